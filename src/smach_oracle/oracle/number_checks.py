@@ -1,4 +1,4 @@
-"""What counts as a number. Pure. True and False are no numbers here."""
+"""Decides which values are numbers. Pure. True and False are not."""
 import math
 import sys
 

@@ -1,4 +1,4 @@
-"""The operator's hand on a running machine: what a person may ask of it, and what it answers.
+"""The operator's hand on a running machine: the commands of a person, and the replies.
 
 Stopping, pausing and letting go are never refused. Whatever lets a machine go on says what will
 run.

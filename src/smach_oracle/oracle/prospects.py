@@ -1,4 +1,4 @@
-"""What an oracle may do in each state of a wrapped machine, told before anything runs."""
+"""Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, cast
 
 import smach

@@ -1,4 +1,4 @@
-"""How the figures of an experiment look: sizes, colours, and how a file is written."""
+"""The looks of an experiment's figures: sizes, colours, and how a file is written."""
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 

@@ -1,4 +1,4 @@
-"""What the sweeps show: over the share of lasting causes, and over the memory."""
+"""Figures of the sweeps: over the share of lasting causes, and over the memory."""
 import re
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
 

@@ -1,4 +1,4 @@
-"""Which answers fit a question: one rule for executive, servers and interfaces. Pure."""
+"""Checks that an answer fits its question: one rule for executive, servers and interfaces. Pure."""
 from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence, Tuple
 
 from ..errors import AnswerError

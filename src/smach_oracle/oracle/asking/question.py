@@ -1,4 +1,4 @@
-"""What the oracle asks an expert and what may come back (paper, section V). No ROS, no smach."""
+"""Questions of the oracle, and answers to them (paper, section V). No ROS, no smach."""
 import threading
 import warnings
 from enum import IntEnum

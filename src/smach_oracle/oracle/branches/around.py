@@ -1,4 +1,4 @@
-"""Which Concurrences and Iterators stand between a container and the machine above it."""
+"""Finds the Concurrences and Iterators between a container and the machine above it."""
 from typing import List, Tuple
 
 from ..machine.nesting import borders_below

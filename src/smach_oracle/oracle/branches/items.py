@@ -1,4 +1,4 @@
-"""What an Iterator goes through, with a memory of how far it has come."""
+"""The items of an Iterator, with a memory of how far it has come."""
 from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
 
 Tell = Callable[[str], None]

@@ -1,4 +1,4 @@
-"""What stands in the place of a branch's state while its Concurrence or Iterator executes."""
+"""Stands in for a branch's state while its Concurrence or Iterator executes."""
 import threading
 from typing import Any, Callable, Optional, cast
 

@@ -1,1 +1,1 @@
-"""What a trial leaves in a store while it runs, and how a machine goes on from that."""
+"""Stores where a trial stands while it runs, and lets a machine go on from there."""

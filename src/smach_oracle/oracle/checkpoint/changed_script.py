@@ -1,4 +1,4 @@
-"""What has changed in a script since its trial was stored, and the names its states have now."""
+"""Finds what has changed in a script since its trial was stored, and its states' new names."""
 from typing import Collection, List, Mapping, NamedTuple, Optional
 
 import smach

@@ -1,4 +1,4 @@
-"""What is to be stored of one container, and what of that is new."""
+"""The facts of one container that are to be stored, and those of them that are new."""
 import json
 from typing import Any, Dict, Iterator, List, Optional, Union
 

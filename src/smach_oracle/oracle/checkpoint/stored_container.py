@@ -1,4 +1,4 @@
-"""What a store says of one container at one moment."""
+"""One container at one moment, as a store has it."""
 from typing import Any, Dict, List, Mapping
 
 from smach_oracle.store.names import BEFORE, IN, MOVED

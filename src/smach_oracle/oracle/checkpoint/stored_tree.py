@@ -1,4 +1,4 @@
-"""Reads what a store says of the containers of a tree at one moment."""
+"""Reads the containers of a tree at one moment from a store."""
 import json
 from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple
 

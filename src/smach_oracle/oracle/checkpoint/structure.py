@@ -1,4 +1,4 @@
-"""What a tree of containers is made of: told in words that can be compared with a later script."""
+"""Describes a tree of containers in words that can be compared with a later script."""
 import hashlib
 import json
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Tuple

@@ -1,4 +1,4 @@
-"""Which keys of a container's userdata are to be stored again."""
+"""Finds the keys of a container's userdata that are to be stored again."""
 import contextlib
 import marshal
 import weakref

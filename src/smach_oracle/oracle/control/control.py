@@ -1,7 +1,7 @@
-"""What an operator has asked of one tree of machines. Pure.
+"""The requests of an operator to one tree of machines. Pure.
 
-The machines look at it before each state. It wakes them by one flag of their engines, `attentive`,
-which they look at in any case: where nothing is set, a step costs nothing more.
+The machines look at the requests before each state. A request wakes them by one flag of their
+engines, `attentive`, which they look at in any case. Without a request a step costs nothing more.
 """
 import threading
 from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple

@@ -1,4 +1,4 @@
-"""Which states are meant: LABEL or PATH/LABEL, with * for a part of a name and ** for any path."""
+"""Patterns of states: LABEL or PATH/LABEL, with * for a part of a name and ** for any path."""
 import fnmatch
 from typing import Sequence, Tuple
 

@@ -1,4 +1,4 @@
-"""How often a state fails, learned with a limited memory (paper, IV-A, IV-C). Pure.
+"""Failure rates of states, learned with a limited memory (paper, IV-A, IV-C). Pure.
 
 The estimate starts as the designer's prior. Every result pushes one share of the prior out, and
 once the memory is full only the latest results count. Two estimators share one face: a window and

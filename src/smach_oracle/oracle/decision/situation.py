@@ -1,4 +1,4 @@
-"""What a policy is asked, and what it may answer (paper, IV-C). Pure.
+"""Situations that a policy decides about, and its possible actions (paper, IV-C). Pure.
 
 A policy is asked three things, in this order: is this a continuous failure. Must the preconditions
 be run, and, once they have run, what now. Where a step back leads is the policy's business too.

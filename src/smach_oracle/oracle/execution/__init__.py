@@ -1,1 +1,1 @@
-"""What happens while a wrapped machine runs: wrapping, trials, steps, the meta state."""
+"""Runs wrapped machines: wrapping, trials, steps, the meta state."""

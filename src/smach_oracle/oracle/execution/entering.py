@@ -1,4 +1,4 @@
-"""What is done before a machine goes to a place, whoever sends it there."""
+"""Prepares a place before a machine goes there, whoever sends it."""
 from typing import Collection, NamedTuple, Tuple
 
 from ..machine.repeats import leave_for

@@ -1,4 +1,4 @@
-"""Items of an Iterator that its author passes over when they fail: said in the log."""
+"""Logs the items of an Iterator that its author passes over when they fail."""
 from ..machine.tree_node import TreeNode
 from ..recovery.failure import Failure
 

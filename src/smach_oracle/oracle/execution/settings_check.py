@@ -1,4 +1,4 @@
-"""Whether the settings of a wrapped machine fit its states."""
+"""Checks that the settings of a wrapped machine fit its states."""
 from typing import List, Set, Tuple
 
 import smach

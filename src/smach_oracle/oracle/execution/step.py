@@ -1,4 +1,4 @@
-"""What happens around a state, off the short way of a plain success in container.py."""
+"""The work around a state, off the short way of a plain success in container.py."""
 import time
 from typing import Any, Mapping, Optional
 

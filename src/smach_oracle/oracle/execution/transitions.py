@@ -1,4 +1,4 @@
-"""How a machine moves on: to a state, or to its end."""
+"""Moves a machine on: to a state, or to its end."""
 import smach
 
 from ..machine.tree_node import TreeNode

@@ -1,1 +1,1 @@
-"""What one wrapped machine keeps beside its states: its place in the tree, records, userdata."""
+"""The data of one wrapped machine beside its states: its place in the tree, records, userdata."""

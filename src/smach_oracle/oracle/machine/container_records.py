@@ -1,4 +1,4 @@
-"""What one container remembers: its states' records, its history, the ways out of its oracle."""
+"""The memory of one container: its states' records, its history, the ways out of its oracle."""
 import copy
 from typing import Any, Dict, Mapping
 

@@ -1,4 +1,4 @@
-"""What the engine is like that executes a machine."""
+"""Finds out how the engine works that executes a machine."""
 import functools
 
 import smach

@@ -1,4 +1,4 @@
-"""Who says whether the robot is well: ports, and functions of the user's own."""
+"""Sources of the robot's health: ports, and functions of the user's own."""
 import time
 from typing import Callable, Optional, Protocol
 

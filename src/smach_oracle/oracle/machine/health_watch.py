@@ -1,4 +1,4 @@
-"""Whether the robot is well, asked for a whole tree of machines. The one notice that it is not."""
+"""Watches the robot's health for a whole tree of machines, and gives the one notice about it."""
 import threading
 import time
 from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple

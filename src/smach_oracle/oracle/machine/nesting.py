@@ -1,4 +1,4 @@
-"""Which machines are nested in which, and which of them are under an oracle."""
+"""Finds the machines nested in others, and those of them that are under an oracle."""
 from typing import Any, Iterator, List, Mapping, Tuple, cast
 
 import smach

@@ -1,4 +1,4 @@
-"""The oracle of one container as adapters see it: who publishes, records or prints what it does."""
+"""The oracle of one container, for adapters that publish, record or print what it does."""
 from typing import Callable, List, Optional
 
 import smach

@@ -1,4 +1,4 @@
-"""What the executive relies on of a SMACH machine: the contract, private names among it.
+"""The part of a SMACH machine that the executive relies on, private names among it.
 
 Both engines have these members, upstream's and our own. The private ones are those that public
 scripts and tools use too.

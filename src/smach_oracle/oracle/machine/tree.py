@@ -1,4 +1,4 @@
-"""What all containers of one wrapped machine share.
+"""The data that all containers of one wrapped machine share.
 
 The trial, its events, the expert, the threads that were left behind.
 """

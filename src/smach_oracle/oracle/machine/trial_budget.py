@@ -1,4 +1,4 @@
-"""What is left of a trial's budget, for all containers of a tree."""
+"""Counts what is left of a trial's budget, for all containers of a tree."""
 import contextlib
 import threading
 from time import monotonic

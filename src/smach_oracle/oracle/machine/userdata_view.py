@@ -1,4 +1,4 @@
-"""What a state reads and writes: the container's userdata by the state's own key names."""
+"""The userdata of a state: the container's userdata by the state's own key names."""
 from typing import Any, Collection, Iterable, Mapping, Tuple, cast
 
 import smach

@@ -1,4 +1,4 @@
-"""Runs what may have to be left behind in a thread of its own.
+"""Runs states and functions that may have to be left behind in threads of their own.
 
 A state with a time limit: on overrun the gate on its userdata is shut and the state is preempted.
 After a grace period it is abandoned. A function: it cannot be preempted, and is abandoned at once.

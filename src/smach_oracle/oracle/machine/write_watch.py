@@ -1,4 +1,4 @@
-"""Which keys of a container's userdata were written, whoever wrote them, and taking that back."""
+"""Finds the keys of a container's userdata that were written, and takes writes back."""
 from typing import Any, Dict, Iterable, NamedTuple, Optional, Set
 
 from .protocols import Machine

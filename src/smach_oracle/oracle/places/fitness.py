@@ -1,4 +1,4 @@
-"""Which places may be named as preconditions of a state, whatever runs."""
+"""Checks which places may be named as preconditions of a state, whatever runs."""
 from typing import List
 
 import smach

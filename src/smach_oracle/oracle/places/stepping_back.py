@@ -1,4 +1,4 @@
-"""What the visits say about a failure, and what ran before it in the levels above."""
+"""Tells what the visits say about a failure, and what ran before it in the levels above."""
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord

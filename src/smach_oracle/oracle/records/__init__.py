@@ -1,1 +1,1 @@
-"""What the executive remembers and reports: visits, rates, events. No ROS."""
+"""The memory and the reports of the executive: visits, rates, events. No ROS."""

@@ -1,4 +1,4 @@
-"""Whether a trial ends before its machine has come to an end, and goes on later from its store.
+"""Notes that a trial ends before its machine does, and goes on later from its store.
 
 Pure, and without smach.
 """

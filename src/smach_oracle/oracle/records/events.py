@@ -1,4 +1,4 @@
-"""What observers (recorder, publisher, checkpoint, viewer) are told, and how.
+"""Events, and how they reach observers (recorder, publisher, checkpoint, viewer).
 
 An observer is a callable that takes one `Event`. It is called in the thread in which the step
 happened, in the order of the sequence numbers, before the machine goes on: an observer that blocks

@@ -1,4 +1,4 @@
-"""What was learned, as rows for those who publish it."""
+"""Learned rates and counts, as rows for those who publish them."""
 from typing import NamedTuple
 
 

@@ -1,4 +1,4 @@
-"""How often a trial was started over, and the userdata with which it has begun."""
+"""Counts how often a trial was started over, and keeps the userdata of its start."""
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 

@@ -1,4 +1,4 @@
-"""What the oracle remembers of one state of a container. Pure, and without smach."""
+"""The oracle's memory of one state of a container. Pure, and without smach."""
 import threading
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 

@@ -1,4 +1,4 @@
-"""What a trial has done to the states of one container, as far as repeats go.
+"""Marks which states of one container a trial has begun, so as not to repeat them.
 
 Pure, and without smach.
 """

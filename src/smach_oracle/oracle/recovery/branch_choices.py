@@ -1,4 +1,4 @@
-"""What a question says of Concurrences and Iterators: where outcomes lead, what runs again."""
+"""Describes Concurrences and Iterators in a question: where outcomes lead, what runs again."""
 from typing import Any, Iterator, Tuple
 
 import smach

@@ -1,4 +1,4 @@
-"""What the oracle of one level decides about a failure of its state (paper, Algorithm 1)."""
+"""Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 from typing import Any, Callable, List, Optional, Tuple
 
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation

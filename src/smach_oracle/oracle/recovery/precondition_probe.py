@@ -1,4 +1,4 @@
-"""How the preconditions of the states that an expert may choose stand now.
+"""Tells how the preconditions of the states that an expert may choose stand now.
 
 Only a callable, and the check of a pair where it is one, can be asked without bringing anything
 about. A state is never run for it. A user's callable may take forever, so it is called in threads

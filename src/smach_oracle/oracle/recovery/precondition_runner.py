@@ -1,4 +1,4 @@
-"""Makes what must hold before a state hold (paper, IV-B).
+"""Makes the preconditions of a state hold (paper, IV-B).
 
 Runs of preconditions do not count as visits.
 """

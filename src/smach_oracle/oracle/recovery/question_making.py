@@ -1,4 +1,4 @@
-"""Everything an expert is told about a failure (paper, section V)."""
+"""Makes a question of a failure, with everything that an expert needs (paper, section V)."""
 from typing import Any, Collection, Dict, Iterator, Mapping, NamedTuple, Tuple
 
 import smach

@@ -1,4 +1,4 @@
-"""What ends a recovery: a preempt, a shutdown, the trial's last minute, and waits until then."""
+"""Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
 import threading
 
 import smach

@@ -1,4 +1,4 @@
-"""What the meta state hands back to the machine."""
+"""Verdicts of the meta state, for the machine."""
 from enum import Enum
 from typing import FrozenSet, NamedTuple, Optional
 

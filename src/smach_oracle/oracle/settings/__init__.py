@@ -1,1 +1,1 @@
-"""What may be set, checked. Pure, and without smach."""
+"""Settings, and their checks. Pure, and without smach."""

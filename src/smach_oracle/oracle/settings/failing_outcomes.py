@@ -1,4 +1,4 @@
-"""Which outcomes sound like a failure. Pure, and without smach."""
+"""Decides which outcomes sound like a failure. Pure, and without smach."""
 import re
 from typing import Iterable, Pattern
 

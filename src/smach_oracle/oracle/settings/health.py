@@ -1,4 +1,4 @@
-"""What must hold for the robot to be well: the setting `healthy`. Pure.
+"""The setting `healthy`: conditions for the robot to be well. Pure.
 
 A topic, a status of the diagnostics, or a function. In YAML a list of them, or one alone:
 {topic: /motors_on}, {diagnostics: Power System}, {function: 'python:module:attribute'}.

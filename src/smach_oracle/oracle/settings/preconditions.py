@@ -1,4 +1,4 @@
-"""What must hold before a state, as its designer wrote it (paper, section IV-B). Pure.
+"""Preconditions of a state as its designer wrote them (paper, section IV-B). Pure.
 
 Four kinds: the label of another state of the same container, or the path of one of another
 container below the top machine, a `smach.State`, a callable `f(userdata) -> bool`. A pair (check,
