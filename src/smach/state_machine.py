@@ -378,10 +378,7 @@ class StateMachine(Container):
         return [str(self._current_label)]
 
     def get_internal_edges(self) -> List[Edge]:
-        """Return all transitions as (outcome, from, to).
-
-        To is None where the outcome falls through.
-        """
+        """Return all transitions (outcome, from, to). To is None if the outcome falls through."""
         return [(outcome, label, to) for label, transitions in self._transitions.items()
                 for outcome, to in transitions.items()]
 

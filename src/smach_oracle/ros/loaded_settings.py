@@ -111,13 +111,16 @@ def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
     except SettingsError:
         raise
     except yaml.YAMLError as err:
-        raise SettingsError(_marked(str(path), err),
-                          getattr(err, 'problem', None) or str(err), 'YAML') from err
+        why = getattr(err, 'problem', None) or str(err)
+        place = _marked(str(path), err)
+        raise SettingsError(place, why, 'YAML',
+                            '{}: not valid YAML: {}'.format(place, why)) from err
     except RecursionError as err:
         raise SettingsError(str(path), 'something that contains itself',
                           'a tree of settings') from err
     except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
-        raise SettingsError(str(path), '{}: {}'.format(type(err).__name__, err), 'YAML') from err
+        raise SettingsError(str(path), str(err), 'YAML', '{}: not valid YAML: {}: {}'.format(
+            path, type(err).__name__, err)) from err
     if values is None:
         return {}, lines
     if not isinstance(values, dict):
@@ -266,9 +269,10 @@ def _entries(path: str, prefix: str, node: yaml.MappingNode,
         dotted = prefix + str(key.value)
         line = key.start_mark.line + 1
         if dotted in first_lines and key.tag != 'tag:yaml.org,2002:merge':
-            raise SettingsError('{} line {}: {}'.format(path, line, dotted),
-                              'a second time (first in line {})'.format(first_lines[dotted]),
-                              'each key once')
+            place, first = '{} line {}: {}'.format(path, line, dotted), first_lines[dotted]
+            raise SettingsError(place, value.value, 'each key once',
+                                '{}: given a second time (first in line {}); allowed: each key '
+                                'once'.format(place, first))
         first_lines[dotted] = line
         entries.append((dotted + '.', value))
     lines.update(first_lines)

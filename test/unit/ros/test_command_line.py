@@ -67,7 +67,9 @@ def test_a_wrong_command_line_is_told_clearly(script, capsys, args, message):
 @pytest.mark.parametrize('text, parts', [
     ('polcy: prose\n', ['o.yaml line 1', 'polcy', 'one of the keys']),
     ('states:\n  PICK:\n    memory: 0\n', ['o.yaml line 3', 'states.PICK.memory', '0', 'from 1']),
-    ('memory: [\n', ['o.yaml line', 'YAML']),
+    ('memory: [\n', ['oracle_run: o.yaml line 2: not valid YAML: expected the node content']),
+    ('memory: 3\nmemory: 4\n', ['oracle_run: o.yaml line 2: memory: given a second time (first in '
+                                'line 1); allowed: each key once']),
     ('high_from: 0.2\n', ['o.yaml line 1', 'high_from', '0.2', 'at least']),
     ('states: {PICK: {preconditions: ["python:os"]}}\n',
      ['o.yaml line 1', 'python:os', 'module:attribute']),
@@ -88,7 +90,8 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_script_starts(script
     with pytest.raises(SystemExit) as caught:
         script_runner.main(['--record', '/proc/no_bags_here', script])
     assert caught.value.code == 2
-    assert '/proc/no_bags_here' in capsys.readouterr().err
+    assert capsys.readouterr().err == ('oracle_run: --record /proc/no_bags_here: no bags can be '
+                                       'written there (No such file or directory)\n')
 
 
 def test_a_script_that_cannot_be_read_is_told_before_it_starts(script, monkeypatch, capsys):

@@ -48,7 +48,10 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _amount(text: str) -> float:
-    amount = float(text)
+    try:
+        amount = float(text)
+    except ValueError:
+        amount = math.nan
     if not 0 < amount < math.inf:
         raise argparse.ArgumentTypeError('{} is not allowed; allowed: a number above 0'.format(
             text))
@@ -59,6 +62,8 @@ def _look_at(path: str, limits: Limits, delete: bool) -> int:
     try:
         if os.path.isdir(path):
             return _folder(path, limits, delete)
+        if not os.path.exists(path):
+            raise StoreError('{}: no such folder or store'.format(path))
         return _store(path, limits, delete)
     except (OSError, StoreError, sqlite3.Error) as err:
         _complain(str(err))

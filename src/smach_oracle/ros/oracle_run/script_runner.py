@@ -196,9 +196,8 @@ def _why_not_readable(script: str) -> str:
 def check(invocation: Invocation) -> None:
     """Find mistakes before the robot moves.
 
-    :raises SettingsError: in the settings file or the command line. The file of the rates cannot be
-        written.
-    :raises OSError: where the folder for the bags cannot be made or written.
+    :raises SettingsError: in the settings file or the command line. The file of the rates, or the
+        folder for the bags, cannot be written.
     """
     loaded = load_settings(invocation.config, None, invocation.overrides)
     with _located(loaded):
@@ -209,7 +208,12 @@ def check(invocation: Invocation) -> None:
             check_writable('checkpoint', settings.checkpoint, replaced=True)
     if invocation.options.record and not invocation.only_check:
         from ..recorder import prepare_folder
-        prepare_folder(invocation.options.record)
+        try:
+            prepare_folder(invocation.options.record)
+        except OSError as err:
+            raise SettingsError('--record', invocation.options.record, 'a folder for bags', (
+                '--record {}: no bags can be written there ({})'.format(
+                    invocation.options.record, err.strerror or err))) from err
 
 
 def _check_name(script: str, name: str) -> Callable[[smach.UserData], bool]:
@@ -348,7 +352,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     invocation = parse(words)
     try:
         check(invocation)
-    except (SettingsError, OSError) as err:
+    except SettingsError as err:
         tell(err)
         sys.exit(USAGE_ERROR)
     if invocation.only_check:

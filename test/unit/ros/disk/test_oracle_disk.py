@@ -227,4 +227,13 @@ def test_no_bag_is_read_before_a_limit_is_reached(folder, monkeypatch):
 
 def test_a_folder_that_is_not_there_is_told(tmp_path, capsys):
     assert main([str(tmp_path / 'nowhere')] + ONE_MONTH) == 2
-    assert 'nowhere' in capsys.readouterr().err
+    assert 'nowhere: no such folder or store' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('days', ['x', '0', '-1', 'nan', 'inf'])
+def test_an_amount_that_is_not_a_number_above_0_is_told(folder, capsys, days):
+    with pytest.raises(SystemExit) as caught:
+        main([str(folder), '--keep-days', days])
+    assert caught.value.code == 2
+    assert '--keep-days: {} is not allowed; allowed: a number above 0'.format(
+        days) in capsys.readouterr().err
