@@ -155,9 +155,11 @@ class Manipulation:
         check_is_there(self.context.robot.see(), target)
         report('choosing a grasp')
         with self._withdrawing(arm, boxes):
-            with self.firmer_after_slip(goal.attempt) as effort:
-                self.held[arm] = pick(self.context, arm, target, boxes, effort,
-                                      elsewhere_of(goal.attempt), partial(self.keep, arm))
+            elsewhere = elsewhere_of(goal.attempt)
+            # what is pressed hard by its top may tilt in the hand
+            with self.firmer_after_slip(0 if elsewhere else goal.attempt) as effort:
+                self.held[arm] = pick(self.context, arm, target, boxes, effort, elsewhere,
+                                      partial(self.keep, arm))
         return PickResult(grasp=pose_message(self.held[arm].grasp))
 
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:

@@ -21,6 +21,7 @@ from ..planning.arm import (
     summary,
 )
 from ..planning.planner import PlanningError
+from ..robot import GRIPPER_OPEN
 from .pick import HeldObject
 from .spots import USUAL, beyond, free_spots
 
@@ -28,6 +29,8 @@ EFFORT = 40000  # collision checks for the choice of a path, about 3 s
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
+# m that the gap grows at least when something is let go. Between neighbours it grows no more
+ENOUGH_TO_LET_GO = 0.02
 # rad, of the object about the vertical, against how it stood
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
 SLACK = 0.16  # m that the height asked for may differ from the one at which the object stands
@@ -44,6 +47,7 @@ class _PlacePath(NamedTuple):
 
     there: np.ndarray  # (m, 7), to above the place
     down: np.ndarray  # (k, 7)
+    gap: float  # m between the tips, to which there is room to open
     back: np.ndarray  # (j, 7), without the object
 
 
@@ -81,9 +85,11 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
         hand.follow(path.down, SLOW)
-        hand.open()
+        hand.open(path.gap)
         hand.space.detach()
         hand.follow(path.back, SLOW)
+        if path.gap < GRIPPER_OPEN:
+            hand.open()
         return centre
 
 
@@ -177,22 +183,33 @@ def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
             if down is None:
                 reasons.append('no straight way down')
                 continue
-            back = _path_back(hand, down[-1], pose, held)
-            if back is None:
-                reasons.append('no way back')
+            release = _release(hand, down[-1], pose, held, support)
+            if release is None:
+                reasons.append('no room to open the fingers and draw back')
                 continue
             try:
-                return there, _PlacePath(hand.path(q, start), down, back)
+                return there, _PlacePath(hand.path(q, start), down, *release)
             except PlanningError as err:
                 reasons.append(str(err))
     raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
         spots[0][0], spots[0][1], summary(reasons)))
 
 
-def _path_back(hand: Arm, start: np.ndarray, pose: np.ndarray,
-               held: HeldObject) -> Optional[np.ndarray]:
+def _release(hand: Arm, q: np.ndarray, pose: np.ndarray, held: HeldObject,
+             support: str) -> Optional[Tuple[float, np.ndarray]]:
+    """How wide to open the fingers (m), and a path back (m, 7), or None where there is no room.
+
+    :param q: (7,), of the hand at `pose` (4x4), where it lets go.
+    """
     hand.space.detach()
     try:
-        return hand.line(start, backed_off(pose, RETREAT))
+        for gap in (GRIPPER_OPEN, min(hand.gap() + ENOUGH_TO_LET_GO, GRIPPER_OPEN)):
+            with hand.opened(gap):
+                with hand.space.touchable([support]):
+                    fits = hand.space.is_free(q)
+                back = hand.line(q, backed_off(pose, RETREAT)) if fits else None
+            if back is not None:
+                return gap, back
+        return None
     finally:
         hand.space.attach(held.half - 0.004, held.tool_from_object)
