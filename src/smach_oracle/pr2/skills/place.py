@@ -20,6 +20,7 @@ from ..planning.arm import (
     seed_of,
     summary,
 )
+from ..planning.collision_map import with_margin
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
 from .pick import HeldObject
@@ -67,7 +68,8 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
-    with Arm(context, arm, boxes, seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
+    with Arm(context, arm, with_margin(boxes),
+             seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
         if support not in boxes:
             raise SkillError(
                 'there is nothing to stand on: the collision map has no {}'.format(support))
