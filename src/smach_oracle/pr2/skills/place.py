@@ -3,8 +3,10 @@ from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tupl
 
 import numpy as np
 
+from smach_oracle.geometry.box import upright_box
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.pieces import largest_piece
 from smach_oracle.geometry.transforms import from_rpy, inverse, transform
 
 from ..kitchen import MapBox
@@ -23,10 +25,11 @@ from ..planning.arm import (
 from ..planning.collision_map import with_margin
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
-from .pick import HeldObject
+from .pick import FIRM, HeldObject
 from .spots import USUAL, beyond, free_spots
 
 EFFORT = 40000  # collision checks for the choice of a path, about 3 s
+CAREFUL = 0.25  # of the joints' velocity limits, with what has slipped before
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
@@ -38,6 +41,10 @@ SLACK = 0.16  # m that the height asked for may differ from the one at which the
 
 NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
+# m by which what leans by 15 degrees is wider than what stands. Noise, and a map that is off, make
+# less of it
+LEANING = 0.022
+CELL = 0.012  # m: points that are closer than this belong together
 BLUR = 0.005  # m by which an edge is seen beside where it is
 LEAST_POINTS = 40
 COLUMNS = 320  # of an image that are looked at
@@ -83,7 +90,7 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
                              'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
                                             _who_stands(taken)))
         centre, path = _find_path(hand, spots, held, support)
-        hand.follow(path.there, FAST)
+        hand.follow(path.there, FAST if held.effort < FIRM else CAREFUL)
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
         hand.follow(path.down, SLOW)
@@ -118,7 +125,7 @@ def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[s
 
 def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
                  others: Sequence[MapBox] = ()) -> bool:
-    """Whether an image shows something as high as the object at its place.
+    """Whether an image shows something as high as the object, and upright, at its place.
 
     :param centre: (3,) m in base_footprint, where the object's centre should be.
     :param others: what stands beside the place. It does not count.
@@ -132,8 +139,15 @@ def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
                    (points[:, 2] < bottom + 3 * held.half[2])]
     for box in others:
         there = there[(beyond(there, box) >= BLUR).any(axis=1)]
-    return len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
+    high = len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
                                                         90) > bottom + UPRIGHT * 2 * held.half[2]
+    return bool(high) and not _leans(there, held)
+
+
+def _leans(points: np.ndarray, held: HeldObject) -> bool:
+    """Whether something at its place (n, 3) takes up more of it than the object that stands."""
+    own = points[largest_piece(points, CELL)]
+    return upright_box(own, float(own[:, 2].min())).wide > 2 * max(held.half[:2]) + LEANING
 
 
 def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.ndarray:
