@@ -43,7 +43,7 @@ NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
 # m by which what leans by 15 degrees is wider than what stands. Noise, and a map that is off, make
 # less of it
-LEANING = 0.022
+LEANING = 0.015
 CELL = 0.012  # m: points that are closer than this belong together
 BLUR = 0.005  # m by which an edge is seen beside where it is
 LEAST_POINTS = 40
