@@ -104,7 +104,8 @@ class Manipulation:
     def move_arms_aside(self, goal: MoveArmsAsideGoal, report: ReportStatus) -> MoveArmsAsideResult:
         """Move both arms, or those named, to the robot's sides.
 
-        The first try of a pick after that forgets what slipped before. What a hand still holds over the spot where it took it is put down there first.
+        The first try of a pick after that forgets what slipped before. What a hand still holds over
+        the spot where it took it is put down there first.
         """
         self._begins = True
         for arm in goal.arms:
