@@ -29,8 +29,8 @@ def free_spots(centre: np.ndarray, tolerance: float, half: np.ndarray,
                boxes: Mapping[str, MapBox], support: str) -> Tuple[List[np.ndarray], List[str]]:
     """The spots on which nothing stands, best first, and the names of what stands on others.
 
-    The nearest are best. One with a thing close beside it is as good as one that is farther by
-    CROWDED times what is lacking to COMFORT: hand and camera err.
+    The nearest are best. One with a thing close to it is as good as one that is farther by CROWDED
+    times what is lacking to COMFORT, for hand and camera err.
 
     :param centre: (3,) m in base_footprint, of what is put down.
     :param half: (3,) m, its half extents.
