@@ -51,6 +51,8 @@ PLACE_TOLERANCE = 0.045  # m, of the area on which the object may stand
 
 # what the script remembers in the course of one trial, in the userdata: so it survives a crash
 MEMORY = {'input_keys': ['memory'], 'output_keys': ['memory']}
+SEEN = ('table', 'objects', 'sizes')  # of a DetectTabletopResult, in the userdata
+FROM_ABOVE = 2  # the attempt at which the hand comes from above, and reaches between things
 
 
 def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
@@ -79,13 +81,19 @@ def detect_goal(userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTab
 
 
 def detected(userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
-    """Keep what the object looks like, or that it was not seen."""
+    """Keep where things stand and what the object looks like, or that it was not seen.
+
+    A look that failed tells nothing: what was seen before it counts on.
+    """
     memory = userdata.memory
     if status != GoalStatus.SUCCEEDED:
         known = result is not None and result.look_at.header.frame_id
         userdata.memory = dict(memory, missed=memory['missed'] + 1,
                                look_at=result.look_at if known else None)
-    elif not memory['colour'].a:
+        return
+    for key in SEEN:
+        setattr(userdata, key, getattr(result, key))
+    if not memory['colour'].a:
         userdata.memory = dict(memory, colour=result.colours[0], size=result.sizes[0])
 
 
@@ -98,9 +106,10 @@ def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
 
 
 def picked(userdata: smach.UserData, status: int, result: PickResult) -> None:
-    """Hold the object otherwise next time: it is picked again where it could not be placed so."""
+    """Hold the object from above next time: it is picked again where it could not be placed so."""
     if status == GoalStatus.SUCCEEDED:
-        userdata.memory = dict(userdata.memory, picks=userdata.memory['picks'] + 1)
+        picks = max(userdata.memory['picks'], FROM_ABOVE)
+        userdata.memory = dict(userdata.memory, picks=picks)
 
 
 def object_in_reach(userdata: smach.UserData) -> bool:
@@ -123,7 +132,7 @@ def make_machine() -> smach.StateMachine:
         smach.StateMachine.add(
             'DETECT_TABLETOP',
             action('detect_tabletop', DetectTabletopAction, goal_cb=detect_goal,
-                   result_cb=detected, result_slots=['table', 'objects', 'sizes'], **MEMORY),
+                   result_cb=detected, input_keys=['memory'], output_keys=['memory', *SEEN]),
             {'succeeded': 'BUILD_COLLISION_MAP'})
         smach.StateMachine.add(
             'BUILD_COLLISION_MAP',

@@ -84,7 +84,18 @@ def test_what_was_picked_and_could_not_be_placed_is_held_otherwise_at_once(userd
     pick_and_place.picked(userdata, GoalStatus.ABORTED, PickResult())
     assert pick_and_place.pick_goal(userdata, PickGoal()).attempt == 1
     pick_and_place.picked(userdata, GoalStatus.SUCCEEDED, PickResult())
-    assert elsewhere_of(pick_and_place.pick_goal(userdata, PickGoal()).attempt) == 2
+    attempt = pick_and_place.pick_goal(userdata, PickGoal()).attempt
+    assert elsewhere_of(attempt) == 1, 'from above, however many picks have failed before'
+
+
+def test_a_look_that_failed_empties_nothing_that_was_seen(userdata):
+    seen = DetectTabletopResult(table=PoseStamped(), objects=[PoseStamped()], sizes=[Vector3()],
+                                colours=[ColorRGBA()])
+    detected(userdata, GoalStatus.SUCCEEDED, seen)
+    detected(userdata, GoalStatus.ABORTED, DetectTabletopResult())
+    assert (userdata.objects, userdata.sizes) == (seen.objects, seen.sizes)
+    state = pick_and_place.make_machine().get_children()['DETECT_TABLETOP']
+    assert {'table', 'objects', 'sizes', 'memory'} <= set(state.get_registered_output_keys())
 
 
 def test_the_ordered_drink_is_looked_for_from_elsewhere_each_time_and_gripped_firmer(userdata):

@@ -98,14 +98,16 @@ class Manipulation:
         self.maps = CollisionMapStore()
         self.held: Dict[str, HeldObject] = {}
         self._effort = FEEL_EFFORT  # N, of the next grip
+        self._begins = True  # whether the arms were aside since the last pick
         self._links = read_joints(context.model.urdf)
 
     def move_arms_aside(self, goal: MoveArmsAsideGoal, report: ReportStatus) -> MoveArmsAsideResult:
-        """Move both arms, or those named, to the robot's sides. Forget what slipped before.
+        """Move both arms, or those named, to the robot's sides.
 
-        What a hand still holds over the spot where it took it is put down there first.
+        The first try of a pick after that forgets what slipped before. What a hand still holds over
+        the spot where it took it is put down there first.
         """
-        self.forget_slips()
+        self._begins = True
         for arm in goal.arms:
             known_arm(arm)
         arms = list(goal.arms) or list(ARMS)
@@ -155,7 +157,11 @@ class Manipulation:
         check_is_there(self.context.robot.see(), target)
         report('choosing a grasp')
         with self._withdrawing(arm, boxes):
-            with self.firmer_after_slip(goal.attempt) as effort:
+            if self._begins and not goal.attempt:
+                self.forget_slips()
+            self._begins = False
+            # only after a slip: what does not slip may tilt where it is pressed hard
+            with self.firmer_after_slip() as effort:
                 self.held[arm] = pick(self.context, arm, target, boxes, effort,
                                       elsewhere_of(goal.attempt), partial(self.keep, arm))
         return PickResult(grasp=pose_message(self.held[arm].grasp))

@@ -1,6 +1,7 @@
 """One arm for the time of one skill: its position, its reach, paths for it, and its motions."""
+import contextlib
 import zlib
-from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional
+from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from smach_oracle.geometry.transforms import apply, from_rpy
 
 from ..fingers import LEAST_GAP
 from ..kitchen import MapBox
-from ..robot import ARM_JOINTS, ARMS, GRIPPER_OPEN, GripperState, Robot, RobotError
+from ..robot import ARM_JOINTS, ARMS, FINGER_JOINTS, GRIPPER_OPEN, GripperState, Robot, RobotError
 from ..work_costs import Work
 from .collision import CollisionModel, CollisionWorld
 from .planner import BUDGET, PlanningError, plan, straight, timed
@@ -187,6 +188,22 @@ class Arm:
         state = self._gripper(0.0, effort)
         self._set_fingers()
         return state.position if state.stalled and state.position > LEAST_GAP else 0.0
+
+    def gap(self) -> float:
+        """m between the finger tips, by the encoders."""
+        joints = encoder_readings(self._robot)
+        return float(sum(joints[name] for name in FINGER_JOINTS[self.name]))
+
+    @contextlib.contextmanager
+    def opened(self, gap: float) -> Iterator[None]:
+        """While this holds, the collision world's fingers stand `gap` m apart."""
+        before = encoder_readings(self._robot)
+        fingers = FINGER_JOINTS[self.name]
+        self.space.place_rest({name: gap / len(fingers) for name in fingers})
+        try:
+            yield
+        finally:
+            self.space.place_rest({name: before[name] for name in fingers})
 
     def _gripper(self, gap: float, effort: float = 50.0) -> GripperState:
         self._spend()

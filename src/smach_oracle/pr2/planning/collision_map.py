@@ -1,6 +1,6 @@
 """Maps to plan in: boxes made of what was detected, or of all that an image shows."""
 import collections
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .arm import SkillError, seed_of
 TABLE = 'table'
 THICK = 0.04  # m, of a table top of which only the upper face is seen
 PADDING = 0.004  # m around objects
+TABLE_ERROR = 0.01  # m that a table may be higher than it is seen
 EDGE = 0.02  # m that the table goes on beyond what is seen of it
 CELL = 0.03  # m, of the boxes made of an image
 # lowest and highest corner of what is looked at
@@ -80,6 +81,19 @@ def map_of(table: UprightBox, objects: Sequence[UprightBox]) -> CollisionMap:
     for k, box in enumerate(objects):
         boxes['object {}'.format(k)] = MapBox(box.centre, box.size / 2 + PADDING, box.yaw)
     return CollisionMap(boxes, tuple(objects))
+
+
+def with_margin(boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:
+    """The boxes with a higher table: it is seen too low by as much as camera and encoders err.
+
+    A forearm that passes over its edge would get caught on it.
+    """
+    higher = dict(boxes)
+    if TABLE in higher:
+        table = higher[TABLE]
+        higher[TABLE] = table._replace(centre=table.centre + [0.0, 0.0, TABLE_ERROR / 2],
+                                       half=table.half + [0.0, 0.0, TABLE_ERROR / 2])
+    return higher
 
 
 def around(made: CollisionMap, target: UprightBox) -> Dict[str, MapBox]:

@@ -17,9 +17,17 @@ SPARE = 0.002  # m between the open tips and such corners that is enough
 SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}
 HEADINGS = np.linspace(-1.3, 1.3, 14)  # rad, beside the straight one from the shoulder
 PITCHES = (0.0, 0.4, 0.8, np.pi / 2)  # rad, of the hand downwards
+ROUND = 0.006  # m by which the sides of the box of something round differ at most
+NO_HEADING = 0.02  # rad that the base may have turned since its box was seen
+FROM_ABOVE = 1.2  # rad, of the hand downwards
 DEPTH = 0.012  # m that the tips go beyond the middle
 LOWEST = 0.035  # m of the tips above what the thing stands on, hand level
 BELOW_TOP = 0.02  # m, hand level
+# what it costs per m that a thing takes up between the tips: fingers that do not lie flat on its
+# faces push it, jam it by its corners, and tilt it
+FLAT = 30.0
+# m below the top, from above: near the middle, for what hangs from its top swings and tilts
+DEEP = 0.05
 
 
 def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
@@ -58,13 +66,22 @@ def _inclination(grasp: np.ndarray) -> float:
 
 def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
     for pitch in PITCHES:
-        for turn in HEADINGS:
+        for turn in np.append(HEADINGS, _to_the_faces(box, straight)):
             heading = straight + turn
-            width = width_across(box, heading)
-            if width <= WIDEST:
+            if width_across(box, heading) <= WIDEST:
                 pose = from_rpy(_middle(box, heading, pitch), pitch=pitch, yaw=heading)
-                corners = CORNERS if _projected(box, heading) > GRIPPER_OPEN - SPARE else 0.0
-                yield abs(turn) + 0.8 * pitch + 8.0 * width + corners, pose
+                taken_up = _projected(box, heading)
+                corners = CORNERS if taken_up > GRIPPER_OPEN - SPARE else 0.0
+                yield abs(turn) + 0.8 * pitch + FLAT * taken_up + corners, pose
+
+
+def _to_the_faces(box: UprightBox, straight: float) -> np.ndarray:
+    """(n,) rad, turns from the straight heading after which the fingers lie flat on two faces."""
+    if _is_round(box):
+        return np.zeros(0)
+    turns = box.yaw + np.pi / 2 * np.arange(4) - straight
+    turns = (turns + np.pi) % (2 * np.pi) - np.pi
+    return np.asarray(turns[np.abs(turns) <= np.abs(HEADINGS).max()])
 
 
 def width_across(box: UprightBox, heading: float) -> float:
@@ -78,7 +95,14 @@ def width_across(box: UprightBox, heading: float) -> float:
     return _projected(box, heading)
 
 
+def _is_round(box: UprightBox) -> bool:
+    """Whether the box of something round is meant: it has no heading, see upright_box()."""
+    return abs(box.yaw) < NO_HEADING and box.wide - box.narrow < ROUND
+
+
 def _projected(box: UprightBox, heading: float) -> float:
+    if _is_round(box):
+        return box.wide
     angle = heading - box.yaw
     return float(box.size[0] * abs(np.sin(angle)) + box.size[1] * abs(np.cos(angle)))
 
@@ -86,8 +110,8 @@ def _projected(box: UprightBox, heading: float) -> float:
 def _middle(box: UprightBox, heading: float, pitch: float) -> np.ndarray:
     """Where the tool frame goes: beyond the middle, at a height where the fingers hold well."""
     bottom, top = box.centre[2] - box.size[2] / 2, box.centre[2] + box.size[2] / 2
-    if pitch > 1.2:
-        return np.array([box.centre[0], box.centre[1], max(bottom + 0.02, top - 0.035)])
+    if pitch > FROM_ABOVE:
+        return np.array([box.centre[0], box.centre[1], max(bottom + 0.02, top - DEEP)])
     height = min(max(box.centre[2], bottom + LOWEST + 0.03 * np.sin(pitch)), top - BELOW_TOP)
     ahead = min(DEPTH, box.narrow / 3)
     return np.array(

@@ -20,6 +20,7 @@ from ..planning.arm import (
     seed_of,
     summary,
 )
+from ..planning.collision_map import with_margin
 from ..planning.grasps import grasps, others_first
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
@@ -76,7 +77,7 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
     candidates = others_first(grasps(target, arm), elsewhere) if arm in ('left', 'right') else []
-    obstacles = dict(boxes)
+    obstacles = with_margin(boxes)
     obstacles[TARGET] = MapBox(target.centre, target.size / 2, target.yaw)
     with Arm(context, arm, obstacles,
              seed_of(arm, target.centre, target.size, context.robot.joints())) as hand:

@@ -3,8 +3,10 @@ from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tupl
 
 import numpy as np
 
+from smach_oracle.geometry.box import upright_box
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
+from smach_oracle.geometry.pieces import largest_piece
 from smach_oracle.geometry.transforms import from_rpy, inverse, transform
 
 from ..kitchen import MapBox
@@ -20,20 +22,29 @@ from ..planning.arm import (
     seed_of,
     summary,
 )
+from ..planning.collision_map import with_margin
 from ..planning.planner import PlanningError
-from .pick import HeldObject
+from ..robot import GRIPPER_OPEN
+from .pick import FIRM, HeldObject
 from .spots import USUAL, beyond, free_spots
 
 EFFORT = 40000  # collision checks for the choice of a path, about 3 s
+CAREFUL = 0.25  # of the joints' velocity limits, with what has slipped before
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
+# m that the gap grows at least when something is let go. Between neighbours it grows no more
+ENOUGH_TO_LET_GO = 0.02
 # rad, of the object about the vertical, against how it stood
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
 SLACK = 0.16  # m that the height asked for may differ from the one at which the object stands
 
 NEAR = 0.05  # m around the place, within which an image must show the object
 UPRIGHT = 0.75  # of its height at least: less, and it lies
+# m by which what leans by 15 degrees is wider than what stands. Noise, and a map that is off, make
+# less of it
+LEANING = 0.015
+CELL = 0.012  # m: points that are closer than this belong together
 BLUR = 0.005  # m by which an edge is seen beside where it is
 LEAST_POINTS = 40
 COLUMNS = 320  # of an image that are looked at
@@ -44,6 +55,7 @@ class _PlacePath(NamedTuple):
 
     there: np.ndarray  # (m, 7), to above the place
     down: np.ndarray  # (k, 7)
+    gap: float  # m between the tips, to which there is room to open
     back: np.ndarray  # (j, 7), without the object
 
 
@@ -63,7 +75,8 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
-    with Arm(context, arm, boxes, seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
+    with Arm(context, arm, with_margin(boxes),
+             seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
         if support not in boxes:
             raise SkillError(
                 'there is nothing to stand on: the collision map has no {}'.format(support))
@@ -77,13 +90,15 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
                              'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
                                             _who_stands(taken)))
         centre, path = _find_path(hand, spots, held, support)
-        hand.follow(path.there, FAST)
+        hand.follow(path.there, FAST if held.effort < FIRM else CAREFUL)
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
         hand.follow(path.down, SLOW)
-        hand.open()
+        hand.open(path.gap)
         hand.space.detach()
         hand.follow(path.back, SLOW)
+        if path.gap < GRIPPER_OPEN:
+            hand.open()
         return centre
 
 
@@ -110,7 +125,7 @@ def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[s
 
 def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
                  others: Sequence[MapBox] = ()) -> bool:
-    """Whether an image shows something as high as the object at its place.
+    """Whether an image shows something as high as the object, and upright, at its place.
 
     :param centre: (3,) m in base_footprint, where the object's centre should be.
     :param others: what stands beside the place. It does not count.
@@ -124,8 +139,15 @@ def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
                    (points[:, 2] < bottom + 3 * held.half[2])]
     for box in others:
         there = there[(beyond(there, box) >= BLUR).any(axis=1)]
-    return len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
+    high = len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
                                                         90) > bottom + UPRIGHT * 2 * held.half[2]
+    return bool(high) and not _leans(there, held)
+
+
+def _leans(points: np.ndarray, held: HeldObject) -> bool:
+    """Whether something at its place (n, 3) takes up more of it than the object that stands."""
+    own = points[largest_piece(points, CELL)]
+    return upright_box(own, float(own[:, 2].min())).wide > 2 * max(held.half[:2]) + LEANING
 
 
 def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.ndarray:
@@ -177,22 +199,33 @@ def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
             if down is None:
                 reasons.append('no straight way down')
                 continue
-            back = _path_back(hand, down[-1], pose, held)
-            if back is None:
-                reasons.append('no way back')
+            release = _release(hand, down[-1], pose, held, support)
+            if release is None:
+                reasons.append('no room to open the fingers and draw back')
                 continue
             try:
-                return there, _PlacePath(hand.path(q, start), down, back)
+                return there, _PlacePath(hand.path(q, start), down, *release)
             except PlanningError as err:
                 reasons.append(str(err))
     raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
         spots[0][0], spots[0][1], summary(reasons)))
 
 
-def _path_back(hand: Arm, start: np.ndarray, pose: np.ndarray,
-               held: HeldObject) -> Optional[np.ndarray]:
+def _release(hand: Arm, q: np.ndarray, pose: np.ndarray, held: HeldObject,
+             support: str) -> Optional[Tuple[float, np.ndarray]]:
+    """How wide to open the fingers (m), and a path back (m, 7), or None where there is no room.
+
+    :param q: (7,), of the hand at `pose` (4x4), where it lets go.
+    """
     hand.space.detach()
     try:
-        return hand.line(start, backed_off(pose, RETREAT))
+        for gap in (GRIPPER_OPEN, min(hand.gap() + ENOUGH_TO_LET_GO, GRIPPER_OPEN)):
+            with hand.opened(gap):
+                with hand.space.touchable([support]):
+                    fits = hand.space.is_free(q)
+                back = hand.line(q, backed_off(pose, RETREAT)) if fits else None
+            if back is not None:
+                return gap, back
+        return None
     finally:
         hand.space.attach(held.half - 0.004, held.tool_from_object)

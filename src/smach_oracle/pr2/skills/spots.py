@@ -10,6 +10,8 @@ from ..kitchen import MapBox
 GRID = 0.02  # m between spots
 USUAL = 0.02  # m beside the place that is near enough, where nothing else is said
 ROOM = 0.004  # m that must be left around what is put down
+COMFORT = 0.025  # m that should be
+CROWDED = 1.5
 FARTHEST = 0.5  # m, of a tolerance
 
 
@@ -25,29 +27,35 @@ def spots(centre: np.ndarray, tolerance: float) -> Iterator[np.ndarray]:
 
 def free_spots(centre: np.ndarray, tolerance: float, half: np.ndarray,
                boxes: Mapping[str, MapBox], support: str) -> Tuple[List[np.ndarray], List[str]]:
-    """The spots on which nothing stands, nearest first, and the names of what stands on others.
+    """The spots on which nothing stands, best first, and the names of what stands on others.
+
+    The nearest are best. One with a thing close to it is as good as one that is farther by CROWDED
+    times what is lacking to COMFORT, for hand and camera err.
 
     :param centre: (3,) m in base_footprint, of what is put down.
     :param half: (3,) m, its half extents.
     :param boxes: what stands there, and the support.
     """
-    found, taken = [], []
-    for spot in spots(centre, tolerance):
-        inside = [name for name, box in sorted(boxes.items())
-                  if name != support and _overlaps(spot, half, box)]
+    found: List[Tuple[float, int, np.ndarray]] = []
+    taken: List[str] = []
+    for order, spot in enumerate(spots(centre, tolerance)):
+        room = {name: _room(spot, half, box) for name, box in boxes.items() if name != support}
+        inside = [name for name, each in room.items() if each < ROOM]
         taken += inside
         if not inside:
-            found.append(spot)
-    return found, sorted(set(taken))
+            lacking = max(0.0, COMFORT - min(room.values(), default=COMFORT))
+            away = float(np.hypot(*(spot - centre)[:2]))
+            found.append((round(away + CROWDED * lacking, 6), order, spot))
+    return [spot for _, _, spot in sorted(found, key=lambda each: each[:2])], sorted(set(taken))
 
 
-def _overlaps(spot: np.ndarray, half: np.ndarray, box: MapBox) -> bool:
-    """Whether something round that stands at a spot meets a box."""
+def _room(spot: np.ndarray, half: np.ndarray, box: MapBox) -> float:
+    """m between something round that stands at a spot and a box, below 0 where they meet."""
     if abs(spot[2] - box.centre[2]) > half[2] + box.half[2]:
-        return False
+        return float('inf')
     outside = np.maximum(beyond(spot, box), 0.0)
-    # m. The narrower side, for what is long may be turned
-    return float(np.hypot(*outside)) < min(half[:2]) + ROOM
+    # the narrower side, for what is long may be turned
+    return float(np.hypot(*outside) - min(half[:2]))
 
 
 def beyond(points: np.ndarray, box: MapBox) -> np.ndarray:

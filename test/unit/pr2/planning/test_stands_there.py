@@ -29,3 +29,11 @@ def test_what_stands_beside_the_place_is_not_taken_for_the_object():
 
 def test_what_is_not_as_high_as_the_object_does_not_stand():
     assert not stands(LOW)
+
+
+def test_what_leans_does_not_stand():
+    """A can that leans by 20 degrees, as slices."""
+    slices = [CAN._replace(name='slice {}'.format(k), size=(0.031, 0.031, 0.02),
+                           position=(0.6, -0.37 + 0.36 * 0.02 * k, PLACE[2] - 0.05 + 0.02 * k))
+              for k in range(6)]
+    assert not stands(*slices)
