@@ -27,9 +27,14 @@ def stow(context: SkillContext, arms: Iterable[str], boxes: Mapping[str, MapBox]
     """
     for arm in arms:
         with Arm(context, arm, boxes, seed_of(arm, encoder_readings(context.robot))) as limb:
-            now = limb.now()
-            if np.abs(limb.chain.nearest_turn(TRAVEL[arm], now) - now).max() > NEAR_ENOUGH:
+            if not is_stowed(limb):
                 limb.go(TRAVEL[arm])
+
+
+def is_stowed(limb: Arm) -> bool:
+    """Whether an arm is in its posture for driving."""
+    now = limb.now()
+    return bool(np.abs(limb.chain.nearest_turn(TRAVEL[limb.name], now) - now).max() <= NEAR_ENOUGH)
 
 
 def carry(limb: Arm, level: bool = True) -> None:
