@@ -56,7 +56,7 @@ def carry(limb: Arm, level: bool = True) -> None:
         except Unreachable:
             continue
         if found:
-            limb.go(found[0], CARRY_SPEED)
+            limb.go(found[0], CARRY_SPEED, level=True)
             return
     raise SkillError('the {} arm cannot take what it holds to the side'.format(limb.name))
 

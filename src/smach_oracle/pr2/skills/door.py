@@ -77,7 +77,7 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _driving_back_on_failure(context):
+    with _driving_back_on_failure(context, kitchen):
         return _open(context, kitchen, arm)
 
 
@@ -114,7 +114,7 @@ def close_door(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _driving_back_on_failure(context):
+    with _driving_back_on_failure(context, kitchen):
         _close(context, kitchen, arm)
 
 
@@ -136,13 +136,14 @@ def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
 
 
 @contextmanager
-def _driving_back_on_failure(context: SkillContext) -> Iterator[None]:
-    """After a failure, drive back: a hand may be caught behind a part of the door."""
+def _driving_back_on_failure(context: SkillContext, kitchen: Kitchen) -> Iterator[None]:
+    """After a failure, let go and drive back: a hand may be caught behind a part of the door."""
     try:
         yield
     except SkillError:
         try:
-            step_back(context, AWAY_FOR_GOOD)
+            if not take_hands_off(context, kitchen):
+                step_back(context, AWAY_FOR_GOOD)
         except SkillError:
             pass  # the first failure is the one to report
         raise

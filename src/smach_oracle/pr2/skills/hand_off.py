@@ -1,4 +1,4 @@
-"""Take a hand away from the refrigerator's door, where a skill was stopped in the middle.
+"""Take a hand away from the refrigerator's door, where a skill failed, or was stopped.
 
 A robot that is told to stop does nothing more. So a hand may still hold the handle, stand around
 it, or stand behind the door. An arm that is stowed from there is held up by the door, or pulls at
@@ -31,18 +31,21 @@ def step_back(context: SkillContext, length: float) -> None:
     drive(context, context.robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
 
 
-def take_hands_off(context: SkillContext, kitchen: Kitchen) -> None:
+def take_hands_off(context: SkillContext, kitchen: Kitchen) -> bool:
     """Take each hand that is about the door away from it, and the base back. Arms stay as they are.
 
     A hand with a gap of less than RELEASE may hold the bar, so it is opened. It holds no drink, for
     these are wider.
 
+    :returns: whether there was one.
     :raises SkillError: where a gripper or the base does not get there.
     """
+    was_there = False
     for arm in ARMS:
         with Arm(context, arm, {}, seed_of(arm, encoder_readings(context.robot))) as limb:
             if is_stowed(limb) or not _is_about_door(context, kitchen, limb.pose()):
                 continue
+            was_there = True
             if fingers_gap(encoder_readings(context.robot), arm) < RELEASE:
                 _let_go(context, arm)
             try:
@@ -50,6 +53,7 @@ def take_hands_off(context: SkillContext, kitchen: Kitchen) -> None:
                 _go_away(context, kitchen)
             except SkillError:  # it is hooked on something, and may have come off it by now
                 _go_away(context, kitchen)
+    return was_there
 
 
 def _go_away(context: SkillContext, kitchen: Kitchen) -> None:
