@@ -14,13 +14,14 @@ def stands_open(joints: Mapping[str, float], arm: str) -> bool:
 
     :param joints: encoder readings, m or rad by joint.
     """
-    return _gap(joints, arm) > GRIPPER_OPEN - WIDE_OPEN
+    return fingers_gap(joints, arm) > GRIPPER_OPEN - WIDE_OPEN
 
 
 def may_hold(joints: Mapping[str, float], arm: str) -> bool:
     """Whether something may keep the fingers apart; parameters as above."""
-    return _gap(joints, arm) > LEAST_GAP and not stands_open(joints, arm)
+    return fingers_gap(joints, arm) > LEAST_GAP and not stands_open(joints, arm)
 
 
-def _gap(joints: Mapping[str, float], arm: str) -> float:
+def fingers_gap(joints: Mapping[str, float], arm: str) -> float:
+    """How far the tips of a gripper are apart, m; parameters as above."""
     return sum(joints.get(name, 0.0) for name in FINGER_JOINTS[arm])

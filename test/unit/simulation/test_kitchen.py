@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
+from support.stopped_robot import stopped_after
 
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.msg import (
@@ -187,21 +188,6 @@ def next_of(machine, label):
     """Where a state's success leads."""
     return next(edge[2] for edge in machine.get_internal_edges()
                 if edge[0] == 'succeeded' and edge[1] == label)
-
-
-def stopped_after(robot, motions, for_good=False):
-    """A robot that is told to stop in the motion after so many, and takes calls again then.
-
-    :param for_good: it does not.
-    """
-    do, left = robot._do, [motions]
-
-    def count(make):
-        left[0] -= 1
-        if left[0] == -1 or for_good and left[0] < 0:
-            raise RobotError('the robot was told to stop')
-        return do(make)
-    robot._do = count
 
 
 @pytest.mark.parametrize('motions', [4, 6, 99])

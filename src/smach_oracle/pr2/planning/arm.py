@@ -20,6 +20,8 @@ READY = {
     'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
     'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])
 }  # rad, a posture for work in front of the robot
+TILT = 0.35  # rad, of what is held, on its way
+LEVEL_BUDGET = 3000  # collision checks for such a way
 ENOUGH = 3  # solutions of the inverse kinematics that are tried for one pose
 
 
@@ -131,6 +133,23 @@ class Arm:
                     self.now() if start is None else start, goal,
                     int(self.generator.integers(1, 2**31)), budget)
 
+    def level_path(self, goal: np.ndarray, start: Optional[np.ndarray] = None) -> np.ndarray:
+        """A path (m, 7) on which the hand tilts by at most TILT, where one is found.
+
+        On any other one something slippery may turn in the hand.
+
+        :param goal: (7,), start: as in path().
+        :raises PlanningError: where no path is found at all.
+        """
+        here = self.now() if start is None else start
+        with self.space.keeping_level(here, TILT):
+            if self.space.is_free(self.chain.nearest_turn(goal, here)):
+                try:
+                    return self.path(goal, here, LEVEL_BUDGET)
+                except PlanningError:
+                    pass
+        return self.path(goal, here)
+
     def line(self, start: np.ndarray, goal: np.ndarray) -> Optional[np.ndarray]:
         """A straight path (m, 7) of the tool from joint positions to a pose.
 
@@ -154,13 +173,14 @@ class Arm:
             raise SkillError('the {} arm did not follow its way: {}'.format(self.name,
                                                                             err)) from err
 
-    def go(self, goal: np.ndarray, speed: float = FAST) -> None:
+    def go(self, goal: np.ndarray, speed: float = FAST, level: bool = False) -> None:
         """Plan and move to joint positions, as `follow` does.
 
+        :param level: whether to take a level_path().
         :raises SkillError: where no path is found, or the arm does not get there.
         """
         try:
-            path = self.path(goal)
+            path = self.level_path(goal) if level else self.path(goal)
         except PlanningError as err:
             raise SkillError(str(err)) from err
         self.follow(path, speed)

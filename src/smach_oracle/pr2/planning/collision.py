@@ -42,6 +42,7 @@ class CollisionWorld:
         self._boxes: Dict[str, int] = {}
         self._held: Optional[Tuple[int, np.ndarray]] = None
         self._touchable: Set[int] = set()
+        self._level: Optional[Tuple[np.ndarray, float]] = None
         self._key = (model, arm)
         self._lent: Optional[CollisionBody] = _POOL.lend(model, arm)
         self._client, self._robot, self._arm = (self._lent.client, self._lent.robot, self._lent.arm)
@@ -115,8 +116,27 @@ class CollisionWorld:
         finally:
             self._touchable = before
 
+    @contextlib.contextmanager
+    def keeping_level(self, q: np.ndarray, tilt: float) -> Iterator[None]:
+        """While this holds, joint positions are free only where the hand tilts by so little.
+
+        :param q: (7,), where what it holds is upright.
+        :param tilt: rad.
+        """
+        before = self._level
+        self._level = self.chain.forward(q)[2, :3], float(np.cos(tilt))
+        try:
+            yield
+        finally:
+            self._level = before
+
     def is_free(self, q: np.ndarray) -> bool:
         """Whether the arm (and what it holds) touches nothing at joint positions (7,)."""
+        if self._level is not None:
+            upright, least = self._level
+            if self.chain.forward(q)[2, :3] @ upright < least:
+                self.checks += 1  # it costs the planner as much of its budget
+                return False
         return next(self._collisions(q), None) is None
 
     def why_not(self, q: np.ndarray) -> str:

@@ -27,9 +27,14 @@ def stow(context: SkillContext, arms: Iterable[str], boxes: Mapping[str, MapBox]
     """
     for arm in arms:
         with Arm(context, arm, boxes, seed_of(arm, encoder_readings(context.robot))) as limb:
-            now = limb.now()
-            if np.abs(limb.chain.nearest_turn(TRAVEL[arm], now) - now).max() > NEAR_ENOUGH:
+            if not is_stowed(limb):
                 limb.go(TRAVEL[arm])
+
+
+def is_stowed(limb: Arm) -> bool:
+    """Whether an arm is in its posture for driving."""
+    now = limb.now()
+    return bool(np.abs(limb.chain.nearest_turn(TRAVEL[limb.name], now) - now).max() <= NEAR_ENOUGH)
 
 
 def carry(limb: Arm, level: bool = True) -> None:
@@ -51,7 +56,7 @@ def carry(limb: Arm, level: bool = True) -> None:
         except Unreachable:
             continue
         if found:
-            limb.go(found[0], CARRY_SPEED)
+            limb.go(found[0], CARRY_SPEED, level=True)
             return
     raise SkillError('the {} arm cannot take what it holds to the side'.format(limb.name))
 

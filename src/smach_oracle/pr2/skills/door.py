@@ -34,6 +34,7 @@ from ..planning.arm import (
 from ..planning.door_swing import DoorSwing, best_swing
 from ..planning.travel import TRAVEL, carry, draw_back, drive, stow
 from ..robot import ARMS, FINGER_JOINTS, GRIPPER_OPEN, Robot
+from .hand_off import AWAY_FOR_GOOD, OFF, RELEASE, step_back, take_hands_off
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
@@ -47,8 +48,6 @@ STEP = np.radians(4.0)
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 # m ahead at least, m to its side at most: a hand there is in the other arm's way
 BEFORE_CHEST = (0.30, 0.20)
-OFF = 0.10  # m that the base takes the hand back from the bar: there may be somebody behind it
-AWAY_FOR_GOOD = 0.40  # m, after a failure
 DRAWN = np.radians(92.0)  # as far as the base takes the handle from there
 DRAWS = 4  # drives in which it does
 LEAST_OPEN = np.radians(82.0)  # the robot gets in, and sees the shelf
@@ -62,8 +61,6 @@ PULLS, PUSHES = 2, 2  # until the door is open, or shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
 BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
-# m between the tips that lets go of the bar. There is no room for more between bar and door
-RELEASE = 0.045
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
 APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
 
@@ -80,7 +77,7 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _driving_back_on_failure(context):
+    with _driving_back_on_failure(context, kitchen):
         return _open(context, kitchen, arm)
 
 
@@ -117,7 +114,7 @@ def close_door(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
     :raises RobotError: where arm, head or gripper do not get somewhere.
     """
     known_arm(arm)
-    with _driving_back_on_failure(context):
+    with _driving_back_on_failure(context, kitchen):
         _close(context, kitchen, arm)
 
 
@@ -139,13 +136,14 @@ def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
 
 
 @contextmanager
-def _driving_back_on_failure(context: SkillContext) -> Iterator[None]:
-    """After a failure, drive back: a hand may be caught behind a part of the door."""
+def _driving_back_on_failure(context: SkillContext, kitchen: Kitchen) -> Iterator[None]:
+    """After a failure, let go and drive back: a hand may be caught behind a part of the door."""
     try:
         yield
     except SkillError:
         try:
-            _step_back(context, AWAY_FOR_GOOD)
+            if not take_hands_off(context, kitchen):
+                step_back(context, AWAY_FOR_GOOD)
         except SkillError:
             pass  # the first failure is the one to report
         raise
@@ -154,11 +152,14 @@ def _driving_back_on_failure(context: SkillContext) -> Iterator[None]:
 def stand_before(context: SkillContext, kitchen: Kitchen) -> None:
     """Drive to where the door is opened, with the arms out of the way.
 
+    A hand that is at the door, as after a skill that was stopped, is taken off it first.
+
     :raises SkillError: where an arm or the base does not get there.
     """
+    take_hands_off(context, kitchen)
     here = inverse(base_from_fridge(kitchen, context.robot.odom_from_base()))
     if here[0, 3] > CLEAR[0] + 0.05:  # within the door's swing
-        _step_back(context, here[0, 3] - CLEAR[0])
+        step_back(context, here[0, 3] - CLEAR[0])
     _stow_beside(context, kitchen, WIDE)
     drive(context, odom_from_pose(kitchen, *OPENING))
 
@@ -179,11 +180,6 @@ def _clear_of_door(context: SkillContext, arm: str) -> None:
         beside = left if arm == 'left' else -left
         if ahead > AHEAD or (ahead > BEFORE_CHEST[0] and beside < BEFORE_CHEST[1]):
             carry(limb, level=False)
-
-
-def _step_back(context: SkillContext, length: float) -> None:
-    """Drive straight back by `length` m."""
-    drive(context, context.robot.odom_from_base() @ from_rpy((-length, 0.0, 0.0)))
 
 
 def _stow_beside(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
@@ -267,10 +263,10 @@ def _draw_along(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray, ang
 def _take_hand_off(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
     """Drive the open hand straight back from the bar, and stow the arms. The door is at `angle`."""
     try:
-        _step_back(context, OFF)
+        step_back(context, OFF)
         _stow_beside(context, kitchen, angle)
     except SkillError:
-        _step_back(context, OFF)  # the door is elsewhere: the camera will tell
+        step_back(context, OFF)  # the door is elsewhere: the camera will tell
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:

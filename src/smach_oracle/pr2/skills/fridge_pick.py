@@ -15,7 +15,7 @@ from ..planning.arm import FEEL_EFFORT, SLOW, Arm, SkillContext, SkillError, see
 from ..planning.travel import carry, drive, stow
 from ..robot import GRIPPER_OPEN
 from .door import WIDE, named_boxes
-from .pick import Grasped, HeldObject, ObjectSlipped, nobody_told, pick, way_up
+from .pick import FIRM, Grasped, HeldObject, ObjectSlipped, nobody_told, pick, way_up
 
 # x, y in m and yaw in rad of the base, in the fridge's frame: from there the right arm reaches
 # far in
@@ -32,6 +32,10 @@ STANDS_THERE = 0.02  # m
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
 PADDING = 0.03  # m, for the fridge is not quite where the map has it
 BESIDE = 0.004  # m around things on the shelf
+# m that a thing on the shelf may be pushed aside, for each kind of grasp that has failed, and so
+# many of them at most
+PUSHED, MOST_PUSHES = 0.012, 2
+LEAST_HALF = 0.005  # m of a thing that is left then
 DRAWN_OUT = 0.05  # m that the base need not draw back
 OFF_SHELF = 0.03  # m that a drink which is drawn out is lifted, at least
 UP = (0.05, 0.03)  # m that it is lifted otherwise
@@ -58,11 +62,14 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
         for name, box in named_boxes(kitchen, fridge, WIDE).items()
     }
     boxes.update({
-        'thing {}'.format(k): MapBox(box.centre, box.size / 2 + BESIDE, box.yaw)
+        'thing {}'.format(k): _kept_off(box, elsewhere)
         for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
     })
     try:
-        held = pick(context, arm, target, boxes, effort, elsewhere, grasped)
+        held = pick(context, arm, target, boxes, effort, elsewhere, grasped)._replace(effort=FIRM)
+        grasped(held)
+        with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
+            hand.close(held.effort)  # so that it does not creep out on the way
         _draw_out(context)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
             _carry(hand, held)
@@ -70,6 +77,21 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
         leave(context, arm)
         raise
     return held
+
+
+def beside(failed: int) -> np.ndarray:
+    """(3,) m that the hand keeps from things on the shelf.
+
+    Where drinks stand too close for a finger between them, it comes in slowly and pushes one aside.
+
+    :param failed: how many kinds of grasp have failed.
+    """
+    pushed = min(failed, MOST_PUSHES) * PUSHED
+    return np.array([BESIDE - pushed, BESIDE - pushed, BESIDE])
+
+
+def _kept_off(box: UprightBox, failed: int) -> MapBox:
+    return MapBox(box.centre, np.maximum(box.size / 2 + beside(failed), LEAST_HALF), box.yaw)
 
 
 def take_out(context: SkillContext, kitchen: Kitchen, arm: str, held: HeldObject) -> bool:
@@ -100,7 +122,10 @@ def _carry(hand: Arm, held: HeldObject) -> None:
     :raises ObjectSlipped: where it did not.
     """
     hand.space.attach(held.half, held.tool_from_object)
-    carry(hand)
+    try:
+        carry(hand, level=False)
+    except SkillError:  # a hand that came from above cannot stay so everywhere
+        carry(hand)
     if hand.close(held.effort) == 0:
         raise ObjectSlipped('the drink was lost on the way out of the refrigerator')
 

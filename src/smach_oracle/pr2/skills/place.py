@@ -65,13 +65,14 @@ class ObjectLost(SkillError):
 
 def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
           boxes: Mapping[str, MapBox], support: str = 'table',
-          tolerance: float = 0.0) -> np.ndarray:
+          tolerance: float = 0.0, level: bool = False) -> np.ndarray:
     """Put the held object down upright, at the free spot nearest to its place.
 
     :param centre: (3,) m, where its centre should be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it should stand.
     :param tolerance: m that it may stand beside its place. 0 means 2 cm.
+    :param level: whether the hand is kept level on the way, where that can be.
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
@@ -89,7 +90,7 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
             raise SkillError('no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} '
                              'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
                                             _who_stands(taken)))
-        centre, path = _find_path(hand, spots, held, support)
+        centre, path = _find_path(hand, spots, held, support, level)
         hand.follow(path.there, FAST if held.effort < FIRM else CAREFUL)
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
@@ -180,7 +181,7 @@ def _poses(spots: Sequence[np.ndarray],
 
 
 def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
-               support: str) -> Tuple[np.ndarray, _PlacePath]:
+               support: str, level: bool) -> Tuple[np.ndarray, _PlacePath]:
     reasons: List[str] = []
     start = hand.now()
     for there, pose in _poses(spots, held):
@@ -204,7 +205,8 @@ def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
                 reasons.append('no room to open the fingers and draw back')
                 continue
             try:
-                return there, _PlacePath(hand.path(q, start), down, *release)
+                way = hand.level_path(q, start) if level else hand.path(q, start)
+                return there, _PlacePath(way, down, *release)
             except PlanningError as err:
                 reasons.append(str(err))
     raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(

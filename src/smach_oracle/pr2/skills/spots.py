@@ -11,7 +11,7 @@ GRID = 0.02  # m between spots
 USUAL = 0.02  # m beside the place that is near enough, where nothing else is said
 ROOM = 0.004  # m that must be left around what is put down
 COMFORT = 0.025  # m that should be
-CROWDED = 1.5
+CROWDED = 1.5  # m farther for each m of room that is lacking
 FARTHEST = 0.5  # m, of a tolerance
 
 
@@ -29,7 +29,7 @@ def free_spots(centre: np.ndarray, tolerance: float, half: np.ndarray,
                boxes: Mapping[str, MapBox], support: str) -> Tuple[List[np.ndarray], List[str]]:
     """The spots on which nothing stands, best first, and the names of what stands on others.
 
-    The nearest are best. One with a thing close to it is as good as one that is farther by CROWDED
+    The nearest are best. A spot with a thing close by is as good as one that is farther by CROWDED
     times what is lacking to COMFORT, for hand and camera err.
 
     :param centre: (3,) m in base_footprint, of what is put down.

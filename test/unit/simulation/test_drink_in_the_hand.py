@@ -1,0 +1,79 @@
+"""A drink between the fingers: wet, grasped with an inclined hand, or beside others."""
+import numpy as np
+import pytest
+
+from smach_oracle.msg import PickGoal
+from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE
+from smach_oracle.pr2.planning.arm import TILT, Arm
+from smach_oracle.pr2.skills.fridge_pick import beside
+from smach_oracle.simulation.physics.world import World
+from smach_oracle.simulation.rehearsal.direct_robot import no_report
+from smach_oracle.simulation.rehearsal.drink_retrieval import DrinkRetrievalRehearsal
+from smach_oracle.simulation.scenes.kitchen_scene import draw
+
+
+def before_the_shelf(scene):
+    """A world, and a trial in it whose drink has been detected."""
+    world = World(scene)
+    trial = DrinkRetrievalRehearsal(world)
+    for _, work in trial.states[:5]:
+        work()
+    return world, trial
+
+
+def pick(trial, attempt):
+    """Pick the drink, as after so many failures."""
+    trial.skills.pick(PickGoal('right', trial.data['drink'], trial.data['size'], FRIDGE, attempt),
+                      no_report)
+
+
+def tilt(world, name):
+    """How far a drink is from upright, degrees."""
+    return np.degrees(np.arccos(np.clip(world.body_pose(name)[2, 2], -1.0, 1.0)))
+
+
+def test_a_drink_that_creeps_between_the_fingers_is_not_lost_on_the_way_out():
+    world, trial = before_the_shelf(draw(20))  # wet and full
+    for _, work in trial.states[5:7]:
+        work()
+    assert world.holding('drink_0')
+    world.close()
+
+
+def test_a_drink_that_was_grasped_with_an_inclined_hand_is_carried_upright():
+    world, trial = before_the_shelf(draw(1, benign=True))
+    pick(trial, attempt=2)
+    tool = world.link_pose('r_gripper_tool_frame')
+    assert tool[2, 0] < -np.sin(0.3), 'the hand is inclined'
+    assert world.holding('drink_0') and tilt(world, 'drink_0') < 12.0
+    world.close()
+
+
+def test_on_a_level_way_the_hand_hardly_tilts():
+    world, trial = before_the_shelf(draw(1, benign=True))
+    pick(trial, attempt=0)
+    with Arm(trial.skills.context, 'right', {}, 1) as limb:
+        above = limb.pose()
+        above[:3, 3] += (0.10, 0.30, 0.10)
+        way = limb.level_path(limb.reach(above, near=limb.now())[0])
+        upright = limb.pose()[2, :3]
+        tilts = [np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in way]
+    assert max(tilts) <= TILT + 1e-6
+    world.close()
+
+
+def test_a_drink_is_reached_by_pushing_its_neighbour_once_no_other_grasp_is_left():
+    world, trial = before_the_shelf(draw(47))  # 0.8 cm between two of them
+    before = world.body_pose('drink_2')[:2, 3]
+    pick(trial, attempt=3)
+    assert world.holding('drink_0')
+    for name in ('drink_1', 'drink_2'):
+        assert tilt(world, name) < 2.0, 'none was knocked over'
+    assert np.hypot(*(world.body_pose('drink_2')[:2, 3] - before)) < 0.05
+    world.close()
+
+
+@pytest.mark.parametrize('failed, least', [(0, 0.004), (1, -0.008), (2, -0.02), (254, -0.02)])
+def test_the_hand_comes_nearer_to_other_drinks_with_each_kind_of_grasp_that_has_failed(
+        failed, least):
+    assert np.allclose(beside(failed), [least, least, 0.004])
