@@ -3,10 +3,10 @@
 
 A plain SMACH script over actions. It stops a trial at the first action that fails. Whoever has a
 state executed again, in the same trial, has it done otherwise: the head looks from elsewhere after
-a look that saw too little, the object is known again by its colour and size, and the gripper holds
-it firmer. An object that could not be placed is held otherwise, mostly from above. No transition
-leads to STEP_ASIDE: it is for those who recover, where light falls into the camera or the object is
-out of reach.
+a look that saw too little, the object is known again by its colour and size, and the hand takes it
+otherwise. An object that could not be placed is taken from above. No transition leads to
+STEP_ASIDE: it is for those who recover, where light falls into the camera or the object is out of
+reach.
 """
 import argparse
 import sys
