@@ -58,7 +58,9 @@ def with_causes(draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE,
     :param lasting: the share of the causes that last, 0 to 1.
     :param without: kinds that are left out where they are drawn.
     """
-    for kind, generator in drawn_kinds(seed, 62, AMOUNT, KINDS_OF, lasting):
+    drawn = drawn_kinds(seed, 62, AMOUNT, KINDS_OF, lasting)
+    # the one that takes things away comes first, so that no other loses what it needs
+    for kind, generator in sorted(drawn, key=lambda each: each[0] != 'edge_of_reach'):
         if kind not in without:
             draft = MAKERS[kind](draft, generator) or draft
     return declared(draft, KINDS_OF[LASTING])
@@ -135,15 +137,18 @@ def _shadow(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDra
     return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values))
 
 
-def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
     """A further thing stands close behind the nearest one, or next to it."""
-    thing, other = draft.things[TARGET], draft.things[-1]
+    spare = _spare_things(draft)
+    if not spare:
+        return None
+    thing, other = draft.things[TARGET], spare[-1]
     gap = float(generator.uniform(0.014, 0.032))
     away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
     far = _radius(thing) + _radius(other) + gap
     spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
     moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
-    return caused(draft._replace(things=draft.things[:-1] + (moved,)), 'crowded',
+    return caused(_with_moved(draft, moved), 'crowded',
                   'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap),
                   until=(thing.name, other.name))
 
@@ -179,16 +184,19 @@ def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Optio
     return None
 
 
-def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
     """Things stand on both sides of the place where the object should go."""
+    spare = _spare_things(draft)
+    if len(spare) < 2:
+        return None
     heading = float(generator.uniform(-np.pi, np.pi))
     distances = [float(generator.uniform(0.07, 0.11)) for _ in range(2)]
     moved = []
-    for other, away, side in zip(draft.things[-2:], distances, (heading, heading + np.pi)):
+    for other, away, side in zip(spare[-2:], distances, (heading, heading + np.pi)):
         spot = (float(GOAL[0] + away * np.cos(side)), float(GOAL[1] + away * np.sin(side)),
                 other.position[2])
         moved.append(other._replace(position=spot))
-    return caused(draft._replace(things=draft.things[:-2] + tuple(moved)), 'goal_occupied',
+    return caused(_with_moved(draft, *moved), 'goal_occupied',
                   'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
                       *(100 * away for away in distances)),
                   until=tuple(each.name for each in moved))
@@ -205,6 +213,18 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
     return caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
                   'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]),
                   until=(thing.name,))
+
+
+def _spare_things(draft: TabletopDraft) -> Tuple[Body, ...]:
+    """The things that no cause needs where they stand. The nearest one is none of them."""
+    needed = {name for cause in draft.causes for name in cause.until}
+    return tuple(each for each in draft.things[TARGET + 1:] if each.name not in needed)
+
+
+def _with_moved(draft: TabletopDraft, *moved: Body) -> TabletopDraft:
+    """The draft with things elsewhere."""
+    places = {each.name: each for each in moved}
+    return draft._replace(things=tuple(places.get(each.name, each) for each in draft.things))
 
 
 def _radius(thing: Body) -> float:
