@@ -20,6 +20,7 @@ from .parameters import read_or_default
 DEFAULT_PARAM = '~oracle'
 CHECKPOINT_PARAM = '~checkpoint'  # goes before the key of DEFAULT_PARAM
 PYTHON_PREFIX = 'python:'
+NOT_YAML = '{}: not valid YAML: {}; allowed: a mapping in YAML'
 
 
 class LoadedSettings(Dict[str, Any]):
@@ -113,14 +114,12 @@ def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
     except yaml.YAMLError as err:
         why = getattr(err, 'problem', None) or str(err)
         place = _marked(str(path), err)
-        raise SettingsError(place, why, 'YAML',
-                            '{}: not valid YAML: {}'.format(place, why)) from err
+        raise SettingsError(place, why, 'YAML', NOT_YAML.format(place, why)) from err
     except RecursionError as err:
         raise SettingsError(str(path), 'something that contains itself',
                           'a tree of settings') from err
     except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
-        raise SettingsError(str(path), str(err), 'YAML', '{}: not valid YAML: {}: {}'.format(
-            path, type(err).__name__, err)) from err
+        raise SettingsError(str(path), str(err), 'YAML', NOT_YAML.format(path, err)) from err
     if values is None:
         return {}, lines
     if not isinstance(values, dict):
