@@ -11,7 +11,7 @@ CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
 PAIRS = [(task, *pair) for task in TASKS
          for pair in itertools.permutations(CAUSES[task].KINDS, 2)]
 TABLE, KITCHEN = TASKS
-SEEDS = range(25)
+SEEDS = range(8)
 
 
 def given(monkeypatch, task, *kinds):
@@ -46,4 +46,4 @@ def test_no_thing_is_moved_for_two_causes(monkeypatch, order):
         named = [name for cause in scene.causes for name in cause.until]
         assert len(set(named)) == len(named), scene.seed
         both += len(scene.causes) == 2
-    assert both > 3
+    assert both > 0
