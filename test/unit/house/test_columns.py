@@ -4,8 +4,8 @@ import pytest
 from house import ROOT, shown, tracked_text
 
 MOST_COLUMNS = 100
-# prose and drawings, and what others have written
-FREE = {'.md', '.rst', '.css', '.dot', '.urdf'}
+# prose, drawings and data, and what others have written
+FREE = {'.md', '.rst', '.css', '.csv', '.dot', '.urdf'}
 RECORDED = ROOT / 'test/data'
 
 
