@@ -40,7 +40,7 @@ class ListedQuestion(NamedTuple):
 
 
 class ListNews(NamedTuple):
-    """When a server spoke last."""
+    """The time at which a server spoke last."""
 
     came_s: float  # by this process's monotonic clock
     stamp_s: float  # by the server's ROS clock, or 0 where that does not run yet

@@ -1,4 +1,4 @@
-"""What the interfaces that robots have started print."""
+"""The printed output of the interfaces that robots have started."""
 import threading
 from collections import OrderedDict
 from typing import Callable, Collection, Optional

@@ -46,7 +46,7 @@ class _Choice(Protocol):
 
 
 class Rule(NamedTuple):
-    """What to answer, and after which time."""
+    """The answer to give, and the time to wait before it."""
 
     kind: str  # goto, supersede, give_up, interface or ignore
     state: str = ''

@@ -57,7 +57,7 @@ CLOSE_S = 1.0
 
 
 class RecordingOptions(NamedTuple):
-    """What the process was started with. It overrides the private parameters of the same names."""
+    """The options of the process. They override the private parameters of the same names."""
 
     record: str = ''  # folder, '' where `~record` decides
     record_topics: Tuple[str, ...] = ()

@@ -38,7 +38,7 @@ PreconditionLists = Optional[Mapping[str, List[Any]]]
 
 
 class _GivenSettings(NamedTuple):
-    """What a machine was given in code, kept for when the parameters are merged in."""
+    """The settings that a machine was given in code, kept until the parameters are merged in."""
 
     settings: Optional[Mapping[str, Any]]
     preconditions: PreconditionLists

@@ -1,1 +1,1 @@
-"""What a machine under the oracle keeps on disk to go on from after a crash. No ROS, no SMACH."""
+"""The file from which a machine under the oracle goes on after a crash. No ROS, no SMACH."""

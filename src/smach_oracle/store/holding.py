@@ -1,4 +1,4 @@
-"""Who holds a machine of a store: a lock of the operating system, which ends with its process."""
+"""The hold on a machine of a store: a lock of the operating system, which ends with its process."""
 import fcntl
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""Which trials of a store go, and how: those that have ended, the oldest first."""
+"""The trials that go from a store: those that have ended, the oldest first."""
 import re
 import sqlite3
 from typing import Iterable, List, NamedTuple, Set
@@ -19,7 +19,7 @@ class Dropped(NamedTuple):
 
 
 class Retention:
-    """What is kept of one store. Nothing is changed before `drop`."""
+    """The trials of one store that stay and go. Nothing is changed before `drop`."""
 
     def __init__(self, store: StoreFile, days: float = 0.0, size: float = 0.0) -> None:
         """`days`: since a trial ended. `size`: bytes of the store. 0: no limit."""

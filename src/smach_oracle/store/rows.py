@@ -1,4 +1,4 @@
-"""What is written to a store, and what is read from it, as plain tuples."""
+"""The rows of a store, as plain tuples: those to write, and those that were read."""
 from typing import NamedTuple, Optional, Tuple
 
 from .codecs import Encoded
@@ -13,7 +13,7 @@ class Fact(NamedTuple):
 
 
 class NewMoment(NamedTuple):
-    """What is committed at once.
+    """The values that are committed at once.
 
     `seq`: number of the trial's last event. `kind`: its name. `label`: a state of `path`.
     `after`: number of the moment that it follows, where that is not the latest one of its trial.

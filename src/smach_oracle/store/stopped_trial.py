@@ -32,7 +32,7 @@ DAMAGE = (ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 
 class Standing(NamedTuple):
-    """Where one container stands."""
+    """The place at which one container stands."""
 
     path: str
     label: str  # of the state. Of a container that has ended, its outcome

@@ -21,7 +21,7 @@ def no_stop() -> bool:
 
 
 class Ending(NamedTuple):
-    """How a trial has ended for good."""
+    """The end of a trial, for good."""
 
     at: float  # s since the epoch
     outcome: str

@@ -15,6 +15,7 @@ from house import ROOT, is_python, shown, tracked_text
 
 MOST_WORDS = 35
 STYLE = 'doc/style.md'
+PAGES = ('.md', '.rst')
 INTERFACES = ('.msg', '.srv', '.action')
 
 
@@ -61,7 +62,7 @@ def quotations_out(text: str) -> str:
 
 
 def page_prose(text: str) -> Iterator[Prose]:
-    """The paragraphs, points of lists and table rows of Markdown, without its code blocks."""
+    """The paragraphs, points of lists and table rows of a page, without its code blocks."""
     begun, kept, code = 0, [], False
     for number, line in enumerate(text.splitlines() + [''], 1):
         code ^= line.lstrip().startswith('```')
@@ -106,7 +107,7 @@ def interface_prose(text: str) -> Iterator[Prose]:
 def prose_of(path: Path) -> List[Prose]:
     """The text for people in a file, none for a kind of file that is not looked at."""
     text = path.read_text(encoding='utf-8')
-    if path.suffix == '.md':
+    if path.suffix in PAGES:
         return list(page_prose(text))
     if path.suffix in INTERFACES:
         return list(interface_prose(text))
@@ -149,7 +150,7 @@ def proselint_faults(path: Path) -> Iterator[Fault]:
 def is_checked(path: Path) -> bool:
     """Whether the rules hold for a file."""
     name = shown(path)
-    kind = path.suffix == '.md' or path.suffix in INTERFACES or is_python(path)
+    kind = path.suffix in PAGES + INTERFACES or is_python(path)
     quotes_them = name == STYLE or name.endswith('plain_words.py')
     return kind and not quotes_them
 
@@ -165,7 +166,7 @@ def main() -> int:
     count = 0
     for path in paths:
         found = faults_of(path)
-        if path.suffix == '.md':
+        if path.suffix in PAGES:
             found += proselint_faults(path)
         for fault in found:
             print('{}:{}: {}: {}'.format(shown(path), *fault))

@@ -3,6 +3,7 @@
 import pytest
 from house import ROOT, shown
 from plain_words import (
+    PAGES,
     STYLE,
     TERMS,
     Prose,
@@ -15,7 +16,7 @@ from plain_words import (
 )
 
 LONG = ' '.join(['The machine goes on'] + ['and on'] * 16) + '.'
-PAGES = [path for path in checked_files() if path.suffix == '.md']
+CHECKED_PAGES = [path for path in checked_files() if path.suffix in PAGES]
 # words that made a reader stop, with the rule that sees them
 STOPPED = [
     ('A program that is no ROS node has nobody to ask, and does so at once.', 'term'),
@@ -73,12 +74,12 @@ def test_code_is_read_by_docstrings_comments_and_longer_strings():
     assert comments == ['first second', 'third']
 
 
-@pytest.mark.parametrize('path', PAGES, ids=shown)
+@pytest.mark.parametrize('path', CHECKED_PAGES, ids=shown)
 def test_a_page_keeps_the_rules(path):
     assert not faults_of(path)
 
 
 def test_the_texts_in_the_code_keep_the_rules():
-    found = {shown(path): faults_of(path) for path in checked_files() if path.suffix != '.md'}
+    found = {shown(path): faults_of(path) for path in checked_files() if path.suffix not in PAGES}
     assert len(found) > 300
     assert not {name: each for name, each in found.items() if each}

@@ -44,7 +44,7 @@ TOO_OLD = 4002  # the page asks for the token by itself, and keeps what the pers
 
 
 class OpenPages:
-    """What the sockets of all pages share."""
+    """The objects that the sockets of all pages share."""
 
     def __init__(self, sections: PageSections, log: TrialLog, question_commands: QuestionCommands,
                  teleoperation: Teleoperation, machine_hand: MachineHand,

@@ -1,4 +1,4 @@
-"""What a robot does after an answer, from its oracle/events."""
+"""The steps of a robot after an answer, from its oracle/events."""
 import queue
 import time
 from typing import Iterator

@@ -1,4 +1,4 @@
-"""What an operator types to hold robots: `pause`, `resume`, `goto PATH STATE` and the like.
+"""The lines by which an operator holds robots: `pause`, `resume`, `goto PATH STATE` and the like.
 
 Calls go to all robots at once: one that hangs delays no other.
 """
@@ -82,7 +82,7 @@ OPERATOR_WORDS = [(word, each.meaning) for word, each in _WORDS.items()] + [
 
 
 class _UsageError(Exception):
-    """What was typed is no whole command. It never leaves this module."""
+    """The typed line is not a whole command. This error never leaves this module."""
 
 
 def robots_of_master() -> Sequence[str]:

@@ -1,4 +1,4 @@
-"""What an expert may answer to a question, and how it is typed. Pure."""
+"""The answers that an expert may give to a question, and how they are typed. Pure."""
 from typing import List, NamedTuple
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, StateChoice

@@ -1,4 +1,4 @@
-"""What the terminal front end needs before it is a node: its command line, and a master."""
+"""The start of the terminal front end, before it is a node: its command line, and a master."""
 import argparse
 import getpass
 import socket

@@ -1,1 +1,1 @@
-"""What ROS's own tools see of the oracle: /diagnostics, and a plugin for roswtf."""
+"""The oracle as ROS's own tools see it: /diagnostics, and a plugin for roswtf."""

@@ -1,1 +1,1 @@
-"""What bags and stores may take of a disk: what goes is named first."""
+"""The limits of what bags and stores take of a disk. They name each file before it goes."""

@@ -17,7 +17,7 @@ Say = Callable[[str], None]
 
 
 class _TrialsOfBag(NamedTuple):
-    """What a bag tells."""
+    """The trials that a bag names, those of them that have ended, and why the bag is kept."""
 
     trials: Tuple[str, ...]
     ended: Tuple[str, ...]

@@ -1,4 +1,4 @@
-"""How much is kept, and which trials go: the oldest that have ended. Pure."""
+"""The limits of a disk, and the trials that go: the oldest that have ended. Pure."""
 from typing import Iterable, List, NamedTuple, Sequence, Set
 
 DAY_S = 86400.0
@@ -6,7 +6,7 @@ GB = 1e9
 
 
 class Limits(NamedTuple):
-    """What is kept. 0 means no limit."""
+    """The amount that is kept. 0 means no limit."""
 
     days: float = 0.0  # since the newest bag of a trial was closed
     gb: float = 0.0  # 10^9 bytes, of all bags of a folder
@@ -39,7 +39,7 @@ class Removal(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What goes, the oldest first, and what stays although the limits are over it."""
+    """The trials that go, the oldest first, and those that stay although a limit is exceeded."""
 
     removals: List[Removal]
     kept: List[Removal]

@@ -29,7 +29,7 @@ _IDENTITY = ('robot', 'container_path', 'failed_state', 'interface')
 
 
 class SettledQuestion(NamedTuple):
-    """How a question ended."""
+    """A question that has ended, and its end."""
 
     goal: ExpertQueryGoal  # once remembered: no more of it than identifies the question
     status: int  # ExpertQueryResult.ANSWERED, EXPIRED or CANCELLED

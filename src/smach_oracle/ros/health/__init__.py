@@ -1,1 +1,1 @@
-"""Whether the robot is well, by topics and diagnostics (setting `healthy`)."""
+"""The health of the robot, by topics and diagnostics (setting `healthy`)."""

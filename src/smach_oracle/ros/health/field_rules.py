@@ -1,4 +1,4 @@
-"""Whether a message, or a status of the diagnostics, says that the robot is well. Pure."""
+"""The rules by which a message, or a status of diagnostics, says that the robot is well. Pure."""
 from typing import Any, NamedTuple
 
 from smach_oracle.oracle.number_checks import is_number

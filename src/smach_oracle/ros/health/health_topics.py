@@ -22,7 +22,7 @@ LOOK_AGAIN_MOST_S = 10.0
 
 
 class Latest:
-    """What was heard last of one thing."""
+    """The newest message of one topic, or status of one name, and when it came."""
 
     def __init__(self) -> None:
         self._heard: Optional[Tuple[Any, float]] = None

@@ -1,4 +1,4 @@
-"""What a machine is and does, published for viewers: for our engine and for upstream's."""
+"""A machine's structure and status, published for viewers, for our engine and for upstream's."""
 from .introspection_server import IntrospectionServer
 
 __all__ = ['IntrospectionServer']

@@ -1,4 +1,4 @@
-"""Which containers are told of when. Pure.
+"""The order in which the heartbeat publishes containers. Pure.
 
 rospy keeps the last `queue_size` messages of what it reads at once, up to 64 kB, and drops the
 others. smach_viewer has 50 there. A large tree that goes out at once would be shown in part, always

@@ -1,4 +1,4 @@
-"""Who sends a running container where a viewer wants it, if anybody checks that.
+"""A hook: what controls a machine sends a running container where a viewer wants it.
 
 The introspection knows nothing of who may do that: what has a hand on the machines says so here.
 """

@@ -1,4 +1,4 @@
-"""What `oracle_run --check` says of a machine, as text for people, 100 columns wide."""
+"""The report of `oracle_run --check` on a machine, as text for people, 100 columns wide."""
 import textwrap
 from collections import Counter
 from dataclasses import fields

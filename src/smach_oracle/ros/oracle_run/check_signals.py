@@ -1,4 +1,4 @@
-"""Which signal is to end a check, whatever handlers rospy and the script have for it."""
+"""The signal that ends a check, whatever handlers rospy and the script have for it."""
 import os
 import signal
 from typing import Optional

@@ -1,4 +1,4 @@
-"""Whether the preconditions in the settings name states of a script's machine."""
+"""A check that the preconditions in the settings name states of a script's machine."""
 import gc
 from typing import Dict, Iterator, List, NamedTuple, Tuple
 

@@ -1,4 +1,4 @@
-"""Whether `python:module:attribute` can be right, told without running anything of the script's.
+"""A check that `python:module:attribute` can be right. It runs nothing of the script's.
 
 A name is refused only where it cannot be there: a module that changes `sys.path`, or that makes
 names in other ways than by saying them, is believed until the name is used.

@@ -44,7 +44,7 @@ OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--recor
 
 
 class CommandLine(NamedTuple):
-    """What stands where: `oracle_run OPTIONS SCRIPT SCRIPT_ARGS`, ROS remappings anywhere."""
+    """The parts of `oracle_run OPTIONS SCRIPT SCRIPT_ARGS`. ROS remappings may stand anywhere."""
 
     options: List[str]
     script: Optional[str]

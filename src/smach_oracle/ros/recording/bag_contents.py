@@ -1,4 +1,4 @@
-"""Which connections a damaged bag has, and which of its messages can still be read.
+"""The connections of a damaged bag, and those of its messages that can still be read.
 
 A message that cannot be deserialised would keep every reader from the rest of its bag.
 """
@@ -23,7 +23,7 @@ _TOPIC = re.compile(r'[/~]?\w[\w/]*', re.ASCII)
 
 
 class BagConnection(NamedTuple):
-    """What a connection record says."""
+    """The fields of a connection record."""
 
     topic: str
     kind: MessageType

@@ -32,7 +32,7 @@ class BagFormatError(OracleError):
 
 
 class ChunkInfo(NamedTuple):
-    """Where a chunk lies and what is in it."""
+    """The place of a chunk in the file, and its content."""
 
     position: int  # in the file
     start: Stamp

@@ -21,7 +21,7 @@ class MendError(OSError):
 
 
 class Saved(NamedTuple):
-    """What is in a mended bag, and what is lost."""
+    """The counts of a mended bag: what it holds, and what is lost."""
 
     messages: int
     checksum: int  # of all topics, stamps and messages

@@ -62,7 +62,7 @@ class LossCounter:
 
 
 class DiskWatch:
-    """Whether the writer thread hangs in a call to the disk.
+    """A watch that notices when the writer thread hangs in a call to the disk.
 
     `with watch:` around each such call.
     """

@@ -28,7 +28,7 @@ class RecorderTopics(NamedTuple):
 
 
 class Reporter(NamedTuple):
-    """How the recorder informs people.
+    """The functions by which the recorder informs people.
 
     Called in its writer thread, or in the machine's where the disk hangs.
     """

@@ -1,4 +1,4 @@
-"""How ROS messages, ROS times and numpy arrays are stored. Nothing is pickled."""
+"""Codecs that store ROS messages, ROS times and numpy arrays. Nothing is pickled."""
 import io
 import struct
 from typing import TYPE_CHECKING, Any, List

@@ -1,4 +1,4 @@
-"""Which page drives a manipulation interface, and whether its commands are fresh. Pure.
+"""The page that drives a manipulation interface, and the age of its commands. Pure.
 
 Times are monotonic, in s.
 """

@@ -1,4 +1,4 @@
-"""What an interface has printed, as plain data for the page. Pure."""
+"""The printed output of an interface, as plain data for the page. Pure."""
 from typing import Any, Dict, Optional
 
 from smach_oracle.msg import InterfaceOutput

@@ -1,4 +1,4 @@
-"""When master, query servers and robots were heard last, and what is too old for an answer.
+"""The times at which master, query servers and robots were heard last, and the limit for an answer.
 
 The page gets it once a second, with a beat: a page that gets none knows that the console is silent.
 """

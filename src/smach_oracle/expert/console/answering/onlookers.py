@@ -1,4 +1,4 @@
-"""Who looks at which question, told to all pages. One thread calls it: that of the sockets."""
+"""The people who look at each question, sent to all pages. Only the sockets' thread calls it."""
 from typing import Any, Dict, List, NamedTuple
 
 from ..web.audit import Person

@@ -1,4 +1,4 @@
-"""How the preconditions of open questions' choices stand now, as the robots publish it."""
+"""The preconditions of the choices of open questions, as the robots publish them now."""
 import threading
 import time
 from collections import OrderedDict

@@ -1,4 +1,4 @@
-"""Which browser holds a claim. Pure. Any thread may use it.
+"""The browser that holds each claim. Pure. Any thread may use it.
 
 Robots know a claim by the expert's name alone, and two people may have the same. Here it belongs to
 the session of one browser: another one of the same name neither shares it nor answers by it.

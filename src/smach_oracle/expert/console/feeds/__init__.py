@@ -1,1 +1,1 @@
-"""What robots publish, followed and made plain."""
+"""The messages of robots, followed and made plain."""

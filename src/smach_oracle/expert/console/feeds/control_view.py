@@ -1,4 +1,4 @@
-"""How a robot's machines stand, as plain data for the page. Pure."""
+"""The state of a robot's machines, as plain data for the page. Pure."""
 from typing import Any, Dict, List
 
 from smach_oracle.msg import ControlStatus, MachineControl

@@ -1,4 +1,4 @@
-"""Whether nodes live: each is asked for its process id, again and again.
+"""A pulse that shows which nodes live: it asks each for its process id, again and again.
 
 A node that was killed stays registered at the master, and one that is stopped keeps its
 connections. Neither answers.

@@ -39,7 +39,7 @@ Point = Tuple[float, float]
 
 
 class GraphLayout(NamedTuple):
-    """Where things are, in pixels from the upper left corner."""
+    """The places of states and transitions, in pixels from the upper left corner."""
 
     width: float
     height: float

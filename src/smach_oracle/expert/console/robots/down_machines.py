@@ -23,7 +23,7 @@ _Stamp = Tuple[object, ...]
 
 
 class _Looked(NamedTuple):
-    """What a store had when its files were as `stamp` says."""
+    """The rows of a store, read when its files had this `stamp`."""
 
     stamp: _Stamp
     rows: List[Dict[str, Any]]

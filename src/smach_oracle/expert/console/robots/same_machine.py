@@ -1,4 +1,4 @@
-"""Whether two robots of the console are one machine that is published twice. Pure.
+"""A test for two robots of the console that are one machine, published twice. Pure.
 
 A script may run its own introspection server in addition to that of its oracle. Both publish the
 same containers, under roots of their own names.
@@ -9,7 +9,7 @@ States = Mapping[str, FrozenSet[str]]  # labels by container path
 
 
 class Source(NamedTuple):
-    """What is published under one name."""
+    """The containers that are published under one name."""
 
     name: str
     nodes: FrozenSet[str]  # that publish it

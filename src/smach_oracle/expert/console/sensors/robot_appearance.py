@@ -1,4 +1,4 @@
-"""How a browser draws a robot: its geometries once, then the poses of its links. No node."""
+"""The looks of a robot in a browser: its geometries once, then the poses of its links. No node."""
 import hashlib
 import json
 import struct

@@ -1,4 +1,4 @@
-"""Which cameras are a robot's own.
+"""The cameras that are a robot's own.
 
 The setting ~cameras says so, the robot's ~failure_cameras, or name and namespace.
 A node directly below / owns no other node's cameras: nothing tells whose those are.

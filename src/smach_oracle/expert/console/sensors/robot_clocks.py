@@ -1,4 +1,4 @@
-"""What a robot's clock says now, by the stamps of what it sends, and how old an image is by it.
+"""The time of a robot's clock, by the stamps of its messages, and the age of an image by it.
 
 The robot, its cameras and the console may run on machines whose clocks differ, or by simulated
 time.
@@ -58,7 +58,7 @@ class RobotClocks:
 
 
 class ImageAges:
-    """How old what a sensor has sent is, by the clock of the robot whose sensor it is."""
+    """The ages of a sensor's messages, by the clock of the robot whose sensor it is."""
 
     def __init__(self, clocks: RobotClocks, cameras: RobotCameras) -> None:
         self._clocks = clocks

@@ -28,7 +28,7 @@ RATE, BURST = 100.0, 200.0  # samples a second of one address
 
 
 class SensorRequests:
-    """What all requests for samples share."""
+    """The objects that all requests for samples share."""
 
     def __init__(self, sensors: SensorStreams, ages: Optional[ImageAges] = None) -> None:
         self.sensors = sensors

@@ -22,7 +22,7 @@ class FileState(NamedTuple):
 
 
 class FoundBags(NamedTuple):
-    """What there is at a moment."""
+    """The bags that were found at one moment."""
 
     states: Dict[str, FileState]  # by path, without links
     refused: Dict[str, str]  # why, by path

@@ -12,7 +12,7 @@ from .recorded_trials import RecordedTrials
 
 
 class HistoryRequests:
-    """What all requests for the past share."""
+    """The objects that all requests for the past share."""
 
     def __init__(self, recorded: RecordedTrials, files: ImageStore) -> None:
         self.recorded = recorded

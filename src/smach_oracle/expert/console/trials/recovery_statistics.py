@@ -1,4 +1,4 @@
-"""How often going to a state helped after a failure, learned from live events. Pure."""
+"""Counts of how often going to a state helped after a failure, learned from live events. Pure."""
 from collections import OrderedDict
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
@@ -11,7 +11,7 @@ FailedState = Tuple[str, str, str]  # robot, container path, state
 
 
 class RecoveryCounts(NamedTuple):
-    """How many of the jumps to a state helped."""
+    """The number of jumps to a state, and of those that helped."""
 
     helped: int
     tried: int

@@ -1,4 +1,4 @@
-"""Who may do what: roles, tokens, hosts and origins that are answered, limits on rates. Pure."""
+"""Rules of access: roles, tokens, hosts and origins that are answered, limits on rates. Pure."""
 import hashlib
 import hmac
 import ipaddress

@@ -1,4 +1,4 @@
-"""What every request passes first: its host, its rate, its origin, and whose session it is."""
+"""The checks that every request passes first: its host, its rate, its origin, and its session."""
 import time
 from typing import Dict, Optional, Tuple
 
@@ -14,7 +14,7 @@ from .settings import ConsoleSettings
 
 
 class AccessControl:
-    """What all handlers share: settings, limits, and the keys of the cookie."""
+    """The objects that all handlers share: settings, limits, and the keys of the cookie."""
 
     def __init__(self, settings: ConsoleSettings, secret: str, audit: Audit) -> None:
         self.settings = settings

@@ -1,4 +1,4 @@
-"""How many connections the console holds, before a token and with one.
+"""The number of connections that the console holds, before a token and with one.
 
 Each takes one of the files that the process may open, and the ROS side needs files, too. Who has
 not come with a token is turned away first, and nobody can take the place of who has.

@@ -71,7 +71,7 @@ class CheckedHandler(tornado.web.RequestHandler):
 
 
 class SharedByRequests(Protocol):
-    """What the requests of one kind share."""
+    """The objects that the requests of one kind share."""
 
     limits: ClientRateLimits
 

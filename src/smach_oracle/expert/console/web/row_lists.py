@@ -44,7 +44,7 @@ class RowLists:
 
 
 class SentLists:
-    """What one page has of the lists."""
+    """The rows of the lists that one page has."""
 
     def __init__(self) -> None:
         self.looks = False  # whether it is to get more

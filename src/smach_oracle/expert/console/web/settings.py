@@ -18,7 +18,7 @@ _port = checks.whole(0, '0 (any free one) to 65535', 65535)
 
 
 class ConsoleSettings(NamedTuple):
-    """What the console was started with."""
+    """The settings with which the console was started."""
 
     address: str
     port: int  # 0: any free one
