@@ -8,6 +8,7 @@ from smach_oracle.ros.disk.disk_command import main
 from smach_oracle.store.codecs import Codecs
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import Held, MachineLock
+from smach_oracle.store.names import RENAMED, STRUCTURE
 from smach_oracle.store.retention import Retention
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
@@ -70,6 +71,21 @@ def test_the_oldest_go_until_the_store_is_small_enough(store):
         add(store, 'trial-{}'.format(days), days, [bytes([number]) * 1000000])
     dropped(store, size=2.5e6)
     assert names(store) == ['trial-3', 'trial-5']
+
+
+def test_the_structure_that_a_trial_went_on_with_stays(store):
+    add(store, 'old', 40, structure='before')
+    trial = add(store, 'stopped', structure='first')
+    for structure, before in (('second', 'first'), ('third', 'second')):
+        store.keep_structure((structure, '{"": {}}'))
+        store.add(trial, [NewMoment(NOW, 0, 'RESUMED', 'TASK', '', tuple(
+            Fact('', name, Codecs().encode(value))
+            for name, value in ((STRUCTURE, structure), (RENAMED, [before, {}]))))])
+    store.keep_structure(('next', '{"": {}}'))  # of a program that begins just now
+    dropped(store, days=30)
+    assert names(store) == ['stopped'] and store.description('before') == ''
+    for structure in ('second', 'third', 'next'):
+        assert store.description(structure) == '{"": {}}', structure
 
 
 def test_planning_changes_nothing(store):
