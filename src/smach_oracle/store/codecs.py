@@ -213,8 +213,8 @@ class _Writer:
             except Exception as err:
                 raise NotStorable('its codec {} failed: {!r}'.format(codec.name, err)) from err
             return {'$by': [codec.name, self.plain(inner)]}
-        if isinstance(value, enum.Flag) and kind.__members__.get(value.name or '') is not value:
-            return {'$flag': [_findable(kind), value.value]}  # some of its flags, or none
+        if isinstance(value, enum.Flag) and not _is_member(value):
+            return {'$flag': [_findable(kind), value.value]}
         if isinstance(value, enum.Enum):
             return {'$enum': [_findable(kind), value.name]}
         if dataclasses.is_dataclass(value):
@@ -234,6 +234,11 @@ class _Writer:
 
 def _name_of(kind: type) -> str:
     return '{}:{}'.format(kind.__module__, kind.__qualname__)
+
+
+def _is_member(value: enum.Flag) -> bool:
+    """Whether it is one member of its class, not several of its flags, or none."""
+    return type(value).__members__.get(value.name or '') is value
 
 
 def _findable(kind: type) -> str:

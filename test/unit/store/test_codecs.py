@@ -63,7 +63,8 @@ VALUES = [
     None, True, 3, -1 << 80, 0.1, 'Größe \ud800', '', [1, [2, {'a': None}]], {'$tuple': [1]},
     {1: 'one', (2, 3): 'pair', None: 0}, (1, (2,)), {1, 2}, frozenset('ab'), b'\x00\xff',
     b'x' * (SHORT + 1), bytearray(b'abc'), 1 + 2j, collections.OrderedDict([('b', 1), ('a', 2)]),
-    Colour.RED, Level.LOW, Doors.LEFT, Doors.LEFT | Doors.RIGHT, Doors(0), Pair(1, (2,)), Thing('cup', [Pair(1, 2)]), 'x' * 10 * SHORT,
+    Colour.RED, Level.LOW, Doors.LEFT, Doors.LEFT | Doors.RIGHT, Doors(0), Pair(1, (2,)),
+    Thing('cup', [Pair(1, 2)]), 'x' * 10 * SHORT,
     {'deep': {'bytes': [b'y' * 1000, b'y' * 1000]}}, float('inf'), [float('-inf')],
 ]
 
