@@ -62,7 +62,7 @@ class StoppedTrial:
         What is in a state counts only while that state is the one under way.
         """
         found = []
-        for path, at in sorted(self._standing().items()):
+        for path, at in sorted(self._place_facts().items()):
             label, phase, text = str(at[0]), str(at[1]), ''
             if phase == FAILED:
                 text = ' '.join(filter(None, map(str, at[3:5])))
@@ -73,7 +73,7 @@ class StoppedTrial:
             found.append(Standing(path, label, phase, text))
         return found
 
-    def _standing(self) -> Dict[str, List[Any]]:
+    def _place_facts(self) -> Dict[str, List[Any]]:
         """Return what tells where a container or a branch stands, by its path."""
         found: Dict[str, List[Any]] = {}
         for path, at in sorted(self._named(AT)):
