@@ -103,6 +103,8 @@ def _show(given: argparse.Namespace) -> None:
     _say('\nWhere it stood')
     for standing in stopped.places():
         _say('  ' + in_words(standing))
+    for path, number in stopped.items():
+        _say('  {} was at item {}'.format(path, number))
     for path, question in stopped.questions():
         _say('  question {} about {} was open'.format(question, path))
     for path, count in stopped.recoveries():

@@ -15,6 +15,7 @@ from .names import (
     ENDED,
     FAILED,
     IN,
+    ITEMS,
     KEPT,
     KEPT_OUT,
     KEY,
@@ -72,6 +73,13 @@ class StoppedTrial:
                 path = self._state_path(path, label).rpartition('/')[0]
             found.append(Standing(path, label, phase, text))
         return found
+
+    def items(self) -> Iterator[Tuple[str, int]]:
+        """Yield path and number of the item of each Iterator that was under way."""
+        standing = self._place_facts()
+        for path, number in sorted(self._named(ITEMS)):
+            if number and self._is_in_state_under_way(path, standing):
+                yield path, int(number)
 
     def _place_facts(self) -> Dict[str, List[Any]]:
         """Return what tells where a container or a branch stands, by its path."""

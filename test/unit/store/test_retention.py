@@ -140,6 +140,15 @@ def test_the_command_reports_before_it_deletes(store, capsys):
     assert names(store) == []
 
 
+def test_a_store_from_which_nothing_goes_is_told_of(store, capsys):
+    add(store, 'stopped')
+    add(store, 'new', 1)
+    for more in ([], ['--delete']):
+        assert main([store.path, '--keep-days', '{:.0f}'.format(time.time() / DAY_S), *more]) == 0
+        assert '{}: 0 trials would go; 0 over the limits stay\n'.format(
+            store.path) in capsys.readouterr().out
+
+
 def test_a_store_that_is_none_or_damaged_is_told_and_left(tmp_path, capsys):
     path = tmp_path / 'robot.db'
     assert main([str(path), '--keep-days', '1', '--delete']) == 2 and not path.exists()

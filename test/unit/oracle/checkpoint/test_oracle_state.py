@@ -162,6 +162,32 @@ def test_of_each_branch_the_state_under_way_is_listed(tmp_path, capsys):
             in told(capsys, machine.store))
 
 
+class EndsAtTwo(smach.State):
+    """Ends the process at the second item."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded'], ['item'])
+
+    def execute(self, userdata):
+        if userdata.item == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 'succeeded'
+
+
+def iterated(diary, points):
+    loop = smach.Iterator(['succeeded'], [], [], it=[1, 2, 3], it_label='item',
+                          exhausted_outcome='succeeded')
+    with loop:
+        smach.Iterator.set_contained_state('ONE', EndsAtTwo(), loop_outcomes=['succeeded'])
+    return around('LOOP', loop, {'succeeded': 'succeeded'})
+
+
+def test_the_item_of_an_iterator_is_shown(tmp_path, capsys):
+    machine = KilledMachine(tmp_path, iterated)
+    assert machine.run() is None
+    assert '  TOP/LOOP was at item 2\n' in told(capsys, machine.store, 'show')
+
+
 def test_it_goes_on_at_a_state_with_a_long_path(tmp_path, capsys):
     machine = KilledMachine(tmp_path, deep)
     assert machine.run(kill_at=5) is None
