@@ -213,13 +213,15 @@ class _Writer:
             except Exception as err:
                 raise NotStorable('its codec {} failed: {!r}'.format(codec.name, err)) from err
             return {'$by': [codec.name, self.plain(inner)]}
+        if isinstance(value, enum.Flag) and not _is_member(value):
+            return {'$flag': [_findable(kind), value.value]}
         if isinstance(value, enum.Enum):
-            return {'$enum': [_name_of(kind), value.name]}
+            return {'$enum': [_findable(kind), value.name]}
         if dataclasses.is_dataclass(value):
             fields = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
-            return {'$data': [_name_of(kind), self._dict(fields)]}
+            return {'$data': [_findable(kind), self._dict(fields)]}
         if isinstance(value, tuple) and isinstance(getattr(kind, '_fields', None), tuple):
-            return {'$named': [_name_of(kind), self._list(value)]}
+            return {'$named': [_findable(kind), self._list(value)]}
         raise NotStorable('no codec is registered for {}'.format(_name_of(kind)))
 
     def _bytes(self, value: bytes, kind: type) -> object:
@@ -234,12 +236,35 @@ def _name_of(kind: type) -> str:
     return '{}:{}'.format(kind.__module__, kind.__qualname__)
 
 
-def _class_named(name: str, wanted: Callable[[type], bool]) -> type:
-    """Return a class of the program that runs. Nothing is imported for it."""
+def _is_member(value: enum.Flag) -> bool:
+    """Whether it is one member of its class, not several of its flags, or none."""
+    return type(value).__members__.get(value.name or '') is value
+
+
+def _findable(kind: type) -> str:
+    """Return the name of a class.
+
+    :raises NotStorable: where a later program would not find the class by it, such as one that a
+        function has made.
+    """
+    name = _name_of(kind)
+    if _found(name) is not kind:
+        raise NotStorable('its class cannot be found by its name, {}'.format(name))
+    return name
+
+
+def _found(name: str) -> Any:
+    """Return what stands at a place of the program that runs. Nothing is imported for it."""
     module, _, path = name.partition(':')
     found: Any = sys.modules.get(module)
     for part in path.split('.'):
         found = getattr(found, part, None)
+    return found
+
+
+def _class_named(name: str, wanted: Callable[[type], bool]) -> type:
+    """Return a class of the program that runs."""
+    found = _found(name)
     if not isinstance(found, type) or not wanted(found):
         raise NotReadable('there is no class {} in this program'.format(name))
     return found
@@ -251,6 +276,12 @@ def _enum(name: str, member: object) -> object:
         raise NotReadable('{} has no {!r} any more'.format(name, member))
     found: object = kind[member]
     return found
+
+
+def _flag(name: str, value: object) -> object:
+    kind: Any = _class_named(name, lambda found: issubclass(found, enum.Flag))
+    made: object = kind(value)
+    return made
 
 
 def _data(name: str, values: Mapping[str, object]) -> object:
@@ -276,7 +307,7 @@ def _named(name: str, values: List[object]) -> object:
 
 
 _CLASSES: Dict[str, Callable[[str, Any], object]] = {
-    '$enum': _enum, '$data': _data, '$named': _named}
+    '$enum': _enum, '$flag': _flag, '$data': _data, '$named': _named}
 _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),

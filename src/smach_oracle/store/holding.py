@@ -21,7 +21,8 @@ class MachineLock:
         """`path`: of the store. `machine`: name of the top machine."""
         self._path, self._machine = path, machine
         digest = hashlib.blake2b(machine.encode('utf-8', 'replace'), digest_size=6).hexdigest()
-        self._file = '{}-lock-{}'.format(os.path.abspath(path), digest)
+        # a link leads to the store that it names, and to its lock
+        self._file = '{}-lock-{}'.format(os.path.realpath(path), digest)
         self._descriptor: Optional[int] = None
 
     def take(self) -> None:

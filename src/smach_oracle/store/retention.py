@@ -1,11 +1,14 @@
 """The trials that go from a store: those that have ended, the oldest first."""
+import json
 import re
 import sqlite3
 from typing import Iterable, List, NamedTuple, Set
 
 from .errors import StoreError
 from .holding import MachineLock
-from .rows import StoredTrial
+from .names import RENAMED, STRUCTURE
+from .renaming import told_renaming
+from .rows import StoredTrial, StoredValue
 from .store_file import StoreFile, transaction
 
 _PART = re.compile(r'"\$part":"([0-9a-f]+)"')
@@ -90,16 +93,35 @@ def size_of(database: sqlite3.Connection) -> int:
 
 
 def _take_out(database: sqlite3.Connection, trials: Iterable[int]) -> None:
+    structures = set()
     for number in trials:  # each has ended: see `_why_kept`
+        structures.update(_structures(database, number))
         database.execute('DELETE FROM facts WHERE moment IN '
                          '(SELECT number FROM moments WHERE trial = ?)', (number,))
         database.execute('DELETE FROM moments WHERE trial = ?', (number,))
         database.execute('DELETE FROM trials WHERE number = ?', (number,))
-    database.execute('DELETE FROM structures WHERE id NOT IN (SELECT structure FROM trials)')
+    if structures:
+        left = {each for trial, in database.execute('SELECT number FROM trials').fetchall()
+                for each in _structures(database, trial)}
+        database.executemany('DELETE FROM structures WHERE id = ?',
+                             [(each,) for each in structures - left])
     used = _used_parts(database)
     for digest, in database.execute('SELECT digest FROM parts').fetchall():
         if bytes(digest) not in used:
             database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
+
+
+def _structures(database: sqlite3.Connection, trial: int) -> Set[str]:
+    """Return the ids of the structures of a trial: it may have gone on with a changed script."""
+    found = {str(structure) for structure, in database.execute(
+        'SELECT structure FROM trials WHERE number = ?', (trial,))}
+    for name, text in database.execute(
+            "SELECT name, text FROM facts JOIN moments ON moment = moments.number WHERE trial = ? "
+            "AND facts.path = '' AND name IN (?, ?) AND text IS NOT NULL",
+            (trial, STRUCTURE, RENAMED)):
+        found.add(str(json.loads(text)) if name == STRUCTURE
+                  else told_renaming(StoredValue(text, None))[0])
+    return found
 
 
 def _used_parts(database: sqlite3.Connection) -> Set[bytes]:

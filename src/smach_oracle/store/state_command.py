@@ -9,7 +9,14 @@ from typing import List, Optional
 from .errors import StoreError
 from .holding import MachineLock
 from .rows import StoredTrial
-from .stopped_trial import DAMAGE, StoppedTrial, chosen_trial, in_words, trial_to_change
+from .stopped_trial import (
+    DAMAGE,
+    StoppedTrial,
+    chosen_trial,
+    in_words,
+    innermost,
+    trial_to_change,
+)
 from .store_file import StoreFile
 
 WRONG = 2  # exit code
@@ -82,18 +89,22 @@ def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
     if not standing:
         return 'stopped before it began'
     how = 'kept, as nobody answered' if stopped.is_kept() else 'stopped'
-    return '{}: {}'.format(how, in_words(standing[-1]))
+    return '{}: {}'.format(how, ', '.join(map(in_words, innermost(standing))))
 
 
 def _show(given: argparse.Namespace) -> None:
     store = StoreFile(given.path, read_only=True)
     trial = chosen_trial(store, given.trial)
+    if given.at is not None:
+        trial = _trial_of(store, given.at, trial if given.trial is not None else None)
     stopped = StoppedTrial(store, trial, given.at)
     _say('trial {} of {}, begun {}: {}'.format(trial.number, trial.machine, _when(trial.begun),
                                               _how_it_is(store, trial)))
     _say('\nWhere it stood')
     for standing in stopped.places():
         _say('  ' + in_words(standing))
+    for path, number in stopped.items():
+        _say('  {} was at item {}'.format(path, number))
     for path, question in stopped.questions():
         _say('  question {} about {} was open'.format(question, path))
     for path, count in stopped.recoveries():
@@ -101,6 +112,18 @@ def _show(given: argparse.Namespace) -> None:
     _say('\nUserdata')
     for path, key, text in stopped.userdata():
         _say('  {} {} = {}'.format(path, key, text))
+
+
+def _trial_of(store: StoreFile, moment: int, wanted: Optional[StoredTrial]) -> StoredTrial:
+    """Return the trial of a moment.
+
+    :raises StoreError: where there is no such moment, or it is not of the trial that is wanted.
+    """
+    trial = store.trial_of(moment)
+    if trial is None or (wanted is not None and wanted.number != trial.number):
+        raise StoreError('{}: there is no moment {}{}; `moments` lists them'.format(
+            store.path, moment, '' if wanted is None else ' of trial {}'.format(wanted.number)))
+    return trial
 
 
 def _moments(given: argparse.Namespace) -> None:

@@ -2,9 +2,9 @@
 import contextlib
 import json
 import time
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple
 
-from .codecs import Codecs, NotStorable
+from .codecs import Codecs, Encoded, NotStorable
 from .errors import StoreError
 from .holding import MachineLock
 from .names import (
@@ -14,6 +14,8 @@ from .names import (
     EDIT,
     ENDED,
     FAILED,
+    IN,
+    ITEMS,
     KEPT,
     KEPT_OUT,
     KEY,
@@ -37,7 +39,7 @@ class Standing(NamedTuple):
     path: str
     label: str  # of the state. Of a container that has ended, its outcome
     phase: str
-    text: str  # what it failed with
+    text: str  # what it failed with, or the path of the state to which it was sent
 
 
 class StoppedTrial:
@@ -56,15 +58,54 @@ class StoppedTrial:
     # -- what is there
 
     def places(self) -> List[Standing]:
-        """Return where the containers stand that had begun, the outermost first."""
+        """Return where the containers stand that had begun, the outermost first.
+
+        What is in a state counts only while that state is the one under way.
+        """
         found = []
-        for path, at in sorted(self._named(AT)):
-            if at and at[1] == MOVED:
-                path, at = at[2].rpartition('/')[0], at[3]
-            if at:
-                text = ' '.join(filter(None, map(str, at[3:5]))) if at[1] == FAILED else ''
-                found.append(Standing(path, str(at[0]), str(at[1]), text))
+        for path, at in sorted(self._place_facts().items()):
+            label, phase, text = str(at[0]), str(at[1]), ''
+            if phase == FAILED:
+                text = ' '.join(filter(None, map(str, at[3:5])))
+            elif phase == BEFORE:
+                text = str(at[2] or '') if len(at) > 2 else ''
+            if phase != ENDED:
+                path = self._state_path(path, label).rpartition('/')[0]
+            found.append(Standing(path, label, phase, text))
         return found
+
+    def items(self) -> Iterator[Tuple[str, int]]:
+        """Yield path and number of the item of each Iterator that was under way."""
+        standing = self._place_facts()
+        for path, number in sorted(self._named(ITEMS)):
+            if number and self._is_in_state_under_way(path, standing):
+                yield path, int(number)
+
+    def _place_facts(self) -> Dict[str, List[Any]]:
+        """Return what tells where a container or a branch stands, by its path."""
+        found: Dict[str, List[Any]] = {}
+        for path, at in sorted(self._named(AT)):
+            if not at or not self._is_in_state_under_way(path, found):
+                continue
+            if at[1] == MOVED:
+                path, at = at[2].rpartition('/')[0], at[3]
+            found[path] = at
+        return found
+
+    @staticmethod
+    def _is_in_state_under_way(path: str, above: Mapping[str, List[Any]]) -> bool:
+        around = path.rpartition('/')[0]
+        while around and around not in above:
+            around = around.rpartition('/')[0]
+        if not around:
+            return '/' not in path  # the top machine
+        label, phase = above[around][:2]
+        return phase == IN and (path + '/').startswith('{}/{}/'.format(around, label))
+
+    def _state_path(self, path: str, label: str) -> str:
+        """Return the path of a state of a container. Of a branch it is that of the branch."""
+        containers = self.containers()
+        return '{}/{}'.format(path, label) if path in containers or not containers else path
 
     def userdata(self) -> Iterator[Tuple[str, str, str]]:
         """Yield path, key and value as JSON, long ones cut, or why there is none."""
@@ -90,7 +131,7 @@ class StoppedTrial:
         """Yield path of the state and id of each question that was open."""
         for path, asked in sorted(self._named(ASKED)):
             if asked:
-                yield '{}/{}'.format(path, asked[0]), str(asked[1])
+                yield self._state_path(path, asked[0]), str(asked[1])
 
     def recoveries(self) -> Iterator[Tuple[str, int]]:
         """Yield path of the state and number of its recoveries, where there were any."""
@@ -98,7 +139,7 @@ class StoppedTrial:
             if name.startswith(STATE) and value.is_there:
                 count = json.loads(value.text or '{}').get('counts', [0, 0])[1]
                 if count:
-                    yield '{}/{}'.format(path, name[len(STATE):]), int(count)
+                    yield self._state_path(path, name[len(STATE):]), int(count)
 
     def containers(self) -> List[str]:
         """Return the paths of all containers, the top machine's name first in each."""
@@ -158,7 +199,7 @@ class StoppedTrial:
                 label, ', '.join(sorted(states))))
         first, _, below = label.partition('/')
         at: List[Optional[str]] = [first, BEFORE, '{}/{}'.format(top, label) if below else None]
-        facts = [Fact(top, AT, Codecs().encode(at))]
+        facts = [Fact(top, AT, Encoded(json.dumps(at), None, {}))]  # also a long path as text
         facts += (Fact(path, ASKED, None) for path, _ in self._named(ASKED))
         self._commit(top, first, facts, who, 'go to ' + label)
 
@@ -258,5 +299,15 @@ def in_words(standing: Standing) -> str:
         return '{} had ended with {}'.format(standing.path, standing.label)
     if standing.phase == FAILED:
         return '{}/{} had failed: {}'.format(standing.path, standing.label, standing.text)
-    return '{}/{} {}'.format(standing.path, standing.label,
-                             'was next' if standing.phase == BEFORE else 'was under way')
+    if standing.phase == BEFORE:
+        return '{}/{} was next{}'.format(standing.path, standing.label, standing.text and (
+            ', on the way to ' + standing.text))
+    return '{}/{} was under way'.format(standing.path, standing.label)
+
+
+def innermost(places: List[Standing]) -> List[Standing]:
+    """Return those in which nothing else stands: the states under way, one of each branch."""
+    going = [each for each in places if each.phase != ENDED]
+    return [each for each in going if not any(
+        '{}/'.format(other.path).startswith('{}/{}/'.format(each.path, each.label))
+        for other in going)] or places[-1:]

@@ -10,7 +10,7 @@ import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 from urllib.parse import quote
 
-from .errors import StoreDamaged, StoreError
+from .errors import StoreDamaged, StoreError, told_error
 from .names import RENAMED
 from .renaming import Renaming, containers_of, told_renaming
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
@@ -66,7 +66,7 @@ class StoreFile:
         try:
             self._db = self._opened(synchronous)
         except sqlite3.Error as err:
-            raise _told(path, err) from err
+            raise told_error(path, err) from err
 
     def _opened(self, synchronous: str) -> sqlite3.Connection:
         where = os.path.abspath(self.path)
@@ -191,7 +191,7 @@ class StoreFile:
                 self._log(moment.at, who, what)
                 self._add(trial, [moment])
         except sqlite3.Error as err:
-            raise _told(self.path, err) from err
+            raise told_error(self.path, err) from err
 
     def drop(self, trial: int, at: float, outcome: str, who: str) -> None:
         """End a trial by hand, so that it is never resumed, with a line in the log.
@@ -203,7 +203,7 @@ class StoreFile:
                 self._log(at, who, 'trial {}: {}'.format(trial, outcome))
                 self._end(trial, at, outcome)
         except sqlite3.Error as err:
-            raise _told(self.path, err) from err
+            raise told_error(self.path, err) from err
 
     def _log(self, at: float, who: str, what: str) -> None:
         self._db.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)', (at, who, what))
@@ -321,7 +321,7 @@ class StoreFile:
             self._db.execute('VACUUM')
             self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')
         except sqlite3.Error as err:
-            raise _told(self.path, err) from err
+            raise told_error(self.path, err) from err
 
     def integrity(self) -> Iterator[Tuple[Any, ...]]:
         """Yield what SQLite finds wrong, ('ok',) where that is nothing."""
@@ -332,7 +332,7 @@ class StoreFile:
             for row in self._db.execute(query, given):
                 yield row  # not `yield from`, which closes the cursor, also of a closed database
         except sqlite3.Error as err:
-            raise _told(self.path, err) from err
+            raise told_error(self.path, err) from err
 
 
 def _try_to_write(database: sqlite3.Connection) -> None:
@@ -361,7 +361,7 @@ def transaction(store: StoreFile, keep: bool = True) -> Iterator[sqlite3.Connect
     except _TakenBack:
         pass
     except sqlite3.Error as err:
-        raise _told(store.path, err) from err
+        raise told_error(store.path, err) from err
 
 
 class _TakenBack(Exception):
@@ -390,9 +390,3 @@ class _Transaction:
     def _roll_back(self) -> None:
         if self._database.in_transaction:
             self._database.execute('ROLLBACK')
-
-
-def _told(path: str, err: sqlite3.Error) -> StoreError:
-    if isinstance(err, sqlite3.OperationalError):
-        return StoreError('{}: {}'.format(path, err))
-    return StoreDamaged('{}: is damaged, or no store: {}'.format(path, err))

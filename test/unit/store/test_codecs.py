@@ -18,6 +18,11 @@ class Level(enum.IntEnum):
     LOW = 2
 
 
+class Doors(enum.Flag):
+    LEFT = 1
+    RIGHT = 2
+
+
 class Pair(collections.namedtuple('Pair', 'one two')):
     pass
 
@@ -43,6 +48,11 @@ class Opaque:
     pass
 
 
+Unfindable = collections.namedtuple('Point', 'x y')  # its name is another one
+Inside = dataclasses.make_dataclass('Inside', ['x'])
+Inside.__qualname__ = 'f.<locals>.Inside'
+
+
 def there_and_back(value, codecs=None, other=None):
     codecs = codecs or Codecs()
     text, whole, parts = codecs.encode(value)
@@ -53,7 +63,8 @@ VALUES = [
     None, True, 3, -1 << 80, 0.1, 'Größe \ud800', '', [1, [2, {'a': None}]], {'$tuple': [1]},
     {1: 'one', (2, 3): 'pair', None: 0}, (1, (2,)), {1, 2}, frozenset('ab'), b'\x00\xff',
     b'x' * (SHORT + 1), bytearray(b'abc'), 1 + 2j, collections.OrderedDict([('b', 1), ('a', 2)]),
-    Colour.RED, Level.LOW, Pair(1, (2,)), Thing('cup', [Pair(1, 2)]), 'x' * 10 * SHORT,
+    Colour.RED, Level.LOW, Doors.LEFT, Doors.LEFT | Doors.RIGHT, Doors(0), Pair(1, (2,)),
+    Thing('cup', [Pair(1, 2)]), 'x' * 10 * SHORT,
     {'deep': {'bytes': [b'y' * 1000, b'y' * 1000]}}, float('inf'), [float('-inf')],
 ]
 
@@ -85,6 +96,8 @@ def test_equal_bytes_are_kept_once():
     ({'inside': [Opaque()]}, 'no codec'),
     (open, 'no codec'),
     (sys, 'no codec'),
+    (Unfindable(1, 2), 'its class cannot be found by its name, test_codecs:Point'),
+    ([Inside(1)], 'its class cannot be found by its name, .*:f.<locals>.Inside'),
 ])
 def test_what_no_codec_knows_is_named(value, why):
     with pytest.raises(NotStorable, match=why):

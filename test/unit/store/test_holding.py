@@ -56,6 +56,17 @@ def test_machines_are_held_apart(path):
     assert not MachineLock(path, 'TWO').is_held_elsewhere()
 
 
+@pytest.mark.parametrize('link', ['link.db', os.path.join('folder', 'robot.db')])
+def test_a_link_to_a_store_is_that_store(tmp_path, path, link):
+    os.symlink(str(tmp_path), str(tmp_path / 'folder'))
+    os.symlink(path, str(tmp_path / 'link.db'))
+    MachineLock(path, 'TASK').take()
+    other = MachineLock(str(tmp_path / link), 'TASK')
+    assert other.is_held_elsewhere()
+    with pytest.raises(Held, match='{}: machine TASK is held by process'.format(link)):
+        other.take()
+
+
 def test_the_lock_of_a_killed_process_is_free(path):
     reader, writer = os.pipe()
     child = os.fork()

@@ -8,6 +8,7 @@ from smach_oracle.ros.disk.disk_command import main
 from smach_oracle.store.codecs import Codecs
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import Held, MachineLock
+from smach_oracle.store.names import RENAMED, STRUCTURE
 from smach_oracle.store.retention import Retention
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
@@ -72,6 +73,21 @@ def test_the_oldest_go_until_the_store_is_small_enough(store):
     assert names(store) == ['trial-3', 'trial-5']
 
 
+def test_the_structure_that_a_trial_went_on_with_stays(store):
+    add(store, 'old', 40, structure='before')
+    trial = add(store, 'stopped', structure='first')
+    for structure, before in (('second', 'first'), ('third', 'second')):
+        store.keep_structure((structure, '{"": {}}'))
+        store.add(trial, [NewMoment(NOW, 0, 'RESUMED', 'TASK', '', tuple(
+            Fact('', name, Codecs().encode(value))
+            for name, value in ((STRUCTURE, structure), (RENAMED, [before, {}]))))])
+    store.keep_structure(('next', '{"": {}}'))  # of a program that begins just now
+    dropped(store, days=30)
+    assert names(store) == ['stopped'] and store.description('before') == ''
+    for structure in ('second', 'third', 'next'):
+        assert store.description(structure) == '{"": {}}', structure
+
+
 def test_planning_changes_nothing(store):
     add(store, 'old', 40, [b'i' * 100000])
     retention = Retention(store, days=30, size=10)
@@ -122,6 +138,15 @@ def test_the_command_reports_before_it_deletes(store, capsys):
     assert main(arguments + ['--delete']) == 0
     assert 'removes {}: trial 1 of TASK'.format(store.path) in capsys.readouterr().out
     assert names(store) == []
+
+
+def test_a_store_from_which_nothing_goes_is_told_of(store, capsys):
+    add(store, 'stopped')
+    add(store, 'new', 1)
+    for more in ([], ['--delete']):
+        assert main([store.path, '--keep-days', '{:.0f}'.format(time.time() / DAY_S), *more]) == 0
+        assert '{}: 0 trials would go; 0 over the limits stay\n'.format(
+            store.path) in capsys.readouterr().out
 
 
 def test_a_store_that_is_none_or_damaged_is_told_and_left(tmp_path, capsys):

@@ -130,6 +130,24 @@ def test_a_place_where_none_can_be_is_named(tmp_path, where):
         StoreFile(str(tmp_path / where))
 
 
+def test_a_log_that_cannot_be_read_where_nothing_can_be_written_is_named(path, monkeypatch):
+    store = StoreFile(path)
+    store.begin_trial(TRIAL)
+
+    def fails(*given, **more):
+        raise sqlite3.OperationalError('unable to open database file')
+    monkeypatch.setattr(sqlite3, 'connect', fails)
+    for may_write, why in ((True, ''), (False, '; nothing can be written there, so copy it with '
+                                               'robot.db-wal to another folder')):
+        monkeypatch.setattr(os, 'access', lambda *given, may=may_write: may)
+        with pytest.raises(StoreError) as told:
+            StoreFile(path, read_only=True)
+        assert str(told.value) == '{}: unable to open database file{}'.format(path, why)
+    store.close()
+    with pytest.raises(StoreError, match='; nothing can be written there$'):
+        StoreFile(path)
+
+
 def test_a_reader_makes_no_store(path):
     with pytest.raises(StoreError, match='there is no such store'):
         StoreFile(path, read_only=True)

@@ -96,6 +96,9 @@ def _store(path: str, limits: Limits, delete: bool) -> int:
             _say('stays    {}'.format(_trial(path, dropped)))
         for dropped in retention.going:
             _say('{} {}'.format('removes' if delete else 'would go', _trial(path, dropped)))
+        if not delete or not retention.going:
+            _say('{}: {} trials would go; {} over the limits stay'.format(
+                path, len(retention.going), len(retention.kept)))
         if delete and retention.going:
             before = _size_on_disk(path)
             retention.drop()

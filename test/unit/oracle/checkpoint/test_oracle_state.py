@@ -1,9 +1,11 @@
 """The command oracle_state, on the store of a machine that was killed."""
 import contextlib
 import os
+import signal
+import threading
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import KilledMachine, Noted, around
 
 import smach
 from smach_oracle.store.holding import MachineLock
@@ -25,6 +27,47 @@ def build(diary, points):
     with machine:
         smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'XY'})
         smach.StateMachine.add('XY', inner, ENDS)
+    return machine
+
+
+class Together(smach.State):
+    """Ends the process once another one runs as well."""
+
+    def __init__(self, both):
+        smach.State.__init__(self, ['succeeded'])
+        self._both = both
+
+    def execute(self, userdata):
+        self._both.wait()
+        os.kill(os.getpid(), signal.SIGKILL)
+        return 'succeeded'
+
+
+def side_by_side(diary, points):
+    together = threading.Barrier(2)
+    left = smach.StateMachine(['succeeded'])
+    with left:
+        smach.StateMachine.add('L', Together(together))
+    both = smach.Concurrence(['succeeded'], 'succeeded')
+    with both:
+        smach.Concurrence.add('LEFT', left)
+        smach.Concurrence.add('RIGHT', Together(together))
+    return around('BOTH', both, {'succeeded': 'succeeded'})
+
+
+LONG = ['PUT_EVERYTHING_THAT_WAS_FOUND_WHERE_IT_BELONGS_%d' % number for number in range(6)]
+
+
+def deep(diary, points):
+    """Machines in machines, whose paths have 300 letters."""
+    inner = Noted('FIRST', diary, points)
+    for label in reversed(LONG):
+        machine = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+        with machine:
+            smach.StateMachine.add(label, inner, {'succeeded': 'LAST'})
+            smach.StateMachine.add('LAST', Noted('LAST', diary, points), ENDS)
+        inner = machine
+    machine.userdata.done = []
     return machine
 
 
@@ -86,6 +129,72 @@ def test_an_earlier_moment_is_shown(killed, capsys):
     lines = told(capsys, killed.store, 'moments').splitlines()
     first = next(line for line in lines if line.endswith('TOP/A'))
     assert 'TOP done = []' in told(capsys, killed.store, 'show', '--at', first.split()[0])
+
+
+@pytest.mark.parametrize('more, why', [
+    ((), 'there is no moment 99'), (('--trial', '1'), 'there is no moment 99 of trial 1')])
+def test_a_moment_that_is_not_there_is_named(killed, capsys, more, why):
+    assert why in refused(capsys, killed.store, 'show', '--at', '99', *more)
+
+
+def test_a_moment_of_a_trial_before_is_shown(killed, capsys):
+    killed.run()
+    killed.run()
+    assert 'trial 2 of TOP' in told(capsys, killed.store, 'show')
+    assert 'trial 1 of TOP' in told(capsys, killed.store, 'show', '--at', '2')
+    assert 'no moment 2 of trial 2' in refused(capsys, killed.store, 'show', '--at', '2',
+                                               '--trial', '2')
+
+
+def test_what_is_in_a_state_is_shown_while_that_is_under_way(killed, capsys):
+    told(capsys, killed.store, 'goto', 'XY/Y')
+    assert 'stopped: TOP/XY was next, on the way to TOP/XY/Y\n' in told(capsys, killed.store)
+    assert 'TOP/XY/X was under way' not in told(capsys, killed.store, 'show')
+    killed.run()
+    assert 'Where it stood\n  TOP had ended with succeeded\n\n' in told(
+        capsys, killed.store, 'show')
+
+
+def test_of_each_branch_the_state_under_way_is_listed(tmp_path, capsys):
+    machine = KilledMachine(tmp_path, side_by_side)
+    assert machine.run() is None
+    assert ('stopped: TOP/BOTH/LEFT/L was under way, TOP/BOTH/RIGHT was under way\n'
+            in told(capsys, machine.store))
+
+
+class EndsAtTwo(smach.State):
+    """Ends the process at the second item."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['succeeded'], ['item'])
+
+    def execute(self, userdata):
+        if userdata.item == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 'succeeded'
+
+
+def iterated(diary, points):
+    loop = smach.Iterator(['succeeded'], [], [], it=[1, 2, 3], it_label='item',
+                          exhausted_outcome='succeeded')
+    with loop:
+        smach.Iterator.set_contained_state('ONE', EndsAtTwo(), loop_outcomes=['succeeded'])
+    return around('LOOP', loop, {'succeeded': 'succeeded'})
+
+
+def test_the_item_of_an_iterator_is_shown(tmp_path, capsys):
+    machine = KilledMachine(tmp_path, iterated)
+    assert machine.run() is None
+    assert '  TOP/LOOP was at item 2\n' in told(capsys, machine.store, 'show')
+
+
+def test_it_goes_on_at_a_state_with_a_long_path(tmp_path, capsys):
+    machine = KilledMachine(tmp_path, deep)
+    assert machine.run(kill_at=5) is None
+    told(capsys, machine.store, 'goto', '/'.join(LONG[:-1] + ['LAST']))
+    assert ', on the way to TOP/' in told(capsys, machine.store)
+    assert machine.run()['outcome'] == 'succeeded'
+    assert machine.diary.count('begins') == {'LAST': 6}
 
 
 def test_an_edited_key_is_what_the_machine_goes_on_with(killed, capsys):

@@ -1,0 +1,72 @@
+"""Killed as the oracle checks and achieves preconditions and tries again, a machine goes on."""
+import pytest
+from killed_machines import KilledMachine, Noted
+from killed_trees import make
+
+import smach
+
+ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
+
+
+class OnceFailing(Noted):
+    """Fails the first time that it comes to its end, in whichever process."""
+
+    def execute(self, userdata):
+        outcome = super().execute(userdata)
+        return 'aborted' if self._diary.count('ends')[self._name] == 1 else outcome
+
+
+class Kitchen:
+    """Builds LOOK, then PICK, which fails once and then wants an open hand and a clear view."""
+
+    def __init__(self, opens):
+        """`opens`: the precondition about the hand, the label OPEN or a pair that achieves it."""
+        self._opens = opens
+        self.preconditions = []
+
+    def __call__(self, diary, points):
+        def is_clear(userdata):
+            points()
+            return True
+
+        def is_open(userdata):
+            points()
+            return 'OPEN' in userdata.done
+
+        inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+        with inner:
+            smach.StateMachine.add('LOOK', Noted('LOOK', diary, points), {'succeeded': 'PICK'})
+            smach.StateMachine.add('PICK', OnceFailing('PICK', diary, points),
+                                   {'succeeded': 'PUT'})
+            smach.StateMachine.add('PUT', Noted('PUT', diary, points), ENDS)
+            smach.StateMachine.add('OPEN', Noted('OPEN', diary, points), {'succeeded': 'PICK'})
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            smach.StateMachine.add('KITCHEN', inner, ENDS)
+        self.preconditions[:] = [
+            'OPEN' if self._opens == 'label' else {'check': is_open, 'achieve': 'OPEN'}, is_clear]
+        return machine
+
+
+def kitchen(folder, opens):
+    build = Kitchen(opens)
+    return KilledMachine(make(folder), build, states={'PICK': {
+        'preconditions': build.preconditions}})
+
+
+@pytest.mark.parametrize('opens', ['label', 'pair'])
+def test_it_comes_to_its_end_and_only_what_was_under_way_runs_again(tmp_path, opens):
+    whole = kitchen(tmp_path / 'whole', opens)
+    told = whole.run()
+    assert told['done'] == ['LOOK', 'PICK', 'OPEN', 'PICK', 'PUT']
+    assert 'PRECONDITION_END' in [kind for kind, _, _ in told['events']]
+    usual = whole.diary.count('begins')
+    for point in range(1, told['points']):
+        killed = kitchen(tmp_path / 'killed', opens)
+        assert killed.run(kill_at=point) is None
+        told = killed.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        begun, ended = killed.diary.count('begins'), killed.diary.count('ends')
+        assert set(ended) == set(usual), (point, ended)
+        assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
