@@ -57,6 +57,11 @@ def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int]
     return _Reading(store, codecs).read(facts if renaming is None else map(renaming, facts))
 
 
+# moments of a state that has failed: what is new then, its preconditions have written
+_AFTER_FAILURE = frozenset(kind.name for kind in (
+    EventKind.PRECONDITION_START, EventKind.DECISION, EventKind.QUERY_OPENED))
+
+
 class _Reading:
     """One pass over the facts of a trial."""
 
@@ -96,9 +101,12 @@ class _Reading:
         container = self._tree.containers.setdefault(path, StoredContainer())
         if name.startswith(KEY):
             self._keys.setdefault(path, {})[name[len(KEY):]] = value
-            if fact.kind == EDIT:  # what somebody has set outlives a restore
+            # what somebody has set outlives a restore, and what a precondition has written
+            if fact.kind == EDIT:
                 for values in self._at_entry.get(path, {}).values():
                     values[name[len(KEY):]] = value
+            elif fact.kind in _AFTER_FAILURE and path == fact.moment_path:
+                self._at_entry.get(path, {}).get(fact.label, {})[name[len(KEY):]] = value
         elif name.startswith(KEPT_OUT):
             container.missing.pop(name[len(KEPT_OUT):], None)
             if value.is_there:

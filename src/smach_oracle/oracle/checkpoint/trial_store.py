@@ -34,6 +34,7 @@ from .structure import structure_of
 _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 _Read = TypeVar('_Read')
+BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
 RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
 
 
@@ -77,6 +78,10 @@ class TrialStore:
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
         if not earlier and (top.phase in ('', ENDED) or word == RESTART):
+            if top.phase != ENDED:
+                smach.logwarn(BEGINS_ANEW.format(
+                    self._top.path, self._store.path, 'on_resume is restart' if word == RESTART
+                    else 'the last trial was stopped before its first state'))
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None

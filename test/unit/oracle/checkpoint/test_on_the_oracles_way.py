@@ -67,6 +67,7 @@ def test_it_comes_to_its_end_and_only_what_was_under_way_runs_again(tmp_path, op
         assert killed.run(kill_at=point) is None
         told = killed.run()
         assert told.get('outcome') == 'succeeded', (point, told)
+        assert 'OPEN' in told['done'], (point, 'what a precondition has written is lost')
         begun, ended = killed.diary.count('begins'), killed.diary.count('ends')
         assert set(ended) == set(usual), (point, ended)
         assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)

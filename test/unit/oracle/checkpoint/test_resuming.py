@@ -153,10 +153,11 @@ def test_asked_first_nothing_moves_without_an_expert(tmp_path):
         make(tmp_path / 'killed')
 
 
-def test_restart_begins_anew(tmp_path):
+def test_restart_begins_anew_and_says_so(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     killed.run(kill_at=12)
     told = killed.run(on_resume='restart')
+    assert any('a new one begins: on_resume is restart' in line for line in told['log'])
     assert told['events'][0][0] == 'TRIAL_START' and told['done'] == ['A', 'B', 'C']
     assert killed.diary.count('begins')['A'] == 2
 
