@@ -150,7 +150,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     if resumption.begins_at:
         _begin_at(top, resumption)
     else:
-        _Setting(resumption, nodes).activate(top)
+        _Setting(resumption, nodes).set_container(top)
 
 
 def _begin_at(top: TreeNode, resumption: Resumption) -> None:
@@ -221,7 +221,7 @@ class _Setting:
             if self._has_begun(path):
                 told = self._resumption.tree.container(path)
                 border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
-        asked = [self._set(each) for each in inside]
+        asked = [self.set_container(each) for each in inside]
         if self._resumption.asks and not any(asked):
             self._ask_behind(node, label=stored.label, inside=inside)
 
@@ -251,8 +251,8 @@ class _Setting:
         return bool(tree.container(path).item) or any(
             told.phase for key, told in tree.containers.items() if key.startswith(path + '/'))
 
-    def _set(self, node: TreeNode) -> bool:
-        """Set a container in a state that was under way. See `activate`."""
+    def set_container(self, node: TreeNode) -> bool:
+        """Set the machine, or a container in a state that was under way. See `activate`."""
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():

@@ -77,7 +77,9 @@ class TrialStore:
         top = tree.container(self._top.key)
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
-        if not earlier and (top.phase in ('', ENDED) or word == RESTART):
+        # before its first state nothing had run, but nothing is to move without being asked either
+        is_over = top.phase == ENDED or word == RESTART or (not top.phase and word != ASK)
+        if not earlier and is_over:
             if top.phase != ENDED:
                 smach.logwarn(BEGINS_ANEW.format(
                     self._top.path, self._store.path, 'on_resume is restart' if word == RESTART

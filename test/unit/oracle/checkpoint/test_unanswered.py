@@ -16,7 +16,8 @@ from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.store.state_command import main
 from smach_oracle.store.store_file import StoreFile
 
-FIRST_STATE = 3  # behind TRIAL_START and CONTAINER_START
+BEFORE_THE_FIRST = {1, 2}  # TRIAL_START and CONTAINER_START
+FIRST_STATE = 3
 # points at which the branches of the Concurrence, and the first item of an Iterator, have ended
 ALL_HAD_ENDED = {34, 46}
 
@@ -68,9 +69,9 @@ def oracle_state(*arguments):
 
 
 def points_in(tmp_path):
-    """Some at which the first state is about to begin, or has, and the machine has not ended."""
+    """Some at which the machine has not ended, from the start of the trial on."""
     some = set(range(FIRST_STATE, points_of(tmp_path, tree), 5))
-    return sorted(some | ALL_HAD_ENDED)
+    return sorted(some | BEFORE_THE_FIRST | ALL_HAD_ENDED)
 
 
 def test_killed_anywhere_the_trial_is_kept_until_somebody_decides(tmp_path):
