@@ -60,8 +60,8 @@ def matches(name: str, path: str) -> bool:
 def exactness(name: str) -> Tuple[bool, bool, int, int]:
     """Return what sorts names by how exact they are, the most exact last.
 
-    A name without `*` is more exact than a pattern, a path more than a label, of patterns the one
-    with more letters, then the one with fewer `**`.
+    A name without `*` is more exact than a pattern, and a path is more exact than a label. Of two
+    patterns the one with more letters is, then the one with fewer `**`.
     """
     return (not is_pattern(name), _is_path(name), len(name.replace('*', '').replace('/', '')),
             -name.split('/').count(ANY_LABELS))

@@ -1,10 +1,10 @@
 """Preconditions of a state as its designer wrote them (paper, section IV-B). Pure.
 
-Four kinds: the label of another state of the same container, or the path of one of another
-container below the top machine, a `smach.State`, a callable `f(userdata) -> bool`. A pair (check,
-achieve) whose second half runs only if the first does not hold. In YAML: a label, a path
-(KITCHEN/LOOK, or /LOOK for a state of the top machine), 'python:module:attribute', or {check: ...,
-achieve: ...}.
+There are four kinds. The first is the label of another state of the same container, or the path of
+a state of another one below the top machine. The others are a `smach.State`, a callable
+`f(userdata) -> bool`, and a pair (check, achieve) whose second half runs only if the first does not
+hold. In YAML: a label, a path (KITCHEN/LOOK, or /LOOK for a state of the top machine),
+'python:module:attribute', or {check: ..., achieve: ...}.
 """
 from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
