@@ -91,6 +91,11 @@ class Border:
         """
         self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
 
+    @property
+    def is_resumed(self) -> bool:
+        """Whether its next execution goes on where the program was stopped."""
+        return self._resumed is not None and self._resumed.trial_id == self._trial_now()
+
     def take_over_userdata(self) -> None:
         """Have the userdata that `resume` was given, at the first execution after it."""
         resumed, self._resumed = self._resumed, None

@@ -8,7 +8,7 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, GOAL, IN,
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..branches.around import borders_around
+from ..branches.around import borders_around, borders_in
 from ..branches.border import Border
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
@@ -176,7 +176,8 @@ class Checkpointer:
             below = self._below(path) if is_container else []
             sent_to = [Place(each, each.entry).path for each in below if each.entry]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
-            if is_container and not any(_goes_on(each) for each in below):
+            if is_container and not (any(_goes_on(each) for each in below) or any(
+                    border.is_resumed for _, border in borders_in(node, label))):
                 yield from self._not_begun_below(path)
         elif kind is EventKind.CONTAINER_START and node is self._top and node.resuming is None:
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
@@ -221,7 +222,10 @@ class Checkpointer:
         return kept[1]
 
     def _items_around(self, event: Event, node: TreeNode) -> Iterator[Fact]:
-        """Yield which items the Iterators around a container have come to."""
+        """Yield which items the Iterators around a container have come to, and with what userdata.
+
+        One moment has both: what is inside goes on with the userdata of this item.
+        """
         for path, border in self._borders_around(node):
             if event.kind is EventKind.CONTAINER_START and event.path == path:
                 continue  # it has not begun with any
@@ -230,6 +234,7 @@ class Checkpointer:
                 self._items[path] = number
                 yield fact_of(path, ITEMS, number)
                 yield from self._not_begun_below(path)
+                yield from self._keys(path, border.container.userdata._data, None)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
