@@ -133,6 +133,8 @@ class Judge:
         if line['seq'] <= self._last_seq:
             self._say(line, 'a number is used twice, or is smaller than one before')
         self._last_seq = line['seq']
+        if kind == 'STATE_START':
+            self._starts(line, path)
         if kind == 'FAILURE' and line['failure'] == FailureKind.INTERRUPTED:
             self._in_doubt(line, path)
         if kind in ('DECISION', 'JUMP') and line['target']:
@@ -163,6 +165,12 @@ class Judge:
             self._trial, self._last_seq, self._promised = line['trial'], -1, -1
         elif line['last_seq'] < self._promised:
             self._say(line, 'event {} was promised'.format(self._promised))
+
+    def _starts(self, line: Line, path: str) -> None:
+        """A visit begins: the one before, which ended in a killed process, was not in doubt."""
+        visits = self._visits.get((path, self._latest.get(path, ())))
+        if visits is not None and visits.phase == 'ended' and visits.run != line['run']:
+            visits.phase = 'over'
 
     def _in_doubt(self, line: Line, path: str) -> None:
         if path not in self._tree.nodes or self._tree.nodes[path].kind != 'leaf':
