@@ -74,7 +74,7 @@ def run(module: str) -> None:
         told = '{} of smach_oracle {}\n'.format(os.path.basename(sys.argv[0]), __version__)
         sys.stdout.write(told)
         return
-    if module.startswith(PRINTING):
+    if module.startswith(PRINTING) or sys.argv[1:2] in HELP:
         sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
     try:
         main = import_module('smach_oracle.' + module).main

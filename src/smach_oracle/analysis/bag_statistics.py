@@ -28,11 +28,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         sys.stdout.write(table.format_text(variants, found.trials))
         code = report_skipped(found.skipped)
         _write_files(args, found, variants)
-    except (BagError, ImportError) as err:
+    except (BagError, ImportError, OSError) as err:
         return report_error('bag_statistics', err)
-    except OSError as err:
-        return report_error('bag_statistics', '{}: {}'.format(err.filename or 'output', err.strerror
-                                                              or err))
     return code
 
 

@@ -56,7 +56,10 @@ def write_json(path: str, data: Mapping[str, object]) -> None:
 
 def report_error(command: str, why: Union[str, Exception]) -> int:
     """Print on standard error why a command has no result, and return the exit code."""
-    text = isinstance(why, ImportError) and lacking(why) or str(why)
+    if isinstance(why, OSError):
+        text = '{}: {}'.format(why.filename or 'output', why.strerror or why)
+    else:
+        text = isinstance(why, ImportError) and lacking(why) or str(why)
     sys.stdout.flush()
     sys.stderr.write('{}: {}\n'.format(command, text))
     return NOTHING_COUNTED

@@ -5,7 +5,6 @@ by key, everything else is replaced. `smach_oracle.oracle` checks the values. He
 learns where the key came from.
 """
 import importlib
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
@@ -13,6 +12,7 @@ import rospy
 import yaml
 
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.close_names import did_you_mean
 from smach_oracle.oracle.settings.paths import path_of
 
 from .parameters import read_or_default
@@ -174,10 +174,8 @@ def resolve_python(name: str) -> object:
 
 def missing_attribute(module: str, attribute: str, names: Iterable[str]) -> str:
     """Return what to say where a module lacks an attribute. `names`: those that it has."""
-    close = get_close_matches(attribute, sorted(set(names)), 1)
-    hint = ' (did you mean {!r}?)'.format(close[0]) if close else ''
     owner = 'the script' if module == '__main__' else 'the module ' + module
-    return '{} has no {!r}{}'.format(owner, attribute, hint)
+    return '{} has no {!r}{}'.format(owner, attribute, did_you_mean(attribute, names))
 
 
 def split_python_name(name: str) -> Tuple[str, str]:

@@ -82,6 +82,12 @@ def test_a_pattern_that_stands_for_no_state_is_refused(name):
         OracleContainer.wrap(tree()[0], settings={'states': {name: {'prior': 0.3}}})
 
 
+def test_a_mistyped_state_is_refused_with_the_one_that_is_meant():
+    said = r"'RIHGT' is no state \(did you mean RIGHT\?\); allowed"
+    with pytest.raises(SettingsError, match=said):
+        OracleContainer.wrap(tree()[0], settings={'states': {'RIHGT': {'prior': 0.3}}})
+
+
 @pytest.mark.parametrize('nested, paths', [
     (True, {'ARM', 'ARM/HAND', 'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'}), (False, set()),
     ([], set()), (['ARM'], {'ARM'}), (['ARM', 'ARM/HAND'], {'ARM', 'ARM/HAND'}),

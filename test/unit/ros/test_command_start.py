@@ -48,7 +48,8 @@ def test_a_command_tells_the_version_without_ros(command):
 
 @pytest.mark.parametrize('line', [
     'bag_statistics ' + BAGS, 'bag_statistics --help', 'what_if ' + BAGS,
-    'oracle_disk --keep-gb 1 ' + BAGS, 'run_trials --plan --protocol all'
+    'oracle_disk --keep-gb 1 ' + BAGS, 'run_trials --plan --protocol all',
+    'oracle_run --help'
 ])
 @pytest.mark.parametrize('what_of_it', ['| true', '2>&1 | true'])
 def test_a_command_whose_reader_has_gone_ends_without_a_word(line, what_of_it):
@@ -57,6 +58,13 @@ def test_a_command_whose_reader_has_gone_ends_without_a_word(line, what_of_it):
         sys.executable, line, what_of_it))
     assert told.stderr == ''
     assert told.stdout == '{}\n'.format(commands.NO_READER)
+
+
+@pytest.mark.parametrize('line', ['compare_variants none.csv', 'draw_results none out'])
+def test_a_file_that_is_not_there_is_named_in_plain_words(line):
+    told = run('{} scripts/{}'.format(sys.executable, line))
+    assert told.stderr.startswith('{}: {}: '.format(*line.split()[:2])), told.stderr
+    assert 'Errno' not in told.stderr and told.returncode == 2
 
 
 def test_catkins_own_tools_read_the_change_log():

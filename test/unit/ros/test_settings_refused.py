@@ -38,8 +38,8 @@ def precondition(given, state='PICK'):
 
 @pytest.mark.parametrize('name, why', [
     ('python:no_such_module:clear', "No module named 'no_such_module'"),
-    ('python:checks:claer', "the module checks has no 'claer' (did you mean 'clear'?)"),
-    ('python:__main__:raedy', "the script has no 'raedy' (did you mean 'ready'?)"),
+    ('python:checks:claer', "the module checks has no 'claer' (did you mean clear?)"),
+    ('python:__main__:raedy', "the script has no 'raedy' (did you mean ready?)"),
     ('python:json.no_such_module:x', "No module named 'json.no_such_module'"),
     ('python:checks', 'the form is python:module:attribute'),
 ])

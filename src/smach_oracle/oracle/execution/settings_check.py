@@ -7,6 +7,7 @@ from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
 from ..machine.tree_node import TreeNode
 from ..places.fitness import allowed_for, why_unfit
+from ..settings.close_names import did_you_mean
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec
 
@@ -20,7 +21,8 @@ def check_state_names(top: TreeNode) -> None:
     for key, name in _named_states(top):
         if name not in known and not any(matches(name, each) for each in known):
             _refuse(top, SettingsError(
-                key, name, 'the states of the machine: ' + ', '.join(sorted(known))))
+                key, name, 'the states of the machine: ' + ', '.join(sorted(known)),
+                problem='is no state' + did_you_mean(name, known)))
 
 
 def check_nested(top: TreeNode) -> None:

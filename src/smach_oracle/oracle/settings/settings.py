@@ -5,7 +5,6 @@ a SettingsError that names the dotted key, the value and what is allowed.
 """
 import math
 from dataclasses import dataclass, field, replace
-from difflib import get_close_matches
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
@@ -13,6 +12,7 @@ from ..errors import SettingsError
 from ..settings.interfaces import InterfaceOffer
 from . import checks as values
 from .budget import Budget, checked_budget
+from .close_names import did_you_mean
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import checked_interfaces
@@ -207,8 +207,7 @@ def _hint(prefix: str, key: str, allowed: List[str]) -> str:
         return ' here (it belongs to a state: below states: LABEL:)'
     if prefix and (key in _MACHINE_CHECKS or key in _TOP_KEYS):
         return ' of a state (it holds for the whole machine: move it to the top of the settings)'
-    close = get_close_matches(key, allowed, 1)
-    return ' (did you mean {}?)'.format(close[0]) if close else ''
+    return did_you_mean(key, allowed)
 
 
 def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:

@@ -23,11 +23,11 @@ def main(arguments: Optional[List[str]] = None) -> int:
     given = _parser().parse_args(arguments)
     limits = Limits(given.keep_days, given.keep_gb)
     if not limits.are_set:
-        _complain('give --keep-days or --keep-gb: nothing goes by itself')
+        _complain('nothing goes without a limit: give --keep-days or --keep-gb')
         return WRONG
     codes = [_look_at(path_of(path), limits, given.delete) for path in given.paths]
     if not given.delete:
-        _say('nothing was removed; --delete does it')
+        _say('nothing was removed: --delete removes it')
     return max(codes)
 
 
