@@ -4,8 +4,8 @@
     python3 benchmarks/fleet.py [--robots N] [--kills N] [--seed S]
 
 Each robot is a process under oracle_run --checkpoint --resume=recover, all with one store, on a
-master of its own. It asks in each round; deadline and lease are shortened in proportion (20 s for
-300 s, 3 s for 45 s). What is killed is drawn: a robot (half of the kills), the server, a console
+master of its own. It asks in each round. The deadline is 20 s instead of 300 s, and a claim holds
+3 s instead of 15 s. What is killed is drawn: a robot (half of the kills), the server, a console
 with its expert, an interface, the action server, the master; everything at once within the first
 tenth. Held against what must hold: each question was closed once, by an answer that fits its robot,
 or as it expired; each robot's rounds are told in turn, and it comes to its end; nothing is open or
