@@ -1,5 +1,5 @@
-"""What the four kinds of container have in common: construction in ``with`` blocks, callbacks,
-userdata at the border.
+"""The base of the four kinds of container: construction in ``with`` blocks, callbacks, userdata at
+the border.
 
 Containers are states, so they nest. While a container is open, ``StateMachine.add(...)`` and its
 like add to it.

@@ -1,4 +1,4 @@
-"""What can go wrong while a machine is built or run.
+"""The errors that may occur while a machine is built or run.
 
 SmachError
 ├── InvalidStateError          a label or state that a container cannot take, or a child that failed

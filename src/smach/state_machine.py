@@ -264,7 +264,7 @@ class StateMachine(Container):
             self._state_transitioning_lock.acquire()
 
     def _prepare_visit(self, label: str, state: Any) -> StateVisit:
-        """What the state is given to read and write, kept for its next visit where that is safe."""
+        """Make the state's view of the userdata. Keep it for its next visit where that is safe."""
         if label not in self._states:
             raise smach.InvalidStateError(
                 "The current state '%s' is none of %s" % (label, list(self._states)))

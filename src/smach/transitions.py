@@ -1,4 +1,4 @@
-"""Where the transitions of a state machine lead, and whether they lead somewhere."""
+"""The transitions of a state machine: where they lead, and whether they lead somewhere."""
 from typing import Any, Collection, List, Mapping, Optional
 
 import smach

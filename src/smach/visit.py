@@ -1,4 +1,4 @@
-"""What a machine keeps of its last visit to a state, so that the next one costs little."""
+"""The part of a state's visit that a machine keeps, so that the next one costs little."""
 from typing import Any, Dict, Mapping, Optional
 
 from smach.state import State

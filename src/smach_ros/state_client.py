@@ -7,8 +7,7 @@ from actionlib import SimpleGoalState
 
 
 class StateClient(actionlib.SimpleActionClient):
-    """What a script finds at ``SimpleActionState._action_client``: a SimpleActionClient for the
-    state's latest goal.
+    """The SimpleActionClient at ``SimpleActionState._action_client``, for the state's latest goal.
 
     It shares the connection of all states of the action, so that having one costs no topics. A goal
     that a script sends through it takes the place of the state's for its methods.
