@@ -38,7 +38,7 @@ class RecordedCause(NamedTuple):
 
 
 class BagContent(NamedTuple):
-    """What the analysis takes from a bag."""
+    """The part of a bag that the analysis takes."""
 
     events: List[Event]  # in the order of their stamps. `seq` is that of their happening
     causes: Dict[str, RecordedCause]  # by trial id

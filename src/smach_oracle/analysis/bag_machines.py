@@ -18,7 +18,7 @@ class RecordedContainer(NamedTuple):
 
 
 class FailureImage(NamedTuple):
-    """What one camera saw when a question was put."""
+    """An image that one camera saw when a question was put."""
 
     query_id: str
     topic: str

@@ -27,7 +27,7 @@ _KINDS = {int(kind): kind for kind in EventKind}
 
 
 class BagRequest(NamedTuple):
-    """What is to be read, and within which limits."""
+    """A request to read bags, within limits."""
 
     paths: List[str]  # they are read as one
     trials: List[str]  # ids. Empty means every trial
@@ -46,7 +46,7 @@ class ReadTrial(NamedTuple):
 
 
 class BagReply(NamedTuple):
-    """What was read."""
+    """The content that was read."""
 
     trials: List[ReadTrial]
     events: List[Event]  # of the trial that is to be replayed, without what the page does not show

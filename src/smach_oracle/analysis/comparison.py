@@ -49,7 +49,7 @@ class Share(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """What the trials of a variant cost. None means it is not known of some trial."""
+    """The costs of a variant's trials. None means that the cost of some trial is not known."""
 
     attempts: float  # a trial
     questions: float  # a trial

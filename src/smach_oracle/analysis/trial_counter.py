@@ -15,7 +15,7 @@ AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
 
 class TrialEnding(Enum):
-    """How a trial ended."""
+    """The way in which a trial ended."""
 
     SUCCESS = 'success'
     FAILURE = 'failure'

@@ -78,9 +78,9 @@ class Pair(NamedTuple):
 
 
 class TruthDetails(NamedTuple):
-    """What the truth on a trial tells beyond its end.
+    """The details that the truth on a trial gives beyond its end.
 
-    Lines of older worlds lack some of it. What they lack is not known, and None.
+    Lines of older worlds lack some of them, and those are None.
     """
 
     wrong_object: Optional[str] = None  # brought to the goal in place of the target. '' means none

@@ -75,7 +75,7 @@ def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) 
 
 
 class _TrialEvents:
-    """What was found of each trial: it may be spread over several bags, and be in more than one."""
+    """The findings about each trial: they may be spread over several bags, or be in several."""
 
     def __init__(self) -> None:
         self.events: Dict[str, Dict[int, Event]] = {}

@@ -22,7 +22,7 @@ _LATER_FIELDS: Allowed = {'wrong_object': ((str,), 'a str'), 'damage': ((dict,),
 
 
 class Truth(NamedTuple):
-    """How one trial truly ended."""
+    """The true end of one trial."""
 
     seed: int
     task: str

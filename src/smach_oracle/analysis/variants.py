@@ -50,7 +50,7 @@ class Count(NamedTuple):
 
 
 class VariantCounts(NamedTuple):
-    """What happened in the trials of one variant of an experiment."""
+    """The counts of what happened in the trials of one variant of an experiment."""
 
     experiment: str
     name: str

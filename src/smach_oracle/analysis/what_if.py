@@ -53,7 +53,7 @@ Key = Tuple[str, str]  # path and state
 
 
 class TriedSettings(NamedTuple):
-    """What became of the recorded decisions under other settings."""
+    """The counts of the recorded decisions under other settings."""
 
     settings: Mapping[str, Any]
     counts: Mapping[str, int]  # by OUTCOMES
@@ -62,7 +62,7 @@ class TriedSettings(NamedTuple):
 
 
 class _LearnedState:
-    """What an oracle learns of a state, and what it knows of the present failure."""
+    """An oracle's knowledge of a state: what it learns, and what it knows of this failure."""
 
     def __init__(self, settings: Mapping[str, Any]) -> None:
         self.estimator = make_estimator(settings['estimator'], settings['memory'],
@@ -234,9 +234,9 @@ def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[s
 
 
 def _conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
-    """Which states have preconditions: those where some were run.
+    """Return whether states have preconditions, if known: those where some were run do.
 
-    Those where none were run, though they would have been, have none.
+    Those where none were run, though they would have been, do not.
     """
     known: Dict[Key, bool] = {}
     for event in events:
