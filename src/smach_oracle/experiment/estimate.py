@@ -1,4 +1,4 @@
-"""How long an experiment takes: by the trials that it has had, else by what was measured before."""
+"""The time that an experiment takes: by the trials that it has had, else as measured before."""
 import statistics
 from typing import Dict, List, NamedTuple, Sequence
 
@@ -8,7 +8,7 @@ START_S = 15.0  # of the nodes of a job
 
 
 class JobWork(NamedTuple):
-    """What a job has done, and what it has to do."""
+    """The work that a job has done, and the work that is left."""
 
     task: str
     missing: int  # trials

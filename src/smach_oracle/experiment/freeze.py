@@ -23,7 +23,7 @@ BLOCKS = ('pick and place', 'drink retrieval', 'persistence', 'memory', 'continu
 
 
 class Freeze(NamedTuple):
-    """What was frozen."""
+    """A freeze of protocol and folders."""
 
     commit: str
     protocol_sha256: str
@@ -60,7 +60,7 @@ def first_seed_of(protocol: bytes, trees: Mapping[str, str]) -> int:
 
 
 def frozen_seeds(root: Path) -> Freeze:
-    """What a checkout would freeze now, as it is committed.
+    """Return what a checkout would freeze now, as it is committed.
 
     :raises ExperimentError: where protocol or folders are not committed as they are, or missing.
     """

@@ -70,7 +70,7 @@ class ExperimentJob:
 
     @property
     def finished(self) -> int:
-        """How many trials are over, lost ones among them."""
+        """The number of trials that are over, lost ones among them."""
         return min(self.trials, self._kept + len(self.summaries) + len(self._lost))
 
     def work(self) -> JobWork:
@@ -134,7 +134,7 @@ class ExperimentJob:
             self._again('it ended before its trials were over')
 
     def _hung(self) -> str:
-        """Why the processes are taken for hung, or ''.
+        """Return why the processes are taken for hung, or ''.
 
         A trial may take long on a machine with much to do.
         """

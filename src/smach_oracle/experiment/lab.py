@@ -1,4 +1,4 @@
-"""What a world that goes on is told when it starts: the run, and how the last trial left it."""
+"""The input with which a world that goes on starts: the run, and how the last trial left it."""
 from pathlib import Path
 from typing import Any, Mapping, Optional
 

@@ -1,4 +1,4 @@
-"""What an experiment consists of, and how its folder remembers it."""
+"""The plan of an experiment: what it consists of, and how its folder remembers it."""
 import itertools
 import json
 import os

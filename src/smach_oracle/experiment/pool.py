@@ -27,7 +27,7 @@ class PartJobs(NamedTuple):
 
 
 class PoolResult(NamedTuple):
-    """What became of the parts of a protocol."""
+    """The parts of a protocol, and the jobs that did not come to their ends."""
 
     parts: List[PartJobs]
     broken: Dict[str, str]  # jobs that could not be brought to their ends, and why

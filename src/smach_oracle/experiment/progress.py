@@ -97,7 +97,7 @@ def describe_variants(jobs: Sequence[ExperimentJob]) -> List[str]:
 
 
 def describe_trials(trials: Sequence[TrialSummary], recovers: bool) -> str:
-    """What came of some trials, in numbers of trials."""
+    """Say what came of some trials, in numbers of trials."""
     failed = '{} failed'.format(sum(trial.ending is TrialEnding.FAILURE for trial in trials))
     if not recovers:
         return failed

@@ -25,7 +25,7 @@ class Part(NamedTuple):
 
 
 class ProtocolChoice(NamedTuple):
-    """What of a protocol is run, and on which seeds."""
+    """The part of a protocol that is run, and its seeds."""
 
     seeds: Mapping[str, int]  # the first of each of BLOCKS
     answer_delay: float  # s

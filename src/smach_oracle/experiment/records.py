@@ -33,7 +33,7 @@ class RecordedTrial(NamedTuple):
 
 
 class JobProgress(NamedTuple):
-    """How far a job is."""
+    """The progress of a job."""
 
     done: List[RecordedTrial]
     lost: Dict[int, str]  # number of the trial, from 0: why
