@@ -1,4 +1,4 @@
-"""What a camera gave at one moment: colour, registered depth, calibration and pose."""
+"""An image of a camera at one moment: colour, registered depth, calibration and pose."""
 from typing import NamedTuple
 
 import numpy as np

@@ -51,7 +51,7 @@ class Joint(NamedTuple):
         return moved(self.parts, self.turns, position) if self.moves else np.eye(4)
 
     def position(self, positions: Mapping[str, float]) -> float:
-        """Where it stands, in rad or m.
+        """Return the position at which the joint stands, in rad or m.
 
         :param positions: rad or m by joint. A joint that is missing goes with the one that it
             mimics, else it stands at zero.

@@ -1,4 +1,4 @@
-"""Where the links of a robot are, from its URDF and its joint positions."""
+"""The poses of a robot's links, from its URDF and its joint positions."""
 from typing import Dict, List, Mapping, Sequence
 
 import numpy as np

@@ -1,4 +1,7 @@
-"""Which of many points can lie on their convex hull: a hull of thirty thousand takes long."""
+"""The points, out of many, that can lie on their convex hull.
+
+A hull of thirty thousand points takes long.
+"""
 import numpy as np
 
 LEAST = 64  # fewer points are not worth the work

@@ -55,7 +55,7 @@ def largest_patch(points: np.ndarray) -> np.ndarray:
 
 def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
                 margin: float) -> List[np.ndarray]:
-    """What stands on a surface: for each thing, the indices of its points.
+    """Return the things that stand on a surface: for each thing, the indices of its points.
 
     Few points are taken for noise.
 

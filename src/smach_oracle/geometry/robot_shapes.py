@@ -1,4 +1,4 @@
-"""What a robot looks like, from its URDF: the shapes of its links, and how the links connect.
+"""A robot's looks, from its URDF: the shapes of its links, and how the links connect.
 
 Anybody on the robot's network may have set a robot description. So its size, its number of parts
 and its numbers are checked, and document types (with them entities) and circles of links are

@@ -8,7 +8,7 @@ from .transforms import quaternion
 
 
 class LinkTransform(NamedTuple):
-    """Where a link is in its parent."""
+    """The pose of a link in its parent."""
 
     parent: str
     child: str
