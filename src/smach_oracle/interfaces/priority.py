@@ -1,4 +1,4 @@
-"""How much of a busy machine a node gets: its nice value, where the system allows it."""
+"""A node's share of a busy machine: its nice value, where the system allows it."""
 import os
 import time
 from pathlib import Path

@@ -20,7 +20,7 @@ _ANGLE = number(-math.inf, math.inf, 'a list of angles, rad')
 
 
 class ArmNames(NamedTuple):
-    """What an arm's parts are called on the robot."""
+    """The names of an arm's parts on the robot."""
 
     base: str  # link from which the arm's joints begin
     tool: str  # link that commands move
@@ -105,7 +105,7 @@ class JointListener:
 
 
 class GripperReport(NamedTuple):
-    """How the last motion of a gripper ended."""
+    """A report on how the last motion of a gripper ended."""
 
     position: float = float('nan')  # m between the finger tips
     stalled: bool = False
@@ -122,7 +122,7 @@ class GripperPort:
         self.report = GripperReport()
 
     def why_not(self) -> str:
-        """Why it cannot be moved now, or ''."""
+        """Return why it cannot be moved now, or ''."""
         return '' if self._link.ready() else 'no gripper at {}'.format(self._link.name)
 
     @property
@@ -176,7 +176,7 @@ class ArmPort:
         self._publisher = rospy.Publisher(topic, JointTrajectory, queue_size=1, tcp_nodelay=True)
 
     def why_not(self) -> str:
-        """Why it cannot be moved now, or ''."""
+        """Return why it cannot be moved now, or ''."""
         if self._publisher.get_num_connections():
             return ''
         return 'no controller listens to {}'.format(self._publisher.resolved_name)

@@ -50,7 +50,7 @@ Brake = Callable[[np.ndarray, np.ndarray, float], Tuple[float, str]]
 
 
 class DriveLimits(NamedTuple):
-    """What a motion is held to."""
+    """The limits of a motion."""
 
     linear: float = 0.25  # m/s of the tool
     angular: float = 1.0  # rad/s of the tool
@@ -113,7 +113,7 @@ class CartesianDrive:
 
     def step(self, joints: np.ndarray, twist: np.ndarray, period: float,
              turn_freely: bool = False) -> DriveStep:
-        """Where the joints (n,) go within one period for the tool to move by `twist` (6,).
+        """Return where the joints (n,) go within one period for the tool to move by `twist` (6,).
 
         :param turn_freely: only the linear part counts. Meanwhile, also where it is zero, tool and
             elbow turn as brings the arm to its posture.

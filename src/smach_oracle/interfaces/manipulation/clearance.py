@@ -80,7 +80,7 @@ class ClearanceModel:
         self._boxes: List[Tuple[int, str]] = []
 
     def set_joints(self, positions: Mapping[str, float]) -> None:
-        """Where the joints are (rad or m). Names that the model does not have are left out."""
+        """Set where the joints are (rad or m). Names that the model does not have are left out."""
         known = [(self._joints[name], [position]) for name, position in positions.items()
                  if name in self._joints]
         if known:

@@ -1,4 +1,4 @@
-"""Who drives, and whether they still do: a dead-man's switch with a watchdog.
+"""A dead-man's switch with a watchdog: who drives, and whether they still do.
 
 Pure. Times are monotonic, in s.
 """
@@ -25,7 +25,7 @@ class DeadManSwitch:
         self._silent_until_s = -math.inf
 
     def holder(self, now_s: float) -> str:
-        """Who holds it, '' for nobody."""
+        """Return who holds it, '' for nobody."""
         return self._operator if now_s < self._until_s else ''
 
     def lapsed(self, now_s: float) -> bool:
@@ -52,7 +52,7 @@ class DeadManSwitch:
             self._dropped = ''
 
     def refuse(self, operator: str) -> None:
-        """What the operator wants cannot be: not held any more, until the next press."""
+        """End the operator's hold until the next press, because their command is impossible."""
         if operator == self._operator:
             self._until_s = -math.inf
 
@@ -63,7 +63,7 @@ class DeadManSwitch:
             self._dropped, self._silent_until_s = operator, now_s + _LET_GO_S
 
     def drop(self, now_s: float) -> None:
-        """What it was held for has ended, or somebody else stops it."""
+        """End the hold: what it was for has ended, or somebody else stops it."""
         holder = self.holder(now_s)
         if holder:
             self.press_for_nothing(holder, now_s)

@@ -145,7 +145,7 @@ class TeleoperationServer:
         return max(due_s + self._settings.period_s, now_s)
 
     def _driver(self) -> str:
-        """Who moves the arm, '' for nobody: the dead-man holds no longer than the goal."""
+        """Return who moves the arm, '' for nobody: the dead-man holds no longer than the goal."""
         return self._dead_man.holder(time.monotonic()) if self._goal.goal is not None else ''
 
     def _take(self, arrived: ArrivedCommand) -> None:

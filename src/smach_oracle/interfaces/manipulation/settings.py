@@ -34,7 +34,7 @@ _NEVER_ZERO = ('linear', 'angular', 'joint_share')  # of the limits: what is div
 
 
 class StateTeleoperation(NamedTuple):
-    """What the interface does about one state."""
+    """The interface's settings for one state."""
 
     arm: str = ''  # which one the person begins with. '' means the one driven last
     outputs: Mapping[str, str] = {}  # output key: one of _OUTPUTS

@@ -27,7 +27,7 @@ _REST_LEAD = 0.05  # rad by which targets may stay ahead of the joints when nobo
 
 
 class DescribedRobot(NamedTuple):
-    """What all arms share."""
+    """The description of the robot that all arms share."""
 
     urdf: str
     base: str  # frame of poses, and of commands that are not in another one
@@ -85,7 +85,7 @@ class TeleoperatedArm:
                 self._port.send(near, np.zeros(len(near)), period_s)
 
     def why_not(self, command: TeleopCommand, frozen: bool) -> str:
-        """Why the command cannot be carried out, or ''.
+        """Return why the command cannot be carried out, or ''.
 
         :param frozen: whether the world stands still, and publishes nothing, between two commands.
         """
@@ -105,7 +105,7 @@ class TeleoperatedArm:
                 or (self.gripper.why_not() if command.move_gripper else ''))
 
     def _unknown(self, more: Sequence[str], frozen: bool) -> str:
-        """Why positions of the arm's joints, or of `more`, are not known, '' where they are."""
+        """Return why positions of the arm's joints, or of `more`, are unknown, '' if known."""
         needed = joints_between(self._tree, self._robot.base, self._names.tool)[::-1]
         needed += [name for name in more if name not in needed]
         positions, _ = self._robot.listener.now()
@@ -163,7 +163,7 @@ class TeleoperatedArm:
         return np.array([positions[name] for name in self.chain.names])
 
     def tool_pose(self) -> PoseStamped:
-        """Where the tool is now, in the robot's base frame."""
+        """Return the pose of the tool now, in the robot's base frame."""
         positions, stamp = self._robot.listener.now()
         pose = link_pose(self._tree, self._robot.base, self._names.tool, positions)
         return PoseStamped(Header(frame_id=self._robot.base, stamp=stamp),

@@ -182,7 +182,7 @@ class _CameraSubscriptions:
             (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w))
 
     def lacking(self, base_frame: str) -> str:
-        """Why there is no image."""
+        """Return why there is no image."""
         silent = [
             each.resolved_name for each, name in zip(self._subscribers, self._seen)
             if not self._seen[name]

@@ -33,7 +33,7 @@ class MarkedScene(NamedTuple):
 
 
 def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
-    """What is around an object.
+    """Return the scene around an object.
 
     :raises MarkedSceneError: where the surface below it is not seen.
     """

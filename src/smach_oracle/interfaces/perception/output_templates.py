@@ -1,4 +1,4 @@
-"""Which outputs a marked object gives, per state: output keys, each with a part of the marking."""
+"""The outputs that a marked object gives, by state: keys, each with a part of the marking."""
 from typing import Dict, Mapping, NamedTuple
 
 from smach_oracle.oracle.errors import SettingsError

@@ -31,9 +31,9 @@ Corners = Tuple[int, int, int, int]  # left, top, right, bottom. The last two ex
 
 
 class SegmentationError(Exception):
-    """What was drawn gives no object. The text says why and what may help.
+    """The drawing gives no object. The text says why and what may help.
 
-    `mask`: (h, w) bool, where GrabCut found one, what came after it failed then.
+    `mask`: (h, w) bool, where GrabCut found one and a later step failed.
     """
 
     def __init__(self, text: str, mask: Optional[np.ndarray] = None) -> None:
