@@ -43,7 +43,7 @@ class Asker(Protocol):
 
 
 class Reply(NamedTuple):
-    """How an inquiry ended: with an answer that fits, or without one."""
+    """The end of an inquiry: with an answer that fits, or without one."""
 
     answer: Optional[Answer]
     question_id: str = ''  # of the last question, '' where none was put

@@ -28,7 +28,7 @@ from .stand_in import StandIn, real
 
 
 class _Resumed(NamedTuple):
-    """How a container goes on that was under way. See `Border.resume`."""
+    """The values with which a container that was under way goes on. See `Border.resume`."""
 
     keys: Dict[str, Any]
     gone: Tuple[str, ...]
@@ -38,7 +38,7 @@ class _Resumed(NamedTuple):
 
 
 class Border:
-    """What is kept beside a Concurrence or an Iterator of a wrapped tree.
+    """The data kept for a Concurrence or an Iterator of a wrapped tree.
 
     `machines`: the hidden machines of its branches, by label. It takes their states' places while
     the container executes, once at a time.

@@ -12,7 +12,7 @@ from .items import TrackedItems
 
 
 class Branch:
-    """What the oracle of a plain state knows of the Concurrence or Iterator that holds it."""
+    """The Concurrence or Iterator that holds a plain state, as the oracle of the state knows it."""
 
     def __init__(self, container: smach.Container, label: str) -> None:
         self.container: Any = container

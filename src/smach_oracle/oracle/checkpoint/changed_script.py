@@ -14,7 +14,7 @@ from .structure import Structure, differences
 
 
 class ChangedScript(NamedTuple):
-    """How a script differs from the one that was stopped.
+    """The differences between a script and the one that was stopped.
 
     `names`: paths of states by those that they had, empty where nobody has told them.
     """

@@ -76,7 +76,7 @@ def _end_goals(top: TreeNode, resumption: Resumption) -> None:
 
 
 class EntryPoint:
-    """Where one container goes on. It is used up when that begins to execute."""
+    """The place where one container goes on. It is used up when that begins to execute."""
 
     def __init__(self, stored: StoredContainer, down: Sequence[Place] = ()) -> None:
         """`down`: the states in which the containers below begin, where it is sent to one."""

@@ -39,7 +39,7 @@ RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up 
 
 
 class TrialStore:
-    """What one trial leaves in the store that the settings name."""
+    """The traces that one trial leaves in the store that the settings name."""
 
     def __init__(self, top: TreeNode) -> None:
         """Hold the machine in the store.

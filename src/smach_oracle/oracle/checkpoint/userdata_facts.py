@@ -24,7 +24,7 @@ class KeptOut(NamedTuple):
 
 
 class WeakIds:
-    """Which objects were seen. One that cannot be referred to weakly is new each time."""
+    """The objects that were seen. One that cannot be referred to weakly is new each time."""
 
     def __init__(self) -> None:
         self._seen: Dict[int, 'weakref.ref[Any]'] = {}

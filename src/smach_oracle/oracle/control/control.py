@@ -18,7 +18,7 @@ EndedBy = Callable[[], Optional[LetGo]]
 
 
 class Engine(Protocol):
-    """What wakes a machine that executes (`EngineProbe`)."""
+    """The part that wakes a machine that executes (`EngineProbe`)."""
 
     attentive: bool
     stays_attentive: bool  # whatever the operator wants
@@ -43,7 +43,7 @@ class Jump(NamedTuple):
 
 
 class Control:
-    """What holds the machines of one tree. Safe to use from several threads.
+    """The part that holds the machines of one tree. Safe to use from several threads.
 
     `is_set`: whether a machine has to look closer before a state.
     """

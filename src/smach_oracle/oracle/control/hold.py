@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class HeldBy(str, Enum):
-    """Why a container waits."""
+    """The reason why a container waits."""
 
     PAUSE = 'paused'
     BREAKPOINT = 'breakpoint'
@@ -12,7 +12,7 @@ class HeldBy(str, Enum):
 
 
 class LetGo(str, Enum):
-    """Why a wait is over."""
+    """The reason why a wait is over."""
 
     RESUMED = 'resumed'
     STEPPED = 'stepped'

@@ -20,7 +20,7 @@ class HoldTeller(Protocol):
 
 
 class Wait(NamedTuple):
-    """What a wait needs of its container."""
+    """The parts of its container that a wait needs."""
 
     teller: HoldTeller
     clocks: ContextManager[None]  # time limits around it stand still within

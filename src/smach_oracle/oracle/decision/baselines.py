@@ -15,7 +15,7 @@ def _times(count: int, one: str, many: str) -> str:
 
 
 class Baseline(Policy):
-    """What they have in common."""
+    """The methods that all baselines have in common."""
 
     def is_continuous(self, context: FailureContext) -> bool:
         """Return whether the last failure was of the same state, which has not succeeded since."""

@@ -8,7 +8,7 @@ from .policy import Action
 
 
 class DecisionFacts(NamedTuple):
-    """What led to a decision, and what it is."""
+    """A decision, and the facts that led to it."""
 
     state: str  # the failed one
     recent: Tuple[int, int]  # failures among its latest results, and their number; 0, 0: not known

@@ -10,7 +10,7 @@ from .failure_rate import FailureClass
 
 
 class Action(str, Enum):
-    """What the oracle does. The values are those of DECISION events."""
+    """An action of the oracle. The values are those of DECISION events."""
 
     REVISIT = 'revisit'  # enter the failed state again
     STEP_BACK = 'step_back'  # enter the state that the policy steps back to
@@ -20,7 +20,7 @@ class Action(str, Enum):
 
 
 class Preconditions(str, Enum):
-    """How the failed state's preconditions stand when the policy decides."""
+    """The standing of the failed state's preconditions when the policy decides."""
 
     NONE = 'none'
     MET = 'met'
@@ -28,7 +28,7 @@ class Preconditions(str, Enum):
 
 
 class FailureContext(NamedTuple):
-    """What the visits before say about a failure of `state`."""
+    """The facts that the visits before give about a failure of `state`."""
 
     state: str
     # where a step back leads if nothing was before: the container's initial state, or with
@@ -41,7 +41,7 @@ class FailureContext(NamedTuple):
 
 
 class Past(NamedTuple):
-    """What has been done in this trial before a decision."""
+    """The history of this trial before a decision."""
 
     recoveries: int = 0  # by the oracle itself, from failures of this state
     restarts: int = 0  # of the top machine

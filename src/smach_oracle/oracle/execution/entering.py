@@ -8,7 +8,7 @@ from .going_on import ask_to_go_on
 
 
 class Entry(NamedTuple):
-    """How a place is entered."""
+    """The way in which a place is entered."""
 
     missing: Tuple[str, ...]  # input keys that it does not find
     userdata: str  # 'restore' or 'keep'

@@ -13,7 +13,7 @@ from .transitions import go_to
 
 
 class Prospect(NamedTuple):
-    """What comes of sending a machine to a place: the checks of an expert's jump."""
+    """The effects of sending a machine to a place: the checks of an expert's jump."""
 
     why_not: str  # it cannot be entered now, or '' where it can
     missing: Tuple[str, ...] = ()  # input keys that it would not find

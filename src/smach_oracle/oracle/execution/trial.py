@@ -87,7 +87,7 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
-    """What the oracle of the top machine decides by, except what is set for single states."""
+    """Return by what the top machine's oracle decides, except what is set for single states."""
     settings, defaults = node.settings, node.settings.defaults
     parameters = sorted(settings.policy_parameters.items())
     return {'policy': settings.policy,
@@ -98,7 +98,7 @@ def _settings(node: TreeNode) -> Dict[str, Any]:
 
 
 def _learned(node: TreeNode) -> Dict[str, Any]:
-    """What was learned so far, where it is kept in a file.
+    """Return what was learned so far, where it is kept in a file.
 
     A record of the trial then has all that is needed to go on after it.
     """
@@ -143,7 +143,7 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
 
 
 def _why(outcome: Optional[str], error: Optional[BaseException]) -> str:
-    """Why an execution has no outcome, '' where it has one."""
+    """Return why an execution has no outcome, '' where it has one."""
     if error is not None:
         return '{}: {}'.format(type(error).__name__, error)
     return NO_OUTCOME if outcome is None else ''

@@ -117,7 +117,7 @@ class Oracle:
 
     @property
     def describe_failure(self) -> Callable[[smach.State], str]:
-        """How a state that failed by outcome is asked what it knows of its failure."""
+        """The function that asks a state that failed by outcome what it knows of its failure."""
         return self._node.tree.describe_failure
 
     @describe_failure.setter

@@ -51,7 +51,7 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
 
 
 class BranchPort(Protocol):
-    """What a node asks where its machine is the hidden one of a branch (`branches.branch`)."""
+    """A branch as the node of its hidden machine sees it (`branches.branch`)."""
 
     @property
     def container(self) -> smach.Container:
@@ -82,7 +82,7 @@ class DeparturePort(Protocol):
 
 
 class EntryPort(Protocol):
-    """Where a container goes on whose program was stopped (`checkpoint.resuming`)."""
+    """The place where a container goes on whose program was stopped (`checkpoint.resuming`)."""
 
     @property
     def label(self) -> str:

@@ -112,7 +112,7 @@ class TrialBudget:
             return why_not
 
     def __reduce__(self) -> Tuple[Any, ...]:
-        """What a trial has spent does not travel with a copied or pickled machine."""
+        """Leave what a trial has spent out of a copied or pickled machine."""
         return TrialBudget, ()
 
 

@@ -54,7 +54,7 @@ _KEEPS_KEY_SETS = _keeps_key_sets()
 
 
 class StateView:
-    """What a state reads and writes, kept for its next visit where that is safe.
+    """A state's view of the userdata, kept for its next visit where that is safe.
 
     This engine and the state's class decide that.
 

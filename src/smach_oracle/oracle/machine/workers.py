@@ -23,7 +23,7 @@ _STOPPED = 'still runs since a preempt or a shutdown'
 
 
 class LimitedResult(NamedTuple):
-    """How a state or a function went in its thread. One of the first three is told."""
+    """The result of a state or a function in its thread. One of the three is set."""
 
     outcome: object = None
     error: Optional[BaseException] = None
@@ -31,7 +31,7 @@ class LimitedResult(NamedTuple):
 
 
 class _Left(NamedTuple):
-    """What was left behind."""
+    """A call that was left behind."""
 
     target: object  # the state or the function, kept so that its id stays its own
     call: BackgroundCall

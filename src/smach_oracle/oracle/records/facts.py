@@ -29,7 +29,7 @@ _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
 
 
 class Decider(str, Enum):
-    """What made a decision."""
+    """The part that made a decision."""
 
     POLICY = 'policy'
     MAX_RECOVERIES = 'max_recoveries'  # the limit, outside every policy
@@ -40,7 +40,7 @@ class Decider(str, Enum):
 
 
 class TrialEnd(str, Enum):
-    """Why a trial ended."""
+    """The reason why a trial ended."""
 
     OUTCOME = 'outcome'
     ERROR = 'error'  # an exception left the machine

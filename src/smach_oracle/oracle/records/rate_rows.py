@@ -3,7 +3,7 @@ from typing import NamedTuple
 
 
 class StateRateRow(NamedTuple):
-    """What was learned of one state. The fields are those of StateRate.msg."""
+    """The numbers learned of one state. The fields are those of StateRate.msg."""
 
     path: str
     state: str
@@ -16,7 +16,7 @@ class StateRateRow(NamedTuple):
 
 
 class TransitionRow(NamedTuple):
-    """How often one edge was taken. The fields are those of TransitionCount.msg."""
+    """The count of one transition. The fields are those of TransitionCount.msg."""
 
     path: str
     state: str

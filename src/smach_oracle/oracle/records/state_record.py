@@ -32,7 +32,7 @@ class FastEdge:
 
 
 class KeptView(Protocol):
-    """What a state reads and writes, kept for its next visit (`machine.userdata_view.StateView`).
+    """A state's view of the userdata, kept for its next visit (`machine.userdata_view.StateView`).
 
     It may be used again while all that it was made of is still the same.
     """

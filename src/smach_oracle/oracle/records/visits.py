@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class VisitResult(IntEnum):
-    """How a visit counts. The numbers are those of VisitedState.msg."""
+    """The result as which a visit counts. The numbers are those of VisitedState.msg."""
 
     SUCCESS = 1
     FAILURE = 2

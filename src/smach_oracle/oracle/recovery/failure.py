@@ -17,7 +17,7 @@ from ..settings.failing_outcomes import PREEMPTED, FailingNames, is_preempted
 
 
 class Route(NamedTuple):
-    """Where an outcome leads, as the machine's author drew it."""
+    """The target of an outcome, as the machine's author drew it."""
 
     target: str  # a state, a container outcome, or '' where it leads nowhere
     is_state: bool
@@ -42,7 +42,7 @@ class Failure(NamedTuple):
 
 
 class ContainerEnding(NamedTuple):
-    """How a container would end, or go on, without an oracle: exactly one is set."""
+    """The way a container would end, or go on, without an oracle: exactly one is set."""
 
     state: Optional[str] = None
     outcome: Optional[str] = None

@@ -34,7 +34,7 @@ def _is_overridden(above: TreeNode, below: Labels) -> bool:
 
 
 class Foreseen(NamedTuple):
-    """Why the end of a container is left to who is above it."""
+    """The reason why the end of a container is left to the one above it."""
 
     text: str
     passed_over: str = ''  # the outcome with which an item of an Iterator is passed over

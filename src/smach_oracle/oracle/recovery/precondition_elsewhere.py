@@ -16,7 +16,7 @@ from ..settings.settings import ALLOW
 
 
 class NotMet(Exception):
-    """Why a precondition is not met, in words. It never leaves this package."""
+    """A precondition is not met. The text says why. This error never leaves its package."""
 
 
 class RunElsewhere:

@@ -17,7 +17,7 @@ from .precondition_probe import LivePreconditionProbe
 
 
 class Account(NamedTuple):
-    """What was done about a failure so far."""
+    """An account of what was done about a failure so far."""
 
     continuous: bool
     reason: str  # why the expert is asked

@@ -7,7 +7,7 @@ from . import checks as values
 
 
 class Budget(NamedTuple):
-    """What all containers of a machine may spend together in one trial. None means no limit."""
+    """The most that all containers of a machine may spend in one trial. None means no limit."""
 
     recoveries: Optional[int] = None  # decisions of the oracle's own that led to a state
     minutes: Optional[float] = None  # of monotonic time, from the beginning of the trial

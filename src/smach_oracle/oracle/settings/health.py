@@ -106,7 +106,7 @@ def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
 
 
 def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
-    """What the field must be: `equals`, or limits. True where nothing is said."""
+    """Return what the field must be: `equals`, or limits. True where nothing is said."""
     limits = [name for name in ('at_least', 'at_most') if name in entry]
     if not limits:
         return {'equals': _plain(prefix + 'equals', entry.get('equals', True))}

@@ -19,7 +19,7 @@ _LIMIT = values.number(0.1, 3600.0, 'seconds from 0.1 to 3600')
 
 
 class InterfaceStart(NamedTuple):
-    """How an interface that is not there is started."""
+    """The way in which an interface that is not there is started."""
 
     kind: str  # 'launch' or 'node'
     package: str
@@ -62,7 +62,7 @@ def checked_interfaces(given: object) -> Offers:
 
 
 def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
-    """How it is started, or None where it is somebody else's to start it."""
+    """Return how it is started, or None where it is somebody else's to start it."""
     kinds = [key for key in ('launch', 'node') if key in entry]
     if not kinds:
         for key in ('args', 'start_limit_s'):

@@ -202,7 +202,7 @@ def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -
 
 
 def _hint(prefix: str, key: str, allowed: List[str]) -> str:
-    """Where the key belongs, or the one that may be meant."""
+    """Say where the key belongs, or which one may be meant."""
     if not prefix and key == 'preconditions':
         return ' here (it belongs to a state: below states: LABEL:)'
     if prefix and (key in _MACHINE_CHECKS or key in _TOP_KEYS):
