@@ -1,4 +1,4 @@
-"""What must hold before a PR2 looks for something, or takes it: functions for an oracle's settings.
+"""Conditions that must hold before a PR2 looks for something or takes it, for an oracle's settings.
 
 Each takes a machine's userdata, which it does not read. They use head camera and encoders, with the
 names of topics and services relative to the script's node. Where its parameter ~snapshot names no

@@ -1,4 +1,4 @@
-"""What the fingers of a gripper tell by their encoders."""
+"""The fingers of a gripper, by their encoders."""
 from typing import Mapping
 
 from .robot import FINGER_JOINTS, GRIPPER_OPEN
@@ -23,5 +23,5 @@ def may_hold(joints: Mapping[str, float], arm: str) -> bool:
 
 
 def fingers_gap(joints: Mapping[str, float], arm: str) -> float:
-    """How far the tips of a gripper are apart, m; parameters as above."""
+    """Return how far the tips of a gripper are apart, m. The parameters are as above."""
     return sum(joints.get(name, 0.0) for name in FINGER_JOINTS[arm])

@@ -1,4 +1,4 @@
-"""What the robot knows of its kitchen: the map of a refrigerator, which may differ from the truth.
+"""The robot's knowledge of its kitchen: the map of a refrigerator, which may differ from the truth.
 
 The fridge's frame: origin on the floor in the middle of the front opening, x into the fridge, y to
 the left of whoever faces it, z up. Its door hangs on the left and opens towards that side. Lengths
@@ -93,7 +93,7 @@ def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
 
 
 def door_angle_at(kitchen: Kitchen, handle: np.ndarray) -> float:
-    """How far the door is open, rad, with its handle at a point (3,) of the fridge's frame."""
+    """Return the door's angle, rad, with its handle at a point (3,) of the fridge's frame."""
     hinge = np.array([0.0, kitchen.width / 2])
     shut, now = (np.arctan2(*(point[:2] - hinge)[::-1])
                  for point in (handle_point(kitchen, 0.0, 0.0), handle))

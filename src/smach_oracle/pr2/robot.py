@@ -1,4 +1,4 @@
-"""What the PR2 offers its own subsystems: encoders, controllers, a camera, never the truth.
+"""The PR2 as its own subsystems have it: encoders, controllers, a camera, never the truth.
 
 Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests and tuning, by the
 world's DirectRobot, which runs in one process. Lengths in m, angles in rad, times in s; frames as
@@ -41,7 +41,7 @@ class RobotError(Exception):
 
 
 class GripperState(NamedTuple):
-    """Where a gripper came to rest."""
+    """The gap and the force with which a gripper came to rest."""
 
     position: float  # m between the finger tips
     effort: float  # N

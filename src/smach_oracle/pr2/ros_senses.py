@@ -1,4 +1,4 @@
-"""What a robot publishes of itself: joint states, transforms, images.
+"""A robot's messages about itself: joint states, transforms, images.
 
 Where its world gives snapshots, all of it is of one moment.
 """
@@ -111,7 +111,7 @@ class RosSenses:
         self._tree_grace = ConnectionGrace()
 
     def lacking(self) -> List[str]:
-        """What is not connected: the service for snapshots, topics.
+        """Return what is not connected: the service for snapshots, topics.
 
         For those that are, it waits until their publishers send to this node.
         """

@@ -1,4 +1,4 @@
-"""What planning and perception cost: s of the world's time for each kind of work.
+"""The costs of planning and perception: s of the world's time for each kind of work.
 
 Costs go by the amount of work and never by a clock: the same question costs the same on any day
 and under any load. The figures are orders of magnitude for the computers that a PR2 carries, not

@@ -70,7 +70,9 @@ USUAL = np.array([0.03, 0.03, 0.06])  # m, half extents of a held thing that not
 
 
 def elsewhere_of(attempt: int) -> int:
-    """How many ways to grasp a thing have failed: the first is tried twice, firmer the second time.
+    """Return how many ways to grasp a thing have failed.
+
+    The first way is tried twice, firmer the second time.
 
     :param attempt: of a goal.
     """
@@ -223,7 +225,7 @@ class Manipulation:
 
     def _standing_at(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
                      boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:
-        """What stands about a place by now, and is not on the map: boxes by name.
+        """Return the things about a place by now that are not on the map: boxes by name.
 
         :param boxes: the map.
         """
@@ -256,7 +258,7 @@ class Manipulation:
 
     @contextlib.contextmanager
     def firmer_after_slip(self, attempt: int = 0) -> Iterator[float]:
-        """How firmly to grip, N. Where it slips even so, the next grip is the firmest.
+        """Yield how firmly to grip, N. Where it slips even so, the next grip is the firmest.
 
         :param attempt: how often it has been tried before. After the first time, the grip is firm.
         """

@@ -54,7 +54,7 @@ NEARER = 0.02  # m by which one thing must stand nearer than another to count as
 
 
 class Perception:
-    """What the camera sees, as the results of the two actions. Needs no node."""
+    """The results of the two actions, from what the camera sees. Needs no node."""
 
     def __init__(self, robot: Robot, links: Dict[str, Joint], kitchen: Kitchen) -> None:
         """
@@ -144,7 +144,7 @@ class Perception:
 
 
 def _look(goal: DetectTabletopGoal) -> Optional[Look]:
-    """What the object that a goal asks for looks like, or None where it asks for the nearest one.
+    """Return the looks of the object that a goal asks for, or None for the nearest one.
 
     :raises NotSeen: for numbers that are not allowed.
     """
@@ -159,7 +159,7 @@ def _look(goal: DetectTabletopGoal) -> Optional[Look]:
 
 @contextlib.contextmanager
 def told_where_to_look(image: CameraImage, odom_from_base: np.ndarray) -> Iterator[None]:
-    """Where what fails knows it, the action's result says where to look to see more.
+    """Have the action's result say where to look to see more, where a failure knows it.
 
     It says so in odom_combined: the robot may have driven when it looks there.
     """

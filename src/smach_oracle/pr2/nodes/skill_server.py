@@ -56,7 +56,7 @@ class SkillServer:
         self._servers.append(server)
 
     def names(self) -> int:
-        """How many actions are served."""
+        """Return how many actions are served."""
         return len(self._servers)
 
     def _serve(self, name: str, spec: type, server: actionlib.SimpleActionServer, handler: Handler,

@@ -1,1 +1,1 @@
-"""What the head camera sees: tables, objects, the refrigerator's door."""
+"""Perception by the head camera: tables, objects, the refrigerator's door."""

@@ -1,4 +1,4 @@
-"""Where the camera measured no depth: patches, as glare makes them, in which things may stand."""
+"""Patches where the camera measured no depth, as glare makes them, in which things may stand."""
 from typing import Optional
 
 import numpy as np

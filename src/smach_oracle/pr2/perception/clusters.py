@@ -1,4 +1,4 @@
-"""What stands on a level surface in a camera image: clusters of points above the surface."""
+"""Things on a level surface in a camera image: clusters of points above the surface."""
 import zlib
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
@@ -18,7 +18,7 @@ MARGIN = 0.01  # m that things must stand inside the edge of the surface
 
 
 class NotSeen(Exception):
-    """What was looked for cannot be made out in the image. The text is the reason, for people.
+    """The image does not show what was looked for. The text is the reason, for people.
 
     :param where: (3,) m in the frame of the base, at which to look to see more. None means not
         known.

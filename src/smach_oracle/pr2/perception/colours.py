@@ -41,7 +41,7 @@ def name_of(colour: np.ndarray) -> str:
 
 
 def unlikeness(colours: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How much the shares of red, green and blue differ, 0 to 1, whatever light falls on them.
+    """Return how much the shares of red, green and blue differ, 0 to 1, in whatever light.
 
     :param colours: (..., 3).
     :param other: (3,).

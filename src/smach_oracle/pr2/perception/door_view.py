@@ -88,7 +88,7 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
 
 
 def _handle_shift(local: np.ndarray, kitchen: Kitchen, offset: float) -> Optional[float]:
-    """How much farther from the hinge than in the map the handle is seen, m.
+    """Return how much farther from the hinge the handle is seen than it is in the map, m.
 
     :param local: (n, 3) points in the door's frame.
     :returns: None where it is not seen.

@@ -80,7 +80,7 @@ def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarra
 
 def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
                colour: str) -> List[Cluster]:
-    """What has a colour: whole things, and parts of things that touch, foremost first."""
+    """Return the things of a colour: whole, or parts of things that touch, foremost first."""
     found = []
     for cluster in clusters:
         pixels = cloud.colour[tuple(cluster.pixels.T)]
@@ -92,7 +92,7 @@ def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
 
 
 def _on_shelf(cloud: OrganizedCloud, clusters: Sequence[Cluster]) -> str:
-    """What is on the shelf, for people."""
+    """Say what is on the shelf, for people."""
     names = [name_of(cloud.colour[tuple(each.pixels.T)].mean(axis=0)) or 'dark'
              for each in clusters]
     if not names:
@@ -128,7 +128,7 @@ def _about_shelf(cloud: OrganizedCloud, kitchen: Kitchen,
 
 def _in_front(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, kitchen: Kitchen,
               base_from_fridge: np.ndarray, min_height: float) -> List[Cluster]:
-    """What stands on the shelf, foremost first."""
+    """Return the things that stand on the shelf, foremost first."""
     low, high = shelf_region(kitchen)
     lowest = max(OFF_SHELF, min_height if min_height > 0 else 0.03)
     found = clusters_on(cloud, plane, patch, lowest, float(high[2] - low[2]) - 0.02, MARGIN)
@@ -138,7 +138,7 @@ def _in_front(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, kitchen: K
 
 
 def _why_no_drink(cloud: OrganizedCloud, cluster: Cluster, what: str, blind: np.ndarray) -> str:
-    """Why a cluster cannot be taken for a drink, or ''.
+    """Return why a cluster cannot be taken for a drink, or ''.
 
     :param what: what it is, for people.
     :param blind: the patches of the image that have no depth.

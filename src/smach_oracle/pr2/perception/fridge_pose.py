@@ -1,4 +1,4 @@
-"""Where the refrigerator stands, by all of its faces that a camera image shows."""
+"""The pose of the refrigerator, by all of its faces that a camera image shows."""
 from typing import NamedTuple
 
 import numpy as np

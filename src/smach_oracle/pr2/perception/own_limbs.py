@@ -1,4 +1,4 @@
-"""Where the robot's own arms are, by its encoders: what the camera sees there is left out."""
+"""The robot's own arms, by its encoders: what the camera sees there is left out."""
 from typing import Dict, List, Mapping
 
 import numpy as np

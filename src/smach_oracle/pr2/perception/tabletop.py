@@ -38,14 +38,14 @@ SAME_SIZE = 0.025  # m by which one thing's extents may differ in two images
 
 
 class Look(NamedTuple):
-    """What a thing looked like in an earlier image."""
+    """The looks of a thing in an earlier image."""
 
     colour: np.ndarray  # (3,) red, green and blue, 0 to 255
     size: np.ndarray  # (3,) m
 
 
 class Tabletop(NamedTuple):
-    """What was found, in the frame of the base."""
+    """The table and the objects that were found, in the frame of the base."""
 
     table: UprightBox  # the part of the table's top that is in view. Its height is 0
     # the one that was asked for, then nearest first. The first one is fit for the gripper
@@ -121,7 +121,7 @@ def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[U
 
 def _beyond(cloud: OrganizedCloud, plane: Plane, distance: float,
             near: np.ndarray) -> List[np.ndarray]:
-    """Where to look, (3,) each, for what may stand nearer than `distance` m beside the image."""
+    """Return where to look, (3,) each, for things nearer than `distance` m next to the image."""
     found = []
     for edge in (cloud.points[:, :EDGE], cloud.points[:, -EDGE:]):
         points = edge[np.isfinite(edge[..., 2])]
@@ -226,7 +226,7 @@ def _no_table(cloud: OrganizedCloud) -> str:
 
 
 def _hidden_by(cloud: OrganizedCloud) -> str:
-    """Which limb covers much of the image, as the end of a sentence."""
+    """Return which limb covers much of the image, as the end of a sentence."""
     shares = [(float((cloud.hidden == index).mean()), name)
               for index, name in enumerate(cloud.limbs)]
     share, name = max(shares, default=(0.0, ''))

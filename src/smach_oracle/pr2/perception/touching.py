@@ -60,7 +60,7 @@ def _with_those_between(points: np.ndarray, colours: np.ndarray,
 
 
 def part_of(cluster: Cluster, chosen: np.ndarray, plane: Plane) -> Optional[Cluster]:
-    """What some points of a cluster make by themselves, or None where they are too few.
+    """Return the cluster that some points of a cluster make, or None where they are too few.
 
     :param chosen: (n,) bool. Those that lie apart from most of them are left out.
     """
@@ -75,7 +75,7 @@ def part_of(cluster: Cluster, chosen: np.ndarray, plane: Plane) -> Optional[Clus
 
 
 def why_several(cloud: OrganizedCloud, cluster: Cluster) -> str:
-    """What shows that this is more than one thing, or ''."""
+    """Return what shows that this is more than one thing, or ''."""
     box = cluster.box
     if box.wide < LEAST_LENGTH:
         return ''

@@ -30,7 +30,7 @@ class SkillError(Exception):
 
 
 class SkillContext(NamedTuple):
-    """What a skill works with: the robot, and the model of its body."""
+    """The things that a skill works with: the robot, and the model of its body."""
 
     robot: Robot
     model: CollisionModel
@@ -289,7 +289,7 @@ def backed_off(pose: np.ndarray, distance: float) -> np.ndarray:
 
 
 def summary(reasons: Iterable[str]) -> str:
-    """How often each reason came up: '5 times out of reach, 2 times ...', most frequent first."""
+    """Count each reason, the most frequent first: '5 times out of reach, 2 times ...'."""
     counted: Dict[str, int] = {}
     for reason in reasons:
         counted[reason] = counted.get(reason, 0) + 1

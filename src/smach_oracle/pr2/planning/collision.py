@@ -1,4 +1,4 @@
-"""What an arm would touch: the robot at its encoder readings among boxes, in a PyBullet client.
+"""Collisions of an arm: the robot at its encoder readings among boxes, in a PyBullet client.
 
 The client is apart from the world's: it knows what the robot has measured. It is cleaned before
 each skill, so that no answer depends on what was asked before. Lengths in m, angles in rad, frame:
@@ -140,7 +140,7 @@ class CollisionWorld:
         return next(self._collisions(q), None) is None
 
     def why_not(self, q: np.ndarray) -> str:
-        """What touches what at joint positions (7,), in words, or '' where nothing does."""
+        """Say what touches what at joint positions (7,), or return '' where nothing does."""
         names = {index: name for name, index in self._links.items()}
         bodies = {body: name for name, body in self._boxes.items()}
         found = set()

@@ -85,7 +85,7 @@ def _next(chain: JointChain, tool_at: ToolAt, angle: float, turns: Sequence[floa
 
 
 def _room(chain: JointChain, q: np.ndarray) -> float:
-    """How far the joints stay from their limits, rad: the least distance, and a little of each."""
+    """Return the joints' room to their limits, rad: the least distance, and a little of each."""
     bounded = ~chain.continuous
     distance = np.minimum(q - chain.lower, chain.upper - q)[bounded]
     return float(np.minimum(distance, ROOM).min() + 0.1 * np.minimum(distance, ROOM).sum())

@@ -85,7 +85,7 @@ def _to_the_faces(box: UprightBox, straight: float) -> np.ndarray:
 
 
 def width_across(box: UprightBox, heading: float) -> float:
-    """How much of the gap between the tips a thing takes up, m.
+    """Return how much of the gap between the tips a thing takes up, m.
 
     :param heading: rad, of the hand that comes.
     """
@@ -108,7 +108,7 @@ def _projected(box: UprightBox, heading: float) -> float:
 
 
 def _middle(box: UprightBox, heading: float, pitch: float) -> np.ndarray:
-    """Where the tool frame goes: beyond the middle, at a height where the fingers hold well."""
+    """Return the tool frame's place: beyond the middle, at a height where the fingers hold well."""
     bottom, top = box.centre[2] - box.size[2] / 2, box.centre[2] + box.size[2] / 2
     if pitch > FROM_ABOVE:
         return np.array([box.centre[0], box.centre[1], max(bottom + 0.02, top - DEEP)])

@@ -1,4 +1,4 @@
-"""How the arms are held while the base drives: compact, clear of doors and of the camera's view."""
+"""The arms while the base drives: compact, clear of doors and of the camera's view."""
 from typing import Iterable, Mapping
 
 import numpy as np

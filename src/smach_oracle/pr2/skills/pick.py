@@ -41,7 +41,7 @@ class ObjectSlipped(SkillError):
 
 
 class HeldObject(NamedTuple):
-    """What a hand holds."""
+    """The object that a hand holds."""
 
     grasp: np.ndarray  # 4x4, base_footprint from tool, when the gripper closed
     tool_from_object: np.ndarray  # 4x4, of its centre, upright as it stood
@@ -53,11 +53,11 @@ Grasped = Callable[[HeldObject], None]
 
 
 def nobody_told(held: HeldObject) -> None:
-    """Where nobody wants to know what the hand has closed on."""
+    """Do nothing: nobody wants to know what the hand has closed on."""
 
 
 class _GraspPath(NamedTuple):
-    """How to get at a grasp."""
+    """The path to a grasp."""
 
     there: np.ndarray  # (m, 7) to the place in front of the object
     approach: np.ndarray  # (k, 7) from there

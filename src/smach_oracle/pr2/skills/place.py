@@ -51,7 +51,7 @@ COLUMNS = 320  # of an image that are looked at
 
 
 class _PlacePath(NamedTuple):
-    """How to put it down."""
+    """The path that puts an object down."""
 
     there: np.ndarray  # (m, 7), to above the place
     down: np.ndarray  # (k, 7)
@@ -215,7 +215,7 @@ def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
 
 def _release(hand: Arm, q: np.ndarray, pose: np.ndarray, held: HeldObject,
              support: str) -> Optional[Tuple[float, np.ndarray]]:
-    """How wide to open the fingers (m), and a path back (m, 7), or None where there is no room.
+    """Return how wide to open the fingers (m) and a path back (m, 7), or None if there is no room.
 
     :param q: (7,), of the hand at `pose` (4x4), where it lets go.
     """

@@ -1,4 +1,4 @@
-"""Where something may be put down: the place itself, and free spots next to it."""
+"""Spots to put something down: the place itself, and free spots next to it."""
 from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
