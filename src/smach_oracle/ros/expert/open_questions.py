@@ -308,7 +308,7 @@ def _check_same(known: ExpertQueryGoal, goal: ExpertQueryGoal) -> None:
 
 
 def _claim_problem(question: OpenQuestion, action: int, expert: str, lease_s: float) -> str:
-    """Why this claim cannot be, '' where it can."""
+    """Return why this claim cannot be, '' where it can."""
     if not expert.strip():
         return 'the claim does not say who claims: `expert` is empty'
     if not 0 <= lease_s < math.inf:

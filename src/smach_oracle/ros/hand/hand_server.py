@@ -137,6 +137,6 @@ def _is_in(path: str, machine: str) -> bool:
 
 
 def _caller(request: Any) -> str:
-    """Who commands: as the request says, else the node that calls."""
+    """Return who commands: as the request says, else the node that calls."""
     header = getattr(request, '_connection_header', None) or {}
     return str(request.by or header.get('callerid', ''))

@@ -149,13 +149,13 @@ def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:
 
 
 def _usual_actions(container: ContainerProspect) -> str:
-    """What the policy may do on the failure of most of the states."""
+    """Say what the policy may do when a state fails, for most of the states."""
     counts = Counter(_actions(container, state) for state in container.states)
     return counts.most_common(1)[0][0] if counts else ''
 
 
 def _actions(container: ContainerProspect, state: StateProspect) -> str:
-    """What the policy may do, by failure rate."""
+    """Say what the policy may do, by failure rate."""
     settings = state.settings
     every = {actions for _, actions in state.actions}
     if every in ({(Action.ASK,)}, {(Action.GIVE_UP,)}):

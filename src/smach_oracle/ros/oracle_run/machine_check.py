@@ -89,7 +89,7 @@ def _prepare(machine: OracleContainer, running: ExitStack) -> str:
 
 
 def _without_name(prospects: Sequence[ContainerProspect], name: str) -> Tuple[str, ...]:
-    """What is said of a machine, which is the same for machines alike, whatever their names."""
+    """Return the report on a machine without its name, which is the same for machines alike."""
     return tuple(line for each in prospects
                  for line in lines_of(each._replace(path=each.path[len(name):])))
 

@@ -76,7 +76,7 @@ def _nothing() -> None:
 
 
 def _report_stream() -> Any:
-    """Where the report goes: stdout, while what the script says there goes to stderr."""
+    """Return the report's stream: stdout, while what the script prints there goes to stderr."""
     report = os.fdopen(os.dup(1), 'w')
     os.dup2(2, 1)
     sys.stdout = sys.stderr
@@ -201,7 +201,7 @@ class _ScriptWatch:
 
 
 def _place(thread_id: int) -> str:
-    """Where the script is, as FILE:LINE."""
+    """Return where the script is, as FILE:LINE."""
     frame: Optional[Any] = sys._current_frames().get(thread_id)
     script = str(getattr(sys.modules['__main__'], '__file__', ''))
     place = '{}:{}'.format(frame.f_code.co_filename, frame.f_lineno) if frame else 'its end'

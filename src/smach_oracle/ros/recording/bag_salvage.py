@@ -91,7 +91,7 @@ class Salvage:
         return following
 
     def _find(self, position: int) -> int:
-        """Where the next record begins, at `position` or behind it, the file's size: nowhere."""
+        """Return where the next record begins, at `position` or behind it, else the file's size."""
         while True:
             found = self._window.find(_FIRST_FIELD, position + 4)
             if found < 0:

@@ -82,7 +82,7 @@ def event_number(data: bytes) -> Optional[int]:
 
 
 def _after_strings(data: bytes, position: int, count: int) -> int:
-    """Where `count` strings end that begin at a position.
+    """Return where `count` strings end that begin at a position.
 
     :raises struct.error: where the data end before.
     :raises UnicodeDecodeError: where one is no text.
