@@ -142,7 +142,7 @@ def pose_on_floor(x_m: float, y_m: float, yaw: float) -> PoseStamped:
 
 
 def palm() -> PoseStamped:
-    """Where the person holds out a hand."""
+    """Return the pose at which the person holds out a hand."""
     return PoseStamped(Header(frame_id=ODOM), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
 

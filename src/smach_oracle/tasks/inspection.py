@@ -78,7 +78,7 @@ def make_machine() -> smach.StateMachine:
 
 
 def drive_goal(userdata: smach.UserData, goal: MoveBaseGoal) -> MoveBaseGoal:
-    """Where to stand at a place."""
+    """Return the goal with which the robot drives to a place, to stand there."""
     place = userdata.place
     turn = Quaternion(0.0, 0.0, math.sin(0.5 * place['yaw']), math.cos(0.5 * place['yaw']))
     return MoveBaseGoal(PoseStamped(Header(frame_id='map'),

@@ -167,7 +167,7 @@ def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
 
 
 def place_pose() -> PoseStamped:
-    """Where the object should stand, m, in ODOM."""
+    """Return the pose at which the object should stand, m, in ODOM."""
     return PoseStamped(Header(frame_id=ODOM),
                        Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0)))
 
