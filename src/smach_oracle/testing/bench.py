@@ -199,7 +199,7 @@ class Bench:
 
 
 class _TrialNotes:
-    """What is seen of one trial, in the order in which it happens. Threads may note at once."""
+    """Notes on one trial, in the order in which things happen. Threads may note at once."""
 
     def __init__(self, machine: smach.StateMachine, failing: FailingNames) -> None:
         self.questions: List[Question] = []

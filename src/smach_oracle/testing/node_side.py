@@ -6,7 +6,7 @@ from smach_oracle.ros.container import OracleContainer as RosOracleContainer
 
 
 class NodeSide:
-    """What a machine has from its node while it is on the bench."""
+    """The things that a machine has from its node while it is on the bench."""
 
     container_class = RosOracleContainer
 
