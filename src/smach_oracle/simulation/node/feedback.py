@@ -37,7 +37,7 @@ def _header(frame_id: str = '') -> Header:
 
 
 def arm(world: World, motion: Trajectory) -> FollowJointTrajectoryFeedback:
-    """Where the joints should be, and are."""
+    """Return where the joints should be, and where they are."""
     wanted = [world.robot.target(name) for name in motion.joints]
     found = [world.robot.position(name) for name in motion.joints]
     return FollowJointTrajectoryFeedback(_header(), motion.joints, _point(wanted), _point(found),
@@ -56,13 +56,13 @@ def arm_result(_world: World, _motion: Trajectory, end: MotionEnd) -> FollowJoin
 
 
 def gripper(name: str, world: World, _motion: GripperMotion) -> GripperCommandFeedback:
-    """Where the fingers are."""
+    """Return where the fingers are."""
     return GripperCommandFeedback(world.gap(name), world.robot.finger_force(name), False, False)
 
 
 def gripper_result(name: str, world: World, _motion: GripperMotion,
                    end: MotionEnd) -> GripperCommandResult:
-    """Where the fingers came to rest."""
+    """Return where the fingers came to rest."""
     state = end.result.gripper if end.result else None
     if state is None:
         return GripperCommandResult(world.gap(name), world.robot.finger_force(name), False, False)
@@ -83,7 +83,7 @@ def head_result(_world: World, _motion: HeadMotion, _end: MotionEnd) -> PointHea
 
 
 def torso(world: World, motion: TorsoMotion) -> SingleJointPositionFeedback:
-    """How far it is."""
+    """Return how far the torso is."""
     name = motion.joints[0]
     position = world.robot.position(name)
     return SingleJointPositionFeedback(_header(), position,
@@ -96,7 +96,7 @@ def torso_result(_world: World, _motion: TorsoMotion, _end: MotionEnd) -> Single
 
 
 def base(world: World, _motion: Motion) -> MoveBaseFeedback:
-    """Where the robot believes to be."""
+    """Return where the robot believes that it is."""
     pose = world.odom_from_base()
     return MoveBaseFeedback(
         PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))))

@@ -1,4 +1,4 @@
-"""What a controller's goal means, or why it is refused: messages in, plain data out, no node."""
+"""The meaning of a controller's goal, or why it is refused: messages in, data out, no node."""
 import math
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 

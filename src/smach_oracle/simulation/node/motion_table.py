@@ -1,4 +1,4 @@
-"""What moves now: at most one motion for each part of the robot."""
+"""The motions under way: at most one for each part of the robot."""
 from typing import Callable, Dict, List, NamedTuple, Optional
 
 from ..physics.trajectory import Motion, MotionResult
@@ -8,7 +8,7 @@ PARTS = ('base', 'head', 'left_arm', 'left_gripper', 'right_arm', 'right_gripper
 
 
 class MotionEnd(NamedTuple):
-    """How a motion ended: with its result, or because it was stopped (None)."""
+    """The end of a motion: its result, or None where it was stopped."""
 
     result: Optional[MotionResult]
     text: str = ''  # why it was stopped, or failed
@@ -33,7 +33,7 @@ class MotionTable:
         return bool(self._running)
 
     def motion(self, part: str) -> Optional[Motion]:
-        """What moves this part, or None."""
+        """Return the motion of this part, or None."""
         running = self._running.get(part)
         return running.motion if running else None
 

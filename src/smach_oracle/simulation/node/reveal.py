@@ -90,7 +90,7 @@ def _message(world: World, name: str, part: _BodyPart, seen: np.ndarray,
 
 
 def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
-    """Where the camera has it, and the share of its outline that nothing hides."""
+    """Return where the camera has it, and the share of its outline that nothing hides."""
     corners = np.array(np.meshgrid(*([[-0.5, 0.5]] * 3))).reshape(3, 8).T * part.size
     camera = camera_pose(world)
     points = corners @ part.pose[:3, :3].T + part.pose[:3, 3]

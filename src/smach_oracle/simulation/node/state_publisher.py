@@ -90,7 +90,9 @@ def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_ba
 
 
 def odometry(odom_from_base: np.ndarray, velocity: np.ndarray, stamp: rospy.Time) -> Odometry:
-    """Where the robot believes to stand, and how it moves. No variance is known (zeros).
+    """Return where the robot believes that it stands, and how it moves.
+
+    No variance is known (zeros).
 
     :param odom_from_base: 4x4, ODOM_FRAME from BASE_FRAME.
     :param velocity: (3,), as `Pr2Body.base_velocity` gives it.

@@ -36,7 +36,7 @@ class TrialTruth:
 
     def record(self, verdict: TrialVerdict, harm: Tuple[Harm, ...], sim_s: float,
                spent: Mapping[str, float], used: Mapping[str, float]) -> Dict[str, Any]:
-        """What is to be written at its end.
+        """Return the record that is to be written at its end.
 
         :param harm: all that came to harm in it.
         :param spent: wall s by what the world's process did in them.

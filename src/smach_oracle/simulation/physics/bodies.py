@@ -172,7 +172,7 @@ def _load(client: int, body: Body, turn: Sequence[float]) -> int:
 
 
 def _set_joints(client: int, placed: PlacedBody) -> None:
-    """Where its joints start, and their dry friction. Nothing else drives them."""
+    """Set where its joints start, and their dry friction. Nothing else drives them."""
     friction = dict(placed.body.joint_friction)
     start = dict(placed.body.joints)
     for name in list(friction) + list(start) + [each[0] for each in placed.body.joint_closing]:

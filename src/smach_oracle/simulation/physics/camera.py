@@ -59,7 +59,7 @@ def believed_camera(world: World) -> np.ndarray:
 
 
 class RenderedView:
-    """What a camera without noise sees.
+    """The view of a camera without noise.
 
     It has `colour` (h, w, 3) uint8 RGB, `depth` (h, w) m, and `bodies` (h, w) by their numbers.
     """

@@ -13,7 +13,7 @@ Start = Union[np.ndarray, float]
 
 
 class LoggedWorld(Protocol):
-    """What the log looks at: see World."""
+    """The parts of World that the log reads."""
 
     periods: int
 
@@ -25,7 +25,7 @@ class LoggedWorld(Protocol):
 
 
 class CauseSpan(NamedTuple):
-    """When a cause was there, s since the trial began."""
+    """The time during which a cause was there, s since the trial began."""
 
     kind: str
     text: str
@@ -41,7 +41,7 @@ class CauseSpan(NamedTuple):
 
 
 class CauseLog:
-    """When the causes of one trial began and ended."""
+    """A log of when the causes of one trial began and ended."""
 
     def __init__(self, causes: Tuple[SceneCause, ...], awaited: List[str]) -> None:
         """

@@ -50,7 +50,7 @@ OPTIONS: Dict[str, Dict[str, float]] = {
 
 
 class DisturbedWorld(Protocol):
-    """What a disturbance moves: see World."""
+    """The parts of World that a disturbance moves or needs."""
 
     periods: int  # control periods since the reset
 
@@ -198,7 +198,7 @@ def _values(disturbance: Disturbance) -> Dict[str, float]:
 
 
 def _periods(disturbance: Disturbance, values: Dict[str, float]) -> int:
-    """How many control periods it takes until the world is left to itself."""
+    """Return how many control periods it takes until the world is left to itself."""
     seconds = values['duration'] + (SETTLING_S if disturbance.kind == 'arm' else 0.0)
     return max(1, round(seconds / PERIOD))
 

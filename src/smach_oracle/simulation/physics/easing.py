@@ -1,4 +1,4 @@
-"""How far a motion has come that starts and ends at rest."""
+"""The progress of a motion that starts and ends at rest."""
 
 
 def eased(share: float) -> float:

@@ -1,4 +1,4 @@
-"""What comes to harm in the course of a trial: things knocked over, dropped, pushed off.
+"""Harm in the course of a trial: things knocked over, dropped, pushed off.
 
 It looks at every thing ten times a second, and judges a thing when that has come to rest again. It
 only looks: physics is the same with it and without.
@@ -17,7 +17,7 @@ STILL = 0.001  # m or rad between two looks: what moves less is at rest
 
 
 class HarmedWorld(Protocol):
-    """What is looked at."""
+    """The parts of World that are watched for harm."""
 
     periods: int
 
@@ -100,7 +100,7 @@ class HarmWatch:
 
     @staticmethod
     def _harm(world: HarmedWorld, name: str, seen: _Watched, pose: np.ndarray) -> str:
-        """What has become of a thing since it last rested, one of KINDS, or ''."""
+        """Return what has become of a thing since it last rested, one of KINDS, or ''."""
         if seen.bottom - _bottom(world.body(name), pose) > FALL:
             return DROPPED if seen.was_held else PUSHED_OFF
         return KNOCKED_OVER if seen.upright and not _stands(pose) else ''

@@ -60,7 +60,7 @@ def _wrong_object(world: World, goal: Goal) -> str:
 
 
 def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:
-    """What keeps one body from being the success that the goal asks for."""
+    """Return what keeps one body from being the success that the goal asks for."""
     pose, (speed, turning) = world.body_pose(name), world.body_speed(name)
     touching = {contact.other for contact in world.contacts(name) if contact.force > 0}
     height = pose[2, 3] - goal.position[2]

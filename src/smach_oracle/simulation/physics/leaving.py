@@ -1,4 +1,4 @@
-"""How a trial leaves a lab in which a robot goes on: what a person does there when it is over."""
+"""The end of a trial in a lab where the robot goes on: what a person does there then."""
 from typing import Tuple
 
 import numpy as np
@@ -43,7 +43,7 @@ def _left(world: World, name: str) -> Body:
 
 
 def _joints(world: World) -> Tuple[Tuple[str, float], ...]:
-    """Where the joints are by their encoders, within their limits."""
+    """Return where the joints are by their encoders, within their limits."""
     limits, found = world.robot.limits, world.joints()
     return tuple((name, min(max(found[name], limits[name][0]), limits[name][1]))
                  for name in JOINTS)

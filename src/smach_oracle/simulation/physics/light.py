@@ -1,4 +1,4 @@
-"""What light does to the head camera's images for a time: it fails, or falls into the lens.
+"""The effect of light on the head camera's images for a time: it fails, or falls into the lens.
 
 A glare begins at a place that reflects the sun or a lamp towards a point, the `eye`. Seen from near
 the ray to that point, the place itself is too bright, and so is its mirror image in the lens, at
@@ -25,7 +25,7 @@ INTO_LENS = 0.9  # rad off the optical axis from which light still gets into the
 
 
 class Light(NamedTuple):
-    """What spoils images from a control period up to another."""
+    """A spell of bad light for images, from a control period up to another."""
 
     kind: str  # 'dim' or 'glare'
     values: Dict[str, float]
@@ -44,7 +44,7 @@ class Lights:
         self._all.append(light)
 
     def quality(self, quality: CameraQuality, period: int) -> CameraQuality:
-        """How well the camera sees at a control period.
+        """Return how well the camera sees at a control period.
 
         :param quality: of the camera undisturbed.
         """
@@ -55,7 +55,7 @@ class Lights:
 
     def dazzled(self, period: int, world_from_camera: np.ndarray, intrinsics: np.ndarray,
                 size: Tuple[int, int]) -> np.ndarray:
-        """How much of each pixel is lost to glare, (h, w), 0 to 1.
+        """Return how much of each pixel is lost to glare, (h, w), 0 to 1.
 
         :param world_from_camera: 4x4, z forward.
         :param intrinsics: (3, 3).

@@ -1,4 +1,4 @@
-"""What carries the head camera: where it is by the encoders, and how it is turned to a point."""
+"""The neck with the head camera: where it is by the encoders, and how it is turned to a point."""
 import math
 from functools import lru_cache
 from typing import Sequence

@@ -117,7 +117,7 @@ class Pr2Body:
                                                 physicsClientId=self._client)
 
     def refusal(self, name: str, position: float) -> str:
-        """Why a joint cannot be sent to a position, or ''."""
+        """Return why a joint cannot be sent to a position, or ''."""
         if name not in self.numbers:
             return 'no joint {!r}; there: {}'.format(name, ', '.join(self.numbers))
         lower, upper = self.limits[name]

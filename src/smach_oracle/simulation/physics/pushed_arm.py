@@ -76,7 +76,7 @@ class PushedArm:
             self._robot.hold(self._arm)
 
     def _points(self, share: float) -> List[np.ndarray]:
-        """Where the person wants the points now, in the world."""
+        """Return where the person wants the points now, in the world."""
         q, base = self._start + share * self._way, self._robot.base()
         return [apply(base @ chain.forward(q[:len(chain.names)]), np.array(point))
                 for chain, (_, point, _) in zip(self._chains, self._grips)]

@@ -1,4 +1,4 @@
-"""What a person recognises in an image of the head camera: outlines of what is really visible.
+"""The things a person recognises in an image of the head camera: outlines of what is visible.
 
 It goes by the pixels that show a thing, and by whether their colours can be told apart: nothing is
 recognised in the dark or in a glare. The outlines err as those that people draw.

@@ -25,7 +25,7 @@ SPEED_MARGIN = 1.1  # times the URDF's limit that a trajectory may ask for
 
 
 class MotionResult(NamedTuple):
-    """How a motion ended."""
+    """The result of a motion."""
 
     ok: bool
     text: str = ''  # why not
@@ -34,7 +34,7 @@ class MotionResult(NamedTuple):
 
 
 class Tolerances(NamedTuple):
-    """How far joints may be off (rad or m, inf: any), where that is not the usual."""
+    """The tolerances of joints (rad or m, inf: any), where they are not the usual ones."""
 
     path: Mapping[str, float] = {}
     goal: Mapping[str, float] = {}
@@ -51,7 +51,7 @@ class Motion(Protocol):
         """Send the joints on for the coming period. The result where it has ended."""
 
     def events(self) -> Sequence[str]:
-        """What has happened when it has ended, for the world's disturbances."""
+        """Return what has happened when it has ended, for the world's disturbances."""
 
     def stop(self, world: World) -> None:
         """Hold everything that it moved where it is."""
@@ -103,7 +103,7 @@ class Trajectory:
         return self._joints
 
     def refusal(self, world: World) -> str:
-        """Why this robot cannot do it, from where it is now, or ''."""
+        """Return why this robot cannot do it, from where it is now, or ''."""
         robot = world.robot
         for column, name in enumerate(self._joints):
             if name not in robot.encoders or name.endswith('finger_joint'):
@@ -227,7 +227,7 @@ def _blended(way: np.ndarray) -> np.ndarray:
 
 
 def _held(world: World, name: str) -> float:
-    """Where a joint was sent, if it is about there, else where it is."""
+    """Return where a joint was sent, if it is about there, else where it is."""
     target, position = world.robot.target(name), world.robot.position(name)
     return target if abs(target - position) < 0.02 else position
 

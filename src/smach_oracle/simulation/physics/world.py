@@ -28,7 +28,7 @@ ITERATIONS = 40  # of the solver, in a step of physics
 
 
 class Contact(NamedTuple):
-    """Where a body touches something."""
+    """A place where a body touches something."""
 
     other: str  # name of a body, 'robot' or 'floor'
     link: str  # of the other
@@ -121,7 +121,7 @@ class World:
         self.periods += count
 
     def _push(self) -> None:
-        """What comes from outside, in the coming step of physics."""
+        """Apply the forces from outside, in the coming step of physics."""
         self._weights.pull()
         for each in self._pushed:
             each.push()
@@ -143,11 +143,11 @@ class World:
 
     @property
     def disturbances(self) -> Disturbances:
-        """What happens to this trial's world."""
+        """The disturbances of this trial's world."""
         return self._disturbances
 
     def cause_spans(self) -> List[CauseSpan]:
-        """When the scene's causes were there, as of now, s since the scene was at rest."""
+        """Return when the scene's causes were there, as of now, s since the scene was at rest."""
         self._disturbances.log.look(self, self.disturbed)
         return self._disturbances.log.spans(REST_PERIODS, self.periods)
 
@@ -172,7 +172,7 @@ class World:
         return self._robot.states(1)
 
     def joint_efforts(self) -> Dict[str, float]:
-        """What the motors give, N m or N."""
+        """Return the efforts of the motors, N m or N."""
         return self._robot.states(3)
 
     def set_target(self, joint: str, position: float, velocity: float = 0.0,
@@ -281,13 +281,13 @@ class World:
         return pose_of(*pose) @ inverse(pose_of(inertial[3], inertial[4]))
 
     def body_speed(self, name: str) -> Tuple[float, float]:
-        """How fast a body moves and turns, m/s and rad/s."""
+        """Return how fast a body moves and turns, m/s and rad/s."""
         linear, angular = pybullet.getBaseVelocity(
             self._find(name).number, physicsClientId=self._client)
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
 
     def fastest(self, name: str) -> float:
-        """How fast a body or any of its joints moves or turns, m/s or rad/s, whichever is more."""
+        """Return the highest speed of a body and its joints, m/s or rad/s."""
         placed = self._find(name)
         joints = [
             abs(state[1]) for state in pybullet.getJointStates(
@@ -337,7 +337,7 @@ class World:
             self._hinges.turn(name, joint, speed)
 
     def contacts(self, name: str) -> List[Contact]:
-        """What touches a body ('robot' is one here, too), as of the last step."""
+        """Return what touches a body ('robot' is one here, too), as of the last step."""
         index = self._robot.index if name == 'robot' else self._find(name).number
         found = []
         for point in pybullet.getContactPoints(bodyA=index, physicsClientId=self._client):

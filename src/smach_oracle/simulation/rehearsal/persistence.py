@@ -1,6 +1,6 @@
-"""How far plain tries get with one kind of cause: a retry of the state, the script started over.
+"""Plain tries against one kind of cause: a retry of the state, the script started over.
 
-In one process, without an executive. What a try finds of the cause comes from the world's own log.
+In one process, without an executive. The world's own log says what a try finds of the cause.
 """
 from typing import Callable, Iterable, List, NamedTuple, Sequence
 
@@ -15,7 +15,7 @@ ROBUST, FUTILE = 0.9, 0.1  # shares: see label()
 
 
 class Course(NamedTuple):
-    """How one trial went."""
+    """The course of one trial."""
 
     seed: int
     kind: str  # of its cause

@@ -40,7 +40,7 @@ FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
 
 
 class RehearsalResult(NamedTuple):
-    """How a trial went."""
+    """The result of a trial."""
 
     seed: int
     failed: str  # the state that failed, '' for none

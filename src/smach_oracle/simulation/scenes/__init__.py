@@ -1,1 +1,1 @@
-"""What a trial's world is made of, and why it may fail."""
+"""The contents of a trial's world, and why it may fail."""

@@ -1,4 +1,4 @@
-"""How far the robot's own measures are off: encoders and the head camera's mounting.
+"""The errors of the robot's own measures: encoders and the head camera's mounting.
 
 They are those of one trial, fixed for its time. Their size is what remains on a PR2 after its
 bundle adjustment (V. Pradeep, K. Konolige, E. Berger, "Calibrating a multi-arm multi-sensor robot",
@@ -21,7 +21,7 @@ JOINTS = tuple(name for arm in ARMS for name in ARM_JOINTS[arm]) + ('head_pan_jo
 
 
 def encoder_errors(seed: int) -> Tuple[Tuple[str, float], ...]:
-    """What the joints of arms and head read too much, rad by joint."""
+    """Draw how much too high the joints of arms and head read, rad by joint."""
     return encoder_errors_of(generator_for(seed, 'encoder_errors').normal(
         0.0, 1.0, len(JOINTS)).clip(-MOST, MOST))
 
@@ -32,7 +32,7 @@ def encoder_errors_of(sigmas: np.ndarray) -> Tuple[Tuple[str, float], ...]:
 
 
 def camera_error(seed: int) -> Tuple[float, float, float, float, float, float]:
-    """How the camera sits, from where the URDF has it: m, then rad of roll, pitch, yaw."""
+    """Draw how the camera sits, from where the URDF has it: m, then rad of roll, pitch, yaw."""
     return camera_error_of(generator_for(seed, 'camera_error').normal(0.0, 1.0, 6).clip(
         -MOST, MOST))
 

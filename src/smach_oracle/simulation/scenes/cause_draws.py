@@ -1,4 +1,4 @@
-"""Which causes a trial has, how long they last, and where light falls: drawn from its seed.
+"""The causes of a trial, how long they last, and where light falls: drawn from its seed.
 
 Every draw has a generator of its own, so that another kind of cause leaves the others as they were.
 """
@@ -46,12 +46,12 @@ def _chosen(weights: WEIGHTS, share: float) -> str:
 
 
 def passing_seconds(generator: np.random.Generator) -> float:
-    """How long somebody stands in the light, or something that moves reflects it."""
+    """Draw how long, s, somebody stands in the light, or something that moves reflects it."""
     return float(min(60.0, generator.lognormal(np.log(4.0), 0.8)))
 
 
 def cloud_minutes(generator: np.random.Generator) -> float:
-    """How long a cloud hides the sun."""
+    """Draw how long, min, a cloud hides the sun."""
     return float(min(60.0, generator.lognormal(np.log(8.0), 0.6)))
 
 

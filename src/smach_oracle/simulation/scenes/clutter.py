@@ -1,4 +1,4 @@
-"""What else stands on a table: things of other shapes and colours than cans and cartons."""
+"""Other things on a table: of other shapes and colours than cans and cartons."""
 import colorsys
 from typing import Callable, Sequence, Tuple
 

@@ -5,15 +5,15 @@ from .scene import Disturbance, SceneCause
 
 
 class SceneDraft(Protocol):
-    """What the drafts of all tasks have. Each is a NamedTuple."""
+    """The fields that the drafts of all tasks have. Each is a NamedTuple."""
 
     @property
     def disturbances(self) -> Tuple[Disturbance, ...]:
-        """What happens in the course of the trial."""
+        """The disturbances in the course of the trial."""
 
     @property
     def causes(self) -> Tuple[SceneCause, ...]:
-        """Why the trial may fail."""
+        """The causes for which the trial may fail."""
 
     @property
     def _replace(self) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""Why a trial in the kitchen may fail: physical causes, drawn from the trial's seed.
+"""The causes of failures in the kitchen: physical ones, drawn from the trial's seed.
 
 Neither the executive nor the subsystems learn of them.
 """

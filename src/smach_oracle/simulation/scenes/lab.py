@@ -42,7 +42,7 @@ class LabRun(NamedTuple):
 
 
 class LabState(NamedTuple):
-    """How a trial has left the lab, after a person has put away what the task was about."""
+    """The lab as a trial has left it, after a person has put away what the task was about."""
 
     began: float  # h of the run
     ended: float
@@ -108,7 +108,7 @@ class _Trial(NamedTuple):
 
     @property
     def as_it_was(self) -> Optional[LabState]:
-        """How it was left, or None where it is set out afresh: at the begin, and once an hour."""
+        """The lab as it was left. None where it is set out afresh: at first, and once an hour."""
         passed = self.state is None or int(self.hour) > int(self.state.began)
         return None if passed else self.state
 

@@ -1,8 +1,8 @@
-"""What changes with the hours of a run: light, calibration, wear.
+"""The changes with the hours of a run: light, calibration, wear.
 
 A run is a robot that goes on for hours in one world. All this is a function of the run's seed and
 of the hour, so that a run can go on from any hour. Hour 0 is the beginning of a day of work.
-Why it is as it is: doc/protocol.md.
+The page doc/protocol.md says why it is so.
 """
 from typing import Callable, List, NamedTuple, Tuple
 
@@ -77,6 +77,6 @@ def drifting(seed: int, what: str, hour: float, count: int) -> np.ndarray:
 
 
 def worn(seed: int, hour: float) -> float:
-    """What share of their friction the finger tips have lost."""
+    """Return the share of their friction that the finger tips have lost."""
     an_hour = float(generator_for(seed, 'wear').uniform(*WEAR))
     return min(MOST_WEAR, an_hour * hour)

@@ -1,11 +1,11 @@
-"""What a trial's world is made of: plain data, drawn from the trial's seed."""
+"""The contents of a trial's world: plain data, drawn from the trial's seed."""
 from typing import NamedTuple, Tuple
 
 Vector = Tuple[float, float, float]
 
 
 class ClosingHinge(NamedTuple):
-    """What pulls a door towards 0, unless it stands open past its stop."""
+    """A hinge that pulls a door towards 0, unless it stands open past its stop."""
 
     torque: float  # N m
     stop: float  # rad. From there on the door stays where it is left
@@ -36,7 +36,7 @@ class Body(NamedTuple):
 
 
 class CameraQuality(NamedTuple):
-    """How well the head camera sees in this trial."""
+    """The quality of the head camera's images in this trial."""
 
     noise: float = 1.0  # depth noise, times that of a Kinect
     dropout: float = 0.005  # share of depth pixels lost at random
@@ -68,7 +68,7 @@ class SceneCause(NamedTuple):
 
 
 class RobotStart(NamedTuple):
-    """How the robot stands at the beginning. Joints that are not named have their defaults."""
+    """The robot at the beginning. Joints that are not named have their defaults."""
 
     joints: Tuple[Tuple[str, float], ...] = ()
     base: Vector = (0.0, 0.0, 0.0)  # x, y in m, yaw in rad, in the world
@@ -84,7 +84,7 @@ class RobotStart(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """What makes the trial a true success. The judge alone reads it."""
+    """The conditions of a true success. The judge alone reads them."""
 
     kind: str  # 'stands_at' or 'in_hand'
     body: str  # name of the body; '' : any of the movable ones

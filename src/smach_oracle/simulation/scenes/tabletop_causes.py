@@ -1,4 +1,4 @@
-"""Why a trial at the table may fail: physical causes, drawn from the trial's seed.
+"""The causes of failures at the table: physical ones, drawn from the trial's seed.
 
 Neither the executive nor the subsystems learn of them.
 """

@@ -1,4 +1,4 @@
-"""How a trial's world differs from what the robot's map and its task say of it.
+"""The differences between a trial's world and what the robot's map and its task say of it.
 
 Someone has measured the kitchen with a tape, people move their furniture by a few centimetres, no
 two cans are of one size, and nobody holds a hand where it was held yesterday.
@@ -53,7 +53,7 @@ def drink_size(seed: int, index: int) -> Tuple[float, float]:
 
 
 def true_palm(seed: int) -> Vector:
-    """Where the receiving hand is held, m."""
+    """Return where the receiving hand is held, m."""
     return _beside(PALM, PALM_SIGMA, _drawn(seed, 'true_palm', 3))
 
 
