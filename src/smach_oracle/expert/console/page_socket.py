@@ -64,7 +64,7 @@ class OpenPages:
         self.workers = ThreadPoolExecutor(8, 'command')
 
     def worker(self, command: PageCommand) -> Callable[..., CommandReply]:
-        """Who carries out a command, in a thread."""
+        """Return the function that carries out a command, in a thread."""
         if command.name in HOLDING_COMMANDS:
             return self.machine_hand.carry_out
         if command.name in STORED_COMMANDS:
@@ -233,7 +233,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._number) else self._limits.commands
 
     def _at_once(self, command: PageCommand) -> Optional[CommandReply]:
-        """What needs no robot's word, and what is refused, or None for the rest."""
+        """Reply to what needs no robot's word, and to what is refused. Return None for the rest."""
         if command.name == 'hello':
             return self._hello(command)
         if self._person is None:

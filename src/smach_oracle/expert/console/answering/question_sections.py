@@ -57,7 +57,10 @@ class QuestionSections:
         return view
 
     def _since(self, key: str, asked: float) -> float:
-        """When it was asked first: while an interface runs for it, its server counts again."""
+        """Return when it was asked first.
+
+        While an interface runs for it, its server counts again.
+        """
         since = self._first_asked[key] = min(asked, self._first_asked.get(key, asked))
         self._first_asked.move_to_end(key)
         while len(self._first_asked) > MOST_REMEMBERED:

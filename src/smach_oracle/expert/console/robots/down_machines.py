@@ -139,7 +139,7 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
 
 
 def _stored_last(moments: Sequence[StoredMoment]) -> float:
-    """When its program stored something last, s since the epoch: not who changed that."""
+    """Return when its program stored something last, s since the epoch. Edits are ignored."""
     return next((each.at for each in reversed(moments) if each.kind != EDIT), moments[-1].at)
 
 

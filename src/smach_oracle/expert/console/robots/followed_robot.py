@@ -63,7 +63,7 @@ class FollowedRobot:
                 self.changed = self._reshaped = True
 
     def on_status(self, message: SmachContainerStatus) -> None:
-        """What is active in a container."""
+        """Note which states are active in a container."""
         path = message.path.lstrip('/')
         with self._lock:
             if self._active.get(path) != message.active_states:
@@ -71,7 +71,7 @@ class FollowedRobot:
                 self.changed = True
 
     def on_rates(self, message: OracleRates) -> None:
-        """What was learned. A message covers one top machine."""
+        """Note what was learned. A message covers one top machine."""
         rates = rates_view(message)
         rows: Dict[str, List[Any]] = {}
         for row in message.transitions:
@@ -84,7 +84,7 @@ class FollowedRobot:
             self._reshaped = self._reshaped or any(path not in self._structures for path in rates)
 
     def on_control(self, message: ControlStatus) -> None:
-        """How its machines stand as operators see them."""
+        """Note how its machines stand as operators see them."""
         machines = control_view(message)
         with self._lock:
             if machines != self.machines:

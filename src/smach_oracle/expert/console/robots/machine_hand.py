@@ -111,7 +111,7 @@ class MachineHand:
         return CommandReply(response.ok, response.message)
 
     def _unknown(self, command: PageCommand) -> str:
-        """Why the console knows no such machine, or '' where it does."""
+        """Return why the console knows no such machine, or '' where it does."""
         robot, path = command.arguments['robot'], command.arguments['path']
         holdable = self._holdable()
         if robot not in holdable:

@@ -92,7 +92,7 @@ class BagFolders:
             found.states[real] = FileState(status.st_size, status.st_mtime_ns)
 
     def _problem(self, real: str, mode: int) -> str:
-        """Why a file is not read, or '' where it may be. `real`: its path without links."""
+        """Return why a file is not read, or '' where it may be. `real`: its path without links."""
         if not any(real == place or real.startswith(_within(place)) for place in self._real()):
             return 'a link that leads out of the folder'
         if not stat.S_ISREG(mode):

@@ -196,7 +196,7 @@ class SessionHandler(CheckedHandler):
         self.finish(json.dumps(known))
 
     def _given(self) -> Optional[Identity]:
-        """Whose token comes with the request, or None for a wrong one."""
+        """Return whose token comes with the request, or None for a wrong one."""
         tokens = self.access.settings.tokens
         return tokens.identify(self._token()) if tokens is not None else None
 
