@@ -127,7 +127,7 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
 
 
 def _arrival(choice: StateChoice) -> Text:
-    """What would be missing or repeated, what must hold, or why it cannot be entered."""
+    """Return what would be missing or repeated, what must hold, or why it cannot be entered."""
     parts = []
     if choice.blocked:
         parts.append(Text('blocked: ' + clean(choice.blocked), 'bold #cc3333'))

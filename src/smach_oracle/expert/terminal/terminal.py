@@ -262,7 +262,7 @@ class Terminal:
                                  lambda: self._why_to_stop(listed), choices, validator)
 
     def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
-        """Why to stop working on a question, or None as long as it is ours to answer."""
+        """Return why to stop working on a question, or None as long as it is ours to answer."""
         if not self._front_end.connected(listed.server):
             return self._gone_for_good('{} is gone.'.format(listed.server))
         now = self._front_end.find(listed.key)
@@ -280,9 +280,10 @@ class Terminal:
         return None
 
     def _why_gone(self, listed: ListedQuestion) -> Optional[str]:
-        """Who settled it.
+        """Return who settled the question, or None where it is still open.
 
-        A server that does not know it was restarted, and a living robot asks it again.
+        Where the server does not know the question, it was restarted. A living robot then asks
+        it again.
         """
         response = self._front_end.claim(listed)
         if response.ok:
