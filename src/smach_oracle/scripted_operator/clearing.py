@@ -42,7 +42,9 @@ def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
 
 
 def free_spot(scene: SeenScene, arm: str, kept: List[np.ndarray], thing: str) -> Optional[Spot]:
-    """Where on the table an arm can put a thing, with room around, the nearest to the robot.
+    """Return a spot on the table where an arm can put a thing, with room around, or None.
+
+    The spot whose y is nearest to 0.25 m on the arm's side comes first, and there the smallest x.
 
     :param kept: (3,) m, places that should stay free.
     """

@@ -12,7 +12,7 @@ _AT_EASE = 8  # periods in which the hand hardly moves any more
 
 
 class GripResult(NamedTuple):
-    """How a motion of the gripper ended."""
+    """The result of a motion of the gripper."""
 
     gap: float  # m between the tips
     stalled: bool

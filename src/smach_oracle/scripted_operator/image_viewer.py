@@ -39,7 +39,7 @@ class ImageViewer:
         self.chance = 0  # of the trial that was seen last, for what a person gets wrong
 
     def look(self, *names: str) -> SeenScene:
-        """What a fresh image shows: all things, and furniture by these names.
+        """Return what a fresh image shows: all things, and furniture by these names.
 
         :raises ViewError: where there is none.
         """
@@ -54,7 +54,7 @@ class ImageViewer:
 
     def outlines(self, stamp: rospy.Time, size: Tuple[int, int],
                  names: Sequence[str] = ()) -> List[Outline]:
-        """What is recognised in a published image.
+        """Return the outlines of what is recognised in a published image.
 
         :param size: its width and height, px.
         :param names: what is looked for. () means all things that a hand could take.

@@ -1,4 +1,4 @@
-"""What a person knows about a failed state when they decide, by looking about."""
+"""A person's knowledge of a failed state when they decide, by looking about."""
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -16,7 +16,7 @@ _REACHED_INSIDE = 0.95  # m from the robot's middle, of a thing on a shelf
 
 
 class Impression(NamedTuple):
-    """What a person knows, and where they last saw the thing."""
+    """A person's knowledge, and the place where they last saw the thing."""
 
     sight: Sight
     about: np.ndarray  # (3,) m, base_footprint

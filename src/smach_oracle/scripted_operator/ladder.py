@@ -1,4 +1,4 @@
-"""What a person tries next about a failed state: a ladder for each kind of work, and a memory.
+"""A person's next try at a failed state: a ladder for each kind of work, and a memory.
 
 Each rung is tried a few times at most, only where what is seen speaks for it, and what has just
 failed is not repeated as long as there is something else. Pure.
@@ -24,7 +24,7 @@ WAIT_S = 20.0  # of the world's time
 
 
 class Sight(NamedTuple):
-    """What a person knows when they decide."""
+    """A person's knowledge when they decide."""
 
     seen: bool = True  # the thing that the task is about
     located: bool = True  # and where it is
@@ -46,7 +46,7 @@ class Tried(NamedTuple):
 
 
 class NextAct(NamedTuple):
-    """What to do about a question."""
+    """The next act about a question."""
 
     act: str
     interface: str = ''  # start this one
@@ -57,7 +57,7 @@ class NextAct(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What may be answered to a question."""
+    """The possible answers to a question."""
 
     state: str
     states: Sequence[str]  # that can be entered now
@@ -120,7 +120,7 @@ _LADDERS: Dict[str, List[Rung]] = {
 
 
 class TrialMemory:
-    """What a person has tried in one trial."""
+    """A person's memory of what they have tried in one trial."""
 
     def __init__(self) -> None:
         self._tried: List[Tried] = []
@@ -130,17 +130,17 @@ class TrialMemory:
         self._tried.append(Tried(state, act, worked))
 
     def times(self, state: str, act: str) -> int:
-        """How often it was done."""
+        """Return how often it was done."""
         return sum((each.state, each.act) == (state, act) for each in self._tried)
 
     def last(self, state: str) -> Tried:
-        """What was done last about a state."""
+        """Return what was done last about a state."""
         return next((each for each in reversed(self._tried) if each.state == state),
                     Tried(state, ''))
 
 
 def choose(plan: StatePlan, asked: Asked, sight: Sight, memory: TrialMemory) -> NextAct:
-    """What to do about a question."""
+    """Choose what to do about a question."""
     before = memory.last(asked.state)
     if before.act in (CLEAR, CLOSER) and before.worked:
         after = _made(BACK, plan, asked) or _made(AGAIN, plan, asked)

@@ -35,7 +35,7 @@ FAR = 0.95  # m from the shoulder, which no hand reaches
 
 
 class Watcher(Protocol):
-    """What a person sees and feels while driving a hand."""
+    """A person's eyes and touch while they drive a hand."""
 
     def look_at(self, point: np.ndarray, *names: str) -> SeenScene:
         """Turn the head to a point (3,) m, base_footprint, and look.
@@ -47,7 +47,7 @@ class Watcher(Protocol):
         """m between the finger tips of an arm."""
 
     def tall(self, name: str) -> Optional[float]:
-        """How tall a thing is (m), where it was seen standing in this trial, or None."""
+        """Return how tall a thing is (m), where it was seen standing in this trial, or None."""
 
 
 class ManoeuvreError(Exception):
@@ -143,7 +143,7 @@ def _approach(driver: HandDriver, grasp: np.ndarray, top: float) -> None:
 
 def _grasps_to_try(attempt: Attempt, scene: SeenScene, thing: SeenThing,
                    pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
-    """How the hand takes a thing: another way at each try, and misjudged a little.
+    """Return how the hand takes a thing: another way at each try, and misjudged a little.
 
     :returns: _WAYS of them, perhaps the same again.
     :raises ManoeuvreError: where there is no way.
@@ -221,7 +221,7 @@ def _beside(pose: np.ndarray, other: UprightBox) -> float:
 
 
 class InHand(NamedTuple):
-    """What the hand holds, as far as it is seen."""
+    """The thing that the hand holds, as far as it is seen."""
 
     centre: np.ndarray  # (3,) m
     half: float  # m from its middle down to its lowest point
@@ -266,7 +266,7 @@ def wrong_thing(attempt: Attempt) -> str:
 
 
 def _look_at_hand(attempt: Attempt) -> InHand:
-    """What the hand holds: between its fingers, as high as it is seen, as tall as it stood."""
+    """Return what the hand holds: between its fingers, as high as seen, as tall as it stood."""
     tool = attempt.driver.hand.tool()[:3, 3]
     thing = attempt.watcher.look_at(tool).near(tool, IN_HAND)
     if thing is None or thing.box is None:

@@ -64,7 +64,7 @@ class ManualTask(NamedTuple):
 
 
 class Result(NamedTuple):
-    """What came of it."""
+    """The result of a task."""
 
     superseded: bool
     worked: bool  # what was meant came about
@@ -197,7 +197,7 @@ _WORK: Dict[str, Callable[[ManualTask, RobotMeans, TakeWheel], None]] = {
 
 def place_of(plan: StatePlan, userdata: Mapping[str, Any],
              means: RobotMeans) -> Tuple[np.ndarray, Optional[float]]:
-    """Where something should be put, (3,) m in base_footprint, and how high the surface there is.
+    """Return the place to put something, (3,) m in base_footprint, and the surface's height.
 
     :raises ManoeuvreError: where nobody knows.
     """

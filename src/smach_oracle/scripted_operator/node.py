@@ -156,7 +156,7 @@ class ScriptedOperator:
 
     def _decide(self, listed: ListedQuestion, userdata: Dict[str, Any],
                 scene: SeenScene) -> Tuple[NextAct, Impression]:
-        """What to do about a question, after a look about."""
+        """Decide what to do about a question, after a look about."""
         goal = listed.goal
         plan = self._settings.plans.of(goal.failed_state)
         offered = [offer.name for offer in goal.interfaces]

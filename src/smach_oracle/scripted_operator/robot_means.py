@@ -1,4 +1,4 @@
-"""What else a person has at hand: the robot's head, its base, its joint states, and time."""
+"""A person's other means: the robot's head, its base, its joint states, and time."""
 import math
 import threading
 import time

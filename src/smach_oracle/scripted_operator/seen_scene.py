@@ -1,4 +1,4 @@
-"""What a person makes of an image: the things recognised in it, and about where they are. Pure.
+"""A person's view of an image: the things recognised in it, and about where they are. Pure.
 
 Places come from the outlines and the measured depth alone, so they err as these do. Where the depth
 is lost, a person still tells about where a thing stands, by what it stands on.
@@ -60,7 +60,7 @@ class SeenThing(NamedTuple):
 
 
 class SeenScene(NamedTuple):
-    """What is seen at one moment."""
+    """The scene that is seen at one moment."""
 
     things: List[SeenThing]
     image: CameraImage
@@ -88,7 +88,7 @@ class SeenScene(NamedTuple):
         return float((white & ~np.isfinite(self.image.depth)).mean()) > LEAST_GLARE
 
     def heights(self) -> Dict[str, float]:
-        """How tall (m) the things are that are seen standing, by name."""
+        """Return how tall (m) the things are that are seen standing, by name."""
         return {thing.name: float(thing.box.size[2]) for thing in self.things
                 if thing.stands and thing.box is not None}
 
@@ -141,7 +141,7 @@ class SeenScene(NamedTuple):
 
 
 def seen_scene(image: CameraImage, outlines: Sequence[Outline]) -> SeenScene:
-    """What a person makes of an image and the outlines recognised in it."""
+    """Return what a person makes of an image and the outlines recognised in it."""
     points = points_of(image.depth, image.intrinsics, image.base_from_camera)
     limbs = next((each.mask for each in outlines if each.name == ROBOT), None)
     outlines = [each for each in outlines if each.name != ROBOT]
@@ -174,7 +174,7 @@ def _seen(image: CameraImage, points: np.ndarray, taken: np.ndarray,
 
 
 def _surface_around(points: np.ndarray, taken: np.ndarray, region: Region) -> Optional[Plane]:
-    """What a thing stands on, where enough of it is seen around the region."""
+    """Return the surface that a thing stands on, where enough of it is seen around the region."""
     left, top, width, height = region
     across, down = max(12, int(0.8 * width)), max(12, int(0.5 * height))
     window = (slice(max(0, top - down // 2), top + height + down),

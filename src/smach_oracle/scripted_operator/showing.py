@@ -79,7 +79,7 @@ def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[Operator
 
 
 def looks_wrong(marked: MarkedResult, thing: SeenThing) -> str:
-    """Why a person rejects a mask: it is not what they see of the thing. Or ''."""
+    """Return why a person rejects a mask: it is not what they see of the thing. Else ''."""
     if marked.mask is None or marked.mask.shape != thing.mask.shape:
         return 'no mask is shown'
     both, either = (marked.mask & thing.mask).sum(), (marked.mask | thing.mask).sum()

@@ -1,4 +1,4 @@
-"""What the scripted operator does about which state, from its settings. Pure.
+"""The scripted operator's plan for each state, from its settings. Pure.
 
     states:
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}
@@ -20,7 +20,7 @@ Point = Tuple[float, float, float]
 
 
 class StatePlan(NamedTuple):
-    """What to do about a failed state."""
+    """The plan for a failed state."""
 
     means: str  # one of MEANS
     arm: str = 'right'  # take, put_down: with which
