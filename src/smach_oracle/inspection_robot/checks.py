@@ -1,4 +1,4 @@
-"""What must hold before the robot does something: functions for the oracle's settings.
+"""Conditions that must hold before the robot does something: functions for the oracle's settings.
 
 Each takes a machine's userdata, which it does not read, and listens to the robot's topics. Those
 that check look at one message. Those that wait return once the check holds, or after a while.

@@ -1,4 +1,4 @@
-"""How far it is along rays to walls and to round things, in the plane."""
+"""Distances along rays to walls and to round things, in the plane."""
 from typing import Sequence, Tuple
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What the robot's hardware publishes."""
+"""The topics that the robot's hardware publishes."""
 from typing import Optional
 
 import numpy as np

@@ -36,7 +36,7 @@ def pose_of(message: PoseMessage) -> Pose:
 
 
 def transform(parent: str, child: str, pose: Pose, stamp: rospy.Time) -> TransformStamped:
-    """Where a frame is in its parent."""
+    """Return the message that says where a frame is in its parent."""
     return TransformStamped(Header(stamp=stamp, frame_id=parent), child,
                             Transform(Vector3(pose[0], pose[1], 0.0), turn_about_z(pose[2])))
 

@@ -1,1 +1,1 @@
-"""What the robot makes of its sensors: where it is, where it can drive, what a gauge shows."""
+"""The robot's conclusions from its sensors: where it is, where it can drive, what a gauge shows."""

@@ -1,4 +1,4 @@
-"""Where the robot is, from one scan and the plan: the pose at which the scan lies on the walls."""
+"""The robot's pose, from one scan and the plan: the one at which the scan lies on the walls."""
 import math
 from typing import Tuple
 

@@ -20,7 +20,7 @@ class ReadingError(Exception):
 
 
 class GaugeReading(NamedTuple):
-    """What a panel says."""
+    """A reading of a panel."""
 
     number: int  # of the panel
     bar: float

@@ -1,1 +1,1 @@
-"""What is true: the hall, its people and its light, the robot's base, what its sensors get."""
+"""The ground truth: the hall, its people and its light, the robot's base, what its sensors get."""

@@ -42,7 +42,7 @@ def _moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
 
 
 class WheeledBase:
-    """Where the robot truly is, and where its wheels say that it is."""
+    """The robot's base: where it truly is, and where its wheels say that it is."""
 
     def __init__(self, pose: Pose, wet: Optional[WetPatch] = None) -> None:
         self.pose = pose  # in the map
@@ -83,7 +83,7 @@ class WheeledBase:
         self.pose = moved
 
     def _on_the_floor(self, dt_s: float) -> Twist:
-        """How the robot moves where its wheels turn as they do."""
+        """Return how the robot moves where its wheels turn as they do."""
         if self._wet is None or not self.on_wet_floor():
             return self.wheels
         share = -math.expm1(-dt_s / WET_LAG_S)

@@ -1,4 +1,4 @@
-"""What may make a trial fail, drawn from its seed: what is in the world, and never a failure."""
+"""Causes that may make a trial fail, drawn from its seed: things in the world, never a failure."""
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 

@@ -1,4 +1,4 @@
-"""How a panel looks: a dark frame, a white plate, a dial with a red needle, a number in cells."""
+"""A panel's looks: a dark frame, a white plate, a dial with a red needle, a number in cells."""
 import math
 
 import cv2

@@ -72,7 +72,7 @@ class InspectionWorld:
         return Sunlight(glare.panel, glare.angle)
 
     def shortcomings(self) -> List[str]:
-        """What the goal lacks: every panel must have been reported, and reported right."""
+        """Return what the goal lacks: every panel must have been reported, and reported right."""
         told = []
         for panel in PANELS:
             reading, true = self.reported.get(panel.number), self.scene.readings[panel.number]

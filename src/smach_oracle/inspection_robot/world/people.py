@@ -11,7 +11,7 @@ WAITS_S = 2.0
 
 
 class Errand(NamedTuple):
-    """Where a person goes, one place after the other, once they set out."""
+    """The places to which a person goes, one after the other, once they set out."""
 
     begins_s: float  # of the trial
     places: Tuple[Tuple[float, float], ...]  # m. The first is where they wait before it

@@ -1,4 +1,4 @@
-"""What the robot's camera sees: walls, panels, people, sunlight, and the blur of its own motion."""
+"""The camera's view: walls, panels, people, sunlight, and the blur of the robot's own motion."""
 import math
 from typing import Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -116,7 +116,7 @@ def _stand(image: np.ndarray, near: np.ndarray, walls: np.ndarray) -> None:
 
 
 def _glare(pose: Pose, light: Sunlight) -> np.ndarray:
-    """What is added to the image: a blot on the panel, and a veil around it."""
+    """Return the light that is added to the image: a blot on the panel, and a veil around it."""
     panel = next(each for each in PANELS if each.number == light.panel)
     ahead, right = _in_camera(pose, panel.x, panel.y)
     if ahead < 0.15:
