@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""How long from an expert's answer to the robot's next step: from the call of the answer service,
-in the expert's process, to the return of `ask` in the robot's, over loopback on a real master.
+"""The time from an expert's answer to the robot's next step, over loopback on a real master. It
+begins at the call of the answer service, in the expert's process, and ends at the return of `ask`
+in the robot's.
 
     benchmarks/answer_latency.py [--questions N] [--shared] [--check]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What comes in over every border, drawn at random: is it all taken, or refused with a reason?
+"""Data drawn at random come in over every border: are they all taken, or refused with a reason?
 
     python3 benchmarks/borders.py [--examples N] [--only WORDS] [--check]
 

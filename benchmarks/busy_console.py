@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How soon a page has the mask of what was drawn, and how soon a hand stands, beside busy cores.
+"""The time until a page has the mask of a drawing, and until a hand stands, next to busy cores.
 
     benchmarks/busy_console.py [--busy N] [--nice N] [--marks N] [--stops N] [--check]
 
@@ -46,7 +46,7 @@ sys.path.insert(0, FIXTURES)
 
 
 class Page:
-    """What a page does, without a browser: one socket, its commands, and an image that is shown."""
+    """A page without a browser: one socket, its commands, and an image that is shown."""
 
     def __init__(self, port):
         self._address = 'localhost:{}'.format(port)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What each kind of cause does to a script without an oracle, and how long it lasts.
+"""The effect of each kind of cause on a script without an oracle, and how long it lasts.
 
     benchmarks/cause_persistence.py [--task TASK] [--kind KIND ...] [--trials N] [--csv FILE]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What it costs to store a moment at each transition, and how long a disk that hangs holds one up.
+"""The cost of a stored moment at each transition, and how long a disk that hangs holds one up.
 
     python3 benchmarks/checkpoint.py [--check] [--transitions N] [--folder FOLDER]
 

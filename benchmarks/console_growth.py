@@ -51,7 +51,7 @@ def main():
 
 
 def quieted():
-    """Where to print to; what the nodes say goes nowhere."""
+    """Silence the nodes, and return a stream to the old standard output."""
     told = os.fdopen(os.dup(1), 'w', buffering=1)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)

@@ -84,7 +84,7 @@ class Killed:
         self.counts: Dict[str, int] = {}
 
     def draw(self) -> str:
-        """What is killed next."""
+        """Draw what is killed next."""
         kinds = ['server', 'console', 'interface', 'action', 'roscore']
         if sum(self.counts.values()) < self._early:
             kinds.append('all')
@@ -94,7 +94,7 @@ class Killed:
 
 
 def sample(fleet: 'KilledFleet') -> Dict[str, Dict[str, int]]:  # noqa: F821
-    """What the programs that are watched take now."""
+    """Return what the programs that are watched take now."""
     return {name: fleet.programs[name].state() for name in WATCHED}
 
 

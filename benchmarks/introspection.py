@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""What introspection of an idle tree of containers costs the processor: the time that the node's
-process takes from it, as a share of one core.
+"""The processor time for introspection of an idle tree of containers: the time that the node's
+process takes, as a share of one core.
 
     benchmarks/introspection.py [--upstream PATH] [--containers N] [--seconds S] [--check]
 
@@ -33,7 +33,7 @@ GROUP = 22  # containers below the root; the others are spread below them
 
 
 class Cost(NamedTuple):
-    """What one node took."""
+    """The cost of one node."""
 
     percent: float  # of one core
     threads: int  # of Python, in the node
@@ -93,7 +93,7 @@ class Master:
 
 
 def measure_all(options: argparse.Namespace) -> Dict[str, Cost]:
-    """What each row cost."""
+    """Measure the cost of each row."""
     rows = {
         'no server': measure(options, 'none', viewed=False),
         'ours': measure(options, 'ours', viewed=False),

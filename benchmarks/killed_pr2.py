@@ -41,7 +41,7 @@ HEAD = '{:>6} {:>12} {:>12} {:>9} {:>9}  {}'
 
 
 class Ended(NamedTuple):
-    """How a trial has ended."""
+    """The end of a trial."""
 
     outcome: str  # of the machine; 'hung' where it did not end
     success: bool  # by the judge of the world

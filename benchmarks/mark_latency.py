@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""How long the perception interface's work takes from a drawing to a mask with its object, at 640 x
-480: a rectangle around a thing, one with strokes, and one as large as the image; with what the
-console makes of the answer for its page.
+"""The time of the perception interface's work from a drawing to a mask with its object, at 640 x
+480. The drawings are a rectangle around a thing, one with strokes, and one as large as the image.
+The time that the console needs to make the answer ready for its page is included.
 
     benchmarks/mark_latency.py [--check]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a decision costs after a million visits, in units of what it costs after ten.
+"""The cost of a decision after a million visits, in units of its cost after ten.
 
     python3 benchmarks/oracle_decision.py [--check] [--visits N]
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""What a failure-free transition costs under an oracle, in steps of the bare loop over the same two
-states.
+"""The cost of a failure-free transition under an oracle, in steps of the bare loop.
+
+Both are over the same two states.
 
     python3 benchmarks/oracle_overhead.py [--check] [--transitions N] [--rounds N]
 

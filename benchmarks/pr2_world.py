@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast the simulated PR2 works, and what its time goes into: a few trials of a task on a master
+"""The speed of the simulated PR2, and what its time goes into: a few trials of a task on a master
 of their own.
 
     benchmarks/pr2_world.py [--task drink_retrieval] [--trials N] [--oracle] [--check]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How fast a wrapped machine runs while it is recorded, and whether anything is lost or piles up in
+"""The speed of a wrapped machine while it is recorded, and whether anything is lost or piles up in
 memory.
 
 A two-state loop without work in its states: the executive at its full speed, the worst case for a

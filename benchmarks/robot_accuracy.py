@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How well the simulated robot does its work, in one process without ROS, and what that costs.
+"""The accuracy of the simulated robot, in one process without ROS, and what its work costs.
 
     benchmarks/robot_accuracy.py [--table N] [--kitchen N] [--first SEED]
 
@@ -37,7 +37,7 @@ ANGLES = ('OPEN_FRIDGE', 'CLOSE_FRIDGE')
 
 
 class TrialOutcome(NamedTuple):
-    """How one trial without a cause went."""
+    """The outcome of one trial without a cause."""
 
     seed: int
     failed: str  # the state, '' for none

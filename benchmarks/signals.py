@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How often a program hangs that meets a signal around its first execute: bare, wrapped as a
+"""The share of programs that hang after a signal around their first execute: bare, wrapped as a
 library, and under oracle_run, in one run.
 
     benchmarks/signals.py [--signals N] [--seed S]

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What a failure-free transition of a machine costs, in steps of the bare loop over the same two
+"""The cost of a failure-free transition of a machine, in steps of the bare loop over the same two
 states.
 
     python3 benchmarks/smach_engine.py [--check] [--upstream PATH] [--steps N] [--rounds N]
@@ -113,7 +113,7 @@ def measure(steps: int, rounds: int) -> Dict[str, float]:
 
 
 def memory_growth_kb(transitions: int) -> int:
-    """How much the process has grown at most while a machine made that many transitions."""
+    """Return by how many kB at most the process grew while a machine made that many transitions."""
     loop = machine_loop(import_silenced(), True)
     loop(10000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

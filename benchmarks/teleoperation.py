@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""How often a driven hand is told where to go, and how soon it stands: the simulated PR2 at real
-time, own master.
+"""The rate of a driven hand's targets, and how soon it stands: the simulated PR2 at real time, own
+master.
 
     benchmarks/teleoperation.py [--seconds N] [--stops N] [--check]
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""How many trials a minute an experiment gets through, and what their time goes into: a few trials
-of a task, with the oracle and without it, one job after the other.
+"""The number of trials a minute that an experiment gets through, and what their time goes into: a
+few trials of a task, with the oracle and without it, one job after the other.
 
     benchmarks/trial_speed.py [--task drink_retrieval] [--trials N] [--json FILE] [--check]
 
@@ -50,7 +50,7 @@ PLANNING = ('pr2_manipulation', 'pr2_perception')
 
 
 class Look(NamedTuple):
-    """What the processes of one job had used up at one moment."""
+    """The processor time that the processes of one job had used up at one moment."""
 
     ended: int  # lines of truth
     cpu_s: Dict[str, float]  # by process
@@ -58,7 +58,7 @@ class Look(NamedTuple):
 
 
 class JobCost(NamedTuple):
-    """What the trials of one job cost."""
+    """The cost of one job's trials."""
 
     name: str
     trials: int  # that ended at a reset, after the first
@@ -177,12 +177,12 @@ def runs(pid: int) -> bool:
 
 
 def lines_of(path: Path) -> int:
-    """How many trials have a line of truth."""
+    """Return how many trials have a line of truth."""
     return path.read_bytes().count(b'\n') if path.exists() else 0
 
 
 def cost_of(job: str, looks: List[Look]) -> Optional[JobCost]:
-    """What one trial costs, from the first end of a trial to the last but one's."""
+    """Return the cost of one trial, from the first end of a trial to the last but one's."""
     truths = [json.loads(line) for line in (Path(job) / TRUTH_FILE).read_text().splitlines()]
     first = next((look for look in looks if look.ended), None)
     last = next((look for look in looks if look.ended == len(truths) - 1), None)
