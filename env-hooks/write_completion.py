@@ -47,7 +47,7 @@ def ask(script: Path) -> Dict[str, Any]:
 
 
 def lines_of(key: str, known: Dict[str, Any]) -> List[Tuple[str, str]]:
-    """What may follow a command, one of its works, or one of its options."""
+    """Return the words that may follow a command, one of its works, or one of its options."""
     more = [] if ' ' in key else ['--version']
     lines = [(key, ' '.join(sorted([*known['options'], *known['works'], *more])))]
     lines += [('{} {}'.format(key, option), ' '.join(choices))

@@ -51,7 +51,7 @@ def api_page() -> str:
 
 
 def help_of(script: Path) -> str:
-    """What a command prints at --help."""
+    """Return what a command prints at --help."""
     run = subprocess.run([sys.executable, str(script), '--help'], stdout=subprocess.PIPE,
                          stderr=subprocess.STDOUT, check=False, timeout=120)
     text = re.sub(r'\nMore: .*\n', '', run.stdout.decode())  # the page below, by a path of here

@@ -1,4 +1,4 @@
-"""How the commands in scripts/ start."""
+"""The start of the commands in scripts/."""
 import io
 import os
 import sys

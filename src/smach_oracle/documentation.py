@@ -1,4 +1,4 @@
-"""Where the pages about the commands are, in a checkout or an install space. Pure."""
+"""The place of the pages about the commands, in a checkout or an install space. Pure."""
 from pathlib import Path
 from typing import Optional
 

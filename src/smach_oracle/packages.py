@@ -1,4 +1,4 @@
-"""What is told where a Python package is missing, and how a command does without one."""
+"""The message about a missing Python package, and how a command does without one."""
 import os
 import re
 import sys
