@@ -160,10 +160,21 @@ def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
 
 
 def test_a_record_that_does_not_replay_is_refused():
-    with pytest.raises(BagError, match='states with settings of their own'):
+    with pytest.raises(BagError, match='state may have settings of its own'):
         what_if.compare(run(60, states={'PICK': {'memory': 3}}), {'memory': 5})
-    with pytest.raises(BagError, match='trials that are missing'):
+    with pytest.raises(BagError, match='trials may be missing'):
         what_if.compare(run(60)[5:], {'memory': 5})
+
+
+def test_programs_that_began_with_nothing_learned_are_told_by_the_rates():
+    parts = [run(count, seed=count, back_to='PICK') for count in (1, 6, 1, 2, 9)]
+    apart = [what_if.compare(part, {'memory': 2}) for part in parts]
+    joined = what_if.compare([trial for part in parts for trial in part], {'memory': 2})
+    assert joined.programs == len(parts)
+    assert joined.counts == {
+        name: sum(part.counts[name] for part in apart) for name in apart[0].counts}
+    assert what_if.format_tried_settings([joined]).endswith(
+        '\n5 programs, each began with nothing learned\n')
 
 
 def record(folder, trials):

@@ -16,8 +16,8 @@ from prompt_toolkit.validation import ValidationError
 from std_msgs.msg import Bool
 
 import smach
+from smach_oracle.analysis.replaying.checks import that_count
 from smach_oracle.analysis.trials import load_trials
-from smach_oracle.analysis.what_if import _that_count
 from smach_oracle.expert.console.feeds.views import event_of
 from smach_oracle.expert.console.web.handlers import SessionHandler
 from smach_oracle.expert.rules import Rules
@@ -78,7 +78,7 @@ def test_a_resumed_trial_that_does_not_say_what_was_stored_is_counted(tmp_path, 
     (tmp_path / 't.bag').write_bytes(crafted_bag(resumed))
     trial, = load_trials([str(tmp_path)]).trials
     assert trial.trial_id == resumed.trial_id
-    assert _that_count([event(), resumed]) == [event(), resumed]
+    assert that_count([event(), resumed]) == [event(), resumed]
 
 
 @pytest.fixture

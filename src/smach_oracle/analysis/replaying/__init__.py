@@ -1,0 +1,1 @@
+"""Recorded trials, followed as an oracle would have lived them."""
