@@ -18,14 +18,15 @@ if os.environ.get('SMACH_UPSTREAM'):
     sys.path.insert(0, os.path.abspath(os.environ['SMACH_UPSTREAM']))
 
 
-LACKING = re.compile(r"No module named '([\w.]+)'")
+LACKING = re.compile(r"No module named '([\w.]+)'|Python package ([\w.]+) is not installed")
 
 
 def what_may_lack(text):
     """The module that a failure lacks, where another Python cannot have it; else ''."""
     found = LACKING.search(text)
     may_lack = os.environ.get('SMACH_ORACLE_MAY_LACK', '').split()
-    return found.group(1) if found and found.group(1).split('.')[0] in may_lack else ''
+    name = (found.group(1) or found.group(2)).split('.')[0] if found else ''
+    return name if name in may_lack else ''
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -44,7 +45,7 @@ def pytest_runtest_makereport(item, call):
 
 def leave_out(report, path):
     """Make a failure for such a reason a test that was left out."""
-    lacking = what_may_lack(str(report.longrepr)) if report.failed else ''
+    lacking = what_may_lack(str(report.longrepr) + report.capstderr) if report.failed else ''
     if lacking:
         report.outcome = 'skipped'
         report.longrepr = (path, 0, 'lacks ' + lacking)

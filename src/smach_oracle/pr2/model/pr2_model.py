@@ -76,7 +76,7 @@ def _installed() -> Path:
     except metadata.PackageNotFoundError as err:
         raise ModelError(
             'the Python package {} is not installed; it has the PR2. Run scripts/setup'.format(
-                err.name)) from err
+                err.args[0])) from err  # Python 3.8 has no name in it
     share = Path(str(package.locate_file('cmeel.prefix'))) / 'share'
     if not (share / 'example-robot-data' / 'robots' / 'pr2_description').is_dir():
         raise ModelError(
