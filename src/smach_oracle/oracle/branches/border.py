@@ -91,6 +91,10 @@ class Border:
         """
         self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
 
+    def forget_resumed(self) -> None:
+        """Begin anew at the next execution, whatever was under way as the program was stopped."""
+        self._resumed = None
+
     @property
     def is_resumed(self) -> bool:
         """Whether its next execution goes on where the program was stopped."""

@@ -10,7 +10,7 @@ from ..branches.around import borders_in
 from ..branches.border import border_of
 from ..branches.items import can_be_indexed
 from ..errors import SettingsError
-from ..machine.nesting import nodes_of
+from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..places.place import Place, place_named, places_of
 from ..places.way import way_to
@@ -131,11 +131,33 @@ def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
     return way.down[1:] if way is not None and way.meets is node else ()
 
 
+def forget_resumed(node: TreeNode) -> None:
+    """Let all that is in a container begin anew.
+
+    To be called as the container is sent elsewhere. What was to go on there may not have begun.
+    """
+    if node.tree.is_resumed:
+        _forget(node)
+
+
+def _forget(node: TreeNode) -> None:
+    for each in nodes_of(node.machine):
+        if each is not node:
+            each.resuming = each.ended_before = each.asked_next = None
+        for record in each.records.by_label.values():
+            record.forget_unfinished()
+        for _, container in borders_below(each.machine):
+            border = border_of(container)
+            if border is not None:
+                border.forget_resumed()
+
+
 def go_on(top: TreeNode, resumption: Resumption) -> None:
     """Set every container of the tree to where it was.
 
     It is to be called once the trial has begun.
     """
+    _forget(top)  # of an execution before that has ended early
     nodes = list(nodes_of(top.machine))
     latest = 0
     for node in nodes:

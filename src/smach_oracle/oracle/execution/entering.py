@@ -1,6 +1,7 @@
 """Prepares a place before a machine goes there, whoever sends it."""
 from typing import Collection, NamedTuple, Tuple
 
+from ..checkpoint.resuming import forget_resumed
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
 from ..places.way import Way, missing_on
@@ -23,6 +24,7 @@ def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
     :param sent: what is done, for a warning.
     """
     node, target = way.meets, way.first
+    forget_resumed(node)
     missing = missing_for(way, written)
     snapshot = node.record(target).snapshot if node.settings.userdata == 'restore' else None
     if snapshot is not None:

@@ -61,6 +61,7 @@ class Tree:
         self.clock = AlarmClock()
         self.control = Control()
         self.trial_id = ''
+        self.is_resumed = False  # whether the trial goes on after its program was stopped
         self.rates_lock = threading.Lock()
         self.departures_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
@@ -73,11 +74,13 @@ class Tree:
         """Number events and questions again."""
         self.trial_id = trial_id
         self.trials += 1
+        self.is_resumed = False
         self._questions = 0
         self.events.begin_trial(trial_id)
 
     def go_on_counting(self, visits: int, whole: Mapping[str, Any]) -> None:
         """Number visits behind `visits`, and go on with what the stored trial had spent."""
+        self.is_resumed = True
         self._visits = itertools.count(visits + 1)
         self._questions = int(whole.get('questions', 0))
         self.budget.go_on(whole.get('budget'))

@@ -145,6 +145,11 @@ class StateRecord:
         """Note that the coming visit is one that was begun before the program was stopped."""
         self.unfinished, self.special = unfinished, True
 
+    def forget_unfinished(self) -> None:
+        """Let the coming visit be a new one, whatever was under way as the program was stopped."""
+        self.unfinished, self.open_question = None, ''
+        self.be_special(self._is_special)
+
     def take_question(self) -> str:
         """Return the id of the question that is open again, once, or '' where none is."""
         question, self.open_question = self.open_question, ''
@@ -231,7 +236,7 @@ class StateRecord:
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
-        self.unfinished, self.open_question = None, ''  # of a trial that ended before the visit
+        self.forget_unfinished()  # of a trial that ended before the visit
         self.forget_entry()
         self._visits_before = self._visits + self._by_edges()
 
