@@ -40,7 +40,7 @@ class TriedSettings(NamedTuple):
     counts: Mapping[str, int]  # by OUTCOMES
     trials: int
     other_trials: int  # in which at least one decision is known to be another
-    programs: int = 1  # that began with nothing learned
+    programs: int = 1  # found that began with nothing learned
 
 
 def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
@@ -50,23 +50,37 @@ def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[s
     return {**kept, **settings}
 
 
-def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> TriedSettings:
+class Recorded:
+    """One replicate, and what is needed to replay it."""
+
+    def __init__(self, trials: Sequence[Sequence[Event]]) -> None:
+        """`trials`: the events of each trial, in order.
+
+        :raises BagError: where it cannot be replayed under its own settings.
+        """
+        self.trials = trials
+        self.settings = dict(summarise(trials[0]).settings)
+        if not set(NEEDED) <= set(self.settings):
+            raise BagError('its trials do not tell the settings of their oracle')
+        self._conditioned = conditioned((event for trial in trials for event in trial),
+                                        policy_of(self.settings))
+        self.beginnings = beginnings(trials, lambda: self.replay({}))
+
+    def replay(self, settings: Mapping[str, Any]) -> Replay:
+        """Return an oracle that has learned nothing, with these settings in place of its own."""
+        return Replay(_changed(self.settings, settings), self._conditioned)
+
+
+def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
     """Put the decisions of one replicate to an oracle of other settings.
 
-    :param trials: the events of each trial, in order.
     :raises BagError: where the record cannot be replayed under its own settings.
     """
-    recorded = dict(summarise(trials[0]).settings)
-    if not set(NEEDED) <= set(recorded):
-        raise BagError('its trials do not tell the settings of their oracle')
-    known = conditioned((event for trial in trials for event in trial), policy_of(recorded))
     counts = dict.fromkeys((*OUTCOMES, GIVES_UP), 0)
-    begin_anew = beginnings(trials, lambda: Replay(recorded, known))
     other_trials = 0
-    for number, trial in enumerate(trials):
-        if number in begin_anew:
-            own = Replay(recorded, known)
-            other = Replay(_changed(recorded, settings), known)
+    for number, trial in enumerate(recorded.trials):
+        if number in recorded.beginnings:
+            own, other = recorded.replay({}), recorded.replay(settings)
         another = False
         for event in that_count(trial):
             check_rate(own, event)
@@ -80,7 +94,8 @@ def compare(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> T
                 counts[outcome] += 1
                 another = another or outcome not in (SAME, NOT_KNOWN)
         other_trials += another
-    return TriedSettings(dict(settings), counts, len(trials), other_trials, len(begin_anew))
+    return TriedSettings(dict(settings), counts, len(recorded.trials), other_trials,
+                         len(recorded.beginnings))
 
 
 def _outcome(recorded: str, tried: str) -> str:
@@ -108,7 +123,8 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
             '{:>20}'.format(row.counts[outcome]) for outcome in columns)
             + '   {} of {}'.format(row.other_trials, row.trials))
     if rows[0].programs > 1:
-        lines.append('{} programs, each began with nothing learned'.format(rows[0].programs))
+        lines.append('at least {} programs, each of which began with nothing learned'.format(
+            rows[0].programs))
     return '\n'.join(lines) + '\n'
 
 
@@ -145,8 +161,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     replayed = []
     for folder, trials in sorted(replicates.items()):
         try:
+            recorded = Recorded(trials)
             rows = [
-                compare(trials, dict(zip(varied, values)))
+                compare(recorded, dict(zip(varied, values)))
                 for values in itertools.product(*varied.values())
             ]
         except OracleError as err:

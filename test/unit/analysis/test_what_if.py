@@ -1,4 +1,5 @@
 """What another oracle would have decided: replayed from the events of real machines."""
+import contextlib
 import json
 import random
 
@@ -22,8 +23,11 @@ class Chance(smach.State):
         super().__init__(outcomes=['succeeded', 'aborted'])
         self._generator = generator
         self._share = share
+        self.stops = False
 
     def execute(self, userdata):
+        if self.stops:
+            raise KeyboardInterrupt
         return 'aborted' if self._generator.random() < self._share else 'succeeded'
 
 
@@ -42,8 +46,8 @@ class Hand(Expert):
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='hand')
 
 
-def run(count, seed=1, states=None, back_to='', health=None, **settings):
-    """The events of some trials of one learning machine, by trial."""
+def run(count, seed=1, states=None, back_to='', health=None, stopped=0, **settings):
+    """The events of some trials of one learning machine, by trial. PICK stops the first ones."""
     generator = random.Random(seed)
     inner = smach.StateMachine(outcomes=['succeeded', 'aborted'])
     with inner:
@@ -59,10 +63,17 @@ def run(count, seed=1, states=None, back_to='', health=None, **settings):
                          settings=dict(KEPT, states=states or {}, **settings))
     events = []
     machine.events.observers.append(events.append)
-    for _ in range(count):
-        machine.execute()
+    pick = machine.get_children()['PICK']
+    for number in range(count):
+        pick.stops = number < stopped
+        with contextlib.suppress(KeyboardInterrupt):
+            machine.execute()
     ids = list(dict.fromkeys(event.trial_id for event in events))
     return [[event for event in events if event.trial_id == trial_id] for trial_id in ids]
+
+
+def compare(trials, settings):
+    return what_if.compare(what_if.Recorded(trials), settings)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +82,7 @@ def run(count, seed=1, states=None, back_to='', health=None, **settings):
                  {'policy': {'name': 'ladder', 'wait_s': 0}}, {'policy': 'always_ask'},
                  {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
 def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
-    tried = what_if.compare(run(60, **{**KEPT, **settings}), {})
+    tried = compare(run(60, **{**KEPT, **settings}), {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
     assert tried.counts[
@@ -101,7 +112,7 @@ def test_so_it_is_of_the_branches_of_concurrences_and_iterators():
     for _ in range(40):
         machine.execute()
     ids = list(dict.fromkeys(event.trial_id for event in events))
-    tried = what_if.compare([[event for event in events if event.trial_id == trial_id]
+    tried = compare([[event for event in events if event.trial_id == trial_id]
                              for trial_id in ids], {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] == sum(tried.counts.values())
@@ -115,7 +126,7 @@ def test_so_it_is_where_states_are_not_repeated_and_a_budget_is_spent(settings):
     held_back = [event for trial in trials for event in trial
                  if event.kind is EventKind.DECISION and event.data['decided_by'] == 'held_back']
     assert bool(held_back) == ('budget' not in settings)
-    tried = what_if.compare(trials, {})
+    tried = compare(trials, {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
 
@@ -136,45 +147,59 @@ def test_what_was_not_counted_changes_no_replayed_decision(author_recovers, monk
     assert any(event.kind == EventKind.HEALTH_WAIT_START for event in events)
     assert author_recovers == any(
         event.kind == EventKind.TRANSITION and event.data for event in events)
-    tried = what_if.compare(trials, {})
+    tried = compare(trials, {})
     assert tried.counts['same'] == sum(tried.counts.values()) > 5
 
 
 def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():
     trials = run(60)
-    tried = what_if.compare(trials, {'memory': 1})
+    tried = compare(trials, {'memory': 1})
     assert tried.counts['would ask'] > 5 and tried.counts['would recover'] == 0
     assert 0 < tried.other_trials <= tried.trials == 60
 
 
 def test_what_was_not_tried_is_not_known():
     trials = run(60, memory=1)  # every failure is HIGH: no precondition was run, if there are any
-    tried = what_if.compare(trials, {'memory': 50})
+    tried = compare(trials, {'memory': 50})
     assert tried.counts['not known'] > 5 and tried.counts['would recover'] == 0
     assert tried.other_trials <= sum(
         tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
 
 
 def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
-    assert what_if.compare(run(60, memory=2), {'memory': 50}).counts['would recover'] > 5
+    assert compare(run(60, memory=2), {'memory': 50}).counts['would recover'] > 5
 
 
 def test_a_record_that_does_not_replay_is_refused():
     with pytest.raises(BagError, match='state may have settings of its own'):
-        what_if.compare(run(60, states={'PICK': {'memory': 3}}), {'memory': 5})
+        compare(run(60, states={'PICK': {'memory': 3}}), {'memory': 5})
     with pytest.raises(BagError, match='trials may be missing'):
-        what_if.compare(run(60)[5:], {'memory': 5})
+        compare(run(60)[5:], {'memory': 5})
 
 
 def test_programs_that_began_with_nothing_learned_are_told_by_the_rates():
     parts = [run(count, seed=count, back_to='PICK') for count in (1, 6, 1, 2, 9)]
-    apart = [what_if.compare(part, {'memory': 2}) for part in parts]
-    joined = what_if.compare([trial for part in parts for trial in part], {'memory': 2})
+    apart = [compare(part, {'memory': 2}) for part in parts]
+    joined = compare([trial for part in parts for trial in part], {'memory': 2})
     assert joined.programs == len(parts)
     assert joined.counts == {
         name: sum(part.counts[name] for part in apart) for name in apart[0].counts}
     assert what_if.format_tried_settings([joined]).endswith(
-        '\n5 programs, each began with nothing learned\n')
+        '\nat least 5 programs, each of which began with nothing learned\n')
+
+
+def test_a_program_whose_first_failures_fit_a_later_beginning_is_found():
+    """Its first trial, which Ctrl-C has stopped, has only taught it that LOOK succeeds."""
+    first = run(9, seed=1)
+    for seed in range(200):
+        second = run(30, seed=seed, stopped=1)
+        failed = [[event.state for event in trial if event.kind == EventKind.FAILURE]
+                  for trial in second]
+        if failed[1][:1] == ['PICK'] and any('LOOK' in states for states in failed[2:9]):
+            break
+    joined = compare(first + second, {})
+    assert joined.programs == 2 and joined.counts['same'] == sum(
+        compare(part, {}).counts['same'] for part in (first, second))
 
 
 def record(folder, trials):
@@ -246,7 +271,7 @@ def test_json_that_cannot_be_written_is_told_in_one_line(tmp_path, capsys):
 
 def tried_under(recorded, settings):
     """The counts, where what one policy recorded is put to another."""
-    return what_if.compare(run(60, **{**KEPT, 'policy': recorded}), settings).counts
+    return compare(run(60, **{**KEPT, 'policy': recorded}), settings).counts
 
 
 def test_what_is_drawn_is_not_known():
@@ -267,13 +292,13 @@ def test_a_policy_that_asks_nobody_would_give_up():
 
 def test_another_policy_has_the_parameters_it_comes_with():
     recorded = run(60, **{**KEPT, 'policy': {'name': 'retry', 'times': 0}})
-    counts = what_if.compare(recorded, {'policy': 'ladder'}).counts
+    counts = compare(recorded, {'policy': 'ladder'}).counts
     assert counts['would recover'] == sum(counts.values()) > 20
 
 
 def test_the_column_of_those_who_give_up_is_there_where_some_do():
     recorded = run(60, **KEPT)
-    rows = [what_if.compare(recorded, settings) for settings in (
+    rows = [compare(recorded, settings) for settings in (
         {'policy': 'always_ask'}, {'policy': 'retry', 'policy.times': 0})]
     assert what_if.GIVES_UP in what_if.format_tried_settings(rows)
     assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1])

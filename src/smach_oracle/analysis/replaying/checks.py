@@ -1,5 +1,5 @@
 """Holds a replay against the record that it follows."""
-from typing import Callable, List, Optional, Sequence, Set
+from typing import Callable, List, Optional, Sequence
 
 from smach_oracle.oracle.records import facts
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
@@ -10,24 +10,25 @@ from .replay import NOT_KNOWN, Replay
 _ROUNDING = 1e-9
 
 
-def beginnings(trials: Sequence[Sequence[Event]], begin: Callable[[], Replay]) -> Set[int]:
+def beginnings(trials: Sequence[Sequence[Event]], begin: Callable[[], Replay]) -> List[int]:
     """Return the numbers of trials that began with nothing learned, from 0. The first is one.
 
     A program that keeps no rates in a file begins so. No event says that. It shows in the rates,
-    which are those of an oracle that has seen only the trials since. `begin`: an oracle that has
-    learned nothing.
+    which are those of an oracle that has seen only the trials since. A program whose rates show
+    nothing is not found. `begin`: returns an oracle that has learned nothing.
 
     :raises BagError: where the rates or decisions of a trial fit no beginning.
     """
-    found, own = {0}, begin()
+    found, own = [0], begin()
     for number, trial in enumerate(trials):
         wrong = _follow(own, trial)
         if wrong is None:
             continue
-        for first in range(number, max(found), -1):
+        # the last one that was found may have begun earlier than its first failures tell
+        for first in range(number, found[-2] if len(found) > 1 else 0, -1):
             own = begin()
             if all(_follow(own, each) is None for each in trials[first:number + 1]):
-                found.add(first)
+                found = [each for each in found if each < first] + [first]
                 break
         else:
             raise wrong
