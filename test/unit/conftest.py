@@ -3,6 +3,7 @@ shared helpers.
 """
 import os
 import re
+import subprocess
 import sys
 
 import pytest
@@ -33,19 +34,28 @@ def what_may_lack(text):
 def pytest_make_collect_report(collector):
     """Leave out a file that imports what another Python cannot have (scripts/test --python)."""
     report = (yield).get_result()
-    leave_out(report, str(collector.path))
+    leave_out(report, str(collector.path), str(report.longrepr))
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item, call):
     """Leave out a test for the same reason, also where a command that it runs says so."""
     report = (yield).get_result()
-    leave_out(report, str(item.path))
+    if call.excinfo is not None:
+        leave_out(report, str(item.path), told_by(call.excinfo.value, report))
 
 
-def leave_out(report, path):
-    """Make a failure for such a reason a test that was left out."""
-    lacking = what_may_lack(str(report.longrepr) + report.capstderr) if report.failed else ''
+def told_by(error, report):
+    """What an error says, those before it, and a command that has ended with it."""
+    told = report.capstderr if isinstance(error, subprocess.CalledProcessError) else ''
+    while error is not None:
+        told, error = told + '\n' + str(error), error.__cause__ or error.__context__
+    return told
+
+
+def leave_out(report, path, told):
+    """Make a failure a test that was left out, where what was told names such a reason."""
+    lacking = what_may_lack(told) if report.failed else ''
     if lacking:
         report.outcome = 'skipped'
         report.longrepr = (path, 0, 'lacks ' + lacking)

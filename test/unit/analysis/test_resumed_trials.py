@@ -65,7 +65,8 @@ def test_a_resumed_trial_is_replayed_and_of_what_was_interrupted_nothing_is_know
     part(tmp_path, kill_at + 1, 0)
     events = events_of(tmp_path)
     assert EventKind.RESUMED in [event.kind for event in events]
-    counts = what_if.compare(what_if.Recorded([events]), {}).counts  # it raises where a rate is another
+    recorded = what_if.Recorded([events])  # it raises where a rate is another
+    counts = what_if.compare(recorded, {}).counts
     assert counts['same'] + counts['not known'] == sum(counts.values())
     if FailureKind.INTERRUPTED in [event.failure_kind for event in events]:
         assert counts['not known'] >= 1

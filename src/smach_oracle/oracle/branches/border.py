@@ -92,7 +92,7 @@ class Border:
         self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
 
     def forget_resumed(self) -> None:
-        """Begin anew at the next execution, whatever was under way as the program was stopped."""
+        """Begin the next execution from the start, whatever was under way in the program before."""
         self._resumed = None
 
     @property

@@ -132,7 +132,7 @@ def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
 
 
 def forget_resumed(node: TreeNode) -> None:
-    """Let all that is in a container begin anew.
+    """Let all that is in a container begin from the start.
 
     To be called as the container is sent elsewhere. What was to go on there may not have begun.
     """
