@@ -140,6 +140,7 @@ class TestExpertProtocol(unittest.TestCase):
         _, listed = self.ask()
         self.assertTrue(wait_for(lambda: slow.find(listed.key)))
         self.assertTrue(slow.claim(listed).ok)
+        self.assertTrue(wait_for(lambda: self.listed(self.ann).holder == 'slow'))  # by its topic
         self.assertTrue(stays(lambda: self.listed(self.ann).holder == 'slow', 2.0 * lease_s))
 
     def test_nobody_answers_by_the_deadline(self):
