@@ -42,10 +42,12 @@ def test_two_processes_that_derive_it_at_once_both_get_it(tmp_path, monkeypatch)
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
     asked = [
         subprocess.Popen([sys.executable, '-c', ASK], stdout=subprocess.PIPE,
-                         universal_newlines=True) for _ in range(2)
+                         stderr=subprocess.PIPE, universal_newlines=True) for _ in range(2)
     ]
-    answers = {process.communicate(timeout=60)[0].strip().splitlines()[-1] for process in asked}
-    assert len(answers) == 1 and all(process.returncode == 0 for process in asked)
+    told = [process.communicate(timeout=60) for process in asked]
+    assert [process.returncode for process in asked] == [0, 0], told[0][1]
+    answers = {output.strip().splitlines()[-1] for output, _ in told}
+    assert len(answers) == 1
     (folder,) = (tmp_path / 'smach_oracle').iterdir()  # no draft is left over
     assert str(folder / 'pr2.urdf') in answers
 
