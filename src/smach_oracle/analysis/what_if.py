@@ -18,12 +18,12 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 from smach_oracle.oracle.decision.policy import POLICIES, Action
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
 from .reading import plain, report_error, report_skipped, write_json
-from .replaying.checks import beginnings, check_decision, check_rate, that_count
+from .replaying.checks import beginnings, that_count
 from .replaying.replay import NOT_KNOWN, STAYS, Replay, conditioned, policy_of
 from .trials import load_replicates, summarise
 
@@ -72,24 +72,16 @@ class Recorded:
 
 
 def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
-    """Put the decisions of one replicate to an oracle of other settings.
-
-    :raises BagError: where the record cannot be replayed under its own settings.
-    """
+    """Put the decisions of one replicate to an oracle of other settings."""
     counts = dict.fromkeys((*OUTCOMES, GIVES_UP), 0)
     other_trials = 0
     for number, trial in enumerate(recorded.trials):
         if number in recorded.beginnings:
-            own, other = recorded.replay({}), recorded.replay(settings)
+            other = recorded.replay(settings)
         another = False
         for event in that_count(trial):
-            check_rate(own, event)
-            if event.kind == EventKind.STATE_START:
-                own.begin_visit(event)
-                other.begin_visit(event)
-            done, tried = own.take(event), other.take(event)
-            if done is not None and tried is not None:
-                check_decision(done, event)
+            tried = other.take(event)
+            if tried is not None:
                 outcome = _outcome(event.outcome, tried)
                 counts[outcome] += 1
                 another = another or outcome not in (SAME, NOT_KNOWN)
@@ -176,7 +168,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         try:
             write_json(args.json, {'folders': replayed, 'skipped': plain(skipped)})
         except OSError as err:
-            return report_error('what_if', '{}: {}'.format(args.json, err.strerror))
+            return report_error('what_if', err)
     if not replayed:
         return report_error('what_if', '{}: no trials with an oracle that could be replayed'.format(
             ', '.join(args.folders)))

@@ -39,12 +39,10 @@ def _follow(own: Replay, trial: Sequence[Event]) -> Optional[BagError]:
     """Follow a trial. Return what does not fit, or None."""
     try:
         for event in that_count(trial):
-            check_rate(own, event)
-            if event.kind == EventKind.STATE_START:
-                own.begin_visit(event)
+            _check_rate(own, event)
             done = own.take(event)
             if done is not None:
-                check_decision(done, event)
+                _check_decision(done, event)
     except BagError as err:
         return err
     return None
@@ -64,7 +62,7 @@ def that_count(trial: Sequence[Event]) -> List[Event]:
     return found
 
 
-def check_rate(own: Replay, event: Event) -> None:
+def _check_rate(own: Replay, event: Event) -> None:
     if event.kind != EventKind.FAILURE or event.failure_kind == FailureKind.INTERRUPTED:
         return
     if abs(own.rate(event) - event.rate) > _ROUNDING:
@@ -74,7 +72,7 @@ def check_rate(own: Replay, event: Event) -> None:
             'missing'.format(event.trial_id, event.state, event.rate, own.rate(event)))
 
 
-def check_decision(done: str, event: Event) -> None:
+def _check_decision(done: str, event: Event) -> None:
     if done not in (event.outcome, NOT_KNOWN):
         raise BagError('{}: {}: it decided {}, where its own settings say {}'.format(
             event.trial_id, event.state, event.outcome, done))

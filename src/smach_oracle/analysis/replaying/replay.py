@@ -64,6 +64,8 @@ class Replay:
             self._running.discard(event.path)
         elif event.kind == EventKind.CONTAINER_START:
             self._begin_execution(event)
+        elif event.kind == EventKind.STATE_START:
+            self._begin_visit(event)
         elif event.kind == EventKind.FAILURE:
             self._failed(event)
         elif event.kind == EventKind.TRANSITION:
@@ -153,7 +155,7 @@ class Replay:
         self._history(event).visited(Visit(event.state, event.outcome, result),
                                           self._conditioned.get((event.path, event.state), False))
 
-    def begin_visit(self, event: Event) -> None:
+    def _begin_visit(self, event: Event) -> None:
         """Note that a state is about to run."""
         state = self._state(event)
         state.context, state.interrupted = None, False
