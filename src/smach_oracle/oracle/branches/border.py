@@ -98,12 +98,17 @@ class Border:
     @property
     def is_resumed(self) -> bool:
         """Whether its next execution goes on where the program was stopped."""
-        return self._resumed is not None and self._resumed.trial_id == self._trial_now()
+        return self._to_resume() is not None
+
+    def _to_resume(self) -> Optional[_Resumed]:
+        """Return how it goes on, unless that was of a trial before."""
+        resumed = self._resumed
+        return resumed if resumed is not None and resumed.trial_id == self._trial_now() else None
 
     def take_over_userdata(self) -> None:
         """Have the userdata that `resume` was given, at the first execution after it."""
-        resumed, self._resumed = self._resumed, None
-        if resumed is not None and resumed.trial_id == self._trial_now():
+        resumed, self._resumed = self._to_resume(), None
+        if resumed is not None:
             data = self.container.userdata._data
             for key in resumed.gone:
                 data.pop(key, None)
@@ -246,9 +251,8 @@ class IteratorBorder(Border):
         self._is_asked_to_go_on = False
         if has_rest and self._ended_with is None and not self.goes_on:
             items.tell_of_repeats()
-        resumed = self._resumed
-        items.begins_with = (1 if resumed is None or resumed.trial_id != trial_id
-                             else resumed.item)
+        resumed = self._to_resume()
+        items.begins_with = 1 if resumed is None else resumed.item
         if self.goes_on:
             self._pass_on(dict(self.states()))
         else:

@@ -87,8 +87,7 @@ class Checkpointer:
                 self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
         if event.kind is EventKind.CONTAINER_START and node.resuming is None:
             pending += self._facts_of(node).begin_execution()
-        if event.kind is (EventKind.CONTAINER_START if node.branch is None
-                          else EventKind.STATE_START):
+        if _enters(event, node):
             self._entered.setdefault(_begins_line(node), []).append(node)
         if event.kind is EventKind.CONTAINER_END:
             pending += self._collected(node, all_keys=True)
@@ -234,7 +233,8 @@ class Checkpointer:
                 self._items[path] = number
                 yield fact_of(path, ITEMS, number)
                 yield from self._not_begun_below(path)
-                yield from self._keys(path, border.container.userdata._data, None)
+                if not _enters(event, node):  # else the commit has them
+                    yield from self._keys(path, border.container.userdata._data, None)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
@@ -309,6 +309,12 @@ def _begins_line(node: TreeNode) -> str:
     while node.parent is not None and node.branch is None and len(node.below) == 1:
         node = node.parent
     return node.key
+
+
+def _enters(event: Event, node: TreeNode) -> bool:
+    """Whether a container, or the state of a branch, begins at an event."""
+    return event.kind is (EventKind.CONTAINER_START if node.branch is None
+                          else EventKind.STATE_START)
 
 
 def _goes_on(node: TreeNode) -> bool:
