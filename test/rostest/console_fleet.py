@@ -131,7 +131,10 @@ class Fleet(unittest.TestCase):
         self.answer_elsewhere(0)
         self.let_go()
         self.assertTrue(browser.says('/robot_5 · JOB', '.detail-head'),
-                        'the list does not move under the mouse')
+                        'the list moved under the mouse, or the page refused the press ({} refused '
+                        'so far); it says:\n{}'.format(
+                            browser.run('return document.body.dataset.refused || 0'),
+                            browser.text()[:1500]))
         self.assertTrue(
             wait_for(
                 lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(0))))

@@ -115,6 +115,9 @@ def test_a_branch_without_an_oracle_fails_as_bare():
 
 
 def test_a_path_of_nested_that_stands_for_nothing_is_refused_with_those_there_are():
+    said = r"'ARN' names nothing in SM_ROOT \(did you mean ARM\?\)"
+    with pytest.raises(SettingsError, match=said):
+        OracleContainer.wrap(tree()[0], settings={'nested': ['ARN']})
     with pytest.raises(SettingsError, match=r"nested: 'ARMS'.*ALL/EACH, ARM, ARM/HAND, BOTH/LEFT"):
         OracleContainer.wrap(tree()[0], settings={'nested': ['ARMS']})
     with pytest.raises(SettingsError, match='true, false, or a list'):

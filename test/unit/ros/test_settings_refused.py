@@ -163,10 +163,10 @@ def test_one_file_serves_several_machines_of_a_script(run):
 
 
 MISTAKES = [
-    (precondition('HOEM'), "line 3: states.PICK.preconditions: 'HOEM' is not allowed; allowed: "
-     'the labels of the other states there: HOME'),
-    (precondition('PICK'), "'PICK' is not allowed"),
-    (precondition('/HOEM'), "'/HOEM' is not allowed"),
+    (precondition('HOEM'), "line 3: states.PICK.preconditions: 'HOEM' is not allowed "
+     '(did you mean HOME?); allowed: the labels of the other states there: HOME'),
+    (precondition('PICK'), "'PICK' is not allowed; allowed: "),
+    (precondition('/HOEM'), "'/HOEM' is not allowed (did you mean /HOME?)"),
     (precondition('{check: "python:checks:clear", achieve: HOEM}'), "'HOEM' is not allowed"),
     ('oracle_label: PICK\n', "line 1: oracle_label: 'PICK' is not allowed; allowed: a name that is "
      'no state or outcome of TASK'),

@@ -37,7 +37,8 @@ def check_nested(top: TreeNode) -> None:
         if not any(matches(name, path) for path in known):
             _refuse(top, SettingsError(
                 'nested', name, 'a path or a pattern of the machines in {}, and of the states of '
-                'its Concurrences and Iterators: {}'.format(top.path, ', '.join(known) or 'none')))
+                'its Concurrences and Iterators: {}'.format(top.path, ', '.join(known) or 'none'),
+                problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known))))
 
 
 def _known_names(top: TreeNode) -> Set[str]:
@@ -69,8 +70,8 @@ def check_preconditions(node: TreeNode) -> None:
                 why_not = why_unfit(node, label, named)
                 if why_not:
                     _refuse(node, SettingsError(
-                        'states.{}.preconditions'.format(label), named,
-                        '{} ({})'.format(allowed_for(node, label), why_not)))
+                        'states.{}.preconditions'.format(label), named, allowed_for(node, label),
+                        problem='is not allowed: ' + why_not))
 
 
 def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:

@@ -5,6 +5,7 @@ import smach
 
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
+from ..settings.close_names import did_you_mean
 from .handing_over import links_to
 from .place import Place, place_named
 
@@ -15,10 +16,10 @@ def why_unfit(node: TreeNode, label: str, name: str) -> str:
     A name without '/' is a label of the state's own container, any other one a path.
     """
     if '/' not in name and (name not in node.labels() or node.branch is not None):
-        return _where_it_is(node, name) or 'there is no such state'
+        return _where_it_is(node, name) or _unknown(node, label, name)
     place = place_named(node, name, at_rest=True)
     if place is None:
-        return 'there is no such state'
+        return _unknown(node, label, name)
     if place.node is node and place.label == label:
         return 'it is the state itself'
     if _is_around(place, node):
@@ -37,6 +38,15 @@ def allowed_for(node: TreeNode, label: str) -> str:
         return elsewhere
     return 'the labels of the other states of {}: {}; or {}'.format(
         node.path, ', '.join(sorted(other for other in node.labels() if other != label)), elsewhere)
+
+
+def _unknown(node: TreeNode, label: str, name: str) -> str:
+    names = {'{}/{}'.format(each.relative_path, state)
+             for each in nodes_of(node.top().machine) for state in each.labels()}
+    if node.branch is None:
+        names.update(node.labels())
+    own = {label, '{}/{}'.format(node.relative_path, label)}
+    return 'there is no such state' + did_you_mean(name, names - own)
 
 
 def _where_it_is(node: TreeNode, name: str) -> str:

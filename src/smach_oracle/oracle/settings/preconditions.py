@@ -58,8 +58,7 @@ def parse_preconditions(key: str, given: object,
                         resolver: Optional[Resolver] = None) -> Tuple[PreconditionSpec, ...]:
     """Check a list of preconditions of one state.
 
-    :raises SettingsError: naming `key` and the
-    position.
+    :raises SettingsError: naming `key` and the position.
     """
     if not isinstance(given, list):
         if isinstance(given, tuple) and all(isinstance(spec, PreconditionSpec) for spec in given):

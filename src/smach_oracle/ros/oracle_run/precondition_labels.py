@@ -1,9 +1,10 @@
 """A check that the preconditions in the settings name states of a script's machine."""
 import gc
-from typing import Dict, Iterator, List, NamedTuple, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Set, Tuple
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.close_names import did_you_mean
 from smach_oracle.oracle.settings.settings import Settings
 
 
@@ -13,6 +14,10 @@ class _Use(NamedTuple):
     key: str
     named: str
     others: Tuple[str, ...]  # the labels that it may name there
+
+    def names(self, paths: Set[str]) -> Set[str]:
+        """Return all that may be meant: those labels, or the paths of the machine."""
+        return paths | {'/' + each for each in paths} if '/' in self.named else set(self.others)
 
 
 def misplaced_preconditions(machine: smach.StateMachine,
@@ -31,7 +36,8 @@ def misplaced_preconditions(machine: smach.StateMachine,
         else:
             wrong.setdefault(use[:2], use)
     return [SettingsError(use.key, use.named, 'the labels of the other states there: '
-                          + ', '.join(use.others))
+                          + ', '.join(use.others),
+                          problem='is not allowed' + did_you_mean(use.named, use.names(paths)))
             for place, use in wrong.items() if place not in right]
 
 
