@@ -55,7 +55,7 @@ from .truth import TrialTruth, append_line
 
 # simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
 # wakes every action server of every node.
-CLOCK_S = {False: 0.05, True: 0.2}
+CLOCK_S = {False: 0.05, True: 0.5}
 LONGEST_PASS_S = 36000.0  # of the world's time, that may pass at once
 REST_S = 1.0  # after a trial, before it is judged
 # for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch

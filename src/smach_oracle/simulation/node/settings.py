@@ -29,7 +29,7 @@ class WorldSettings(NamedTuple):
     # file of a lab that goes on from trial to trial. None means each trial has a fresh world
     lab: str = NONE
     truth_file: str = NONE  # gets a line of JSON on each trial that has ended
-    # joint states and transforms per simulated s. At factor 0 the default is 4
+    # joint states and transforms per simulated s. At factor 0 the default is 1
     state_rate: float = 10.0
     # images per simulated s for those who subscribe. At factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
@@ -69,7 +69,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
         lab=taken('lab', NONE, _file),
-        state_rate=number('state_rate', 10.0 if factor else 4.0, 0.1, 60.0),
+        state_rate=number('state_rate', 10.0 if factor else 1.0, 0.1, 60.0),
         camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
         camera_binning=taken('camera_binning', 1, _one_or_two))
 
