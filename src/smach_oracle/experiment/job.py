@@ -38,6 +38,8 @@ class ExperimentJob:
         # of the trials that are over, by the path of their bags
         self.summaries: Dict[str, TrialSummary] = {}
         self.messages: List[str] = []  # for the person at the terminal
+        # on which its processes stay. None means any
+        self.core: Optional[int] = None
         self._plan = plan
         self._seed = plan.first_seed(replicate)
         self._hung_after_s = hung_after_s
@@ -99,7 +101,8 @@ class ExperimentJob:
         if self._plan.hours is not None:
             write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
                       self._results.last_left())
-        self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
+        self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments(),
+                              self.core)
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))

@@ -10,6 +10,7 @@ import signal
 import socket
 import subprocess
 import time
+from functools import partial
 from pathlib import Path
 from typing import IO, Any, Dict, List, Mapping, Optional
 
@@ -33,9 +34,11 @@ class Launch:
     Its output goes to the end of `launch.log` in the job's folder, ROS's logs to `log`.
     """
 
-    def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any]) -> None:
+    def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any],
+                 core: Optional[int] = None) -> None:
         """Start it.
 
+        :param core: processor core on which all its processes stay. None means any.
         :raises OSError: where that cannot be done.
         """
         self._mark = str(folder)
@@ -46,7 +49,8 @@ class Launch:
         self._log_file: IO[str] = (folder / LOG_FILE).open('a')
         self._process = subprocess.Popen(command, env=self.environment,
                                          stdout=self._log_file, stderr=subprocess.STDOUT,
-                                         start_new_session=True, preexec_fn=end_with_parent)
+                                         start_new_session=True,
+                                         preexec_fn=partial(_begin, core))
 
     def running(self) -> bool:
         """Whether roslaunch has not ended."""
@@ -104,6 +108,12 @@ def last_words(log: Path, count: int = 6) -> str:
         if line.strip()
     ]
     return ''.join('\n  ' + line for line in lines[-count:])
+
+
+def _begin(core: Optional[int]) -> None:
+    end_with_parent()
+    if core is not None:
+        os.sched_setaffinity(0, {core})
 
 
 def end_with_parent() -> None:

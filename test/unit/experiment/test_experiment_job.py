@@ -62,7 +62,7 @@ class FakeLaunch:
     script = []
     started = []
 
-    def __init__(self, folder, launch_file, arguments):
+    def __init__(self, folder, launch_file, arguments, core=None):
         self.arguments = arguments
         self.completes, self.hangs = FakeLaunch.script.pop(0)
         first = arguments['seed'] - FIRST_SEED

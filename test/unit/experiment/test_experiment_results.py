@@ -170,7 +170,7 @@ def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatc
     monkeypatch.setattr(job_module, 'Launch', lambda *launched: started.append(launched))
     job = ExperimentJob(given, given.variants[0], 0, tmp_path, 300.0)
     job.start()
-    (_, _, arguments), = started
+    (_, _, arguments, _), = started
     assert arguments['seed'] == FIRST_SEED + 3
     assert json.loads(Path(arguments['lab']).read_text()) == {
         'seed': FIRST_SEED, 'slot_h': 0.5, 'left': {'ended': 0.6}}, 'a lost trial leaves nothing'

@@ -83,13 +83,13 @@ LAYERS: Dict[str, List[Layer]] = {
         {'script_run', 'soak'}, {'bench', 'recorded', 'soak_report'}, 'observed_trial',
         {'injection', 'node_side', 'trial_text', 'script'}, {'faults', 'places'}, 'errors'
     ],
-    'simulation': [{'rehearsal', 'node'}, 'physics', 'scenes'],
+    'simulation': [{'rehearsal', 'node'}, 'pictures', 'physics', 'scenes'],
     'inspection_robot': [{'nodes', 'checks'}, {'world', 'robot'}, {'rays', 'site'}],
 }
 # what runs where no ROS is installed
 ROS_FREE = [
     'oracle', 'store', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception',
-    'pr2/planning', 'pr2/skills', 'simulation/physics', 'simulation/scenes',
+    'pr2/planning', 'pr2/skills', 'simulation/physics', 'simulation/pictures', 'simulation/scenes',
     'inspection_robot/world', 'inspection_robot/robot', 'commands', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}

@@ -3,6 +3,7 @@ import sys
 import threading
 import time
 import traceback
+from pathlib import Path
 from typing import Optional
 
 import rosgraph
@@ -51,11 +52,12 @@ from .reveal import reveal
 from .settings import NONE, WorldSettings, read_settings
 from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
+from .trial_film import TrialFilm
 from .truth import TrialTruth, append_line
 
 # simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
 # wakes every action server of every node.
-CLOCK_S = {False: 0.05, True: 0.2}
+CLOCK_S = {False: 0.05, True: 0.5}
 LONGEST_PASS_S = 36000.0  # of the world's time, that may pass at once
 REST_S = 1.0  # after a trial, before it is judged
 # for the last trial's line, at the end, on a busy machine: less than the 15 s after which roslaunch
@@ -79,6 +81,7 @@ class WorldNode:
         self._lab = read_lab(settings) if settings.lab != NONE else None
         self._world = World(self._drawn(settings.seed), settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
+        self._film = TrialFilm(Path(settings.film)) if settings.film != NONE else None
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
                                CLOCK_S[settings.lock_step])
@@ -117,6 +120,8 @@ class WorldNode:
     # in the world's thread
 
     def _after_tick(self) -> None:
+        if self._film:
+            self._film.look(self._world)
         now = self._clock.now_ns / 1e9
         came_to_rest = not self._motions and self._published != self._world.periods
         if came_to_rest or (now >= self._state_due and not self._between_targets()):
@@ -172,6 +177,8 @@ class WorldNode:
         began_s = time.monotonic()
         self._world.reset(self._lab.scene(seed) if self._lab else self._drawn(seed))
         self._recognition.forget()
+        if self._film:
+            self._film.begin(seed)
         self._loop.watch.add_time('reset')
         self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
         causes = self._world.scene.causes
@@ -186,6 +193,8 @@ class WorldNode:
     def _finish_trial(self) -> None:
         """Write down how the trial ended, once."""
         truth, self._truth = self._truth, None
+        if self._film:
+            self._film.end()
         if truth is None or not (self._lab or self._settings.truth_file != NONE):
             return
         sim_s = self._world.time
@@ -261,7 +270,7 @@ def main() -> None:
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
         '~lasting, ~lab, ~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, '
-        '~camera_rate, ~camera_binning, ~reveal; see doc/simulation.md.')
+        '~camera_rate, ~camera_binning, ~film, ~reveal; see doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:
         # before the node is made: rospy looks at it only then

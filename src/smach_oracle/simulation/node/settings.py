@@ -1,4 +1,6 @@
 """The parameters of the world node."""
+import os
+from pathlib import Path
 from typing import Any, Callable, NamedTuple, TypeVar
 
 from smach_oracle.oracle.errors import SettingsError
@@ -29,10 +31,11 @@ class WorldSettings(NamedTuple):
     # file of a lab that goes on from trial to trial. None means each trial has a fresh world
     lab: str = NONE
     truth_file: str = NONE  # gets a line of JSON on each trial that has ended
-    # joint states and transforms per simulated s. At factor 0 the default is 4
+    # joint states and transforms per simulated s. At factor 0 the default is 1
     state_rate: float = 10.0
     # images per simulated s for those who subscribe. At factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
+    film: str = NONE  # folder that gets a video of each trial
     # offer the truth to everybody, as services world/reveal and world/judge: to try things out
     reveal: bool = False
     # columns and rows of the camera's sensor that make one pixel of its images
@@ -68,8 +71,8 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
-        lab=taken('lab', NONE, _file),
-        state_rate=number('state_rate', 10.0 if factor else 4.0, 0.1, 60.0),
+        lab=taken('lab', NONE, _file), film=taken('film', NONE, _folder),
+        state_rate=number('state_rate', 10.0 if factor else 1.0, 0.1, 60.0),
         camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
         camera_binning=taken('camera_binning', 1, _one_or_two))
 
@@ -84,6 +87,15 @@ def _file(key: str, value: object) -> str:
     if not isinstance(value, str) or not value:
         raise SettingsError(key, value, "a file's name, or {}".format(NONE))
     return value if value == NONE else path_of(value)
+
+
+def _folder(key: str, value: object) -> str:
+    path = _file(key, value)
+    if path != NONE:
+        if not Path(path).is_dir():
+            raise SettingsError(key, value, 'a folder that is there, or {}'.format(NONE))
+        check_writable(key, os.path.join(path, '0.mp4'))
+    return path
 
 
 def _writable_file(key: str, value: object) -> str:

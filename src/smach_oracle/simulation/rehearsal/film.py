@@ -10,11 +10,12 @@ import numpy as np
 from smach_oracle.oracle.settings.paths import path_of, why_not_writable
 
 from ..physics.world import World
+from ..pictures.portrait import portrait
+from ..pictures.video import VideoError, VideoFile
 from ..scenes import kitchen_scene, tabletop_scene
 from ..scenes.scene import Scene
 from .drink_retrieval import DrinkRetrievalRehearsal
 from .pick_and_place import PickAndPlaceRehearsal, Rehearsal, rehearse
-from .portrait import portrait
 
 FRAME = (480, 320)  # pixels, of the video
 PICTURE = (960, 640)
@@ -95,13 +96,13 @@ def write_video(path: str, frames: List[np.ndarray], frames_s: float) -> bool:
     :param frames_s: images per s.
     :returns: whether this OpenCV can.
     """
-    height, width = frames[0].shape[:2]
-    video = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*'mp4v'), frames_s, (width, height))
-    if not video.isOpened():
+    video = VideoFile(Path(path), frames_s)
+    try:
+        for frame in frames:
+            video.add(frame)
+    except VideoError:
         return False
-    for frame in frames:
-        video.write(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR))
-    video.release()
+    video.close()
     return Path(path).stat().st_size > 0
 
 
