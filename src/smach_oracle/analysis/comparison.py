@@ -57,7 +57,8 @@ class Costs(NamedTuple):
     expert_s: Optional[float]  # a trial
     expert_s_per_hour: Optional[float]
     wrong_objects: Optional[int]
-    damage: Optional[float]  # things that came to harm, a completed task
+    damage: Optional[float]  # things that came to harm in any trial, for each true success
+    damage_done: Optional[float]  # of these, in a trial of true success
     completion_s: Optional[float]  # median time of a true success
     trials_between: Optional[float]  # trials an intervention. None means there was none
     hours_between: Optional[float]
@@ -89,13 +90,14 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
     hours = robot_hours(ended)
     expert_s = _total(ended, lambda row: row.expert_s)
     done = [row for row in ended if row.succeeded]
-    harm = _total(done, lambda row: row.damage)
     times = [row.sim_s for row in done if row.sim_s is not None]
     wrong = [row.wrong_object for row in ended]
     return Costs(
         sum(row.attempts for row in rows) / len(rows), asked / len(rows), _ratio(asked, hours),
         _ratio(expert_s, len(ended)), _ratio(expert_s, hours),
-        None if None in wrong else sum(map(bool, wrong)), _ratio(harm, len(done)),
+        None if None in wrong else sum(map(bool, wrong)),
+        _ratio(_total(ended, lambda row: row.damage), len(done)),
+        _ratio(_total(done, lambda row: row.damage), len(done)),
         statistics.median(times) if times else None, _ratio(len(rows), interventions),
         _ratio(hours, interventions))
 
@@ -163,8 +165,8 @@ def _variant(name: str, rows: Sequence[TrialRow]) -> str:
 
 
 _COSTS = ('attempts a trial', 'questions a trial', 'questions a robot hour', 'expert s a trial',
-          'expert s a robot hour', 'trials with a wrong object', 'damage a completed task',
-          's to completion, median', 'trials between interventions',
+          'expert s a robot hour', 'trials with a wrong object', 'damage for each completed task',
+          'damage in a completed task', 's to completion, median', 'trials between interventions',
           'robot hours between interventions')
 
 

@@ -150,9 +150,16 @@ def test_costs_are_told_a_trial_and_a_robot_hour():
     assert (costs.trials_between, costs.hours_between) == (1.5, pytest.approx(0.5))
 
 
+def test_damage_is_that_of_all_trials_for_each_completed_task():
+    costs = comparison.costs_of([
+        row(1, damage=1), row(2), row(3, ending='failure', true_success=False, damage=3),
+        row(4, ending='lost', true_success=None, damage=None, wrong_object=None)])
+    assert (costs.damage, costs.damage_done) == (2.0, 0.5), 'what fell in a failed trial, too'
+
+
 def test_what_is_not_known_of_all_trials_is_not_told():
     costs = comparison.costs_of([row(1, sim_s=None, damage=None, wrong_object=None), row(2)])
-    assert costs[2:8] == (None, 0.0, None, None, None, 60.0)
+    assert costs[2:9] == (None, 0.0, None, None, None, None, 60.0)
     assert costs.trials_between is None
 
 

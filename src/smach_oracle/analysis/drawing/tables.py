@@ -8,9 +8,10 @@ from .looks import title_of, variants_of
 
 SHARES = ('true success', 'interventions', 'recovered', 'with attempts', 'lost or hung')
 COSTS = ('attempts', 'questions', 'questions_per_hour', 'expert_s', 'expert_s_per_hour',
-         'wrong_objects', 'damage', 'completion_s', 'trials_between', 'hours_between')
+         'wrong_objects', 'damage', 'damage_done', 'completion_s', 'trials_between', 'hours_between')
 HEADS = ('attempts a trial', 'questions a trial', 'questions an hour', 'expert s a trial',
-         'expert s an hour', 'wrong object', 'damage a completed task', 'completion, s',
+         'expert s an hour', 'wrong object', 'damage for each completed task',
+         'damage in a completed task', 'completion, s',
          'trials between interventions', 'hours between interventions')
 
 
