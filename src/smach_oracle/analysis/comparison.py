@@ -1,12 +1,12 @@
 """Compare variants that ran the same trials, from the rows that an experiment has kept.
 
 Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
-cost for a trial and for a robot hour. Prints McNemar's exact test of the interventions for each two
-variants, and the best that any variant did in each trial (hindsight). Exit code: 0, or 2 if there
-was nothing to read.
+cost for a trial and for a robot hour. Prints the best that any variant did in each trial that all
+ran (hindsight), beside what each did there. Prints McNemar's exact test of the interventions, of
+`default` against each other variant, or of each two. Exit code: 0, or 2 if there was nothing to
+read.
 """
 import argparse
-import itertools
 import statistics
 import sys
 from pathlib import Path
@@ -16,7 +16,15 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
 from .intervals import Interval, replicate_interval, wilson_interval
-from .pairing import HINDSIGHT, Happened, hindsight, paired_counts
+from .pairing import (
+    COMPARED,
+    HINDSIGHT,
+    Happened,
+    hindsight,
+    on_common_seeds,
+    paired_counts,
+    pairs_to_test,
+)
 from .reading import report_error
 from .trial_rows import LOST, TrialRow, read_rows
 
@@ -132,15 +140,43 @@ def format_comparison(rows: Sequence[TrialRow]) -> str:
     """Return the tables, one task after the other."""
     texts = []
     for (task, share), mine in groups_of(rows).items():
-        names = list(dict.fromkeys(row.variant for row in mine))
-        variants = {name: [row for row in mine if row.variant == name] for name in names}
-        best = hindsight(mine) if len(names) > 1 else []
-        if best:
-            variants[HINDSIGHT] = best
+        variants = by_variant(mine)
         told = '' if share is None else ', {:.0%} of the causes last'.format(share)
         texts += ['{}{}\n'.format(task, told)] + [_variant(*each) for each in variants.items()]
-        texts += _tests({name: variants[name] for name in names})
+        texts += _same_seeds(mine) + _tests(variants)
     return '\n'.join(texts)
+
+
+def by_variant(rows: Sequence[TrialRow]) -> Dict[str, List[TrialRow]]:
+    """Return the rows of each variant: those that are compared first, then as they were begun."""
+    found: Dict[str, List[TrialRow]] = {}
+    for row in rows:
+        found.setdefault(row.variant, []).append(row)
+    first = [name for name in COMPARED if name in found]
+    return {name: found[name] for name in dict.fromkeys([*first, *found])}
+
+
+def with_hindsight(rows: Sequence[TrialRow]) -> Dict[str, List[TrialRow]]:
+    """Return the rows of each variant on the seeds that all of them ran, and HINDSIGHT's.
+
+    It is empty where there are no such seeds, or no two variants.
+    """
+    best = hindsight(rows)
+    found = by_variant(on_common_seeds(rows))
+    return {**found, HINDSIGHT: best} if len(found) > 1 else {}
+
+
+def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
+    """Tell the bound, beside each variant on the same seeds."""
+    found = with_hindsight(rows)
+    if not found:
+        return []
+    lines = ['  on the {} seeds that all variants ran:'.format(len(found[HINDSIGHT]))]
+    for name, mine in found.items():
+        true, needed = shares_of(mine)[:2]
+        lines.append('    {:<24}{:>7.1%} true success {:>7.1%} interventions'.format(
+            name, true.share, needed.share))
+    return ['\n'.join(lines) + '\n']
 
 
 def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
@@ -176,8 +212,8 @@ def _number(value: Optional[float]) -> str:
 
 def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
     lines = []
-    for (first, ours), (second, theirs) in itertools.combinations(variants.items(), 2):
-        counts = paired_counts(ours, theirs, lambda row: row.intervened)
+    for first, second in pairs_to_test(list(variants)):
+        counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
         if sum(counts):
             lines.append(
                 '  interventions, {} against {}: {} trials under {} alone, {} under {} alone, '

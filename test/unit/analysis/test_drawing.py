@@ -3,10 +3,15 @@
 import pytest
 from matplotlib import rc_context
 
-from smach_oracle.analysis.comparison import costs_of, format_comparison, robot_hours
+from smach_oracle.analysis.comparison import (
+    costs_of,
+    format_comparison,
+    robot_hours,
+    with_hindsight,
+)
 from smach_oracle.analysis.drawing import command
 from smach_oracle.analysis.drawing.hours_figure import draw_hours, learned_rates
-from smach_oracle.analysis.drawing.main_figure import draw_main
+from smach_oracle.analysis.drawing.main_figure import draw_main, draw_same_seeds
 from smach_oracle.analysis.drawing.sweep_figures import draw_memory, draw_persistence
 from smach_oracle.analysis.drawing.tables import format_tables
 from smach_oracle.analysis.figure import STYLE
@@ -31,18 +36,55 @@ def errorbars(axes):
             for bars in axes.containers}
 
 
+def cells_of(text):
+    """Markdown tables, each by the first cell of its lines."""
+    found, before = [], ''
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip('|').split('|')]
+        if line.startswith('|') and not before.startswith('|'):
+            found.append({})
+        if line.startswith('|') and cells[-1] != '---':
+            found[-1][cells[0]] = cells[1:]
+        before = line
+    return found
+
+
 def test_the_main_figure_has_each_share_with_its_interval_and_hides_none():
     rows = rows_of('bare', 4) + rows_of('default', 4)  # alike: the worst case for hiding
     with rc_context(STYLE):
         axes = draw_main(rows).axes[0]
-    assert [tick.get_text() for tick in axes.get_yticklabels()] == ['bare', 'default', 'hindsight']
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ['bare', 'default']
     points = [(float(bars.lines[0].get_xdata()[0]), float(bars.lines[0].get_ydata()[0]))
               for bars in axes.containers]
     heights = sorted(y for _, y in points)
-    assert len(points) == 12 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
+    assert len(points) == 8 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
     x, _, (segments,) = errorbars(axes)['intervention']
     assert x[0] == pytest.approx(40.0)
     assert segments[0][:, 0] == pytest.approx([100 * end for end in wilson_interval(4, 10)])
+
+
+def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
+    """Seeds 7 to 16 were run by all, and 17 to 26 by two of three."""
+    later = [row._replace(seed=row.seed + 10, replicate=1, ending='failure', true_success=False)
+             for variant in ('bare', 'default') for row in rows_of(variant, 0)]
+    rows = rows_of('bare', 2) + rows_of('default', 1) + later + rows_of('ladder', 3)
+    assert {name: len(mine) for name, mine in with_hindsight(rows).items()} == dict.fromkeys(
+        ('bare', 'default', 'ladder', 'hindsight'), 10)
+    with rc_context(STYLE):
+        assert [tick.get_text() for tick in draw_main(rows).axes[0].get_yticklabels()] == [
+            'bare', 'default', 'ladder']
+        axes, = draw_same_seeds(rows).axes
+    assert axes.get_title('left') == 'Pick and place, 10 seeds that all ran'
+    assert [tick.get_text() for tick in axes.get_yticklabels()][-1] == 'hindsight'
+    shares = [float(bars.lines[0].get_xdata()[0]) for bars in axes.containers]
+    assert shares[1::4] == [20.0, 10.0, 30.0, 10.0], 'interventions'
+    tables = cells_of(format_tables(rows))
+    assert tables[0]['interventions'] == [
+        '60.0% (39% to 78%)', '55.0% (34% to 74%)', '30.0% (11% to 60%)']
+    assert [cell.split()[0] for cell in tables[1]['interventions']] == [
+        '20.0%', '10.0%', '30.0%', '10.0%']
+    assert 'the 10 seeds that all variants ran' in format_tables(rows)
+    assert 'on the 10 seeds that all variants ran' in format_comparison(rows)
 
 
 def test_persistence_is_drawn_over_the_share_with_variants_beside_each_other():
@@ -77,17 +119,14 @@ def test_the_hours_have_events_counts_and_learned_rates():
     assert learned_rates(rows[:1]) == {'PICK': [(0.0, 0.5)], 'PLACE': [(0.0, 0.25)]}
 
 
-def test_tables_tell_all_figures_of_a_variant_and_the_bound():
-    rows = rows_of('bare', 0) + rows_of('default', 2, attempts=1, expert_s=6.0)
-    text = format_tables(rows)
-    cells = [[cell.strip() for cell in line.strip('|').split('|')]
-             for line in text.splitlines() if line.startswith('|')]
-    told = dict(zip(cells[0], next(line for line in cells if line[0] == 'default')))
-    assert told['interventions'] == '20.0% (6% to 51%)'
-    assert (told['attempts a trial'], told['expert s a trial'], told['expert s an hour'],
-            told['trials between interventions'], told['completion, s']) == (
-                '1', '6', '360', '5', '60')
-    assert [line[0] for line in cells[2:]] == ['bare', 'default', 'hindsight']
+def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant():
+    told = cells_of(format_tables(rows_of('bare', 0) + rows_of('default', 2, attempts=1,
+                                                               expert_s=6.0)))[0]
+    assert told[''] == ['bare', 'default'] and told['trials'] == ['10', '10']
+    assert told['interventions'][1] == '20.0% (6% to 51%)'
+    assert [told[name][1] for name in ('attempts a trial', 'expert s a trial',
+                                       'expert s a robot hour', 'trials between interventions',
+                                       's to completion, median')] == ['1', '6', '360', '5', '60']
 
 
 def test_shares_of_lasting_causes_are_never_compared_with_each_other():

@@ -171,7 +171,7 @@ def test_the_command_compares_all_variants(tmp_path, capsys):
     assert comparison.main([str(path)]) == 0
     text = capsys.readouterr().out
     assert 'prose (10 trials, 2 replicates)' in text and HINDSIGHT in text
-    assert 'interventions, prose against bare: 0 trials under prose alone, 10 under bare' in text
+    assert 'interventions, bare against prose: 10 trials under bare alone, 0 under prose' in text
     assert 'McNemar p = 0.00195' in text
     assert 'interventions        10  100.0% (72.2% to 100.0%)' in text
 

@@ -1,8 +1,8 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
 FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
-needed. OUT gets main.svg, persistence.svg, memory.svg, continuous.svg, each with a PNG, and
-tables.md, as far as there are rows of them.
+needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, each with a
+PNG, and tables.md, as far as there are rows of them.
 """
 import argparse
 import sys
@@ -44,7 +44,7 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
     """
     from .hours_figure import draw_hours  # matplotlib takes a second: only where it is wanted
     from .looks import save
-    from .main_figure import draw_main
+    from .main_figure import draw_main, draw_same_seeds, same_seeds
     from .sweep_figures import draw_memory, draw_persistence
     draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(zip(KINDS, (
         draw_main, draw_persistence, draw_memory, draw_hours)))
@@ -54,6 +54,9 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
                                   for kind, rows in found.items()), encoding='utf-8')
     for kind, rows in found.items():
         paths += save(partial(draws[kind], rows), output / kind)
+    compared = found.get('main', ())
+    if same_seeds(compared):
+        paths += save(partial(draw_same_seeds, compared), output / 'same_seeds')
     return paths
 
 

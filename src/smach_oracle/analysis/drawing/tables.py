@@ -1,56 +1,87 @@
-"""The figures of an experiment as a Markdown table: a line for each variant."""
-from typing import List, Optional, Sequence
+"""The figures of an experiment as Markdown tables: a line for each figure, a column a variant."""
+from typing import Dict, List, Optional, Sequence, Tuple
 
-from ..comparison import Costs, Group, Share, costs_of, groups_of, shares_of
-from ..pairing import HINDSIGHT, hindsight
+from ..comparison import (
+    Costs,
+    Group,
+    Share,
+    by_variant,
+    costs_of,
+    groups_of,
+    shares_of,
+    with_hindsight,
+)
+from ..pairing import HINDSIGHT
 from ..trial_rows import TrialRow
-from .looks import title_of, variants_of
+from .looks import title_of
+from .markdown import titled
 
-SHARES = ('true success', 'interventions', 'recovered', 'with attempts', 'lost or hung')
-COSTS = ('attempts', 'questions', 'questions_per_hour', 'expert_s', 'expert_s_per_hour',
-         'wrong_objects', 'damage', 'damage_done', 'completion_s', 'trials_between', 'hours_between')
-HEADS = ('attempts a trial', 'questions a trial', 'questions an hour', 'expert s a trial',
-         'expert s an hour', 'wrong object', 'damage for each completed task',
-         'damage in a completed task', 'completion, s',
-         'trials between interventions', 'hours between interventions')
+SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
+          'false success', 'lost or hung')
+# of Costs, and what it is called
+COSTS: Tuple[Tuple[str, str], ...] = (
+    ('wrong_objects', 'trials with a wrong object'),
+    ('damage', 'damage for each completed task'),
+    ('damage_done', 'damage in a completed task'),
+    ('attempts', 'attempts a trial'),
+    ('questions', 'questions a trial'),
+    ('questions_per_hour', 'questions a robot hour'),
+    ('expert_s', 'expert s a trial'),
+    ('expert_s_per_hour', 'expert s a robot hour'),
+    ('completion_s', 's to completion, median'),
+    ('trials_between', 'trials between interventions'),
+    ('hours_between', 'robot hours between interventions'))
+SAME_SEEDS = ('true success', 'interventions', 'a question asked')
 
 
 def format_tables(rows: Sequence[TrialRow]) -> str:
-    """Return a table for each task and share of lasting causes."""
-    texts = []
+    """Return the tables of each task and share of lasting causes."""
+    texts: List[str] = []
     for group, mine in groups_of(rows).items():
-        heads = ['variant', 'trials', *SHARES, *HEADS]
-        lines = ['**{}**'.format(_titled(group)), '', _line(heads), _line(['---'] * len(heads))]
-        names = variants_of(mine)
-        for name in names:
-            lines.append(_variant(name, [row for row in mine if row.variant == name]))
-        best = hindsight(mine) if len(names) > 1 else []
-        if best:
-            lines.append(_variant(HINDSIGHT, best))
-        texts.append('\n'.join(lines) + '\n')
+        texts.append(_main(named(group), by_variant(mine)))
+        texts += _same_seeds(named(group), mine)
     return '\n'.join(texts)
 
 
-def _titled(group: Group) -> str:
+def named(group: Group) -> str:
+    """Return what a task and a share of lasting causes are called in a title."""
     task, share = group
     return title_of(task) + ('' if share is None else ', {:.0%} of the causes last'.format(share))
 
 
-def _variant(name: str, rows: Sequence[TrialRow]) -> str:
-    shares = {share.name: share for share in shares_of(rows)}
-    costs: Costs = costs_of(rows)
-    return _line([name.replace('_', ' '), str(len(rows)),
-                  *(_percent(shares[each]) for each in SHARES),
-                  *(_number(getattr(costs, each)) for each in COSTS)])
+def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
+    shares = [{share.name: share for share in shares_of(rows)} for rows in variants.values()]
+    costs: List[Costs] = [costs_of(rows) for rows in variants.values()]
+    lines = [['trials', *(str(len(rows)) for rows in variants.values())]]
+    for name in SHARES:
+        lines.append([name, *(percent(each[name]) for each in shares)])
+    for name, head in COSTS:
+        lines.append([head, *(number(getattr(each, name)) for each in costs)])
+    return titled(title, _heads(variants), lines)
 
 
-def _percent(share: Share) -> str:
+def _same_seeds(title: str, rows: Sequence[TrialRow]) -> List[str]:
+    """Tell the bound beside each variant on the same seeds."""
+    found = with_hindsight(rows)
+    if not found:
+        return []
+    shares = [{share.name: share for share in shares_of(mine)} for mine in found.values()]
+    return [titled('{}: the {} seeds that all variants ran'.format(title, len(found[HINDSIGHT])),
+                   _heads(found), [[name, *(percent(each[name]) for each in shares)]
+                                   for name in SAME_SEEDS],
+                   ['Hindsight is the best that any variant did on each of these seeds: a bound, '
+                    'and no variant.'])]
+
+
+def _heads(variants: Dict[str, List[TrialRow]]) -> List[str]:
+    return ['', *(name.replace('_', ' ') for name in variants)]
+
+
+def percent(share: Share) -> str:
+    """Return a share with its interval, in percent."""
     return '{:.1%} ({:.0%} to {:.0%})'.format(share.share, *share.interval)
 
 
-def _number(value: Optional[float]) -> str:
+def number(value: Optional[float]) -> str:
+    """Return a figure. '-' means there is none."""
     return '-' if value is None else '{:.3g}'.format(value)
-
-
-def _line(cells: List[str]) -> str:
-    return '| {} |'.format(' | '.join(cells))
