@@ -15,7 +15,7 @@ from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
-from .intervals import Interval, replicate_interval, wilson_interval
+from .intervals import Interval, wilson_interval
 from .pairing import (
     COMPARED,
     HINDSIGHT,
@@ -48,7 +48,8 @@ class Share(NamedTuple):
     trials: int
     of: int
     interval: Interval  # 95% Wilson score interval
-    over_replicates: Optional[Interval]  # 95% t interval, or None for fewer than two
+    # the smallest and the largest share of a replicate, or None for fewer than two
+    over_replicates: Optional[Interval]
 
     @property
     def share(self) -> float:
@@ -83,8 +84,9 @@ def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
 def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
            parts: Sequence[Sequence[TrialRow]]) -> Share:
     number = sum(map(happened, rows))
-    return Share(name, number, len(rows), wilson_interval(number, len(rows)), replicate_interval(
-        [sum(map(happened, part)) / len(part) for part in parts]))
+    shares = [sum(map(happened, part)) / len(part) for part in parts]
+    return Share(name, number, len(rows), wilson_interval(number, len(rows)),
+                 (min(shares), max(shares)) if len(shares) > 1 else None)
 
 
 def costs_of(rows: Sequence[TrialRow]) -> Costs:
@@ -194,7 +196,7 @@ def _variant(name: str, rows: Sequence[TrialRow]) -> str:
         over = share.over_replicates
         lines.append('    {:<18}{:>5} {:>7.1%} ({:.1%} to {:.1%}){}'.format(
             share.name, share.trials, share.share, share.interval[0], share.interval[1],
-            '' if over is None else '; over replicates {:.1%} to {:.1%}'.format(*over)))
+            '' if over is None else '; replicates {:.1%} to {:.1%}'.format(*over)))
     lines += ['    {:<42}{}'.format(told.replace('_', ' '), _number(value))
               for told, value in zip(_COSTS, costs_of(rows))]
     return '\n'.join(lines) + '\n'

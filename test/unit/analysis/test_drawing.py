@@ -7,6 +7,7 @@ from smach_oracle.analysis.comparison import (
     costs_of,
     format_comparison,
     robot_hours,
+    shares_of,
     with_hindsight,
 )
 from smach_oracle.analysis.drawing import command
@@ -81,7 +82,7 @@ def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
     tables = cells_of(format_tables(rows))
     assert tables[0]['interventions'] == [
         '60.0% (39% to 78%)', '55.0% (34% to 74%)', '30.0% (11% to 60%)']
-    assert [cell.split()[0] for cell in tables[1]['interventions']] == [
+    assert [cell.split()[0] for cell in tables[-1]['interventions']] == [
         '20.0%', '10.0%', '30.0%', '10.0%']
     assert 'the 10 seeds that all variants ran' in format_tables(rows)
     assert 'on the 10 seeds that all variants ran' in format_comparison(rows)
@@ -127,6 +128,37 @@ def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant
     assert [told[name][1] for name in ('attempts a trial', 'expert s a trial',
                                        'expert s a robot hour', 'trials between interventions',
                                        's to completion, median')] == ['1', '6', '360', '5', '60']
+
+
+def test_the_tables_test_the_default_against_each_other_variant():
+    rows = [row for name, asked in (('bare', 8), ('default', 1), ('restart', 3), ('ladder', 7))
+            for row in rows_of(name, asked)]
+    tests = cells_of(format_tables(rows))[1]
+    assert tests['default against ladder'] == ['10', '1', '0', '6', '3', '0.031']
+    assert [name for name in tests if name] == [
+        'default against ' + each for each in ('bare', 'restart', 'ladder')]
+
+
+def test_over_replicates_stand_the_smallest_and_the_largest_share():
+    rows = [row._replace(replicate=number) for number, asked in enumerate((1, 4, 2))
+            for row in rows_of('default', asked)]
+    share = next(each for each in shares_of(rows) if each.name == 'interventions')
+    assert share.over_replicates == (0.1, 0.4)
+    assert shares_of(rows[:10])[0].over_replicates is None
+    told = cells_of(format_tables(rows + rows_of('ladder', 0)))[0]
+    assert told['interventions, replicates'] == ['10.0% to 40.0%', '-']
+    assert 'replicates 10.0% to 40.0%' in format_comparison(rows)
+    assert 'interventions, replicates' not in format_tables(rows[:10])
+
+
+def test_the_main_figure_has_a_bar_from_the_smallest_to_the_largest_replicate():
+    rows = [row._replace(replicate=number) for number, asked in enumerate((1, 4, 2))
+            for row in rows_of('default', asked)]
+    with rc_context(STYLE):
+        bars = draw_main(rows + rows_of('ladder', 0)).axes[0].collections
+    ends = [tuple(segment[:, 0]) for each in bars if each.get_label() == 'replicates'
+            for segment in each.get_segments()]
+    assert len(ends) == 4 and ends[1] == pytest.approx((10.0, 40.0))
 
 
 def test_shares_of_lasting_causes_are_never_compared_with_each_other():

@@ -39,6 +39,13 @@ class Percent:
         self.share = 100.0 * number / len(rows)
         low, high = wilson_interval(number, len(rows))
         self.interval: Interval = (100 * low, 100 * high)
+        parts: Dict[int, List[bool]] = {}
+        for row in rows:
+            parts.setdefault(row.replicate, []).append(happened(row))
+        shares = [100.0 * sum(part) / len(part) for part in parts.values()]
+        # the smallest and the largest of a replicate. None means there are no two
+        self.replicates: Optional[Interval] = (
+            (min(shares), max(shares)) if len(shares) > 1 else None)
 
     @property
     def reach(self) -> Tuple[float, float]:
@@ -64,9 +71,14 @@ def panels(titles: Sequence[str], height_in: float, rows: int = 1,
     return figure, made
 
 
-def legend_above(figure: Figure, axes: Any) -> None:
-    """Put the legend of some axes above all, where it covers no data."""
-    handles, labels = axes.get_legend_handles_labels()
+def legend_above(figure: Figure, axes: Any, shown: Sequence[str] = ()) -> None:
+    """Put the legend of some axes above all, where it covers no data.
+
+    :param shown: its labels. None are all.
+    """
+    found = [(handle, label) for handle, label in zip(*axes.get_legend_handles_labels())
+             if label in (shown or (label,))]
+    handles, labels = [handle for handle, _ in found], [label for _, label in found]
     figure.legend(handles, labels, loc='upper center', ncol=6, frameon=False, borderpad=0.2)
 
 

@@ -21,7 +21,10 @@ LINE_IN, FRAME_IN = 0.32, 0.95
 
 
 def draw_main(rows: Sequence[TrialRow]) -> Figure:
-    """Draw a line for each variant and a panel for each task, over all trials of the variant."""
+    """Draw a line for each variant and a panel for each task, over all trials of the variant.
+
+    A pale bar goes from the smallest to the largest share of a replicate.
+    """
     return _draw({task: by_variant([row for row in rows if row.task == task])
                   for task in tasks_of(rows)}, {})
 
@@ -58,8 +61,12 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]],
             for number, (label, colour, marker, happened) in enumerate(SHOWN if chosen else ()):
                 percent = Percent(chosen, happened)
                 low, high = percent.reach
+                height = line + APART * (number - (len(SHOWN) - 1) / 2)
+                if percent.replicates:
+                    axes.hlines([height], *percent.replicates, color=colour, linewidth=4.0,
+                                alpha=0.3, label='replicates')
                 axes.errorbar(
-                    [percent.share], [line + APART * (number - (len(SHOWN) - 1) / 2)],
+                    [percent.share], [height],
                     xerr=[[low], [high]], color=colour, marker=marker, linestyle='none',
                     markersize=3.5, elinewidth=0.8, capsize=1.5, clip_on=False,
                     label=label if line == 0 else None)
@@ -69,7 +76,7 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]],
         axes.set_yticklabels([name.replace('_', ' ') for name in names] if axes is made[0] else [])
         axes.set_xlabel('Trials (%)')
         axes.grid(axis='x', linewidth=0.3)
-    legend_above(figure, made[0])
+    legend_above(figure, made[0], [label for label, *_ in SHOWN])
     return figure
 
 

@@ -11,13 +11,14 @@ from ..comparison import (
     shares_of,
     with_hindsight,
 )
-from ..pairing import HINDSIGHT
+from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
 from .looks import title_of
 from .markdown import titled
 
 SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
           'false success', 'lost or hung')
+OVER_REPLICATES = ('true success', 'interventions', 'a question asked', 'recovered')
 # of Costs, and what it is called
 COSTS: Tuple[Tuple[str, str], ...] = (
     ('wrong_objects', 'trials with a wrong object'),
@@ -38,8 +39,9 @@ def format_tables(rows: Sequence[TrialRow]) -> str:
     """Return the tables of each task and share of lasting causes."""
     texts: List[str] = []
     for group, mine in groups_of(rows).items():
-        texts.append(_main(named(group), by_variant(mine)))
-        texts += _same_seeds(named(group), mine)
+        variants = by_variant(mine)
+        texts.append(_main(named(group), variants))
+        texts += _tests(named(group), variants) + _same_seeds(named(group), mine)
     return '\n'.join(texts)
 
 
@@ -55,9 +57,28 @@ def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
     lines = [['trials', *(str(len(rows)) for rows in variants.values())]]
     for name in SHARES:
         lines.append([name, *(percent(each[name]) for each in shares)])
+        if name in OVER_REPLICATES and any(each[name].over_replicates for each in shares):
+            lines.append([name + ', replicates', *(over_replicates(each[name]) for each in shares)])
     for name, head in COSTS:
         lines.append([head, *(number(getattr(each, name)) for each in costs)])
-    return titled(title, _heads(variants), lines)
+    return titled(title, _heads(variants), lines, [
+        'In parentheses: 95% Wilson intervals over trials.', *(
+            ['Replicates: the smallest and the largest share of a replicate.']
+            if any(line[0].endswith('replicates') for line in lines) else [])])
+
+
+def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
+    """Tell McNemar's exact test of the interventions."""
+    lines = []
+    for first, second in pairs_to_test(list(variants)):
+        counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
+        if sum(counts):
+            lines.append(['{} against {}'.format(first, second).replace('_', ' '),
+                          *map(str, (sum(counts), *counts)), '{:.2g}'.format(counts.p_value)])
+    heads = ['', 'pairs', 'both', 'the first alone', 'the second alone', 'neither', 'p']
+    return [titled(title + ': interventions, paired by seed', heads, lines, [
+        "p: McNemar's exact test, two-sided, on the pairs that differ, without a correction for "
+        'their number.'])] if lines else []
 
 
 def _same_seeds(title: str, rows: Sequence[TrialRow]) -> List[str]:
@@ -80,6 +101,12 @@ def _heads(variants: Dict[str, List[TrialRow]]) -> List[str]:
 def percent(share: Share) -> str:
     """Return a share with its interval, in percent."""
     return '{:.1%} ({:.0%} to {:.0%})'.format(share.share, *share.interval)
+
+
+def over_replicates(share: Share) -> str:
+    """Return the smallest and the largest share of a replicate, in percent."""
+    over = share.over_replicates
+    return '-' if over is None else '{:.1%} to {:.1%}'.format(*over)
 
 
 def number(value: Optional[float]) -> str:
