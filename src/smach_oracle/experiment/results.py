@@ -114,7 +114,7 @@ class JobResults:
                 details = read_details(str(truth)) if truth.exists() else {}
             new.append(row_of(trial.summary, self._task, self._variant, self._replicate,
                               cause.seed, details.get(cause.seed, NO_DETAILS), self._version,
-                              trial.learned, self._lasting_share))
+                              trial.learned, self._lasting_share, trial.tries))
         for number, why in lost.items():
             if self._first_seed + number not in self._rows:
                 new.append(TrialRow(self._task, self._variant, self._replicate,

@@ -1,4 +1,7 @@
 """The rows that an experiment keeps of its trials, and what follows from them."""
+import csv
+import io
+
 import pytest
 
 from smach_oracle.analysis import comparison
@@ -52,7 +55,8 @@ def test_rows_come_back_as_they_were_written(tmp_path):
             row(2, ending='lost', true_success=None, wrong_object=None, damage=None,
                 expert_s=None, sim_s=None),
             row(3, wrong_object='cup', true_success=False, lasting=2, lasting_share=0.5, wall_s=2.5,
-                hour=1.25, left='{"ended": 1.3}')]
+                hour=1.25, left='{"ended": 1.3}', memory=10, prior=0.1,
+                cause_log='[["glare",true,4.2,null]]', tries='[["PICK",1.5,3.0,0]]')]
     append_rows(path, rows[:1])
     append_rows(path, rows[1:])
     assert read_rows(path) == rows
@@ -75,7 +79,8 @@ def test_of_the_same_trial_the_later_row_counts(tmp_path):
 
 
 @pytest.mark.parametrize('column, text', [
-    ('seed', 'x'), ('true_success', 'perhaps'), ('ending', 'won'), ('replicate', '')])
+    ('seed', 'x'), ('true_success', 'perhaps'), ('ending', 'won'), ('replicate', ''),
+    ('cause_log', '[["glare"]]'), ('tries', '[3]'), ('tries', '{')])
 def test_a_wrong_cell_is_named(tmp_path, column, text):
     path = tmp_path / 'results.csv'
     append_rows(path, [row()._replace(**{column: text})])
@@ -90,6 +95,25 @@ def test_other_columns_are_refused(tmp_path):
         read_rows(path)
 
 
+def older(path, rows):
+    """Write rows as the version before the world's log was in them did."""
+    append_rows(path, rows)
+    lines = list(csv.reader(io.StringIO(path.read_text())))
+    with path.open('w', newline='') as target:
+        csv.writer(target, lineterminator='\n').writerows(line[:23] for line in lines)
+    assert path.read_text().startswith('task,variant,replicate,seed,ending,true_success,')
+    assert path.read_text().splitlines()[0].endswith(',wall_s,hour,left')
+
+
+def test_rows_of_an_older_version_are_read_and_gone_on_with(tmp_path):
+    path = tmp_path / 'results.csv'
+    older(path, [row(1, memory=10, cause_log='[]'), row(2)])
+    assert read_rows(path) == [row(1), row(2)]
+    append_rows(path, [row(3, memory=10)])
+    assert read_rows(path) == [row(1), row(2), row(3, memory=10)]
+    assert [item.name for item in tmp_path.iterdir()] == ['results.csv']
+
+
 # -- truth
 
 def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
@@ -102,7 +126,7 @@ def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
                     '"left": {"ended": 1}}\n{"se')
     details = read_details(str(path))
     assert details == {1: NO_DETAILS,
-                       2: ('cup', 2, {'expert': 12.5}, 1, 9.0, 0.5, {'ended': 1})}
+                       2: ('cup', 2, {'expert': 12.5}, 1, 9.0, 0.5, {'ended': 1}, None, None)}
     assert details_of({'damage': {'dropped': 3}}).damage == 3
 
 

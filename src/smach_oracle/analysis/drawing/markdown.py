@@ -4,7 +4,7 @@ from typing import List, Sequence
 
 def table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     """Return a table. Each line has as many cells as there are heads."""
-    rows = [list(heads), ['---'] * len(heads), *map(list, lines)]
+    rows = [heads, ['---'] * len(heads), *lines]
     return '\n'.join('| {} |'.format(' | '.join(row)) for row in rows) + '\n'
 
 
