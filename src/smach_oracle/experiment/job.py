@@ -44,7 +44,7 @@ class ExperimentJob:
         self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
                                          self._seed, plan.trials)
         self._results = JobResults(output, plan.task, variant.name, replicate, self._seed,
-                                   plan.lasting)
+                                   plan.lasting, plan.slot_h)
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
@@ -96,8 +96,8 @@ class ExperimentJob:
         :raises OSError: where that cannot be done.
         """
         self._ended_at = self._sign_at = time.monotonic()
-        if self._plan.hours is not None:
-            write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
+        if self._plan.slot_h is not None:
+            write_lab(self._records.folder, self._seed, self._plan.slot_h,
                       self._results.last_left())
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments())
 

@@ -49,6 +49,11 @@ class ExperimentPlan(NamedTuple):
         """Seed of the first trial of a replicate (from 0). Each next trial has the next seed."""
         return self.seed + replicate * self.trials
 
+    @property
+    def slot_h(self) -> Optional[float]:
+        """h from the begin of a trial to that of the next, in a world that goes on."""
+        return None if self.hours is None else self.hours / self.trials
+
     def as_data(self) -> Dict[str, Any]:
         """The plan as plain data, as its file has it."""
         data = self._asdict()

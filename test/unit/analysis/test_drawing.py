@@ -1,5 +1,7 @@
 """The figures and tables of an experiment, drawn from its rows alone."""
 
+import json
+
 import pytest
 from matplotlib import rc_context
 
@@ -19,7 +21,10 @@ from smach_oracle.analysis.figure import STYLE
 from smach_oracle.analysis.intervals import wilson_interval
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows
 
-LEARNED = '{"": {"PICK": {"window": [0, 1, 0, 1]}, "PLACE": {"failures": 1, "successes": 3}}}'
+LEARNED = json.dumps({'': {
+    'PICK': {'estimator': 'window', 'failures': 2, 'successes': 2, 'window': [0, 1, 0, 1]},
+    'PLACE': {'estimator': 'exponential', 'failures': 1, 'successes': 3, 'rate': 0.15},
+    'LOOK': {'estimator': 'window', 'failures': 0, 'successes': 4, 'window': [0, 0, 0, 0]}}})
 
 
 def rows_of(variant, asked, count=10, **more):
@@ -117,7 +122,28 @@ def test_the_hours_have_events_counts_and_learned_rates():
     curve = next(line for line in needed.lines if line.get_label() == 'intervention')
     assert curve.get_ydata()[-1] == 2 and curve.get_xdata()[-1] == 4.5
     assert [line.get_label() for line in rates.lines] == ['PICK', 'PLACE']
-    assert learned_rates(rows[:1]) == {'PICK': [(0.0, 0.5)], 'PLACE': [(0.0, 0.25)]}
+
+
+def test_rates_are_those_that_the_oracle_goes_by_from_the_end_of_a_trial_on():
+    """The window of 10 is filled with the prior of 0.2: (2 + 6 * 0.2) / 10."""
+    rows = [row._replace(hour=1.0, learned=LEARNED, memory=10, prior=0.2)
+            for row in rows_of('default', 0, 1)]
+    end = 1.0 + 60 / 3600
+    assert learned_rates(rows) == {'PICK': [(end, pytest.approx(0.32))], 'PLACE': [(end, 0.15)]}
+    older = [row._replace(memory=None, prior=None) for row in rows]
+    assert learned_rates(older)['PICK'] == [(end, pytest.approx(0.26))]
+
+
+def test_a_lost_trial_is_among_the_hours():
+    rows = [row._replace(hour=0.5 * number, learned=LEARNED)
+            for number, row in enumerate(rows_of('default', 0))]
+    rows[4] = rows[4]._replace(ending='lost', true_success=None, sim_s=None, learned='')
+    with rc_context(STYLE):
+        events, needed, _ = draw_hours(rows).axes
+    assert list(next(line for line in events.lines
+                     if line.get_label() == 'lost').get_xdata()) == [2.0]
+    curve = next(line for line in needed.lines if line.get_label() == 'intervention')
+    assert list(curve.get_xdata()[curve.get_ydata() == 1])[0] == 2.0
 
 
 def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant():

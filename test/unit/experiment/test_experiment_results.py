@@ -196,6 +196,23 @@ def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatc
         'seed': FIRST_SEED, 'slot_h': 0.5, 'left': {'ended': 0.6}}, 'a lost trial leaves nothing'
 
 
+def test_a_lost_trial_of_a_world_that_goes_on_has_its_hour(tmp_path):
+    """One begins every half hour. The third took until hour 1.7, so the fourth was late."""
+    truth = tmp_path / 'truth.jsonl'
+    truth.write_text(''.join(json.dumps({
+        'seed': FIRST_SEED + number, 'hour': hour, 'left': {'ended': ended}}) + '\n'
+        for number, hour, ended in ((0, 0.0, 0.1), (2, 1.0, 1.7))))
+    job = JobResults(tmp_path, 'pick_and_place', 'bare', 0, FIRST_SEED, None, 0.5)
+    job.add([trial(0), trial(2)], {}, truth)
+    job.add([], {1: 'hung', 3: 'hung'}, truth)
+    hours = {row.seed - FIRST_SEED: row.hour for row in read_rows(tmp_path / RESULTS_FILE)}
+    assert hours == {0: 0.0, 1: 0.5, 2: 1.0, 3: 1.7}
+    given = plan('--variants', 'bare', '--hours', '3')
+    whole = ExperimentJob(given, given.variants[0], 0, tmp_path / 'other', 300.0)
+    whole._results.add([], {2: 'hung'}, truth)
+    assert read_rows(tmp_path / 'other' / RESULTS_FILE)[0].hour == 1.0
+
+
 def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path):
     variant, = plan('--variants', 'random').variants
     JobResults(tmp_path, 'pick_and_place', 'random', 0, FIRST_SEED).add(

@@ -1,15 +1,20 @@
 """Continuous operation over its hours: attempts and questions, what was needed, learned rates."""
 import json
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from smach_oracle.oracle.decision.failure_rate import FailureRate, make_estimator
+from smach_oracle.oracle.settings.settings import StateSettings
+
+from ..comparison import SECONDS_PER_HOUR
 from ..figure import BLACK, BLUE, VERMILLION
 from ..sweep_figure import GREEN
-from ..trial_rows import TrialRow
+from ..trial_rows import LOST, TrialRow
 from .looks import Happened, legend_above, panels, tasks_of, title_of
 
+USUAL = StateSettings()
 HEIGHT_IN = 5.6
 CURVES: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('oracle recovered', BLUE, '-', lambda row: row.recovered),
@@ -59,6 +64,9 @@ def _draw_events(axes: Any, rows: Sequence[TrialRow]) -> None:
                 axes.axvspan(hour, hour + width, color=colour, linewidth=0, alpha=0.6)
     axes.vlines(hours, 0, [row.attempts for row in rows], color=BLUE, linewidth=0.9)
     axes.vlines(hours, [-row.questions for row in rows], 0, color=VERMILLION, linewidth=0.9)
+    lost = [row.hour for row in rows if row.ending == LOST]
+    axes.plot(lost, [0] * len(lost), color=BLACK, marker='x', linestyle='none', markersize=5,
+              label='lost')
     axes.axhline(0, color=BLACK, linewidth=0.5)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
 
@@ -88,24 +96,31 @@ def _draw_rates(axes: Any, rows: Sequence[TrialRow]) -> None:
 
 
 def learned_rates(rows: Sequence[TrialRow]) -> Dict[str, List[Tuple[float, float]]]:
-    """Return the failure rate of each state after each trial, as (hour, rate).
+    """Return the failure rate that the oracle goes by after each trial, as (hour of its end, rate).
 
-    It is that of the window of the latest results. Where the estimator has none, of all.
+    States that never failed are left out. A row of an older version lacks memory and prior: then
+    they are those of the settings' defaults.
     """
     series: Dict[str, List[Tuple[float, float]]] = {}
+    failed = set()
     for row in rows:
         for path, states in (json.loads(row.learned) if row.learned else {}).items():
             for state, learned in states.items():
-                rate = _rate(learned)
-                if rate is not None:
-                    name = '{}/{}'.format(path, state) if path else state
-                    series.setdefault(name, []).append((row.hour or 0.0, rate))
-    return series
+                name = '{}/{}'.format(path, state) if path else state
+                series.setdefault(name, []).append((_end(row), _rate(row, learned)))
+                if learned.get('failures'):
+                    failed.add(name)
+    return {name: series[name] for name in series if name in failed}
 
 
-def _rate(learned: Dict[str, Any]) -> Any:
-    window = learned.get('window')
-    if isinstance(window, list) and window:
-        return sum(window) / len(window)
-    total = learned.get('failures', 0) + learned.get('successes', 0)
-    return learned.get('failures', 0) / total if total else None
+def _end(row: TrialRow) -> float:
+    return (row.hour or 0.0) + (row.sim_s or 0.0) / SECONDS_PER_HOUR
+
+
+def _rate(row: TrialRow, learned: Mapping[str, Any]) -> float:
+    estimator = make_estimator(
+        learned.get('estimator', FailureRate.kind),
+        USUAL.memory if row.memory is None else row.memory,
+        USUAL.prior if row.prior is None else row.prior)
+    estimator.restore(learned)
+    return estimator.rate
