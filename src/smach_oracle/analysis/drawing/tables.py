@@ -13,6 +13,7 @@ from ..comparison import (
 )
 from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
+from .cause_tables import by_cause, by_log
 from .looks import title_of
 from .markdown import titled
 
@@ -42,6 +43,7 @@ def format_tables(rows: Sequence[TrialRow]) -> str:
         variants = by_variant(mine)
         texts.append(_main(named(group), variants))
         texts += _tests(named(group), variants) + _same_seeds(named(group), mine)
+        texts += by_cause(named(group), variants) + by_log(named(group), variants)
     return '\n'.join(texts)
 
 
