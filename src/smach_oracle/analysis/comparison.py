@@ -10,7 +10,7 @@ import argparse
 import statistics
 import sys
 from pathlib import Path
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -110,6 +110,25 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
         _ratio(_total(done, lambda row: row.damage), len(done)),
         statistics.median(times) if times else None, _ratio(len(rows), interventions),
         _ratio(hours, interventions))
+
+
+def common_completion(variants: Mapping[str, Sequence[TrialRow]]
+                      ) -> Tuple[int, Dict[str, float]]:
+    """Return the median times (s) of the variants that are compared, on seeds that all completed.
+
+    Each variant completes other trials: the fewer it completes, the easier they are.
+
+    :returns: the number of seeds, and the medians. 0 and none where there are no such.
+    """
+    if any(name not in variants for name in COMPARED):
+        return 0, {}
+    times = {name: {row.pair: row.sim_s for row in variants[name]
+                    if row.succeeded and row.sim_s is not None} for name in COMPARED}
+    seeds = set.intersection(*(set(each) for each in times.values()))
+    if not seeds:
+        return 0, {}
+    return len(seeds), {name: statistics.median(each[pair] for pair in seeds)
+                        for name, each in times.items()}
 
 
 def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:

@@ -1,7 +1,7 @@
 """Variants that ran the same trials, compared trial by trial."""
 import itertools
 import math
-from typing import Callable, Dict, List, NamedTuple, Sequence, Set, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 from .trial_rows import Pair, TrialRow
 
@@ -48,6 +48,44 @@ def paired_counts(first: Sequence[TrialRow], second: Sequence[TrialRow],
     pairs = [(happened(row), others[row.pair]) for row in first if row.pair in others]
     return PairedCounts(*(pairs.count(each) for each in (
         (True, True), (True, False), (False, True), (False, False))))
+
+
+class Trend(NamedTuple):
+    """A test of whether a share of trials grows with a number."""
+
+    z: float  # above 0: it grows
+    p_value: float  # two-sided
+
+
+def trend_of(rows: Sequence[TrialRow], number_of: Callable[[TrialRow], float],
+             happened: Happened) -> Optional[Trend]:
+    """Test whether something happens the oftener, the larger a number is.
+
+    It is Mantel's extension test (N. Mantel, J. Am. Stat. Assoc. 58, 1963) with a stratum for each
+    seed: Cochran and Armitage's for trials that are paired. Under the null hypothesis all orders of
+    the trials of a seed are as likely. None where nothing differs within a seed.
+    """
+    by_pair: Dict[Pair, List[TrialRow]] = {}
+    for row in rows:
+        by_pair.setdefault(row.pair, []).append(row)
+    total = variance = 0.0
+    for each in by_pair.values():
+        if len(each) > 1:
+            numbers, events = [number_of(row) for row in each], [float(happened(row))
+                                                                 for row in each]
+            total += _products(numbers, events)
+            variance += (_products(numbers, numbers) * _products(events, events)
+                         / (len(each) - 1))
+    if not variance:
+        return None
+    z = total / math.sqrt(variance)
+    return Trend(z, math.erfc(abs(z) / math.sqrt(2)))
+
+
+def _products(some: Sequence[float], others: Sequence[float]) -> float:
+    """Return the sum of the products of deviations from the means."""
+    mean, other = sum(some) / len(some), sum(others) / len(others)
+    return sum((x - mean) * (y - other) for x, y in zip(some, others))
 
 
 def pairs_to_test(names: Sequence[str]) -> List[Tuple[str, str]]:

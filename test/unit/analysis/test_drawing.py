@@ -16,6 +16,7 @@ from smach_oracle.analysis.drawing import command
 from smach_oracle.analysis.drawing.hours_figure import draw_hours, learned_rates
 from smach_oracle.analysis.drawing.main_figure import draw_main, draw_same_seeds
 from smach_oracle.analysis.drawing.sweep_figures import draw_memory, draw_persistence
+from smach_oracle.analysis.drawing.sweep_tables import format_sweeps
 from smach_oracle.analysis.drawing.tables import format_tables
 from smach_oracle.analysis.figure import STYLE
 from smach_oracle.analysis.intervals import wilson_interval
@@ -87,7 +88,8 @@ def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
     tables = cells_of(format_tables(rows))
     assert tables[0]['interventions'] == [
         '60.0% (39% to 78%)', '55.0% (34% to 74%)', '30.0% (11% to 60%)']
-    assert [cell.split()[0] for cell in tables[-1]['interventions']] == [
+    bounded = next(table for table in tables if 'hindsight' in table.get('', ()))
+    assert [cell.split()[0] for cell in bounded['interventions']] == [
         '20.0%', '10.0%', '30.0%', '10.0%']
     assert 'the 10 seeds that all variants ran' in format_tables(rows)
     assert 'on the 10 seeds that all variants ran' in format_comparison(rows)
@@ -185,6 +187,49 @@ def test_the_main_figure_has_a_bar_from_the_smallest_to_the_largest_replicate():
     ends = [tuple(segment[:, 0]) for each in bars if each.get_label() == 'replicates'
             for segment in each.get_segments()]
     assert len(ends) == 4 and ends[1] == pytest.approx((10.0, 40.0))
+
+
+def test_completion_is_compared_on_the_seeds_that_all_three_completed():
+    """The bare script completes the short trials alone, so its median is the shortest."""
+    rows = [row._replace(sim_s=10.0 * row.seed, **(
+        {'ending': 'failure', 'true_success': False} if name == 'bare' and row.seed > 9 else {}))
+        for name in ('bare', 'default', 'restart', 'ladder') for row in rows_of(name, 0)]
+    told = cells_of(format_tables(rows))[0]
+    assert told['s to completion, median'] == ['80', '115', '115', '115']
+    assert told['s to completion, median, on the 3 seeds that bare, default and restart '
+                'completed'] == ['80', '80', '80', '-']
+    assert 'on the 3 seeds' not in format_tables(rows_of('bare', 0) + rows_of('default', 0))
+
+
+def test_the_tables_say_which_hours_count():
+    rows = rows_of('default', 0)
+    assert 'The time between trials does not count' in format_tables(rows)
+    on = [row._replace(hour=0.5 * number) for number, row in enumerate(rows)]
+    assert 'The time between trials counts, too' in format_tables(on)
+
+
+def test_the_difference_to_restart_is_told_at_each_share_of_lasting_causes():
+    rows = [row for share, first, second in ((0.0, 3, 3), (1.0, 2, 9))
+            for name, asked in (('default', first), ('restart', second))
+            for row in rows_of(name, asked, lasting_share=share)]
+    differences, = (cells for cells in cells_of(format_sweeps('persistence', rows))
+                    if 'causes that last' in cells)
+    assert differences['0%'] == ['10', '30.0%', '30.0%', '0.0% (-20.0% to 20.0%)']
+    assert differences['100%'][:3] == ['10', '20.0%', '90.0%']
+    assert differences['100%'][3].startswith('-70.0% (-86.5% to -26.6%)')
+    assert format_sweeps('persistence', rows_of('default', 0, lasting_share=0.0)) == ''
+
+
+def test_the_trend_over_the_memory_is_tested_within_seeds():
+    rows = [row for memory, asked in ((2, 1), (10, 4), (50, 8))
+            for row in rows_of('default_memory_{}'.format(memory), asked)]
+    text = format_sweeps('memory', rows)
+    told, = cells_of(text)
+    assert [told[number][1].split(' (')[0] for number in ('2', '10', '50')] == [
+        '1 of 10, 10.0%', '4 of 10, 40.0%', '8 of 10, 80.0%']
+    assert 'grows with N' in text and 'z = 3.24, p = 0.0012' in text
+    assert 'falls with N' in format_sweeps('memory', [
+        row._replace(variant=row.variant.replace('50', '1')) for row in rows])
 
 
 def test_shares_of_lasting_causes_are_never_compared_with_each_other():

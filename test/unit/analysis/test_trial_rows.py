@@ -1,16 +1,19 @@
 """The rows that an experiment keeps of its trials, and what follows from them."""
 import csv
 import io
+import math
 
 import pytest
 
 from smach_oracle.analysis import comparison
 from smach_oracle.analysis.bag_events import BagError
+from smach_oracle.analysis.intervals import paired_difference
 from smach_oracle.analysis.pairing import (
     HINDSIGHT,
     hindsight,
     mcnemar_exact,
     paired_counts,
+    trend_of,
 )
 from smach_oracle.analysis.trial_rows import (
     NO_DETAILS,
@@ -149,6 +152,27 @@ def test_pairs_are_trials_of_the_same_seed_that_both_ran():
     theirs = [row(seed, 'restart', questions=1) for seed in range(2, 9)]
     counts = paired_counts(ours, theirs, lambda trial: trial.intervened)
     assert counts == (2, 0, 3, 0) and counts.p_value == 0.25
+
+
+@pytest.mark.parametrize('counts, low, high', [
+    # Fagerland, Lydersen and Laake, Stat. Med. 33, 2014: airway hyperresponsiveness
+    ((1, 1, 7, 12), -0.507, -0.026),
+    ((0, 0, 0, 10), -0.278, 0.278), ((10, 0, 0, 0), -0.278, 0.278), ((0, 0, 10, 0), -1.0, -0.607)])
+def test_the_interval_of_a_paired_difference(counts, low, high):
+    assert paired_difference(*counts) == pytest.approx((low, high), abs=1e-3)
+    assert paired_difference(counts[0], counts[2], counts[1], counts[3]) == pytest.approx(
+        (-high, -low), abs=1e-3)
+
+
+def test_a_trend_is_that_within_seeds():
+    """Within a seed all orders are alike under the null: the variance is that of them."""
+    scores = {'a': 0.0, 'b': 1.0, 'c': 2.0}
+    rows = [row(seed, name, questions=int(name in asked))
+            for seed, asked in enumerate(('c', 'c', 'bc', 'abc', '')) for name in scores]
+    z, p_value = trend_of(rows, lambda each: scores[each.variant], lambda each: each.questions > 0)
+    assert z == pytest.approx(3.0 / math.sqrt(3 * 2 / 3))
+    assert p_value == pytest.approx(math.erfc(z / math.sqrt(2)))
+    assert trend_of(rows[-3:], lambda each: scores[each.variant], lambda each: True) is None
 
 
 def test_hindsight_is_the_best_of_each_trial_that_all_ran():

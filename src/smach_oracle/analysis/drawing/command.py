@@ -15,6 +15,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from ..bag_events import BagError
 from ..reading import report_error
 from ..trial_rows import TrialRow, read_rows
+from .sweep_tables import format_sweeps
 from .tables import format_tables
 
 ROWS = 'results.csv'
@@ -50,8 +51,10 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
         draw_main, draw_persistence, draw_memory, draw_hours)))
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']
-    paths[0].write_text('\n'.join('## {}\n\n{}'.format(kind.capitalize(), format_tables(rows))
-                                  for kind, rows in found.items()), encoding='utf-8')
+    paths[0].write_text('\n'.join(
+        '## {}\n\n{}'.format(kind.capitalize(), '\n'.join(filter(None, (
+            format_sweeps(kind, rows), format_tables(rows))))) for kind, rows in found.items()),
+        encoding='utf-8')
     for kind, rows in found.items():
         paths += save(partial(draws[kind], rows), output / kind)
     compared = found.get('main', ())

@@ -1,5 +1,4 @@
 """Figures of the sweeps: over the share of lasting causes, and over the memory."""
-import re
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 from matplotlib.figure import Figure
@@ -7,12 +6,12 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from ..trial_rows import TrialRow
 from .looks import Happened, Percent, legend_above, look_of, panels, tasks_of, title_of, variants_of
+from .policies import memory_of, policy_of
 
 Shown = Tuple[str, Happened]
 INTERVENTIONS: Shown = ('Interventions (% of trials)', lambda row: row.intervened)
 QUESTIONS: Shown = ('With a question (% of trials)', lambda row: row.questions > 0)
 SUCCESS: Shown = ('True success (% of trials)', lambda row: row.succeeded)
-MEMORY = re.compile(r'(.+)_memory_(\d+)')
 HEIGHT_IN = 4.0
 ASIDE = 2.5  # percent of causes, from one variant's marker to the next
 ASIDE_FACTOR = 1.04  # of a memory, likewise
@@ -29,18 +28,6 @@ def draw_memory(rows: Sequence[TrialRow]) -> Figure:
     """Draw trials with a question above true success, over the memory N."""
     return _draw(rows, (QUESTIONS, SUCCESS), policy_of, memory_of, 'Memory N (results of a state)',
                  lambda x, place: x * ASIDE_FACTOR ** place, True)
-
-
-def memory_of(row: TrialRow) -> Optional[float]:
-    """Return the memory that a variant is named by. None means by none."""
-    named = MEMORY.fullmatch(row.variant)
-    return float(named.group(2)) if named else None
-
-
-def policy_of(row: TrialRow) -> str:
-    """Return the name of a variant without its memory."""
-    named = MEMORY.fullmatch(row.variant)
-    return named.group(1) if named else row.variant
 
 
 def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],

@@ -6,6 +6,7 @@ from ..comparison import (
     Group,
     Share,
     by_variant,
+    common_completion,
     costs_of,
     groups_of,
     shares_of,
@@ -63,10 +64,23 @@ def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
             lines.append([name + ', replicates', *(over_replicates(each[name]) for each in shares)])
     for name, head in COSTS:
         lines.append([head, *(number(getattr(each, name)) for each in costs)])
+        if name == 'completion_s':
+            lines += _completion(variants)
     return titled(title, _heads(variants), lines, [
         'In parentheses: 95% Wilson intervals over trials.', *(
             ['Replicates: the smallest and the largest share of a replicate.']
-            if any(line[0].endswith('replicates') for line in lines) else [])])
+            if any(line[0].endswith('replicates') for line in lines) else []),
+        'A robot hour is one of world time in which a trial runs. ' + (
+            'The time between trials counts, too: the world goes on.'
+            if any(row.hour is not None for rows in variants.values() for row in rows)
+            else 'The time between trials does not count.')])
+
+
+def _completion(variants: Dict[str, List[TrialRow]]) -> List[List[str]]:
+    seeds, medians = common_completion(variants)
+    head = 's to completion, median, on the {} seeds that bare, default and restart completed'
+    return [[head.format(seeds), *(number(medians.get(name)) for name in variants)]
+            ] if seeds else []
 
 
 def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
