@@ -18,6 +18,9 @@ from .results import JobResults
 
 LEFTOVER_GRACE_S = 15.0  # for processes that an earlier job left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
+# s without a sign of life, after which a trial is taken for hung. The longest of 1,612 trials took
+# 92 s in all, beside other work. A machine would have to be ten times as slow
+HUNG_AFTER_S = 900.0
 LONGEST = 5  # times the time without a sign of life: what a trial may take that goes on and on
 LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a trial
 

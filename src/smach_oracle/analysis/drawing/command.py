@@ -56,6 +56,8 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
             format_sweeps(kind, rows), format_tables(rows))))) for kind, rows in found.items()),
         encoding='utf-8')
     for kind, rows in found.items():
+        if kind == 'continuous' and all(row.hour is None for row in rows):
+            continue
         paths += save(partial(draws[kind], rows), output / kind)
     compared = found.get('main', ())
     if same_seeds(compared):
