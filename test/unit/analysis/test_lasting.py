@@ -1,4 +1,4 @@
-"""What the rows tell of causes and tries, and which causes the world's log shows to last."""
+"""The log of causes and the tries in the rows, and which causes the log shows to last."""
 import pytest
 
 from smach_oracle.analysis.comparison import by_variant
