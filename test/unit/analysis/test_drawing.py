@@ -113,6 +113,7 @@ def test_the_memory_figure_tells_how_often_the_expert_is_asked():
         asked = draw_memory(rows).axes[0]
     x, y, _ = errorbars(asked)['default']
     assert list(x) == [2.0, 20.0] and list(y) == [50.0, 10.0]
+    assert asked.get_ylim() == (0.0, 80.0), 'the interval of 5 of 10 ends at 76%'
 
 
 def test_the_hours_have_events_counts_and_learned_rates():
@@ -227,9 +228,20 @@ def test_the_trend_over_the_memory_is_tested_within_seeds():
     told, = cells_of(text)
     assert [told[number][1].split(' (')[0] for number in ('2', '10', '50')] == [
         '1 of 10, 10.0%', '4 of 10, 40.0%', '8 of 10, 80.0%']
-    assert 'grows with N' in text and 'z = 3.24, p = 0.0012' in text
-    assert 'falls with N' in format_sweeps('memory', [
+    assert 'z = 3.24 (above 0: the share grows), p = 0.0012' in text
+    assert 'z = -' in format_sweeps('memory', [
         row._replace(variant=row.variant.replace('50', '1')) for row in rows])
+
+
+def test_tasks_stand_in_the_order_of_the_paper_and_sweeps_of_the_memory_have_no_tests():
+    rows = [row for task in ('drink_retrieval', 'pick_and_place')
+            for name in ('default_memory_2', 'default_memory_5')
+            for row in rows_of(name, 1, task=task)]
+    text = format_tables(rows)
+    assert text.index('**Pick and place**') < text.index('**Drink retrieval**')
+    assert 'paired by seed' in text and 'hindsight' in text
+    memory = format_tables(rows, 'memory')
+    assert 'paired by seed' not in memory and 'hindsight' not in memory
 
 
 def test_shares_of_lasting_causes_are_never_compared_with_each_other():

@@ -51,10 +51,10 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
         draw_main, draw_persistence, draw_memory, draw_hours)))
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']
+    texts = [[format_sweeps(kind, rows), format_tables(rows, kind)] for kind, rows in found.items()]
     paths[0].write_text('\n'.join(
-        '## {}\n\n{}'.format(kind.capitalize(), '\n'.join(filter(None, (
-            format_sweeps(kind, rows), format_tables(rows))))) for kind, rows in found.items()),
-        encoding='utf-8')
+        '## {}\n\n{}'.format(kind.capitalize(), '\n'.join(filter(None, each)))
+        for kind, each in zip(found, texts)), encoding='utf-8')
     for kind, rows in found.items():
         if kind == 'continuous' and all(row.hour is None for row in rows):
             continue

@@ -71,15 +71,17 @@ def panels(titles: Sequence[str], height_in: float, rows: int = 1,
     return figure, made
 
 
-def legend_above(figure: Figure, axes: Any, shown: Sequence[str] = ()) -> None:
+def legend_above(figure: Figure, axes: Any, shown: Sequence[str] = (),
+                 more: Sequence[Tuple[Any, str]] = ()) -> None:
     """Put the legend of some axes above all, where it covers no data.
 
     :param shown: its labels. None are all.
+    :param more: further entries: what is drawn, and its label.
     """
     found = [(handle, label) for handle, label in zip(*axes.get_legend_handles_labels())
-             if label in (shown or (label,))]
-    handles, labels = [handle for handle, _ in found], [label for _, label in found]
-    figure.legend(handles, labels, loc='upper center', ncol=6, frameon=False, borderpad=0.2)
+             if label in (shown or (label,))] + list(more)
+    figure.legend([handle for handle, _ in found], [label for _, label in found],
+                  loc='upper center', ncol=6, frameon=False, borderpad=0.2, columnspacing=1.4)
 
 
 def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:

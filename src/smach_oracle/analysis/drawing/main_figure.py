@@ -2,6 +2,7 @@
 from typing import Dict, List, Mapping, Sequence, Tuple
 
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from ..comparison import by_variant, with_hindsight
 from ..figure import BLACK, BLUE, VERMILLION
@@ -17,6 +18,7 @@ SHOWN: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('recovered', GREEN, '^', lambda row: row.recovered),
 )
 APART = 0.17  # of a line's height, from one share's marker to the next
+PALE = 0.3  # of the bars of replicates
 LINE_IN, FRAME_IN = 0.32, 0.95
 
 
@@ -54,7 +56,7 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]],
     titles = [', '.join([title_of(task), *([told[task]] if task in told else [])])
               for task in tasks]
     figure, (made,) = panels(titles, height_in, margins=dict(
-        left=0.11, top=1 - 0.5 / height_in, bottom=0.38 / height_in, wspace=0.06))
+        left=0.11, top=1 - 0.5 / height_in, bottom=0.38 / height_in, wspace=0.09))
     for axes, variants in zip(made, tasks.values()):
         for line, name in enumerate(names):
             chosen = variants.get(name, ())
@@ -64,7 +66,7 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]],
                 height = line + APART * (number - (len(SHOWN) - 1) / 2)
                 if percent.replicates:
                     axes.hlines([height], *percent.replicates, color=colour, linewidth=4.0,
-                                alpha=0.3, label='replicates')
+                                alpha=PALE, label='replicates')
                 axes.errorbar(
                     [percent.share], [height],
                     xerr=[[low], [high]], color=colour, marker=marker, linestyle='none',
@@ -76,7 +78,10 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]],
         axes.set_yticklabels([name.replace('_', ' ') for name in names] if axes is made[0] else [])
         axes.set_xlabel('Trials (%)')
         axes.grid(axis='x', linewidth=0.3)
-    legend_above(figure, made[0], [label for label, *_ in SHOWN])
+    several = any(len({row.replicate for row in rows}) > 1
+                  for variants in tasks.values() for rows in variants.values())
+    legend_above(figure, made[0], [label for label, *_ in SHOWN], [
+        (Patch(color=BLACK, alpha=PALE, linewidth=0), 'replicates')] if several else [])
     return figure
 
 

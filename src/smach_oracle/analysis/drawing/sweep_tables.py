@@ -62,8 +62,8 @@ def _trend(title: str, rows: Sequence[TrialRow], memories: Sequence[float]) -> s
     trend = trend_of(rows, lambda row: math.log(memory_of(row) or 1.0),
                      lambda row: row.questions > 0)
     told = 'No two trials of a seed differ.' if trend is None else (
-        'The share {} with N: z = {:.2f}, p = {:.2g}, two-sided.'.format(
-            'grows' if trend.z > 0 else 'falls', *trend))
+        'Trend over N: z = {:.2f} (above 0: the share grows), p = {:.2g}, two-sided.'.format(
+            *trend))
     return titled(title, ['memory N', 'trials', 'with a question'], lines, [
         told + " Mantel's extension test over log N, with a stratum for each seed (J. Am. Stat. "
         "Assoc. 58, 1963): Cochran and Armitage's for paired trials. It does not know that trials "

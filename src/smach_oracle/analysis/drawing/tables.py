@@ -15,7 +15,7 @@ from ..comparison import (
 from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
 from .cause_tables import by_cause, by_log
-from .looks import title_of
+from .looks import tasks_of, title_of
 from .markdown import titled
 
 SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
@@ -34,17 +34,25 @@ COSTS: Tuple[Tuple[str, str], ...] = (
     ('completion_s', 's to completion, median'),
     ('trials_between', 'trials between interventions'),
     ('hours_between', 'robot hours between interventions'))
+COMPARING = ('main', 'persistence')
 SAME_SEEDS = ('true success', 'interventions', 'a question asked')
 
 
-def format_tables(rows: Sequence[TrialRow]) -> str:
-    """Return the tables of each task and share of lasting causes."""
+def format_tables(rows: Sequence[TrialRow], kind: str = 'main') -> str:
+    """Return the tables of each task and share of lasting causes.
+
+    :param kind: of the figure. Variants are compared in those of COMPARING.
+    """
     texts: List[str] = []
-    for group, mine in groups_of(rows).items():
-        variants = by_variant(mine)
-        texts.append(_main(named(group), variants))
-        texts += _tests(named(group), variants) + _same_seeds(named(group), mine)
-        texts += by_cause(named(group), variants) + by_log(named(group), variants)
+    groups = groups_of(rows)
+    for task in tasks_of(rows):
+        for group in (each for each in groups if each[0] == task):
+            title, variants = named(group), by_variant(groups[group])
+            texts.append(_main(title, variants))
+            if kind in COMPARING:
+                texts += _tests(title, variants) + _same_seeds(title, groups[group])
+                texts += by_cause(title, variants) if kind == 'main' else []
+                texts += by_log(title, variants)
     return '\n'.join(texts)
 
 
