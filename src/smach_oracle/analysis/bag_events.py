@@ -43,6 +43,7 @@ class BagContent(NamedTuple):
     events: List[Event]  # in the order of their stamps. `seq` is that of their happening
     causes: Dict[str, RecordedCause]  # by trial id
     nodes: Dict[str, str]  # by trial id: the node, from the topic of the events
+    stamps: List[float]  # of each of the events: ROS time, s. 0 where there was none
 
 
 def find_bags(places: Sequence[str]) -> List[str]:
@@ -134,6 +135,7 @@ class EventReader:
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
         causes: List[Tuple[int, RecordedCause]] = []
         nodes: Dict[str, str] = {}
+        stamps: List[float] = []
         with self._open(path) as reader:
             connections = [
                 item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)
@@ -147,6 +149,8 @@ class EventReader:
                 else:
                     events.append(_event(message))
                     ends[message.trial_id] = stamp
+                    told = message.header.stamp
+                    stamps.append(told.sec + told.nanosec / 1e9)
                     nodes[message.trial_id] = item.topic[:-len(_EVENTS)] if item.topic.endswith(
                         _EVENTS) else ''
                 if len(events) > self._most_events:
@@ -158,7 +162,7 @@ class EventReader:
         found = {trial_id: _latest(causes, end) for trial_id, end in ends.items()}
         return BagContent(
             events, {trial_id: cause
-                     for trial_id, cause in found.items() if cause is not None}, nodes)
+                     for trial_id, cause in found.items() if cause is not None}, nodes, stamps)
 
 
 def _latest(causes: Sequence[Tuple[int, RecordedCause]], end: int) -> Optional[RecordedCause]:

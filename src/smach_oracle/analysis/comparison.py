@@ -1,22 +1,30 @@
 """Compare variants that ran the same trials, from the rows that an experiment has kept.
 
 Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
-cost for a trial and for a robot hour. Prints McNemar's exact test of the interventions for each two
-variants, and the best that any variant did in each trial (hindsight). Exit code: 0, or 2 if there
-was nothing to read.
+cost for a trial and for a robot hour. Prints the best that any variant did in each trial that all
+ran (hindsight), beside what each did there. Prints McNemar's exact test of the interventions, of
+`default` against each other variant, or of each two. Exit code: 0, or 2 if there was nothing to
+read.
 """
 import argparse
-import itertools
 import statistics
 import sys
 from pathlib import Path
-from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
-from .intervals import Interval, replicate_interval, wilson_interval
-from .pairing import HINDSIGHT, Happened, hindsight, paired_counts
+from .intervals import Interval, wilson_interval
+from .pairing import (
+    COMPARED,
+    HINDSIGHT,
+    Happened,
+    hindsight,
+    on_common_seeds,
+    paired_counts,
+    pairs_to_test,
+)
 from .reading import report_error
 from .trial_rows import LOST, TrialRow, read_rows
 
@@ -40,7 +48,8 @@ class Share(NamedTuple):
     trials: int
     of: int
     interval: Interval  # 95% Wilson score interval
-    over_replicates: Optional[Interval]  # 95% t interval, or None for fewer than two
+    # the smallest and the largest share of a replicate, or None for fewer than two
+    over_replicates: Optional[Interval]
 
     @property
     def share(self) -> float:
@@ -57,7 +66,8 @@ class Costs(NamedTuple):
     expert_s: Optional[float]  # a trial
     expert_s_per_hour: Optional[float]
     wrong_objects: Optional[int]
-    damage: Optional[float]  # things that came to harm, a completed task
+    damage: Optional[float]  # things that came to harm in any trial, for each true success
+    damage_done: Optional[float]  # of these, in a trial of true success
     completion_s: Optional[float]  # median time of a true success
     trials_between: Optional[float]  # trials an intervention. None means there was none
     hours_between: Optional[float]
@@ -74,8 +84,9 @@ def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
 def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
            parts: Sequence[Sequence[TrialRow]]) -> Share:
     number = sum(map(happened, rows))
-    return Share(name, number, len(rows), wilson_interval(number, len(rows)), replicate_interval(
-        [sum(map(happened, part)) / len(part) for part in parts]))
+    shares = [sum(map(happened, part)) / len(part) for part in parts]
+    return Share(name, number, len(rows), wilson_interval(number, len(rows)),
+                 (min(shares), max(shares)) if len(shares) > 1 else None)
 
 
 def costs_of(rows: Sequence[TrialRow]) -> Costs:
@@ -89,15 +100,35 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
     hours = robot_hours(ended)
     expert_s = _total(ended, lambda row: row.expert_s)
     done = [row for row in ended if row.succeeded]
-    harm = _total(done, lambda row: row.damage)
     times = [row.sim_s for row in done if row.sim_s is not None]
     wrong = [row.wrong_object for row in ended]
     return Costs(
         sum(row.attempts for row in rows) / len(rows), asked / len(rows), _ratio(asked, hours),
         _ratio(expert_s, len(ended)), _ratio(expert_s, hours),
-        None if None in wrong else sum(map(bool, wrong)), _ratio(harm, len(done)),
+        None if None in wrong else sum(map(bool, wrong)),
+        _ratio(_total(ended, lambda row: row.damage), len(done)),
+        _ratio(_total(done, lambda row: row.damage), len(done)),
         statistics.median(times) if times else None, _ratio(len(rows), interventions),
         _ratio(hours, interventions))
+
+
+def common_completion(variants: Mapping[str, Sequence[TrialRow]]
+                      ) -> Tuple[int, Dict[str, float]]:
+    """Return the median times (s) of the variants that are compared, on seeds that all completed.
+
+    Each variant completes other trials: the fewer it completes, the easier they are.
+
+    :returns: the number of seeds, and the medians. 0 and none where there are no such.
+    """
+    if any(name not in variants for name in COMPARED):
+        return 0, {}
+    times = {name: {row.pair: row.sim_s for row in variants[name]
+                    if row.succeeded and row.sim_s is not None} for name in COMPARED}
+    seeds = set.intersection(*(set(each) for each in times.values()))
+    if not seeds:
+        return 0, {}
+    return len(seeds), {name: statistics.median(each[pair] for pair in seeds)
+                        for name, each in times.items()}
 
 
 def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:
@@ -130,15 +161,43 @@ def format_comparison(rows: Sequence[TrialRow]) -> str:
     """Return the tables, one task after the other."""
     texts = []
     for (task, share), mine in groups_of(rows).items():
-        names = list(dict.fromkeys(row.variant for row in mine))
-        variants = {name: [row for row in mine if row.variant == name] for name in names}
-        best = hindsight(mine) if len(names) > 1 else []
-        if best:
-            variants[HINDSIGHT] = best
+        variants = by_variant(mine)
         told = '' if share is None else ', {:.0%} of the causes last'.format(share)
         texts += ['{}{}\n'.format(task, told)] + [_variant(*each) for each in variants.items()]
-        texts += _tests({name: variants[name] for name in names})
+        texts += _same_seeds(mine) + _tests(variants)
     return '\n'.join(texts)
+
+
+def by_variant(rows: Sequence[TrialRow]) -> Dict[str, List[TrialRow]]:
+    """Return the rows of each variant: those that are compared first, then as they were begun."""
+    found: Dict[str, List[TrialRow]] = {}
+    for row in rows:
+        found.setdefault(row.variant, []).append(row)
+    first = [name for name in COMPARED if name in found]
+    return {name: found[name] for name in dict.fromkeys([*first, *found])}
+
+
+def with_hindsight(rows: Sequence[TrialRow]) -> Dict[str, List[TrialRow]]:
+    """Return the rows of each variant on the seeds that all of them ran, and HINDSIGHT's.
+
+    It is empty where there are no such seeds, or no two variants.
+    """
+    best = hindsight(rows)
+    found = by_variant(on_common_seeds(rows))
+    return {**found, HINDSIGHT: best} if len(found) > 1 else {}
+
+
+def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
+    """Tell the bound, beside each variant on the same seeds."""
+    found = with_hindsight(rows)
+    if not found:
+        return []
+    lines = ['  on the {} seeds that all variants ran:'.format(len(found[HINDSIGHT]))]
+    for name, mine in found.items():
+        true, needed = shares_of(mine)[:2]
+        lines.append('    {:<24}{:>7.1%} true success {:>7.1%} interventions'.format(
+            name, true.share, needed.share))
+    return ['\n'.join(lines) + '\n']
 
 
 def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
@@ -156,15 +215,15 @@ def _variant(name: str, rows: Sequence[TrialRow]) -> str:
         over = share.over_replicates
         lines.append('    {:<18}{:>5} {:>7.1%} ({:.1%} to {:.1%}){}'.format(
             share.name, share.trials, share.share, share.interval[0], share.interval[1],
-            '' if over is None else '; over replicates {:.1%} to {:.1%}'.format(*over)))
+            '' if over is None else '; replicates {:.1%} to {:.1%}'.format(*over)))
     lines += ['    {:<42}{}'.format(told.replace('_', ' '), _number(value))
               for told, value in zip(_COSTS, costs_of(rows))]
     return '\n'.join(lines) + '\n'
 
 
 _COSTS = ('attempts a trial', 'questions a trial', 'questions a robot hour', 'expert s a trial',
-          'expert s a robot hour', 'trials with a wrong object', 'damage a completed task',
-          's to completion, median', 'trials between interventions',
+          'expert s a robot hour', 'trials with a wrong object', 'damage for each completed task',
+          'damage in a completed task', 's to completion, median', 'trials between interventions',
           'robot hours between interventions')
 
 
@@ -174,8 +233,8 @@ def _number(value: Optional[float]) -> str:
 
 def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
     lines = []
-    for (first, ours), (second, theirs) in itertools.combinations(variants.items(), 2):
-        counts = paired_counts(ours, theirs, lambda row: row.intervened)
+    for first, second in pairs_to_test(list(variants)):
+        counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
         if sum(counts):
             lines.append(
                 '  interventions, {} against {}: {} trials under {} alone, {} under {} alone, '

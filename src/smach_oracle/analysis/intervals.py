@@ -1,4 +1,4 @@
-"""Confidence intervals of shares: over trials, and over replicates."""
+"""Confidence intervals of shares: over trials, over replicates, and of a paired difference."""
 import math
 from typing import Optional, Sequence, Tuple
 
@@ -54,3 +54,37 @@ def replicate_interval(shares: Sequence[float]) -> Optional[Interval]:
     variance = sum((share - mean) ** 2 for share in shares) / (count - 1)
     half = t_quantile(count - 1) * math.sqrt(variance / count)
     return max(0.0, mean - half), min(1.0, mean + half)
+
+
+def paired_difference(both: int, first_alone: int, second_alone: int, none: int) -> Interval:
+    """Return the interval of the difference of two paired shares, the first less the second.
+
+    It is Newcombe's, from Wilson's intervals of the two (R. G. Newcombe, Stat. Med. 17, 1998,
+    p. 2635, method 10). (-1, 1) where there are no pairs.
+    """
+    pairs = both + first_alone + second_alone + none
+    if not pairs:
+        return -1.0, 1.0
+    first, second = (both + first_alone) / pairs, (both + second_alone) / pairs
+    low, high = wilson_interval(both + first_alone, pairs)
+    other_low, other_high = wilson_interval(both + second_alone, pairs)
+    phi = _phi(both, first_alone, second_alone, none)
+    difference = first - second
+    return (difference - _joined(first - low, other_high - second, phi),
+            difference + _joined(high - first, second - other_low, phi))
+
+
+def _phi(both: int, first_alone: int, second_alone: int, none: int) -> float:
+    """Return how much two paired shares go with each other, -1 to 1, corrected for few pairs."""
+    spread = ((both + first_alone) * (second_alone + none)
+              * (both + second_alone) * (first_alone + none))
+    if not spread:
+        return 0.0
+    product = both * none - first_alone * second_alone
+    pairs = both + first_alone + second_alone + none
+    corrected = max(product - pairs / 2, 0.0) if product > 0 else float(product)
+    return corrected / math.sqrt(spread)
+
+
+def _joined(one: float, other: float, phi: float) -> float:
+    return math.sqrt(max(0.0, one * one - 2 * phi * one * other + other * other))

@@ -8,13 +8,16 @@ import io
 import json
 import os
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .bag_events import BagError
+from .lasting.causes_log import LoggedCause, causes_in, causes_of, causes_text
+from .lasting.tries import StateTry, WorldClock, in_world_time, tries_in, tries_text
 from .trial_counter import TrialEnding
 from .trials import TrialSummary
 from .truth import DAMAGE
 
+OLDEST = 23  # columns of the oldest rows that can be read
 LOST = 'lost'  # an ending: the trial hung, or its processes died
 
 
@@ -44,6 +47,11 @@ class TrialRow(NamedTuple):
     wall_s: Optional[float] = None  # of the machine, that the trial took
     hour: Optional[float] = None  # of a world that goes on, at which it began
     left: str = ''  # how it left a world that goes on, as JSON
+    # those below are not in rows of older versions. doc/comparing.md describes them
+    cause_log: str = ''  # the world's log of the causes, as JSON
+    tries: str = ''  # of the states that failed, in the world's time, as JSON
+    memory: Optional[int] = None  # of the oracle, results of a state
+    prior: Optional[float] = None  # failure rate that a state begins with
 
     @property
     def succeeded(self) -> bool:
@@ -90,6 +98,8 @@ class TruthDetails(NamedTuple):
     wall_s: Optional[float] = None
     hour: Optional[float] = None  # of a world that goes on, at which it began
     left: Optional[Mapping[str, Any]] = None  # how it left a world that goes on
+    causes: Optional[List[LoggedCause]] = None
+    clock: Optional[WorldClock] = None
 
 
 NO_DETAILS = TruthDetails()
@@ -98,9 +108,12 @@ NO_DETAILS = TruthDetails()
 def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed: int,
            details: TruthDetails = NO_DETAILS, version: str = '',
            learned: Optional[Mapping[str, Any]] = None,
-           lasting_share: Optional[float] = None) -> TrialRow:
-    """Return the row of a trial that has come to its end."""
-    truth, cause = summary.truth, summary.cause
+           lasting_share: Optional[float] = None, tries: Sequence[StateTry] = ()) -> TrialRow:
+    """Return the row of a trial that has come to its end.
+
+    :param tries: of the states that failed, in ROS time.
+    """
+    truth, cause, settings = summary.truth, summary.cause, dict(summary.settings)
     asked_s = None
     if details.passed_s is not None:  # a world that was not told of the expert's time has no entry
         asked_s = details.passed_s.get('expert', None if summary.questions else 0.0)
@@ -111,7 +124,10 @@ def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed:
         asked_s, None if truth is None else truth.sim_s,
         ' '.join(cause.kinds) if cause is not None else '', details.lasting,
         '' if truth is None else truth.why, version,
-        _as_json(learned), lasting_share, details.wall_s, details.hour, _as_json(details.left))
+        _as_json(learned), lasting_share, details.wall_s, details.hour, _as_json(details.left),
+        '' if details.causes is None else causes_text(details.causes),
+        '' if details.clock is None else tries_text(in_world_time(tries, details.clock)),
+        settings.get('memory'), settings.get('prior'))
 
 
 def _as_json(data: Optional[Mapping[str, Any]]) -> str:
@@ -123,16 +139,41 @@ def append_rows(path: Path, rows: Sequence[TrialRow]) -> None:
 
     :raises OSError: where they cannot be written.
     """
+    known = path.exists() and path.stat().st_size > 0
+    if known and _columns(path) != TrialRow._fields:
+        _rewrite(path)
+    with path.open('a', encoding='utf-8', newline='') as target:
+        target.write(_text_of(rows, not known))
+        target.flush()
+        os.fsync(target.fileno())
+
+
+def _text_of(rows: Sequence[TrialRow], with_columns: bool) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator='\n')
-    if not path.exists() or not path.stat().st_size:
+    if with_columns:
         writer.writerow(TrialRow._fields)
     for row in rows:
         writer.writerow([_written(value) for value in row])
-    with path.open('a', encoding='utf-8', newline='') as target:
-        target.write(text.getvalue())
+    return text.getvalue()
+
+
+def _columns(path: Path) -> Tuple[str, ...]:
+    with path.open(encoding='utf-8', newline='') as source:
+        return tuple(next(csv.reader(source), []))
+
+
+def _rewrite(path: Path) -> None:
+    """Give the rows of an older version the columns of this one. A crash leaves the old file.
+
+    :raises BagError: where a row is wrong.
+    """
+    temporary = path.with_name(path.name + '.tmp')
+    with temporary.open('w', encoding='utf-8', newline='') as target:
+        target.write(_text_of(read_rows(path), True))
         target.flush()
         os.fsync(target.fileno())
+    os.replace(str(temporary), str(path))
 
 
 def _written(value: object) -> object:
@@ -144,7 +185,8 @@ def _written(value: object) -> object:
 def read_rows(path: Path) -> List[TrialRow]:
     """Return the rows of a file. If a variant has a trial twice, the later row is used.
 
-    A last line that was cut off in its writing is skipped.
+    A last line that was cut off in its writing is skipped. In rows of older versions the columns
+    that came later are not known.
 
     :raises BagError: where another line is wrong.
     :raises OSError: where the file cannot be read.
@@ -154,11 +196,12 @@ def read_rows(path: Path) -> List[TrialRow]:
     lines = list(csv.reader(io.StringIO(whole)))
     if not lines:
         return []
-    if tuple(lines[0]) != TrialRow._fields:
+    columns = len(lines[0])
+    if columns < OLDEST or tuple(lines[0]) != TrialRow._fields[:columns]:
         raise BagError('{}: its columns are not those of this version'.format(path))
     found: Dict[Any, TrialRow] = {}
     for number, line in enumerate(lines[1:], 2):
-        row = _parsed(line, '{} row {}'.format(path, number))
+        row = _parsed(line, columns, '{} row {}'.format(path, number))
         found[row.variant, row.replicate, row.pair] = row
     return list(found.values())
 
@@ -182,25 +225,31 @@ def _flag(text: str) -> bool:
 _PARSERS: Mapping[str, Callable[[str], Any]] = {
     'replicate': int, 'seed': int, 'true_success': _flag, 'damage': int, 'failures': int,
     'attempts': int, 'questions': int, 'answered': int, 'expert_s': float, 'sim_s': float,
-    'lasting': int, 'lasting_share': float, 'wall_s': float, 'hour': float,
+    'lasting': int, 'lasting_share': float, 'wall_s': float, 'hour': float, 'memory': int,
+    'prior': float,
 }
 _MAY_BE_EMPTY = ('true_success', 'damage', 'expert_s', 'sim_s', 'lasting', 'lasting_share',
-                 'wall_s', 'hour')
+                 'wall_s', 'hour', 'memory', 'prior')
+# columns that are JSON, where they are not empty
+_TEXTS: Mapping[str, Callable[[str], object]] = {'cause_log': causes_in, 'tries': tries_in}
 _ENDINGS = {ending.value for ending in TrialEnding} | {LOST}
 
 
-def _parsed(line: Sequence[str], where: str) -> TrialRow:
-    if len(line) != len(TrialRow._fields):
-        raise BagError('{}: {} cells, not {}'.format(where, len(line), len(TrialRow._fields)))
+def _parsed(line: Sequence[str], columns: int, where: str) -> TrialRow:
+    if len(line) != columns:
+        raise BagError('{}: {} cells, not {}'.format(where, len(line), columns))
     cells: Dict[str, Any] = dict(zip(TrialRow._fields, line))
     # '' is no object. A row that has the damage has this, too
     cells['wrong_object'] = (None if cells['damage'] == '' and not cells['wrong_object']
                              else cells['wrong_object'])
-    for name, parse in _PARSERS.items():
+    for name in cells:
         try:
-            cells[name] = (None if not cells[name] and name in _MAY_BE_EMPTY
-                           else parse(cells[name]))
-        except (ValueError, KeyError) as err:
+            if name in _PARSERS:
+                cells[name] = (None if not cells[name] and name in _MAY_BE_EMPTY
+                               else _PARSERS[name](cells[name]))
+            elif name in _TEXTS and cells[name]:
+                _TEXTS[name](cells[name])
+        except (ValueError, KeyError, TypeError) as err:
             raise BagError('{}: {}: {!r} is not allowed'.format(where, name, cells[name])) from err
     if cells['ending'] not in _ENDINGS:
         raise BagError('{}: ending: {!r} is not allowed; allowed: {}'.format(
@@ -241,7 +290,15 @@ def details_of(data: Mapping[str, Any]) -> TruthDetails:
     return TruthDetails(wrong if isinstance(wrong, str) else None, _damage(data.get('damage')),
                         passed if isinstance(passed, dict) else None,
                         _lasting(data.get('causes')), _number(data.get('wall_s')),
-                        _number(data.get('hour')), left if isinstance(left, dict) else None)
+                        _number(data.get('hour')), left if isinstance(left, dict) else None,
+                        causes_of(data.get('causes')), _clock(data))
+
+
+def _clock(data: Mapping[str, Any]) -> Optional[WorldClock]:
+    trial_s, pauses = _number(data.get('clock_s')), data.get('pauses')
+    if trial_s is None or not isinstance(pauses, list):
+        return None
+    return WorldClock(trial_s, tuple((float(begin), float(length)) for begin, length in pauses))
 
 
 def _number(value: object) -> Optional[float]:

@@ -22,7 +22,7 @@ from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
 
 from .freeze import ABANDONED, FROZEN, checkout, run_freeze
-from .job import ExperimentJob
+from .job import HUNG_AFTER_S, LONGEST, ExperimentJob
 from .plan import (
     BARE,
     CONFIGURED,
@@ -115,9 +115,9 @@ def make_parser() -> argparse.ArgumentParser:
         '--hours', type=float, metavar='H',
         help='of a world that goes on from trial to trial (default: each trial has a fresh one)')
     parser.add_argument(
-        '--hung-after', type=float, default=300.0, metavar='S',
+        '--hung-after', type=float, default=HUNG_AFTER_S, metavar='S',
         help='after so many s without an event a trial is run again, and likewise after five times '
-        'as many in all (default: 300)')
+        'as many in all (default: {:.0f})'.format(HUNG_AFTER_S))
     freezing = parser.add_mutually_exclusive_group()
     freezing.add_argument('--freeze', metavar='NOTE',
                           help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
@@ -223,9 +223,11 @@ def main(argv: Optional[List[str]] = None) -> int:
         if args.only_plan:
             parts = chosen_parts(args) if args.protocol else [Part('', args.plan)]
             print(plan_text(parts, args.output, args.jobs))
+            print(limit_text(args.hung_after))
             return 0
         if shutil.which('roslaunch') is None:
             raise ExperimentError('roslaunch not found; source the workspace first')
+        print(limit_text(args.hung_after))
         if args.protocol:
             with alone_in(output):
                 code, told = run_protocol(args, output)
@@ -249,9 +251,15 @@ def main(argv: Optional[List[str]] = None) -> int:
 
 def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> List[ExperimentJob]:
     with alone_in(output):
-        if enter_folder(output, plan):
+        if enter_folder(output, plan, args.hung_after):
             print('Going on in {}'.format(output))
         return run(plan, output, args.jobs, args.hung_after)
+
+
+def limit_text(hung_after_s: float) -> str:
+    """Return which trials are taken for hung, in words."""
+    return 'A trial counts as hung after {:.0f} s without an event, or {:.0f} s in all.'.format(
+        hung_after_s, LONGEST * hung_after_s)
 
 
 def freeze_seeds(args: argparse.Namespace) -> int:

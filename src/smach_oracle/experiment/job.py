@@ -18,6 +18,9 @@ from .results import JobResults
 
 LEFTOVER_GRACE_S = 15.0  # for processes that an earlier job left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
+# s without a sign of life, after which a trial is taken for hung. The longest of 1,612 trials took
+# 92 s in all, beside other work. A machine would have to be ten times as slow
+HUNG_AFTER_S = 900.0
 LONGEST = 5  # times the time without a sign of life: what a trial may take that goes on and on
 LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a trial
 
@@ -46,7 +49,7 @@ class ExperimentJob:
         self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
                                          self._seed, plan.trials)
         self._results = JobResults(output, plan.task, variant.name, replicate, self._seed,
-                                   plan.lasting)
+                                   plan.lasting, plan.slot_h)
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
@@ -98,8 +101,8 @@ class ExperimentJob:
         :raises OSError: where that cannot be done.
         """
         self._ended_at = self._sign_at = time.monotonic()
-        if self._plan.hours is not None:
-            write_lab(self._records.folder, self._seed, self._plan.hours / self._plan.trials,
+        if self._plan.slot_h is not None:
+            write_lab(self._records.folder, self._seed, self._plan.slot_h,
                       self._results.last_left())
         self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments(),
                               self.core)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 EXPERIMENT_FILE = 'experiment.json'
+LIMITS = 'hung_after_s'  # key of the limits that trials were run with, in the order of their use
 FORMAT = 'smach_oracle experiment'
 VERSION = 1
 # The task, its launch file, and how many trials the paper has of it.
@@ -48,6 +49,11 @@ class ExperimentPlan(NamedTuple):
     def first_seed(self, replicate: int) -> int:
         """Seed of the first trial of a replicate (from 0). Each next trial has the next seed."""
         return self.seed + replicate * self.trials
+
+    @property
+    def slot_h(self) -> Optional[float]:
+        """h from the begin of a trial to that of the next, in a world that goes on."""
+        return None if self.hours is None else self.hours / self.trials
 
     def as_data(self) -> Dict[str, Any]:
         """The plan as plain data, as its file has it."""
@@ -100,9 +106,10 @@ def named_variants(names: Sequence[str], settings: Mapping[str, Any],
     return tuple(variants)
 
 
-def enter_folder(folder: Path, plan: ExperimentPlan) -> bool:
+def enter_folder(folder: Path, plan: ExperimentPlan, hung_after_s: Optional[float] = None) -> bool:
     """Make the folder of an experiment, or come back to it.
 
+    :param hung_after_s: noted in its file. An experiment may go on with another one.
     :returns: whether it was there before: the experiment goes on.
     :raises ExperimentError: where it holds another experiment, or something else.
     :raises OSError: where it cannot be made or read.
@@ -110,18 +117,23 @@ def enter_folder(folder: Path, plan: ExperimentPlan) -> bool:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / EXPERIMENT_FILE
     if path.exists():
-        _refuse_another(path, plan)
+        content = _refuse_another(path, plan)
+        limits = list(content.get(LIMITS, []))
+        if hung_after_s is not None and limits[-1:] != [hung_after_s]:
+            write_json(path, {**content, LIMITS: [*limits, hung_after_s]})
         return True
     if any(item.name != '.lock' for item in folder.iterdir()):
         raise ExperimentError('{}: not empty, and no experiment: there is no {} in it'.format(
             folder, EXPERIMENT_FILE))
     write_json(
         path,
-        {'format': FORMAT, 'version': VERSION, 'settings': plan.as_data(), 'software': software()})
+        {'format': FORMAT, 'version': VERSION, 'settings': plan.as_data(), 'software': software(),
+         **({} if hung_after_s is None else {LIMITS: [hung_after_s]})})
     return False
 
 
-def _refuse_another(path: Path, plan: ExperimentPlan) -> None:
+def _refuse_another(path: Path, plan: ExperimentPlan) -> Dict[str, Any]:
+    """Return the content of an experiment's file, where its settings are these."""
     try:
         content = json.loads(path.read_text(encoding='utf-8'))
         there, ours = content['settings'], json.loads(json.dumps(plan.as_data()))
@@ -139,6 +151,7 @@ def _refuse_another(path: Path, plan: ExperimentPlan) -> None:
                 path.parent, '; '.join('{}: there {}, now {}'.format(
                     'variants' if key == ARMS else key, setting_text(there.get(key)),
                     setting_text(ours.get(key))) for key in differing)))
+    return dict(content)
 
 
 def setting_text(value: Any) -> str:

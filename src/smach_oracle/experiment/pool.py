@@ -71,7 +71,7 @@ def run_parts(parts: Sequence[Part], output: Path, at_a_time: int,
         try:
             for part in parts:
                 folder = output / part.name
-                goes_on = enter_folder(folder, part.plan)
+                goes_on = enter_folder(folder, part.plan, hung_after_s)
                 made.append(PartJobs(part, []))
                 for job in _make_jobs(part.plan, folder, hung_after_s):
                     job.name = '{}/{}'.format(part.name, job.name)

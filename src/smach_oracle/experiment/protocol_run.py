@@ -5,7 +5,9 @@ from typing import Dict, List, Optional, Tuple
 
 from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.comparison import format_comparison
+from smach_oracle.analysis.drawing.command import draw_all, find_rows
 from smach_oracle.analysis.trial_rows import read_rows
+from smach_oracle.packages import lacking
 
 from .estimate import JobWork, duration, paces, seconds_left, seconds_missing
 from .freeze import BLOCKS, checkout, frozen_seeds, last_freeze
@@ -14,6 +16,7 @@ from .pool import run_parts
 from .protocols import Part, ProtocolChoice, parts_of
 from .results import RESULTS_FILE
 
+FIGURES = 'figures'  # folder in that of a protocol
 DONE, FAILED, LOST = 0, 1, 3  # exit codes
 
 
@@ -41,25 +44,43 @@ def frozen_blocks(root: Path) -> Dict[str, int]:
 
 
 def run_protocol(args: argparse.Namespace, output: Path) -> Tuple[int, str]:
-    """Run the parts in one pool, compare the variants of each, and name what is missing.
+    """Run the parts in one pool, compare the variants, draw the figures, and name what is missing.
+
+    Figures and tables are of all rows in the folder, also those of other parts.
 
     :returns: the exit code, and a text to print.
     :raises ExperimentError: as run_parts() does.
     """
     result = run_parts(chosen_parts(args), output, args.jobs, args.hung_after)
-    lost, told = [], []
-    for part, jobs in result.parts:
-        rows = output / part.name / RESULTS_FILE
-        if rows.exists():
-            told.append('Part {}\n{}'.format(part.name, format_comparison(read_rows(rows))))
-        lost += ['{}: seed {}: {}'.format(job.name, *each) for job in jobs
-                 for each in sorted(job.lost.items())]
+    lost = ['{}: seed {}: {}'.format(job.name, *each) for _, jobs in result.parts for job in jobs
+            for each in sorted(job.lost.items())]
+    told = compared(output)
     for title, texts in (('Lost trials', lost), ('Replicates that were left', [
             '{}: {}'.format(*each) for each in result.broken.items()])):
         if texts:
             told.append('{}:\n  {}'.format(title, '\n  '.join(texts)))
     told.append('Rows, bags and logs: {}'.format(output))
     return FAILED if result.broken else LOST if lost else DONE, '\n'.join(told)
+
+
+def compared(output: Path) -> List[str]:
+    """Compare the variants of each figure, draw the figures, and return texts to print.
+
+    What cannot be drawn is told, for the trials are there.
+    """
+    try:
+        found = find_rows(output)
+    except BagError as err:
+        return [str(err)]
+    texts = ['{}\n\n{}'.format(kind.capitalize(), format_comparison(rows))
+             for kind, rows in found.items()]
+    try:
+        paths = draw_all(found, output / FIGURES)
+    except OSError as err:
+        return texts + ['Figures were not drawn: {}'.format(err)]
+    except ImportError as err:
+        return texts + ['Figures were not drawn: {}'.format(lacking(err) or err)]
+    return texts + ['Figures and tables:\n  {}'.format('\n  '.join(map(str, paths)))]
 
 
 def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
+from smach_oracle.analysis.lasting.tries import StateTry, tries_of
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import TrialSummary, summarise
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
@@ -30,6 +31,7 @@ class RecordedTrial(NamedTuple):
 
     summary: TrialSummary
     learned: Optional[Mapping[str, Any]]  # at its end, or None where the bag lacks it
+    tries: Tuple[StateTry, ...] = ()  # of the states that failed, in ROS time
 
 
 class JobProgress(NamedTuple):
@@ -130,7 +132,8 @@ class ReplicateRecords:
         end = next((event for event in content.events if event.kind == EventKind.TRIAL_END), None)
         learned = end.data.get('learned') if end is not None and isinstance(end.data,
                                                                             Mapping) else None
-        return RecordedTrial(summary._replace(cause=content.causes.get(summary.trial_id)), learned)
+        return RecordedTrial(summary._replace(cause=content.causes.get(summary.trial_id)), learned,
+                             tuple(tries_of(content.events, content.stamps)))
 
     def is_complete(self, recorded: RecordedTrial) -> bool:
         """Whether a trial has come to its end, and the world has told how."""

@@ -40,9 +40,11 @@ class JobResults:
     """The rows of one job."""
 
     def __init__(self, output: Path, task: str, variant: str, replicate: int,
-                 first_seed: int, lasting_share: Optional[float] = None) -> None:
+                 first_seed: int, lasting_share: Optional[float] = None,
+                 slot_h: Optional[float] = None) -> None:
         """Read them.
 
+        :param slot_h: h from the begin of one trial to that of the next, in a world that goes on.
         :raises ExperimentError: where the file cannot be used.
         :raises OSError: where it cannot be read.
         """
@@ -52,6 +54,7 @@ class JobResults:
         self._replicate = replicate
         self._first_seed = first_seed
         self._lasting_share = lasting_share
+        self._slot_h = slot_h
         self._version = code_version()
         self._rows: Dict[int, TrialRow] = {}  # by seed
         if self._path.exists():
@@ -114,16 +117,30 @@ class JobResults:
                 details = read_details(str(truth)) if truth.exists() else {}
             new.append(row_of(trial.summary, self._task, self._variant, self._replicate,
                               cause.seed, details.get(cause.seed, NO_DETAILS), self._version,
-                              trial.learned, self._lasting_share))
+                              trial.learned, self._lasting_share, trial.tries))
         for number, why in lost.items():
             if self._first_seed + number not in self._rows:
                 new.append(TrialRow(self._task, self._variant, self._replicate,
                                     self._first_seed + number, LOST, why=why,
-                                    version=self._version,
-                                    lasting_share=self._lasting_share))
+                                    version=self._version, lasting_share=self._lasting_share,
+                                    hour=self._hour_of(number)))
         if new:
             append_rows(self._path, new)
             self._rows.update((row.seed, row) for row in new)
+
+
+    def _hour_of(self, number: int) -> Optional[float]:
+        """Return the hour at which a lost trial was to begin, of a world that goes on.
+
+        Where the trial before it took long, it is the end of that one.
+        """
+        if self._slot_h is None:
+            return None
+        before = [row for row in self.rows() if row.seed < self._first_seed + number and row.left]
+        left = _data_in(before[-1], before[-1].left, 'how the world was left') if before else None
+        ended = left.get('ended') if left else None
+        return max(number * self._slot_h,
+                   float(ended) if isinstance(ended, (int, float)) else 0.0)
 
 
 def _data_in(row: TrialRow, text: str, what: str) -> Optional[Mapping[str, Any]]:

@@ -1,19 +1,31 @@
 """The figures and tables of an experiment, drawn from its rows alone."""
 
+import json
+
 import pytest
 from matplotlib import rc_context
 
-from smach_oracle.analysis.comparison import costs_of, format_comparison, robot_hours
+from smach_oracle.analysis.comparison import (
+    costs_of,
+    format_comparison,
+    robot_hours,
+    shares_of,
+    with_hindsight,
+)
 from smach_oracle.analysis.drawing import command
 from smach_oracle.analysis.drawing.hours_figure import draw_hours, learned_rates
-from smach_oracle.analysis.drawing.main_figure import draw_main
+from smach_oracle.analysis.drawing.main_figure import draw_main, draw_same_seeds
 from smach_oracle.analysis.drawing.sweep_figures import draw_memory, draw_persistence
+from smach_oracle.analysis.drawing.sweep_tables import format_sweeps
 from smach_oracle.analysis.drawing.tables import format_tables
 from smach_oracle.analysis.figure import STYLE
 from smach_oracle.analysis.intervals import wilson_interval
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows
 
-LEARNED = '{"": {"PICK": {"window": [0, 1, 0, 1]}, "PLACE": {"failures": 1, "successes": 3}}}'
+LEARNED = json.dumps({'': {
+    'PICK': {'estimator': 'window', 'failures': 2, 'successes': 2, 'window': [0, 1, 0, 1]},
+    'PLACE': {'estimator': 'exponential', 'failures': 1, 'successes': 3, 'rate': 0.15},
+    'LOOK': {'estimator': 'window', 'failures': 0, 'successes': 4, 'window': [0, 0, 0, 0]}}})
 
 
 def rows_of(variant, asked, count=10, **more):
@@ -31,18 +43,56 @@ def errorbars(axes):
             for bars in axes.containers}
 
 
+def cells_of(text):
+    """Markdown tables, each by the first cell of its lines."""
+    found, before = [], ''
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip('|').split('|')]
+        if line.startswith('|') and not before.startswith('|'):
+            found.append({})
+        if line.startswith('|') and cells[-1] != '---':
+            found[-1][cells[0]] = cells[1:]
+        before = line
+    return found
+
+
 def test_the_main_figure_has_each_share_with_its_interval_and_hides_none():
     rows = rows_of('bare', 4) + rows_of('default', 4)  # alike: the worst case for hiding
     with rc_context(STYLE):
         axes = draw_main(rows).axes[0]
-    assert [tick.get_text() for tick in axes.get_yticklabels()] == ['bare', 'default', 'hindsight']
+    assert [tick.get_text() for tick in axes.get_yticklabels()] == ['bare', 'default']
     points = [(float(bars.lines[0].get_xdata()[0]), float(bars.lines[0].get_ydata()[0]))
               for bars in axes.containers]
     heights = sorted(y for _, y in points)
-    assert len(points) == 12 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
+    assert len(points) == 8 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
     x, _, (segments,) = errorbars(axes)['intervention']
     assert x[0] == pytest.approx(40.0)
     assert segments[0][:, 0] == pytest.approx([100 * end for end in wilson_interval(4, 10)])
+
+
+def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
+    """Seeds 7 to 16 were run by all, and 17 to 26 by two of three."""
+    later = [row._replace(seed=row.seed + 10, replicate=1, ending='failure', true_success=False)
+             for variant in ('bare', 'default') for row in rows_of(variant, 0)]
+    rows = rows_of('bare', 2) + rows_of('default', 1) + later + rows_of('ladder', 3)
+    assert {name: len(mine) for name, mine in with_hindsight(rows).items()} == dict.fromkeys(
+        ('bare', 'default', 'ladder', 'hindsight'), 10)
+    with rc_context(STYLE):
+        assert [tick.get_text() for tick in draw_main(rows).axes[0].get_yticklabels()] == [
+            'bare', 'default', 'ladder']
+        axes, = draw_same_seeds(rows).axes
+    assert axes.get_title('left') == 'Pick and place, 10 seeds that all ran'
+    assert [tick.get_text() for tick in axes.get_yticklabels()][-1] == 'hindsight'
+    shares = [float(bars.lines[0].get_xdata()[0]) for bars in axes.containers]
+    assert shares[1::4] == [20.0, 10.0, 30.0, 10.0], 'interventions'
+    tables = cells_of(format_tables(rows))
+    assert tables[0]['interventions'] == [
+        '60.0% (39% to 78%)', '55.0% (34% to 74%)', '30.0% (11% to 60%)']
+    bounded = next(table for table in tables if 'hindsight' in table.get('', ()))
+    assert [cell.split()[0] for cell in bounded['interventions']] == [
+        '20.0%', '10.0%', '30.0%', '10.0%']
+    assert 'the 10 seeds that all variants ran' in format_tables(rows)
+    assert 'on the 10 seeds that all variants ran' in format_comparison(rows)
 
 
 def test_persistence_is_drawn_over_the_share_with_variants_beside_each_other():
@@ -63,6 +113,7 @@ def test_the_memory_figure_tells_how_often_the_expert_is_asked():
         asked = draw_memory(rows).axes[0]
     x, y, _ = errorbars(asked)['default']
     assert list(x) == [2.0, 20.0] and list(y) == [50.0, 10.0]
+    assert asked.get_ylim() == (0.0, 80.0), 'the interval of 5 of 10 ends at 76%'
 
 
 def test_the_hours_have_events_counts_and_learned_rates():
@@ -74,20 +125,123 @@ def test_the_hours_have_events_counts_and_learned_rates():
     curve = next(line for line in needed.lines if line.get_label() == 'intervention')
     assert curve.get_ydata()[-1] == 2 and curve.get_xdata()[-1] == 4.5
     assert [line.get_label() for line in rates.lines] == ['PICK', 'PLACE']
-    assert learned_rates(rows[:1]) == {'PICK': [(0.0, 0.5)], 'PLACE': [(0.0, 0.25)]}
 
 
-def test_tables_tell_all_figures_of_a_variant_and_the_bound():
-    rows = rows_of('bare', 0) + rows_of('default', 2, attempts=1, expert_s=6.0)
+def test_rates_are_those_that_the_oracle_goes_by_from_the_end_of_a_trial_on():
+    """The window of 10 is filled with the prior of 0.2: (2 + 6 * 0.2) / 10."""
+    rows = [row._replace(hour=1.0, learned=LEARNED, memory=10, prior=0.2)
+            for row in rows_of('default', 0, 1)]
+    end = 1.0 + 60 / 3600
+    assert learned_rates(rows) == {'PICK': [(end, pytest.approx(0.32))], 'PLACE': [(end, 0.15)]}
+    older = [row._replace(memory=None, prior=None) for row in rows]
+    assert learned_rates(older)['PICK'] == [(end, pytest.approx(0.26))]
+
+
+def test_a_lost_trial_is_among_the_hours():
+    rows = [row._replace(hour=0.5 * number, learned=LEARNED)
+            for number, row in enumerate(rows_of('default', 0))]
+    rows[4] = rows[4]._replace(ending='lost', true_success=None, sim_s=None, learned='')
+    with rc_context(STYLE):
+        events, needed, _ = draw_hours(rows).axes
+    assert list(next(line for line in events.lines
+                     if line.get_label() == 'lost').get_xdata()) == [2.0]
+    curve = next(line for line in needed.lines if line.get_label() == 'intervention')
+    assert list(curve.get_xdata()[curve.get_ydata() == 1])[0] == 2.0
+
+
+def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant():
+    told = cells_of(format_tables(rows_of('bare', 0) + rows_of('default', 2, attempts=1,
+                                                               expert_s=6.0)))[0]
+    assert told[''] == ['bare', 'default'] and told['trials'] == ['10', '10']
+    assert told['interventions'][1] == '20.0% (6% to 51%)'
+    assert [told[name][1] for name in ('attempts a trial', 'expert s a trial',
+                                       'expert s a robot hour', 'trials between interventions',
+                                       's to completion, median')] == ['1', '6', '360', '5', '60']
+
+
+def test_the_tables_test_the_default_against_each_other_variant():
+    rows = [row for name, asked in (('bare', 8), ('default', 1), ('restart', 3), ('ladder', 7))
+            for row in rows_of(name, asked)]
+    tests = cells_of(format_tables(rows))[1]
+    assert tests['default against ladder'] == ['10', '1', '0', '6', '3', '0.031']
+    assert [name for name in tests if name] == [
+        'default against ' + each for each in ('bare', 'restart', 'ladder')]
+
+
+def test_over_replicates_stand_the_smallest_and_the_largest_share():
+    rows = [row._replace(replicate=number) for number, asked in enumerate((1, 4, 2))
+            for row in rows_of('default', asked)]
+    share = next(each for each in shares_of(rows) if each.name == 'interventions')
+    assert share.over_replicates == (0.1, 0.4)
+    assert shares_of(rows[:10])[0].over_replicates is None
+    told = cells_of(format_tables(rows + rows_of('ladder', 0)))[0]
+    assert told['interventions, replicates'] == ['10.0% to 40.0%', '-']
+    assert 'replicates 10.0% to 40.0%' in format_comparison(rows)
+    assert 'interventions, replicates' not in format_tables(rows[:10])
+
+
+def test_the_main_figure_has_a_bar_from_the_smallest_to_the_largest_replicate():
+    rows = [row._replace(replicate=number) for number, asked in enumerate((1, 4, 2))
+            for row in rows_of('default', asked)]
+    with rc_context(STYLE):
+        bars = draw_main(rows + rows_of('ladder', 0)).axes[0].collections
+    ends = [tuple(segment[:, 0]) for each in bars if each.get_label() == 'replicates'
+            for segment in each.get_segments()]
+    assert len(ends) == 4 and ends[1] == pytest.approx((10.0, 40.0))
+
+
+def test_completion_is_compared_on_the_seeds_that_all_three_completed():
+    """The bare script completes the short trials alone, so its median is the shortest."""
+    rows = [row._replace(sim_s=10.0 * row.seed, **(
+        {'ending': 'failure', 'true_success': False} if name == 'bare' and row.seed > 9 else {}))
+        for name in ('bare', 'default', 'restart', 'ladder') for row in rows_of(name, 0)]
+    told = cells_of(format_tables(rows))[0]
+    assert told['s to completion, median'] == ['80', '115', '115', '115']
+    assert told['s to completion, median, on the 3 seeds that bare, default and restart '
+                'completed'] == ['80', '80', '80', '-']
+    assert 'on the 3 seeds' not in format_tables(rows_of('bare', 0) + rows_of('default', 0))
+
+
+def test_the_tables_say_which_hours_count():
+    rows = rows_of('default', 0)
+    assert 'The time between trials does not count' in format_tables(rows)
+    on = [row._replace(hour=0.5 * number) for number, row in enumerate(rows)]
+    assert 'The time between trials counts, too' in format_tables(on)
+
+
+def test_the_difference_to_restart_is_told_at_each_share_of_lasting_causes():
+    rows = [row for share, first, second in ((0.0, 3, 3), (1.0, 2, 9))
+            for name, asked in (('default', first), ('restart', second))
+            for row in rows_of(name, asked, lasting_share=share)]
+    differences, = (cells for cells in cells_of(format_sweeps('persistence', rows))
+                    if 'causes that last' in cells)
+    assert differences['0%'] == ['10', '30.0%', '30.0%', '0.0% (-20.0% to 20.0%)']
+    assert differences['100%'][:3] == ['10', '20.0%', '90.0%']
+    assert differences['100%'][3].startswith('-70.0% (-86.5% to -26.6%)')
+    assert format_sweeps('persistence', rows_of('default', 0, lasting_share=0.0)) == ''
+
+
+def test_the_trend_over_the_memory_is_tested_within_seeds():
+    rows = [row for memory, asked in ((2, 1), (10, 4), (50, 8))
+            for row in rows_of('default_memory_{}'.format(memory), asked)]
+    text = format_sweeps('memory', rows)
+    told, = cells_of(text)
+    assert [told[number][1].split(' (')[0] for number in ('2', '10', '50')] == [
+        '1 of 10, 10.0%', '4 of 10, 40.0%', '8 of 10, 80.0%']
+    assert 'z = 3.24 (above 0: the share grows), p = 0.0012' in text
+    assert 'z = -' in format_sweeps('memory', [
+        row._replace(variant=row.variant.replace('50', '1')) for row in rows])
+
+
+def test_tasks_stand_in_the_order_of_the_paper_and_sweeps_of_the_memory_have_no_tests():
+    rows = [row for task in ('drink_retrieval', 'pick_and_place')
+            for name in ('default_memory_2', 'default_memory_5')
+            for row in rows_of(name, 1, task=task)]
     text = format_tables(rows)
-    cells = [[cell.strip() for cell in line.strip('|').split('|')]
-             for line in text.splitlines() if line.startswith('|')]
-    told = dict(zip(cells[0], next(line for line in cells if line[0] == 'default')))
-    assert told['interventions'] == '20.0% (6% to 51%)'
-    assert (told['attempts a trial'], told['expert s a trial'], told['expert s an hour'],
-            told['trials between interventions'], told['completion, s']) == (
-                '1', '6', '360', '5', '60')
-    assert [line[0] for line in cells[2:]] == ['bare', 'default', 'hindsight']
+    assert text.index('**Pick and place**') < text.index('**Drink retrieval**')
+    assert 'paired by seed' in text and 'hindsight' in text
+    memory = format_tables(rows, 'memory')
+    assert 'paired by seed' not in memory and 'hindsight' not in memory
 
 
 def test_shares_of_lasting_causes_are_never_compared_with_each_other():

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from smach_oracle.analysis.drawing import looks
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows, read_rows
 from smach_oracle.experiment import command, pool, protocol_run
 from smach_oracle.experiment.estimate import JobWork, duration, seconds_left
@@ -142,7 +143,8 @@ class FakeRunner:
         append_rows(self._rows, [TrialRow(
             self._plan.task, self.variant.name, self._replicate,
             self._plan.first_seed(self._replicate) + self.finished, 'success',
-            lasting_share=self._plan.lasting)])
+            lasting_share=self._plan.lasting,
+            hour=None if self._plan.hours is None else float(self.finished))])
         self.finished += 1
         FakeRunner.ended += 1
 
@@ -169,13 +171,18 @@ class FakeSignals:
 
 @pytest.fixture
 def run(monkeypatch, tmp_path):
-    """Run a protocol's command with fake runners; returns its exit code and what it printed."""
+    """Run a protocol's command with fake runners; returns its exit code and what it printed.
+
+    It draws only if it is told to.
+    """
+    drawn = protocol_run.draw_all
     monkeypatch.setattr(pool, 'ExperimentJob', FakeRunner)
     monkeypatch.setattr(pool, 'StopSignals', FakeSignals)
     monkeypatch.setattr(pool, 'POLL_S', 0.0)
     monkeypatch.setattr(command.shutil, 'which', lambda name: '/bin/' + name)
 
-    def run_command(*options, breaks=(), stop_after=1000):
+    def run_command(*options, breaks=(), stop_after=1000, draws=False):
+        monkeypatch.setattr(protocol_run, 'draw_all', drawn if draws else lambda *_: [])
         FakeRunner.breaks, FakeRunner.stop_after = breaks, stop_after
         FakeRunner.started, FakeRunner.ended = [], 0
         told = io.StringIO()
@@ -193,12 +200,42 @@ def test_all_parts_are_run_in_one_pool_with_a_folder_each(run, tmp_path):
     for name in names:
         settings = json.loads((tmp_path / name / 'experiment.json').read_text())['settings']
         assert (settings['seed'], settings['trials']) == (7, 2)
-        assert 'Part ' + name in told
     rows = [row for name in names for row in read_rows(tmp_path / name / 'results.csv')]
     assert len(rows) == FakeRunner.ended == 2 * len(FakeRunner.started)
     assert {row.lasting_share for row in rows} == {None, 0.0, 0.5, 1.0}
     kinds = ['drink_retrieval' in name for name, _ in FakeRunner.started]
     assert kinds == sorted(kinds, reverse=True), 'the longest come first'
+
+
+def test_the_one_command_compares_all_variants_and_draws_figures_and_tables(run, tmp_path):
+    code, told = run('--jobs', '3', draws=True)
+    assert code == 0
+    for name in ('bare', 'restart', 'ladder', 'always_ask'):
+        assert 'interventions, default against {}: '.format(name) in told
+    names = {path.name for path in (tmp_path / 'figures').iterdir()}
+    assert names == {'tables.md'} | {stem + end for stem in (
+        'main', 'same_seeds', 'persistence', 'memory', 'continuous') for end in ('.svg', '.png')}
+    assert '| default against ladder | 2 |' in (tmp_path / 'figures' / 'tables.md').read_text()
+    assert str(tmp_path / 'figures' / 'tables.md') in told
+
+
+def test_trials_are_kept_where_figures_cannot_be_drawn(run, monkeypatch):
+    def without(stem, output):
+        raise ModuleNotFoundError("No module named 'matplotlib'", name='matplotlib')
+    monkeypatch.setattr(looks, 'save', without)
+    code, told = run('--jobs', '3', draws=True)
+    assert code == 0 and 'Figures were not drawn: ' in told and 'matplotlib' in told
+    assert 'Rows, bags and logs' in told and 'default against bare' in told
+
+
+def test_the_limit_of_a_hung_trial_is_printed_and_kept(run, tmp_path):
+    told = run('--jobs', '3', stop_after=5)[1]
+    assert 'hung after 900 s without an event, or 4500 s in all' in told
+    assert 'hung after 60 s' in run('--jobs', '3', '--hung-after', '60', stop_after=5)[1]
+    run('--jobs', '3', '--hung-after', '60', stop_after=5)
+    for name in ('pick_and_place_compared', 'drink_retrieval_memory'):
+        content = json.loads((tmp_path / name / 'experiment.json').read_text())
+        assert content['hung_after_s'] == [900.0, 60.0]
 
 
 def test_stopped_it_goes_on_where_it_was(run, tmp_path):

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from smach_oracle.analysis.bag_events import RecordedCause
+from smach_oracle.analysis.lasting.tries import StateTry
 from smach_oracle.analysis.trial_rows import LOST, append_rows, read_rows
 from smach_oracle.analysis.trials import summarise
 from smach_oracle.analysis.truth import Truth
@@ -66,6 +67,25 @@ def test_what_the_truth_tells_beyond_the_end_is_in_the_row(results, tmp_path):
     row, = read_rows(tmp_path / RESULTS_FILE)
     assert (row.wrong_object, row.damage, row.expert_s) == ('cup', 1, 20.5)
     assert not row.succeeded
+
+
+def test_a_row_tells_the_worlds_log_and_the_tries_in_the_worlds_time(results, tmp_path):
+    truth = tmp_path / 'truth.jsonl'
+    truth.write_text(json.dumps({
+        'seed': 100, 'causes': [{'kind': 'glare', 'text': 'low sun', 'lasting': True,
+                                 'began_s': 4.25, 'ended_s': None}],
+        'clock_s': 50.0, 'pauses': [[55.0, 2.0]]}) + '\n')
+    told = trial(0)
+    results().add([told._replace(
+        tries=(StateTry('PICK', 54.0, 60.0, 0), StateTry('PICK', 61.0, None, 1)),
+        summary=told.summary._replace(settings=(('memory', 10), ('prior', 0.1))))], {}, truth)
+    row, = read_rows(tmp_path / RESULTS_FILE)
+    assert row.cause_log == '[["glare",true,4.25,null]]'
+    assert row.tries == '[["PICK",4.0,8.0,0],["PICK",9.0,null,1]]'
+    assert (row.memory, row.prior) == (10, 0.1)
+    results('bare').add([trial(0)], {}, tmp_path / 'none')
+    older = read_rows(tmp_path / RESULTS_FILE)[1]
+    assert (older.cause_log, older.tries, older.memory) == ('', '', None), 'not known'
 
 
 @pytest.mark.parametrize('questions, expert_s', [(0, 0.0), (2, None)])
@@ -174,6 +194,23 @@ def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatc
     assert arguments['seed'] == FIRST_SEED + 3
     assert json.loads(Path(arguments['lab']).read_text()) == {
         'seed': FIRST_SEED, 'slot_h': 0.5, 'left': {'ended': 0.6}}, 'a lost trial leaves nothing'
+
+
+def test_a_lost_trial_of_a_world_that_goes_on_has_its_hour(tmp_path):
+    """One begins every half hour. The third took until hour 1.7, so the fourth was late."""
+    truth = tmp_path / 'truth.jsonl'
+    truth.write_text(''.join(json.dumps({
+        'seed': FIRST_SEED + number, 'hour': hour, 'left': {'ended': ended}}) + '\n'
+        for number, hour, ended in ((0, 0.0, 0.1), (2, 1.0, 1.7))))
+    job = JobResults(tmp_path, 'pick_and_place', 'bare', 0, FIRST_SEED, None, 0.5)
+    job.add([trial(0), trial(2)], {}, truth)
+    job.add([], {1: 'hung', 3: 'hung'}, truth)
+    hours = {row.seed - FIRST_SEED: row.hour for row in read_rows(tmp_path / RESULTS_FILE)}
+    assert hours == {0: 0.0, 1: 0.5, 2: 1.0, 3: 1.7}
+    given = plan('--variants', 'bare', '--hours', '3')
+    whole = ExperimentJob(given, given.variants[0], 0, tmp_path / 'other', 300.0)
+    whole._results.add([], {2: 'hung'}, truth)
+    assert read_rows(tmp_path / 'other' / RESULTS_FILE)[0].hour == 1.0
 
 
 def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path):

@@ -1,8 +1,8 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
 FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
-needed. OUT gets main.svg, persistence.svg, memory.svg, continuous.svg, each with a PNG, and
-tables.md, as far as there are rows of them.
+needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, each with a
+PNG, and tables.md, as far as there are rows of them.
 """
 import argparse
 import sys
@@ -15,6 +15,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from ..bag_events import BagError
 from ..reading import report_error
 from ..trial_rows import TrialRow, read_rows
+from .sweep_tables import format_sweeps
 from .tables import format_tables
 
 ROWS = 'results.csv'
@@ -44,16 +45,23 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
     """
     from .hours_figure import draw_hours  # matplotlib takes a second: only where it is wanted
     from .looks import save
-    from .main_figure import draw_main
+    from .main_figure import draw_main, draw_same_seeds, same_seeds
     from .sweep_figures import draw_memory, draw_persistence
     draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(zip(KINDS, (
         draw_main, draw_persistence, draw_memory, draw_hours)))
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']
-    paths[0].write_text('\n'.join('## {}\n\n{}'.format(kind.capitalize(), format_tables(rows))
-                                  for kind, rows in found.items()), encoding='utf-8')
+    texts = [[format_sweeps(kind, rows), format_tables(rows, kind)] for kind, rows in found.items()]
+    paths[0].write_text('\n'.join(
+        '## {}\n\n{}'.format(kind.capitalize(), '\n'.join(filter(None, each)))
+        for kind, each in zip(found, texts)), encoding='utf-8')
     for kind, rows in found.items():
+        if kind == 'continuous' and all(row.hour is None for row in rows):
+            continue
         paths += save(partial(draws[kind], rows), output / kind)
+    compared = found.get('main', ())
+    if same_seeds(compared):
+        paths += save(partial(draw_same_seeds, compared), output / 'same_seeds')
     return paths
 
 

@@ -39,6 +39,13 @@ class Percent:
         self.share = 100.0 * number / len(rows)
         low, high = wilson_interval(number, len(rows))
         self.interval: Interval = (100 * low, 100 * high)
+        parts: Dict[int, List[bool]] = {}
+        for row in rows:
+            parts.setdefault(row.replicate, []).append(happened(row))
+        shares = [100.0 * sum(part) / len(part) for part in parts.values()]
+        # the smallest and the largest of a replicate. None means there are no two
+        self.replicates: Optional[Interval] = (
+            (min(shares), max(shares)) if len(shares) > 1 else None)
 
     @property
     def reach(self) -> Tuple[float, float]:
@@ -64,10 +71,17 @@ def panels(titles: Sequence[str], height_in: float, rows: int = 1,
     return figure, made
 
 
-def legend_above(figure: Figure, axes: Any) -> None:
-    """Put the legend of some axes above all, where it covers no data."""
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc='upper center', ncol=6, frameon=False, borderpad=0.2)
+def legend_above(figure: Figure, axes: Any, shown: Sequence[str] = (),
+                 more: Sequence[Tuple[Any, str]] = ()) -> None:
+    """Put the legend of some axes above all, where it covers no data.
+
+    :param shown: its labels. None are all.
+    :param more: further entries: what is drawn, and its label.
+    """
+    found = [(handle, label) for handle, label in zip(*axes.get_legend_handles_labels())
+             if label in (shown or (label,))] + list(more)
+    figure.legend([handle for handle, _ in found], [label for _, label in found],
+                  loc='upper center', ncol=6, frameon=False, borderpad=0.2, columnspacing=1.4)
 
 
 def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:

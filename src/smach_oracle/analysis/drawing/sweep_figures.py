@@ -1,5 +1,5 @@
 """Figures of the sweeps: over the share of lasting causes, and over the memory."""
-import re
+import math
 from typing import Callable, Dict, List, Optional, Sequence, Tuple
 
 from matplotlib.figure import Figure
@@ -7,12 +7,12 @@ from matplotlib.ticker import FixedLocator, NullLocator
 
 from ..trial_rows import TrialRow
 from .looks import Happened, Percent, legend_above, look_of, panels, tasks_of, title_of, variants_of
+from .policies import memory_of, policy_of
 
 Shown = Tuple[str, Happened]
 INTERVENTIONS: Shown = ('Interventions (% of trials)', lambda row: row.intervened)
 QUESTIONS: Shown = ('With a question (% of trials)', lambda row: row.questions > 0)
 SUCCESS: Shown = ('True success (% of trials)', lambda row: row.succeeded)
-MEMORY = re.compile(r'(.+)_memory_(\d+)')
 HEIGHT_IN = 4.0
 ASIDE = 2.5  # percent of causes, from one variant's marker to the next
 ASIDE_FACTOR = 1.04  # of a memory, likewise
@@ -31,18 +31,6 @@ def draw_memory(rows: Sequence[TrialRow]) -> Figure:
                  lambda x, place: x * ASIDE_FACTOR ** place, True)
 
 
-def memory_of(row: TrialRow) -> Optional[float]:
-    """Return the memory that a variant is named by. None means by none."""
-    named = MEMORY.fullmatch(row.variant)
-    return float(named.group(2)) if named else None
-
-
-def policy_of(row: TrialRow) -> str:
-    """Return the name of a variant without its memory."""
-    named = MEMORY.fullmatch(row.variant)
-    return named.group(1) if named else row.variant
-
-
 def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],
           series_of: Callable[[TrialRow], str], x_of: Callable[[TrialRow], Optional[float]],
           label: str, aside: Callable[[float, float], float], logarithmic: bool) -> Figure:
@@ -51,6 +39,7 @@ def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],
     figure, made = panels([title_of(task) for task in tasks], HEIGHT_IN, rows=2, margins=dict(
         bottom=0.10, top=0.89, hspace=0.12))
     series = variants_of([row._replace(variant=series_of(row)) for row in rows])
+    highest = [_highest(rows, happened, series_of, x_of) for _, happened in shown]
     for column, task in enumerate(tasks):
         points = _points([row for row in rows if row.task == task], series_of, x_of)
         for line, (name, happened) in enumerate(shown):
@@ -70,12 +59,20 @@ def _draw(rows: Sequence[TrialRow], shown: Sequence[Shown],
             axes.xaxis.set_major_locator(FixedLocator(ticks))
             axes.xaxis.set_minor_locator(NullLocator())
             axes.set_xticklabels(['{:g}'.format(x) for x in ticks] if line else [])
-            axes.set_ylim(0, 100)
+            axes.set_ylim(0, highest[line])
             if column == 0:
                 axes.set_ylabel(name)
         made[-1][column].set_xlabel(label)
     legend_above(figure, made[0][0])
     return figure
+
+
+def _highest(rows: Sequence[TrialRow], happened: Happened, series_of: Callable[[TrialRow], str],
+             x_of: Callable[[TrialRow], Optional[float]]) -> float:
+    """Return the end of an axis (%): the tens above all intervals, alike for all tasks."""
+    ends = [Percent(chosen, happened).interval[1] for task in tasks_of(rows) for chosen in _points(
+        [row for row in rows if row.task == task], series_of, x_of).values()]
+    return min(100.0, 10.0 * math.ceil(max(ends, default=100.0) / 10.0))
 
 
 def _points(rows: Sequence[TrialRow], series_of: Callable[[TrialRow], str],

@@ -1,55 +1,138 @@
-"""The figures of an experiment as a Markdown table: a line for each variant."""
-from typing import List, Optional, Sequence
+"""The figures of an experiment as Markdown tables: a line for each figure, a column a variant."""
+from typing import Dict, List, Optional, Sequence, Tuple
 
-from ..comparison import Costs, Group, Share, costs_of, groups_of, shares_of
-from ..pairing import HINDSIGHT, hindsight
+from ..comparison import (
+    Costs,
+    Group,
+    Share,
+    by_variant,
+    common_completion,
+    costs_of,
+    groups_of,
+    shares_of,
+    with_hindsight,
+)
+from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
-from .looks import title_of, variants_of
+from .cause_tables import by_cause, by_log
+from .looks import tasks_of, title_of
+from .markdown import titled
 
-SHARES = ('true success', 'interventions', 'recovered', 'with attempts', 'lost or hung')
-COSTS = ('attempts', 'questions', 'questions_per_hour', 'expert_s', 'expert_s_per_hour',
-         'wrong_objects', 'damage', 'completion_s', 'trials_between', 'hours_between')
-HEADS = ('attempts a trial', 'questions a trial', 'questions an hour', 'expert s a trial',
-         'expert s an hour', 'wrong object', 'damage a completed task', 'completion, s',
-         'trials between interventions', 'hours between interventions')
+SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
+          'false success', 'lost or hung')
+OVER_REPLICATES = ('true success', 'interventions', 'a question asked', 'recovered')
+# of Costs, and what it is called
+COSTS: Tuple[Tuple[str, str], ...] = (
+    ('wrong_objects', 'trials with a wrong object'),
+    ('damage', 'damage for each completed task'),
+    ('damage_done', 'damage in a completed task'),
+    ('attempts', 'attempts a trial'),
+    ('questions', 'questions a trial'),
+    ('questions_per_hour', 'questions a robot hour'),
+    ('expert_s', 'expert s a trial'),
+    ('expert_s_per_hour', 'expert s a robot hour'),
+    ('completion_s', 's to completion, median'),
+    ('trials_between', 'trials between interventions'),
+    ('hours_between', 'robot hours between interventions'))
+COMPARING = ('main', 'persistence')
+SAME_SEEDS = ('true success', 'interventions', 'a question asked')
 
 
-def format_tables(rows: Sequence[TrialRow]) -> str:
-    """Return a table for each task and share of lasting causes."""
-    texts = []
-    for group, mine in groups_of(rows).items():
-        heads = ['variant', 'trials', *SHARES, *HEADS]
-        lines = ['**{}**'.format(_titled(group)), '', _line(heads), _line(['---'] * len(heads))]
-        names = variants_of(mine)
-        for name in names:
-            lines.append(_variant(name, [row for row in mine if row.variant == name]))
-        best = hindsight(mine) if len(names) > 1 else []
-        if best:
-            lines.append(_variant(HINDSIGHT, best))
-        texts.append('\n'.join(lines) + '\n')
+def format_tables(rows: Sequence[TrialRow], kind: str = 'main') -> str:
+    """Return the tables of each task and share of lasting causes.
+
+    :param kind: of the figure. Variants are compared in those of COMPARING.
+    """
+    texts: List[str] = []
+    groups = groups_of(rows)
+    for task in tasks_of(rows):
+        for group in (each for each in groups if each[0] == task):
+            title, variants = named(group), by_variant(groups[group])
+            texts.append(_main(title, variants))
+            if kind in COMPARING:
+                texts += _tests(title, variants) + _same_seeds(title, groups[group])
+                texts += by_cause(title, variants) if kind == 'main' else []
+                texts += by_log(title, variants)
     return '\n'.join(texts)
 
 
-def _titled(group: Group) -> str:
+def named(group: Group) -> str:
+    """Return what a task and a share of lasting causes are called in a title."""
     task, share = group
     return title_of(task) + ('' if share is None else ', {:.0%} of the causes last'.format(share))
 
 
-def _variant(name: str, rows: Sequence[TrialRow]) -> str:
-    shares = {share.name: share for share in shares_of(rows)}
-    costs: Costs = costs_of(rows)
-    return _line([name.replace('_', ' '), str(len(rows)),
-                  *(_percent(shares[each]) for each in SHARES),
-                  *(_number(getattr(costs, each)) for each in COSTS)])
+def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
+    shares = [{share.name: share for share in shares_of(rows)} for rows in variants.values()]
+    costs: List[Costs] = [costs_of(rows) for rows in variants.values()]
+    lines = [['trials', *(str(len(rows)) for rows in variants.values())]]
+    for name in SHARES:
+        lines.append([name, *(percent(each[name]) for each in shares)])
+        if name in OVER_REPLICATES and any(each[name].over_replicates for each in shares):
+            lines.append([name + ', replicates', *(over_replicates(each[name]) for each in shares)])
+    for name, head in COSTS:
+        lines.append([head, *(number(getattr(each, name)) for each in costs)])
+        if name == 'completion_s':
+            lines += _completion(variants)
+    return titled(title, _heads(variants), lines, [
+        'In parentheses: 95% Wilson intervals over trials.', *(
+            ['Replicates: the smallest and the largest share of a replicate.']
+            if any(line[0].endswith('replicates') for line in lines) else []),
+        'A robot hour is one of world time in which a trial runs. ' + (
+            'The time between trials counts, too: the world goes on.'
+            if any(row.hour is not None for rows in variants.values() for row in rows)
+            else 'The time between trials does not count.')])
 
 
-def _percent(share: Share) -> str:
+def _completion(variants: Dict[str, List[TrialRow]]) -> List[List[str]]:
+    seeds, medians = common_completion(variants)
+    head = 's to completion, median, on the {} seeds that bare, default and restart completed'
+    return [[head.format(seeds), *(number(medians.get(name)) for name in variants)]
+            ] if seeds else []
+
+
+def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
+    """Tell McNemar's exact test of the interventions."""
+    lines = []
+    for first, second in pairs_to_test(list(variants)):
+        counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
+        if sum(counts):
+            lines.append(['{} against {}'.format(first, second).replace('_', ' '),
+                          *map(str, (sum(counts), *counts)), '{:.2g}'.format(counts.p_value)])
+    heads = ['', 'pairs', 'both', 'the first alone', 'the second alone', 'neither', 'p']
+    return [titled(title + ': interventions, paired by seed', heads, lines, [
+        "p: McNemar's exact test, two-sided, on the pairs that differ, without a correction for "
+        'their number.'])] if lines else []
+
+
+def _same_seeds(title: str, rows: Sequence[TrialRow]) -> List[str]:
+    """Tell the bound beside each variant on the same seeds."""
+    found = with_hindsight(rows)
+    if not found:
+        return []
+    shares = [{share.name: share for share in shares_of(mine)} for mine in found.values()]
+    return [titled('{}: the {} seeds that all variants ran'.format(title, len(found[HINDSIGHT])),
+                   _heads(found), [[name, *(percent(each[name]) for each in shares)]
+                                   for name in SAME_SEEDS],
+                   ['Hindsight is the best that any variant did on each of these seeds: a bound, '
+                    'and no variant.'])]
+
+
+def _heads(variants: Dict[str, List[TrialRow]]) -> List[str]:
+    return ['', *(name.replace('_', ' ') for name in variants)]
+
+
+def percent(share: Share) -> str:
+    """Return a share with its interval, in percent."""
     return '{:.1%} ({:.0%} to {:.0%})'.format(share.share, *share.interval)
 
 
-def _number(value: Optional[float]) -> str:
+def over_replicates(share: Share) -> str:
+    """Return the smallest and the largest share of a replicate, in percent."""
+    over = share.over_replicates
+    return '-' if over is None else '{:.1%} to {:.1%}'.format(*over)
+
+
+def number(value: Optional[float]) -> str:
+    """Return a figure. '-' means there is none."""
     return '-' if value is None else '{:.3g}'.format(value)
-
-
-def _line(cells: List[str]) -> str:
-    return '| {} |'.format(' | '.join(cells))

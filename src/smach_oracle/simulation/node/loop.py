@@ -81,8 +81,7 @@ class WorldLoop:
     def pass_time(self, seconds: float) -> None:
         """Let motions and physics go on for so long at once, for the world's own thread."""
         for _ in range(round(seconds / PERIOD_S)):
-            self._motions.tick()
-            self._clock.advance(PERIOD_S)
+            self._clock.advance(PERIOD_S, self._motions.tick())
 
     def pass_by(self, world: World, seconds: float) -> None:
         """Let time pass in the world that the motions move, for the world's own thread.
@@ -127,7 +126,7 @@ class WorldLoop:
                 self._busy_until = time.monotonic()
             elif time.monotonic() - self._busy_until > self._settings.idle_grace:
                 # nothing moves, and those who sleep in simulated time wake up
-                self._clock.skip(IDLE_TICK_S * self._settings.idle_speed)
+                self._clock.pause(IDLE_TICK_S * self._settings.idle_speed)
             self.watch.add_time('idle')
 
     def _run_paced(self) -> None:
@@ -142,8 +141,8 @@ class WorldLoop:
 
     def _tick(self) -> None:
         self.watch.add_time('idle')
-        self._motions.tick()
-        self._clock.advance(PERIOD_S)
+        moved = self._motions.tick()
+        self._clock.advance(PERIOD_S, moved)
         self.watch.add_time('physics')
         self._after_tick()
         self.watch.add_time('publish')

@@ -181,6 +181,7 @@ class WorldNode:
             self._film.begin(seed)
         self._loop.watch.add_time('reset')
         self._truth = TrialTruth(self._world.scene, self._world.time, began_s)
+        self._clock.begin_trial()
         causes = self._world.scene.causes
         self._cause.publish(
             TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
@@ -203,6 +204,7 @@ class WorldNode:
         verdict = self._judge()
         record = truth.record(verdict, self._world.harm.found(self._world), sim_s,
                               self._loop.watch.spent, self._loop.watch.used)
+        record.update(self._clock.trial_record())
         if self._lab:
             record.update(self._lab.leave(self._world, verdict, record['sim_s']))
         if self._settings.truth_file == NONE:

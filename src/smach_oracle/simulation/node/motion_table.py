@@ -62,8 +62,11 @@ class MotionTable:
         for part in sorted(self._running):
             self.stop(part, text, aborted=True)
 
-    def tick(self) -> None:
-        """Advance or end every motion. Then let a control period pass, unless all have ended."""
+    def tick(self) -> bool:
+        """Advance or end every motion. Then let a control period pass, unless all have ended.
+
+        :returns: whether it passed.
+        """
         for part in sorted(self._running):
             running = self._running[part]
             if running.result is None:
@@ -78,7 +81,9 @@ class MotionTable:
                 if running.result is not None
             ]
         ended = [self._running.pop(part) for part in over]
-        if self._running or not over:
+        passes = bool(self._running) or not over
+        if passes:
             self._world.step()
         for running in ended:
             running.ended(MotionEnd(running.result, running.result.text if running.result else ''))
+        return passes

@@ -1,7 +1,8 @@
 """Simulated time, which only goes forward."""
-from typing import Callable
+from typing import Any, Callable, Dict, List, Tuple
 
 MIN_STEP_NS = 1_000_000  # between two stamps that were asked for
+TOUCHING_NS = 10_000_000  # two pauses that are nearer have no step of the world between them
 
 
 class SimClock:
@@ -21,9 +22,16 @@ class SimClock:
         self._stamped_ns = 0
         # ROS takes a time of 0 for none
         self.now_ns = int(1e9)
+        self._trial_ns = self.now_ns  # at which the trial began
+        self._pauses: List[Tuple[int, int]] = []  # of the trial: begin, length
 
-    def advance(self, seconds: float) -> None:
-        """Go on, and publish the time where that is due."""
+    def advance(self, seconds: float, moved: bool = True) -> None:
+        """Go on, and publish the time where that is due.
+
+        :param moved: whether the world went on, too.
+        """
+        if not moved:
+            self._note_pause(seconds)
         self.now_ns += int(round(seconds * 1e9))
         if self.now_ns - self._published_ns >= self._period_ns:
             self.publish()
@@ -35,6 +43,32 @@ class SimClock:
         """
         self.now_ns += int(round(seconds * 1e9))
         self.publish()
+
+    def pause(self, seconds: float) -> None:
+        """Go on at once while the world stands still, and publish the time."""
+        self._note_pause(seconds)
+        self.skip(seconds)
+
+    def _note_pause(self, seconds: float) -> None:
+        begin, length = self.now_ns, int(round(seconds * 1e9))
+        if self._pauses and begin - sum(self._pauses[-1]) <= TOUCHING_NS:
+            first = self._pauses.pop()[0]
+            begin, length = first, begin + length - first
+        if length:
+            self._pauses.append((begin, length))
+
+    def begin_trial(self) -> None:
+        """Take the time now for that at which a trial begins."""
+        self._trial_ns, self._pauses = self.now_ns, []
+
+    def trial_record(self) -> Dict[str, Any]:
+        """Return the time (s) at which the trial began, and its pauses, as plain data.
+
+        A pause is a time in which the world stood still, as [begin, length], s. So a time of this
+        clock can be told in the world's time.
+        """
+        return {'clock_s': round(self._trial_ns / 1e9, 3), 'pauses': [
+            [round(begin / 1e9, 3), round(length / 1e9, 3)] for begin, length in self._pauses]}
 
     def publish(self) -> None:
         """Publish the time now."""

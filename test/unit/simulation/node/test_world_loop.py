@@ -110,8 +110,8 @@ class Running:
 
     def __init__(self, world, **settings):
         self.times, self.world, self.table = [], world, MotionTable(world)
-        self.loop = WorldLoop(self.table, SimClock(self.times.append), WorldSettings(**settings),
-                              lambda: None)
+        self.clock = SimClock(self.times.append)
+        self.loop = WorldLoop(self.table, self.clock, WorldSettings(**settings), lambda: None)
         self.closed = threading.Event()
         self.thread = threading.Thread(target=self.loop.run, args=(self.closed.set,), daemon=True)
         self.thread.start()
@@ -190,6 +190,34 @@ def test_a_clock_never_gives_a_stamp_twice():
     clock.advance(1 / 60)
     stamps.append(clock.stamp())
     assert stamps == sorted(set(stamps)) and told == stamps
+
+
+def test_the_clock_tells_in_which_times_of_a_trial_the_world_stood_still():
+    clock = SimClock(lambda now: None)
+    clock.pause(3.0)
+    clock.begin_trial()
+    clock.advance(1.0)
+    clock.pause(0.5)
+    clock.stamp()
+    clock.pause(0.5)  # a stamp between two makes one pause of them
+    clock.skip(2.0)  # a leap is the world's time
+    clock.pause(0.25)
+    record = clock.trial_record()
+    assert record['clock_s'] == 4.0
+    assert record['pauses'] == [[5.0, 1.0], [8.0, 0.25]]
+
+
+@pytest.mark.parametrize('running', [LOCK_STEP], indirect=True)
+def test_an_idle_world_pauses_and_the_clock_without_pauses_is_its_time(running):
+    running.wait(lambda: len(running.times) > 3)
+    running.move(30)
+    at_rest = len(running.times)
+    running.wait(lambda: len(running.times) > at_rest + 3)
+    record, now = running.loop.call(
+        lambda: (running.clock.trial_record(), running.clock.now_ns / 1e9))
+    assert len(record['pauses']) == 2, 'the second begins with the tick in which the motion ends'
+    passed = now - record['clock_s'] - sum(length for _, length in record['pauses'])
+    assert passed == pytest.approx(30 / 60, abs=0.01)
 
 
 def test_the_settings_of_a_world_without_limit_differ_from_those_of_a_paced_one():

@@ -1,0 +1,1 @@
+"""Which causes of a trial were still there when its failed state was tried again."""
