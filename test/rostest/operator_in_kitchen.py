@@ -75,7 +75,7 @@ class InKitchen(unittest.TestCase):
     def test_where_nothing_can_be_driven_it_sends_the_machine_to_a_state(self):
         answers = [self.ask('CLOSE_FRIDGE')[1] for _ in range(2)]
         self.assertEqual([(answer.kind, answer.state) for answer in answers],
-                         [(AnswerKind.GOTO, 'CLOSE_FRIDGE'), (AnswerKind.GOTO, 'MOVE_OUT')])
+                         [(AnswerKind.GOTO, 'MOVE_OUT'), (AnswerKind.GOTO, 'CLOSE_FRIDGE')])
 
 
 if __name__ == '__main__':

@@ -29,7 +29,6 @@ OUT = 0.28  # m straight back out of a shelf
 HELD = (0.006, 0.079)  # m between the tips, where there is something between them
 HALF_TALL = 0.06  # m, of a thing of which nothing is seen in the hand
 UNTIL_IT_TOUCHES = 0.06  # m that a hand is lowered at most until what it holds touches
-LIES = 0.75  # of its height: what is seen lower has fallen over
 IN_HAND = 0.13  # m from the tool to the middle of what is in the hand
 FAR = 0.95  # m from the shoulder, which no hand reaches
 
@@ -105,21 +104,41 @@ def pick(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     :raises StuckError: where the hand does not get there.
     """
     if not attempt.feels(_GRIP):
-        _fetch(attempt, *found(attempt, target, about))
+        scene, thing = found(attempt, target, about)
+        fetch(attempt, thing.bottom + float(_box(thing).size[2]),
+              _grasps_to_try(attempt, scene, thing))
+    lift(attempt)
+
+
+def lift(attempt: Attempt) -> None:
+    """Lift what the hand has closed on.
+
+    :raises ManoeuvreError: where it is not in the hand in the end.
+    :raises StuckError: where the hand does not get there.
+    """
     attempt.driver.shift(z=LIFT, share=0.5)
     attempt.driver.rest(10)
     if not attempt.holds:
         raise ManoeuvreError('it slipped out of the hand')
 
 
-def _fetch(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
+def fetch(attempt: Attempt, top: float, ways: Sequence[np.ndarray],
+          until_it_touches: bool = False) -> None:
+    """Close the hand on a thing.
+
+    :param top: m, how high it is.
+    :param ways: poses of the hand (4x4, base_footprint from tool), tried one after the other where
+        the arm gets stuck.
+    :param until_it_touches: the last bit goes as far as it goes: the hand comes from above.
+    :raises ManoeuvreError: where nothing is between the fingers then.
+    :raises StuckError: where the hand does not get there.
+    """
     driver = attempt.driver
-    top = thing.bottom + float(_box(thing).size[2])
     driver.open()
-    for last, grasp in enumerate(_grasps_to_try(attempt, scene, thing), 1 - _WAYS):
+    for last, grasp in enumerate(ways, 1 - len(ways)):
         come_out(driver, top)
         try:
-            _approach(driver, grasp, top)
+            _approach(driver, grasp, top, until_it_touches)
             break
         except StuckError:
             if last == 0:
@@ -131,14 +150,18 @@ def _fetch(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
         raise ManoeuvreError('the hand closed on nothing')
 
 
-def _approach(driver: HandDriver, grasp: np.ndarray, top: float) -> None:
+def _approach(driver: HandDriver, grasp: np.ndarray, top: float, until_it_touches: bool) -> None:
     """Bring the open hand around a thing: above the place before it, down, and straight in."""
     before = transform(grasp[:3, 3] - BEFORE * grasp[:3, 0], grasp[:3, :3])
     above = before.copy()
     above[2, 3] = max(above[2, 3], top + 0.10)
     driver.go(above, near=(0.04, 0.2))
     driver.go(before)
-    driver.go(grasp, share=0.4, near=(0.006, 0.05))
+    try:
+        driver.go(grasp, share=0.4, near=(0.006, 0.05))
+    except StuckError:
+        if not until_it_touches:
+            raise
 
 
 def _grasps_to_try(attempt: Attempt, scene: SeenScene, thing: SeenThing,
@@ -329,7 +352,7 @@ def _check_stands(attempt: Attempt, name: str, place: np.ndarray) -> None:
     beside = float(np.hypot(*(thing.box.centre - place)[:2]))
     if beside > 0.05:
         raise ManoeuvreError('{} is {:.0f} cm beside its place'.format(name, 100 * beside))
-    if float(thing.box.size[2]) < LIES * (attempt.watcher.tall(name) or 0.0):
+    if thing.lies(attempt.watcher.tall(name)):
         raise ManoeuvreError('{} lies at its place'.format(name))
 
 

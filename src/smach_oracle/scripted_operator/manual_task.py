@@ -11,7 +11,7 @@ from .clearing import arm_for, free_spot, in_the_way, move_aside, move_to, on_pl
 from .hand_driver import HandDriver, StuckError
 from .image_viewer import ImageViewer, ViewError
 from .interface_clients import FinishClient, PerceptionClient
-from .ladder import BY_HAND, CLEAR, CLOSER, MARK, NextAct
+from .ladder import BY_HAND, CLEAR, CLOSER, MARK, PREPARING, UPRIGHT, NextAct
 from .manoeuvres import (
     Attempt,
     ManoeuvreError,
@@ -26,6 +26,7 @@ from .seen_scene import SeenScene, SeenThing
 from .showing import show
 from .state_plans import PUT_DOWN, StatePlan
 from .topic_hand import GoalEndedError, TeleoperationClient, TopicHand
+from .uprighting import set_upright, take_upright
 
 SUCCESS = 'succeeded'
 BASE = 'base_footprint'
@@ -34,6 +35,7 @@ BASE_LINK_HEIGHT = 0.051  # m of base_link above base_footprint
 AHEAD = np.array([0.65, 0.0, 0.75])  # m, where a person looks who knows nothing better
 _BEGIN_S = 30.0  # wall time in which an interface must begin
 _MISJUDGED = np.array([0.007, 0.007, 0.010])  # m, sigma of the places to which a person drives
+_DONE = 0.04  # m from its place: a thing that stands there is left as it is
 _DRAW_S = 5.0  # of the world's time, that a drawing takes
 _TAKE_HOLD_S = 5.0  # likewise, to take the wheel of a hand
 
@@ -78,13 +80,15 @@ def carry_out(task: ManualTask, interfaces: OperatorInterfaces) -> Result:
     done = ''
     try:
         wrong = _shown(task, interfaces) if shows else _driven(task, interfaces)
-        if not wrong and task.choice.act in (CLEAR, CLOSER):
-            done = 'there is room now: the state itself was not done'
+        interfaces.means.end_work()  # before the machine can go on
+        if not wrong and task.choice.act in PREPARING:
+            done = 'it is prepared: the state itself was not done'
         elif not wrong:
             wrong = client.finish(SUCCESS, 'by the scripted operator')
     except (GoalEndedError, ViewError, rospy.ServiceException) as err:
         wrong = str(err)
     if wrong or done:
+        interfaces.means.end_work()
         client.give_up(wrong or done)
     return Result(not wrong and not done, not wrong, wrong or done)
 
@@ -129,16 +133,33 @@ TakeWheel = Callable[[str], Attempt]  # of an arm
 def _state_by_hand(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     attempt = take_wheel(task.plan.arm)
     if task.plan.means == PUT_DOWN:
-        place, surface = place_of(task.plan, task.userdata, means)
-        other = wrong_thing(attempt)
-        if other:
-            _put_away(attempt, task, place)
-            raise ManoeuvreError('{} was in the hand: it is the wrong thing'.format(other))
-        put_down(attempt, place, surface)
+        _put_by_hand(task, means, attempt)
     elif task.plan.inside:
         pull_out(attempt, SeenScene.wanted, task.about)
     else:
         pick(attempt, SeenScene.wanted, task.about)
+
+
+def _put_by_hand(task: ManualTask, means: RobotMeans, attempt: Attempt) -> None:
+    """Put the thing where it should be, also where it lies and the hand is empty."""
+    place, surface = place_of(task.plan, task.userdata, means)
+    if attempt.holds:
+        other = wrong_thing(attempt)
+        if other:
+            _put_away(attempt, task, place)
+            raise ManoeuvreError('{} was in the hand: it is the wrong thing'.format(other))
+    else:
+        _, thing = found(attempt, SeenScene.wanted, task.about)
+        lies = thing.lies(means.tall(thing.name))
+        if thing.box is not None and not lies and _stands_at(thing.box.centre, place):
+            return
+        (take_upright if lies else pick)(attempt, SeenScene.wanted, task.about)
+        place, surface = place_of(task.plan, task.userdata, means)  # nothing lies there any more
+    put_down(attempt, place, surface)
+
+
+def _stands_at(centre: np.ndarray, place: np.ndarray) -> bool:
+    return bool(np.hypot(*(centre - place)[:2]) < _DONE)
 
 
 def _put_away(attempt: Attempt, task: ManualTask, place: np.ndarray) -> None:
@@ -191,8 +212,13 @@ def _closer(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     move_to(attempt, SeenScene.wanted, thing.box.centre, spot)
 
 
+def _upright(task: ManualTask, _means: RobotMeans, take_wheel: TakeWheel) -> None:
+    """Set the thing upright where it lies."""
+    set_upright(take_wheel(arm_for(task.about)), SeenScene.wanted, task.about)
+
+
 _WORK: Dict[str, Callable[[ManualTask, RobotMeans, TakeWheel], None]] = {
-    BY_HAND: _state_by_hand, CLEAR: _clear, CLOSER: _closer}
+    BY_HAND: _state_by_hand, CLEAR: _clear, CLOSER: _closer, UPRIGHT: _upright}
 
 
 def place_of(plan: StatePlan, userdata: Mapping[str, Any],

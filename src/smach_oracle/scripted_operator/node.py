@@ -48,7 +48,7 @@ class OperatorSettings:
         self.seed = int(number_of('~seed', 0, 0, 2 ** 31))
         self.median_s = number_of('~delay_median_s', 15.0, 0.0, 3600.0)
         self.sigma = number_of('~delay_sigma', 0.5, 0.0, 3.0)
-        self.most_questions = int(number_of('~most_questions', 12, 1, 1000))
+        self.most_questions = int(number_of('~most_questions', 6, 1, 1000))
         self.rate_hz = number_of('~rate_hz', 30.0, 10.0, 500.0)
         self.perception = name_of('~perception', 'perception_interface')
         self.manipulation = name_of('~manipulation', 'manipulation_interface')
@@ -104,7 +104,11 @@ class ScriptedOperator:
 
     def _attend_to(self, listed: ListedQuestion) -> None:
         try:
-            self._answer(listed)
+            try:
+                self._interfaces.means.begin_work()
+                self._answer(listed)
+            finally:
+                self._interfaces.means.end_work()
         except (ServerGoneError, ViewError, GoalEndedError, rospy.ServiceException) as err:
             rospy.logwarn('%s of %s: %s', listed.goal.failed_state, listed.goal.container_path, err)
             self._front_end.release(listed)
@@ -134,14 +138,14 @@ class ScriptedOperator:
             return
         number = self._memory.times(goal.failed_state, choice.act)
         if not choice.interface:
-            self._memory.note(goal.failed_state, choice.act)
+            self._memory.note(goal.failed_state, choice, impression.sight)
             return
         plan = self._settings.plans.of(goal.failed_state)
         task = ManualTask(goal.query_id, choice, plan, userdata, number, generator,
                           impression.about)
         begun_s = time.monotonic()
         result = carry_out(task, self._interfaces)
-        self._memory.note(goal.failed_state, choice.act, result.worked)
+        self._memory.note(goal.failed_state, choice, impression.sight, result.worked)
         rospy.loginfo('%s, %s: %s (%.1f s)', goal.failed_state, choice.act, result.text or 'done',
                       time.monotonic() - begun_s)
 
@@ -165,6 +169,8 @@ class ScriptedOperator:
             return NextAct('give up', why='{} questions in one trial are enough'.format(
                 self._settings.most_questions)), Impression(Sight(), np.zeros(3))
         impression = look_about(plan, userdata, scene, self._interfaces.means)
+        impression = impression._replace(
+            sight=impression.sight._replace(repeated=goal.recoveries > 0))
         asked = Asked(goal.failed_state, [
             choice.state for choice in goal.choices if not (choice.blocked or choice.container)
         ], offered)
@@ -193,6 +199,8 @@ class ScriptedOperator:
                 else ExpertDecision.GOTO if planned.goto else ExpertDecision.GIVE_UP)
         rospy.loginfo('%s failed (%s): %s %s', listed.goal.failed_state, listed.goal.text
                       or listed.goal.outcome, planned.act, planned.interface or planned.goto)
+        if not planned.interface:
+            self._interfaces.means.end_work()
         answer = self._front_end.answer(listed, ExpertDecision(
             kind=kind, state=planned.goto, interface=planned.interface, why=planned.why))
         if not answer.ok:

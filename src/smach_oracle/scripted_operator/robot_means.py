@@ -3,7 +3,7 @@ import math
 import threading
 import time
 from collections import OrderedDict
-from typing import Callable, Dict, List, Mapping, NamedTuple, Optional
+from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import genpy
 import numpy as np
@@ -16,10 +16,17 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
 from control_msgs.msg import PointHeadAction, PointHeadGoal
-from smach_oracle.geometry.transforms import from_quaternion
+from smach_oracle.geometry.transforms import from_quaternion, yaw_of
 from smach_oracle.ros.goal_link import GoalLink
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
-from smach_oracle.srv import PassTime, PassTimeRequest, Snapshot, SnapshotRequest
+from smach_oracle.srv import (
+    ChargeTime,
+    ChargeTimeRequest,
+    PassTime,
+    PassTimeRequest,
+    Snapshot,
+    SnapshotRequest,
+)
 
 from .image_viewer import ImageViewer, ViewError
 from .seen_scene import SeenScene
@@ -41,6 +48,8 @@ class MeansNames(NamedTuple):
     odometry: str = 'base_odometry/odom'
     snapshot: str = 'world/snapshot'  # or NONE
     pass_time: str = 'world/pass_time'  # or NONE: ROS time passes by itself
+    # or NONE, and where pass_time is NONE: nobody counts a person's time
+    charge_time: str = 'world/charge_time'
     camera_frame: str = 'wide_stereo_optical_frame'
     base_frame: str = 'base_footprint'
 
@@ -58,6 +67,7 @@ class RobotMeans:
         self._eye = eye
         self._head = GoalLink(rospy.resolve_name(names.head), PointHeadAction)
         self._base = GoalLink(rospy.resolve_name(names.base), MoveBaseAction)
+        self._at_work = False
         self._tall: Dict[str, float] = {}  # m, of things that were seen standing
         self._heard = threading.Condition()
         self._states: 'OrderedDict[rospy.Time, Dict[str, float]]' = OrderedDict()
@@ -118,6 +128,14 @@ class RobotMeans:
         place, turn = stands.pose.pose.position, stands.pose.pose.orientation
         return from_quaternion((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))
 
+    def stands(self) -> Tuple[float, ...]:
+        """Return where the robot stands by its odometry: x and y in m, and its yaw in rad.
+
+        :raises ViewError: where that does not come.
+        """
+        base = self.odom_from_base()
+        return float(base[0, 3]), float(base[1, 3]), yaw_of(base)
+
     def gap(self, arm: str) -> float:
         """See Watcher.
 
@@ -143,6 +161,33 @@ class RobotMeans:
                          PassTimeRequest(seconds, WHAT), _MOTION_S)
         except (ServerGoneError, rospy.ServiceException) as err:
             raise ViewError('time does not pass: {}'.format(err)) from err
+
+    def begin_work(self) -> None:
+        """From now on all of the world's time is the person's.
+
+        :raises ViewError: where the world does not answer.
+        """
+        if not self._at_work:
+            self._charge(True)
+            self._at_work = True
+
+    def end_work(self) -> None:
+        """The machine goes on from here. It does nothing where the person is not at work.
+
+        :raises ViewError: where the world does not answer.
+        """
+        if self._at_work:
+            self._at_work = False
+            self._charge(False)
+
+    def _charge(self, on: bool) -> None:
+        if NONE in (self._names.pass_time, self._names.charge_time):
+            return
+        try:
+            call_service(rospy.resolve_name(self._names.charge_time), ChargeTime,
+                         ChargeTimeRequest(WHAT, on), _MOTION_S)
+        except (ServerGoneError, rospy.ServiceException) as err:
+            raise ViewError('nobody counts the time: {}'.format(err)) from err
 
     def _snap(self) -> Optional[rospy.Time]:
         """The stamp of the joint states to wait for. None means the newest."""

@@ -26,6 +26,9 @@ STANDING = 0.03  # m between the lowest point that is seen of a thing and what i
 WELL_SEEN = 0.2  # of the points of the level with the most of them
 WHITE = 240  # each of a pixel's three values, of 255, where light is too bright
 LEAST_GLARE = 0.005  # of the image's pixels
+DIM = 65.0  # of 255: the mean of an image, below which there is little light
+LYING = 0.75  # of its height: what is seen lower has fallen over
+LONG = 1.25  # of its height: what is seen wider lies, where nobody has seen it stand
 TOP_BAND = 0.02  # m below its highest point, that belongs to the top of a thing
 
 Region = Tuple[int, int, int, int]  # px: x, y, width, height
@@ -58,6 +61,16 @@ class SeenThing(NamedTuple):
         """m above the floor, or 0 where nobody can tell."""
         return float(self.box.centre[2] - self.box.size[2] / 2) if self.box is not None else 0.0
 
+    def lies(self, tall: Optional[float]) -> bool:
+        """Whether it lies.
+
+        :param tall: m, of the thing when it was seen standing. None means it was not.
+        """
+        if self.box is None:
+            return False
+        height = float(self.box.size[2])
+        return height < LYING * tall if tall is not None else self.box.wide > LONG * height
+
 
 class SeenScene(NamedTuple):
     """The scene that is seen at one moment."""
@@ -87,10 +100,14 @@ class SeenScene(NamedTuple):
         white = self.image.colour.min(axis=-1) > WHITE
         return float((white & ~np.isfinite(self.image.depth)).mean()) > LEAST_GLARE
 
+    def dim(self) -> bool:
+        """Whether there is little light."""
+        return float(self.image.colour.mean()) < DIM
+
     def heights(self) -> Dict[str, float]:
         """Return how tall (m) the things are that are seen standing, by name."""
         return {thing.name: float(thing.box.size[2]) for thing in self.things
-                if thing.stands and thing.box is not None}
+                if thing.stands and thing.box is not None and not thing.lies(None)}
 
     def boxes_but(self, *names: str) -> List[UprightBox]:
         """The boxes of all other movable things."""

@@ -27,11 +27,12 @@ class StatePlan(NamedTuple):
     what: str = ''  # take: userdata key of the detected pose or poses. '' : whatever is nearest
     place: str = ''  # put_down: userdata key of the pose where it should stand
     onto: str = ''  # put_down: or name of the body on whose top it should stand
-    inside: bool = False  # take: out of a shelf, level and straight back
+    # show, take: in a shelf. The hand goes in level and straight back, and nothing is moved there
+    inside: bool = False
     hidden: str = ''  # show: state to go to where nothing of it can be seen
     lost: str = ''  # put_down: state to go to where the hand holds nothing
     otherwise: str = ''  # state to go to after `tries` tries; '' : the failed one itself
-    # state to go on to, this one left undone, where all that was tried twice; '' : never
+    # retry: state to go on to, this one left undone, where little else is left; '' : never
     leave: str = ''
     # state to go to where this one should be tried again, once somebody has looked about with the
     # robot's head; '' : the failed one itself

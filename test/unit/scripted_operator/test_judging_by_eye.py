@@ -41,7 +41,8 @@ def test_a_thing_is_looked_for_and_found(world):
     world.reset(draw(2, benign=True))
     truth = world.body_pose('object_0')[:3, 3]
     found = sight(world, TAKE, objects=[pose(truth)])
-    assert found.sight == Sight()
+    assert found.sight._replace(place=None, around=()) == Sight()
+    assert found.sight.place == tuple(found.about) and len(found.sight.around) <= 3
     assert np.linalg.norm(found.about - truth) < 0.02
 
 
@@ -82,3 +83,65 @@ def test_light_in_the_camera_is_noticed(world):
 def test_nothing_is_put_down_with_an_empty_hand(world):
     world.reset(draw(2, benign=True))
     assert not sight(world, PUT, place_pose=pose((0.6, -0.35, 0.8))).sight.holds
+
+
+def lying(world, height):
+    """A scene whose object lies at a place, its middle so many m above the floor."""
+    scene = draw(2, benign=True)
+    world.reset(scene._replace(bodies=tuple(
+        body._replace(position=(0.62, -0.1, height), pitch=np.pi / 2, yaw=0.3)
+        if body.name == 'object_0' else body for body in scene.bodies)))
+    world.step(60)
+
+
+def table_top(world):
+    table = next(body for body in world.scene.bodies if body.name == 'table')
+    return table.position[2] + table.size[2] / 2
+
+
+def test_a_thing_that_lies_on_the_table_is_seen_to_lie_and_is_not_lost(world):
+    lying(world, table_top(world) + 0.03)
+    for plan in (TAKE, PUT):
+        found = sight(world, plan, place_pose=pose((0.6, -0.35, 0.8)))
+        assert (found.sight.lies, found.sight.lost, found.sight.located) == (True, False, True)
+
+
+def test_a_thing_on_the_floor_is_looked_for_there_and_is_lost(world):
+    scene = draw(2, benign=True)
+    world.reset(scene._replace(bodies=tuple(
+        body._replace(position=(0.75, -0.75, 0.05), pitch=np.pi / 2)
+        if body.name == 'object_0' else body for body in scene.bodies)))
+    world.step(60)
+    for plan in (TAKE, PUT, StatePlan('show', look=LOOK)):
+        assert sight(world, plan, place_pose=pose((0.6, -0.35, 0.8))).sight.lost
+
+
+def test_a_thing_that_stands_at_its_place_is_seen_to_be_there(world):
+    world.reset(draw(2, benign=True))
+    truth = world.body_pose('object_0')[:3, 3]
+    assert sight(world, PUT, place_pose=pose(truth)).sight.there
+    assert not sight(world, PUT, place_pose=pose(truth + [0.0, -0.3, 0.0])).sight.there
+
+
+def test_where_other_things_are_seen_nothing_hides_what_is_gone(world):
+    scene = draw(2, benign=True)
+    world.reset(scene._replace(bodies=tuple(
+        body._replace(position=(-2.0, 0.0, 0.1)) if body.name == 'object_0' else body
+        for body in scene.bodies)))
+    found = sight(world, StatePlan('show', look=LOOK))
+    assert (found.sight.seen, found.sight.open) == (False, True)
+    watcher = DirectWatcher(world)
+    plain = watcher.look
+    limb = np.zeros(plain().image.depth.shape, bool)
+    limb[:40, :40] = True
+    watcher.look = lambda *names: plain(*names)._replace(limbs=limb)
+    found = look_about(StatePlan('show', look=LOOK), {}, watcher.look(), watcher)
+    assert not found.sight.open, 'an arm may hide it'
+
+
+def test_little_light_is_noticed(world):
+    world.reset(draw(2, benign=True))
+    scene = DirectWatcher(world).look_at(np.array(LOOK[0]))
+    assert not scene.dim()
+    scene.image.colour[:] = scene.image.colour * 0.4
+    assert scene.dim()

@@ -17,6 +17,9 @@ from smach_oracle.pr2.model.pr2_model import ModelError
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.shutdown import ShutdownGuard
 from smach_oracle.srv import (
+    ChargeTime,
+    ChargeTimeRequest,
+    ChargeTimeResponse,
     Judge,
     JudgeRequest,
     JudgeResponse,
@@ -99,6 +102,7 @@ class WorldNode:
         self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
                           # before snapshots: who has these finds it, and charges it from the start
                           rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
+                          rospy.Service('world/charge_time', ChargeTime, self._answer_charge),
                           rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
                           rospy.Service('world/recognise', Recognise, self._answer_recognise)]
         if settings.reveal:  # where experiments run nobody can ask for the truth
@@ -166,6 +170,10 @@ class WorldNode:
         if self._truth is not None and self._settings.lock_step:
             self._truth.passed(seconds, what)
         return self._publish_state()
+
+    def _charge(self, what: str, on: bool) -> None:
+        if self._truth is not None:
+            self._truth.charge(what, on, self._world.time)
 
     def _drawn(self, seed: int) -> Scene:
         return draw(self._settings.task, seed, self._settings.benign, self._settings.lasting)
@@ -243,6 +251,13 @@ class WorldNode:
                 self._loop.call(lambda: self._pass_time(request.seconds, request.what)))
         except WorldStopped as err:
             raise rospy.ServiceException(str(err)) from err
+
+    def _answer_charge(self, request: ChargeTimeRequest) -> ChargeTimeResponse:
+        try:
+            self._loop.call(lambda: self._charge(request.what, request.on))
+        except WorldStopped as err:
+            raise rospy.ServiceException(str(err)) from err
+        return ChargeTimeResponse()
 
     def _answer_recognise(self, request: RecogniseRequest) -> RecogniseResponse:
         try:

@@ -25,9 +25,24 @@ class TrialTruth:
         self.happened([CauseSpan(each.kind, each.text, each.lasting, None, None)
                        for each in scene.causes])
         self._passed: Dict[str, float] = {}  # s of the world's time, by what took it
+        self._charged: Dict[str, float] = {}  # simulated s at which work began that goes on
 
     def passed(self, seconds: float, what: str) -> None:
-        """Add up the world's time (s) that passed for some work."""
+        """Add up the world's time (s) that passed for some work.
+
+        Work that has begun counts by its begin and end alone.
+        """
+        if what not in self._charged:
+            self._add(seconds, what)
+
+    def charge(self, what: str, on: bool, sim_s: float) -> None:
+        """Some work begins (on) or ends at a time, simulated s. All time between is its own."""
+        if on:
+            self._charged.setdefault(what, sim_s)
+        elif what in self._charged:
+            self._add(sim_s - self._charged.pop(what), what)
+
+    def _add(self, seconds: float, what: str) -> None:
         self._passed[what] = self._passed.get(what, 0.0) + seconds
 
     def happened(self, spans: Sequence[CauseSpan]) -> None:
@@ -43,6 +58,8 @@ class TrialTruth:
         :param used: processor s of the world's thread, likewise.
         """
         wall = time.monotonic() - self._began
+        for what in tuple(self._charged):
+            self.charge(what, False, sim_s)
         return {
             'seed': self._scene.seed, 'task': self._scene.task, 'success': verdict.success,
             'why': verdict.why, 'wrong_object': verdict.wrong_object, 'damage': harm_record(harm),

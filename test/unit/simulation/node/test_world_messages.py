@@ -177,6 +177,20 @@ def test_the_truth_adds_up_the_time_that_was_let_pass():
     assert record['passed_s'] == {'planning': 2.5, 'expert': 5.0}
 
 
+def test_work_that_moves_the_robot_is_charged_from_its_begin_to_its_end_and_no_time_twice():
+    truth = TrialTruth(scene(), 100.0)
+    truth.charge('expert', True, 104.0)
+    truth.passed(5.0, 'expert')
+    truth.passed(0.5, 'planning')
+    truth.charge('expert', True, 110.0)
+    truth.charge('expert', False, 134.0)
+    truth.charge('expert', False, 140.0)
+    truth.passed(2.0, 'expert')
+    truth.charge('expert', True, 150.0)
+    record = truth.record(TrialVerdict(True, ''), (), 153.0, {}, {})
+    assert record['passed_s'] == {'planning': 0.5, 'expert': 30.0 + 2.0 + 3.0}
+
+
 def test_the_truth_tells_when_a_cause_was_there():
     truth = TrialTruth(scene(), 0.0)
     truth.happened([CauseSpan('crowded', 'by much', True, 0.0, 7.5)])

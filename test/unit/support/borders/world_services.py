@@ -14,6 +14,7 @@ from smach_oracle.simulation.node.settings import WorldSettings
 from smach_oracle.simulation.scenes.lab import LabRun
 from smach_oracle.simulation.scenes.tasks import TASKS
 from smach_oracle.srv import (
+    ChargeTimeRequest,
     PassTimeRequest,
     RecogniseRequest,
     ResetWorldRequest,
@@ -96,6 +97,8 @@ BORDERS = [
     Border('service world/snapshot', message(SnapshotRequest), _service('snapshot'), (TAKEN,)),
     Border('service world/pass_time', message(PassTimeRequest, {
         'seconds': st.sampled_from((0.0, 0.5, 36000.0, 36000.1))}), _service('pass_time')),
+    Border('service world/charge_time', message(ChargeTimeRequest), _service('charge_time'),
+           (TAKEN,)),
     Border('service world/recognise', message(RecogniseRequest, {
         'stamp': _stamps(), 'names': _bodies}), _service('recognise')),
     Border('service world/reveal', message(RevealRequest, {
