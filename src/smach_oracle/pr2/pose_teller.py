@@ -17,6 +17,8 @@ from .robot import ODOM_FRAME
 TOPIC = 'initialpose'  # where amcl, and RViz's button, have it
 SIGMA = (0.01, 0.01)  # m, rad: what a look at the kitchen leaves
 TOLD_S = 0.05  # wall s until a robot may have taken it over
+# wall s after which it is told again. A pose that comes late would be taken for one from later on
+AGAIN_S = 5.0
 NEAR = 1e-3  # m or rad between what was told and what the robot believes then
 
 
@@ -26,6 +28,10 @@ class PoseTeller:
     def __init__(self) -> None:
         self.name = rospy.resolve_name(TOPIC)
         self._poses = rospy.Publisher(TOPIC, PoseWithCovarianceStamped, queue_size=1)
+
+    def has_listener(self) -> bool:
+        """Whether anybody gets what is told now."""
+        return bool(self._poses.get_num_connections() > 0)
 
     def tell(self, odom_from_base: np.ndarray) -> None:
         """Tell where the robot stands (4x4, in ODOM_FRAME)."""

@@ -35,7 +35,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike, quaternion
 from smach_oracle.ros.goal_link import GoalEvent, GoalLink, SentGoal, lost
 
-from .pose_teller import TOLD_S, PoseTeller, told
+from .pose_teller import AGAIN_S, TOLD_S, PoseTeller, told
 from .robot import ARM_JOINTS, ARMS, BASE_FRAME, CAMERA_FRAME, ODOM_FRAME, GripperState, RobotError
 from .ros_senses import RosSenses
 from .ros_time import WorldTime
@@ -133,9 +133,11 @@ class RosRobot:
     def localise(self, odom_from_base: np.ndarray) -> None:
         """See Robot."""
         until = time.monotonic() + self._timeout_s
+        tell_at = 0.0
         while True:
-            # again and again: the first may go out before anybody listens
-            self._localisation.tell(odom_from_base)
+            if time.monotonic() >= tell_at and self._localisation.has_listener():
+                self._localisation.tell(odom_from_base)
+                tell_at = time.monotonic() + AGAIN_S
             time.sleep(TOLD_S)
             if told(odom_from_base, self.odom_from_base()):
                 return

@@ -168,8 +168,7 @@ def test_bad_goals_are_refused_with_what_is_allowed():
 def test_the_rehearsal_goes_the_way_of_the_script():
     assert drink_retrieval.PALM == PALM
     assert drink_rehearsal.DRIVES == {
-        'MOVE_IN': drink_retrieval.IN_THE_FRIDGE, 'MOVE_HOME': drink_retrieval.HOME,
-        'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE
+        'MOVE_HOME': drink_retrieval.HOME, 'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE
     }
     assert drink_rehearsal.TORSO_HEIGHT == drink_retrieval.TORSO_HEIGHT
     assert drink_rehearsal.ORDERED == drink_retrieval.ORDERED

@@ -1,5 +1,6 @@
 """The skills of the second use case over messages: the door, picking inside it, handing over."""
 from functools import partial
+from typing import Optional
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.geometry.links import link_pose
@@ -57,6 +58,7 @@ class KitchenSkills(Manipulation):
     def localise_at_fridge(self, goal: LocaliseAtFridgeGoal,
                            report: ReportStatus) -> LocaliseAtFridgeResult:
         """Look at the refrigerator, and set right where the robot believes to stand."""
+        self.hands.feel(self.context.robot)
         report('looking where the refrigerator stands')
         found = localise_at_fridge(self.context, self.kitchen)
         return LocaliseAtFridgeResult(x=found.x, y=found.y, yaw=found.yaw)
@@ -64,6 +66,7 @@ class KitchenSkills(Manipulation):
     def open_door(self, goal: OpenDoorGoal, report: ReportStatus) -> OpenDoorResult:
         """Open the refrigerator. What slipped before that is forgotten."""
         self.forget_slips()
+        self.hands.feel(self.context.robot)
         report('opening the refrigerator')
         return OpenDoorResult(angle=open_door(self.context, self.kitchen, known_arm(goal.arm)))
 
@@ -83,14 +86,16 @@ class KitchenSkills(Manipulation):
         arm = known_arm(goal.arm)
         robot = self.context.robot
         target = box_in_base(goal.object, goal.size, robot, 'object')
-        if not self._taken_out(arm, report):
+        self.hands.feel(robot)
+        held = self._taken_out(arm, report)
+        if held is None:
             if self._is_inside(arm):
                 report('taking the hand out of the refrigerator')
                 leave(self.context, arm)
             robot.gripper(arm, GRIPPER_OPEN)
             there = come_near(self.context, self.kitchen, target, arm, goal.attempt)
-            self._pick_inside(goal, arm, there, there is not target, report)
-        return PickResult(grasp=pose_message(self.held[arm].grasp))
+            held = self._pick_inside(goal, arm, there, there is not target, report)
+        return PickResult(grasp=pose_message(held.grasp))
 
     def _is_inside(self, arm: str) -> bool:
         """Whether a hand is in the refrigerator."""
@@ -99,21 +104,22 @@ class KitchenSkills(Manipulation):
         tool = link_pose(self._links, BASE_FRAME, TOOL_FRAME[arm], joints)
         return bool((inverse(fridge) @ tool)[0, 3] > 0.0)
 
-    def _taken_out(self, arm: str, report: ReportStatus) -> bool:
-        """Go on with an earlier pick, where the hand still holds what it has closed on."""
-        self.forget_let_go(arm)
-        if arm not in self.held:
-            return False
+    def _taken_out(self, arm: str, report: ReportStatus) -> Optional[HeldObject]:
+        """Go on with an earlier pick, where the hand still holds what it has closed on.
+
+        :returns: that, or None where there is nothing.
+        """
+        held = self.hands.find(arm)
+        if held is None:
+            return None
         report('taking out what the {} hand holds'.format(arm))
         try:
-            if take_out(self.context, self.kitchen, arm, self.held[arm]):
-                return True
+            return held if take_out(self.context, self.kitchen, arm, held) else None
         finally:
-            self.forget_let_go(arm)
-        return False
+            self.hands.feel(self.context.robot)
 
     def _pick_inside(self, goal: PickGoal, arm: str, target: UprightBox, driven: bool,
-                     report: ReportStatus) -> None:
+                     report: ReportStatus) -> HeldObject:
         """Pick a drink from where the base stands.
 
         :param driven: whether the base has driven since the drink was seen.
@@ -128,19 +134,22 @@ class KitchenSkills(Manipulation):
         target = seen_again(target, others) if driven else target
         try:
             with self.firmer_after_slip(goal.attempt) as effort:
-                pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others, effort,
-                                 elsewhere_of(goal.attempt), grasped=partial(self.keep, arm))
+                held = pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others,
+                                        effort, elsewhere_of(goal.attempt),
+                                        grasped=partial(self.hands.keep, arm))
         except SkillError:
-            self.forget_let_go(arm)
+            self.hands.feel(robot)
             raise
+        return held
 
     def hand_over(self, goal: HandOverGoal, report: ReportStatus) -> HandOverResult:
         """Set down what is held on the palm that waits for it."""
         arm = known_arm(goal.arm)
         palm = pose_in_base(goal.pose, self.context.robot, 'pose')[:3, 3]
         report('handing over')
-        hand_over(self.context, arm, palm, self.held.get(arm) or unknown_held(self.context, arm))
-        self.held.pop(arm, None)
+        self.hands.feel(self.context.robot)
+        held = self.hands.find(arm) or unknown_held(self.context, arm)
+        hand_over(self.context, arm, palm, held)
         return HandOverResult()
 
 

@@ -24,7 +24,7 @@ from smach_oracle.msg import (
 )
 from smach_oracle.oracle.number_checks import is_number
 
-from ..fingers import may_hold, stands_open
+from ..fingers import stands_open
 from ..kitchen import MapBox
 from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
@@ -53,6 +53,7 @@ from ..planning.collision_map import (
 from ..planning.travel import draw_back
 from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
 from ..skills.arms_aside import arms_aside, is_aside
+from ..skills.hand_memory import HandMemory, MindfulRobot
 from ..skills.pick import FIRM, HeldObject, ObjectSlipped, pick
 from ..skills.place import NEAR, RETREAT, ObjectLost, place, put_back, stands_there
 from ..skills.spots import FARTHEST
@@ -96,9 +97,9 @@ class Manipulation:
     """
 
     def __init__(self, context: SkillContext) -> None:
-        self.context = context
+        self.hands = HandMemory()
+        self.context = context._replace(robot=MindfulRobot(context.robot, self.hands))
         self.maps = CollisionMapStore()
-        self.held: Dict[str, HeldObject] = {}
         self._effort = FEEL_EFFORT  # N, of the next grip
         self._begins = True  # whether the arms were aside since the last pick
         self._links = read_joints(context.model.urdf)
@@ -110,6 +111,7 @@ class Manipulation:
         the spot where it took it is put down there first.
         """
         self._begins = True
+        self.hands.feel(self.context.robot)
         for arm in goal.arms:
             known_arm(arm)
         arms = list(goal.arms) or list(ARMS)
@@ -152,6 +154,7 @@ class Manipulation:
         """Grasp an object and lift it."""
         arm = known_arm(goal.arm)
         target = box_in_base(goal.object, goal.size, self.context.robot, 'object')
+        self.hands.feel(self.context.robot)
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen(target)
         boxes = around(made, target)
         self._put_back(arm, boxes)
@@ -164,9 +167,9 @@ class Manipulation:
             self._begins = False
             # only after a slip: what does not slip may tilt where it is pressed hard
             with self.firmer_after_slip() as effort:
-                self.held[arm] = pick(self.context, arm, target, boxes, effort,
-                                      elsewhere_of(goal.attempt), partial(self.keep, arm))
-        return PickResult(grasp=pose_message(self.held[arm].grasp))
+                held = pick(self.context, arm, target, boxes, effort, elsewhere_of(goal.attempt),
+                            partial(self.hands.keep, arm))
+        return PickResult(grasp=pose_message(held.grasp))
 
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
         """Look at the place, put down what is held at a free spot, and look whether it stands.
@@ -181,6 +184,7 @@ class Manipulation:
             raise SkillError('tolerance is {} m; allowed: 0 to {}'.format(goal.tolerance, FARTHEST))
         centre = pose_in_base(goal.pose, robot, 'pose')[:3, 3]
         grasp = pose_in_base(goal.grasp, robot, 'grasp')
+        self.hands.feel(robot)
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen()
         held, boxes = self._held_object(arm, grasp, made)
         report('looking at the place')
@@ -196,7 +200,6 @@ class Manipulation:
             if self._is_placed(arm, centre, goal.tolerance, held, made):
                 return PlaceResult()
             raise
-        self.held.pop(arm, None)
         report('looking whether it stands there')
         arms_aside(self.context, [arm], {**boxes, 'placed': MapBox(stood, held.half, 0.0)})
         others = [box for name, box in boxes.items() if name != 'table']
@@ -243,15 +246,6 @@ class Manipulation:
                 for name, other in boxes.items() if name.startswith('object'))
         }
 
-    def keep(self, arm: str, held: HeldObject) -> None:
-        """A hand holds this from now on, also where the skill is stopped before its end."""
-        self.held[arm] = held
-
-    def forget_let_go(self, arm: str) -> None:
-        """Forget what a hand has held, where its fingers show that it holds nothing."""
-        if not may_hold(encoder_readings(self.context.robot), arm):
-            self.held.pop(arm, None)
-
     def forget_slips(self) -> None:
         """The next grip is as gentle as the first."""
         self._effort = FEEL_EFFORT
@@ -275,7 +269,7 @@ class Manipulation:
         try:
             yield
         except errors:
-            self.forget_let_go(arm)
+            self.hands.feel(self.context.robot)
             try:
                 arms_aside(self.context, [arm], boxes)
             except SkillError:
@@ -285,7 +279,7 @@ class Manipulation:
     def _return_held(self, arms: Sequence[str], report: ReportStatus) -> None:
         """Put down what hands hold, where they are over the spot that it was taken from."""
         for arm in arms:
-            held = self.held.get(arm)
+            held = self.hands.find(arm)
             joints = encoder_readings(self.context.robot)
             tool = link_pose(self._links, BASE_FRAME, TOOL_FRAME[arm], joints)
             if held is not None and np.hypot(*(tool - held.grasp)[:2, 3]) < NEAR:
@@ -295,13 +289,9 @@ class Manipulation:
                 self._put_back(arm, self._seen(own).boxes)
 
     def _put_back(self, arm: str, boxes: Dict[str, MapBox]) -> None:
-        """Put an object that the hand still holds straight down. A hand that stands open has none.
-
-        What was held may have been taken from the hand since then, or have been in another trial's
-        world.
-        """
-        held = self.held.pop(arm, None)
-        if held is not None and not stands_open(encoder_readings(self.context.robot), arm):
+        """Put an object that the hand still holds straight down."""
+        held = self.hands.find(arm)
+        if held is not None:
             put_back(self.context, arm, held, boxes)
 
     def _held_object(self, arm: str, grasp: np.ndarray,
@@ -312,7 +302,7 @@ class Manipulation:
         """
         index = nearest_object(made, grasp[:3, 3], BESIDE_GRASP)
         boxes = dict(made.boxes)
-        known = self.held.get(arm)
+        known = self.hands.find(arm)
         if known is not None and np.linalg.norm((known.grasp - grasp)[:3, 3]) >= SAME_GRASP:
             known = None
         if index is not None:

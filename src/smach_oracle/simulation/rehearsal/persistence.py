@@ -1,6 +1,8 @@
 """Plain tries against one kind of cause: a retry of the state, the script started over.
 
-In one process, without an executive. The world's own log says what a try finds of the cause.
+In one process, without an executive. A state that is tried again varies its goal as the script
+does. A script that is started over remembers nothing. The world's own log says what a try finds of
+the cause.
 """
 from typing import Callable, Iterable, List, NamedTuple, Sequence
 
@@ -91,6 +93,7 @@ def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) ->
         cured = 'retry' if left < 0 else ''
         for _ in range(RESTARTS):
             if left >= 0:
+                trial.begin()
                 left = tries.go(0, 0, 'restart')
                 cured = 'restart' if left < 0 else ''
     world.step(SETTLING)

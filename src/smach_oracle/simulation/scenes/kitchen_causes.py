@@ -29,7 +29,7 @@ KINDS_OF = {
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
 IN_FRIDGE = 'look_at:4'  # the first three are at the door
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
-TARGET = 0  # the drink that stands nearest to the front
+TARGET = 0  # the drink that is ordered
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 STEADY: Vector = (0.008, 0.008, 0.006)
@@ -94,7 +94,7 @@ def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> Kit
 
 
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """A further drink stands right beside the nearest one."""
+    """A further drink stands right beside the one that is ordered."""
     gap = float(generator.uniform(0.0, 0.012))
     heading = float(
         generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2))
@@ -154,11 +154,11 @@ def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> Kitc
                    for drink in draft.drinks[:1]) + draft.drinks[1:]
     return caused(
         draft._replace(drinks=drinks), 'slippery_drink',
-        'the nearest drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
+        'the ordered drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
 
 
 def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """Somebody moves the nearest drink to where there is room, after it has been detected."""
+    """Somebody moves the ordered drink to where there is room, after it has been detected."""
     ways = [(float(generator.uniform(0.0, 0.06)), side * float(generator.uniform(0.05, 0.09)))
             for _ in range(30) for side in (1.0, -1.0)]
     x, y = draft.drinks[TARGET].position[:2]
@@ -166,13 +166,13 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
     values = (('dx', dx), ('dy', dy), ('duration', 0.8))
     return caused(
         draft, 'drink_moved',
-        'somebody moves the nearest drink by {:.0f} cm, once it has been seen'.format(
+        'somebody moves the ordered drink by {:.0f} cm, once it has been seen'.format(
             100 * float(np.hypot(dx, dy))),
         Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:4', values))
 
 
 def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
-    """m from a place for the nearest drink to the next drink's middle or, if nearer, to a wall."""
+    """m from a place for the ordered drink to the next drink's middle or, if nearer, to a wall."""
     gaps = [float(np.hypot(other.position[0] - x, other.position[1] - y))
             for number, other in enumerate(draft.drinks) if number != TARGET]
     return min(gaps + [draft.half_width - abs(y - draft.front[1])])

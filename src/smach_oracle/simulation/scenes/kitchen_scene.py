@@ -1,5 +1,5 @@
 """The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person."""
-from typing import List, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from smach_oracle.pr2.robot import ARM_JOINTS, ARMS, FINGER_JOINTS
 
 from .calibration import camera_error, encoder_errors
 from .cause_draws import LASTING_SHARE
+from .chance import generator_for
 from .fridge import fridge
 from .kitchen_causes import KitchenDraft, with_causes
 from .person import PALM_SIZE, person
@@ -17,11 +18,14 @@ from .unlike_the_map import drink_size, localisation_error, true_kitchen, true_p
 
 TASK = 'drink_retrieval'
 DRINK_MASS = 0.33  # kg
-ORDERED = 'drink_0'  # the red one: red is what the task orders
+ORDERED = 'drink_0'  # the red one, wherever it stands: red is what the task orders
 COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
            (0.60, 0.20, 0.55))
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
+# m to each side of a drink's middle: no other's middle is there, before one that the arm can reach.
+# An open hand is 0.07 to each side, a drink 0.03
+HAND = 0.10
 START_TORSO = 0.15  # m
 
 
@@ -63,7 +67,11 @@ def composed(seed: int, draft: KitchenDraft, kitchen: Kitchen, robot: RobotStart
 
 
 def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
-    """Upright on the shelf, apart from each other, near the front. The foremost comes first."""
+    """Upright on the shelf, apart from each other, near the front.
+
+    The ordered one comes first. It is any of those before which there is room for a hand. The
+    others follow, the foremost of them first.
+    """
     generator = np.random.default_rng([seed, 2])
     places: List[Tuple[float, float]] = []
     for _ in range(100):
@@ -72,7 +80,15 @@ def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
                 np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
+    in_reach = [place for place in places if _is_in_reach(place, places)]
+    places.insert(0, places.pop(places.index(
+        in_reach[int(generator_for(seed, 'ordered').integers(len(in_reach)))])))
     return tuple(drink_at(seed, index, place, kitchen) for index, place in enumerate(places))
+
+
+def _is_in_reach(place: Tuple[float, float], places: Sequence[Tuple[float, float]]) -> bool:
+    """Whether none of the places (m, in the fridge's frame) is in a hand's way from the front."""
+    return not any(x < place[0] and abs(y - place[1]) < HAND for x, y in places)
 
 
 def drink_at(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen) -> Body:

@@ -249,13 +249,32 @@ def test_what_a_hand_held_in_another_trial_does_not_count(bench):
         bench.skills.pick(
             picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
     fresh = bench.world.periods - before
-    bench.skills.held.clear()
+    bench.skills.hands.forget('right')
     bench.world.reset(bench.world.scene)
     before = bench.world.periods
     with pytest.raises(SkillError, match='too wide for the gripper'):
         bench.skills.pick(
             picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
     assert bench.world.periods - before == fresh  # as in a process that has run no trial before
+
+
+@pytest.mark.parametrize('gap', [0.09, 0.075])
+def test_a_hand_that_has_opened_holds_nothing(bench, gap):
+    bench.pick(bench.map().map_id)
+    assert bench.skills.hands.find('right') is not None
+    bench.skills.context.robot.gripper('left', 0.0)
+    bench.skills.context.robot.gripper('right', 0.0, 40.0)  # feels it
+    assert bench.skills.hands.find('right') is not None
+    bench.skills.context.robot.gripper('right', gap)
+    assert bench.skills.hands.find('right') is None
+
+
+def test_a_hand_that_was_emptied_by_somebody_else_holds_nothing_at_the_next_goal(bench):
+    bench.pick(bench.map().map_id)
+    bench.robot.gripper('right', 0.09)
+    bench.robot.gripper('right', 0.0)
+    bench.skills.move_arms_aside(MoveArmsAsideGoal(), say)
+    assert bench.skills.hands.find('right') is None
 
 
 def test_without_a_map_pick_makes_its_own_of_what_the_camera_sees(bench):

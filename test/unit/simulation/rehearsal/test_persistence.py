@@ -23,6 +23,9 @@ def task_that(fails, calls, seconds=1.0):
             self.states = [('FIRST', lambda: self._do('FIRST')), ('SECOND', self._second)]
             self._world, self._tries = world, 0
 
+        def begin(self):
+            calls.append('begin')
+
         def _do(self, name):
             calls.append(name)
             self._world.step(round(60 * seconds))
@@ -53,7 +56,7 @@ def test_a_retry_comes_before_a_restart(world):
 def test_the_script_is_started_over_after_the_retries(world):
     calls = []
     found = run_scene(shadow(600.0), world, task_that(lambda tries: tries <= 5, calls))
-    assert calls == ['FIRST'] + ['SECOND'] * 4 + ['FIRST', 'SECOND'] * 2
+    assert calls == ['FIRST'] + ['SECOND'] * 4 + ['begin', 'FIRST', 'SECOND'] * 2
     assert found.ended == 'restart' and found.there_at_retry and found.there_at_restart
 
 
