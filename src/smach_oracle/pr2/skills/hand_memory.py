@@ -1,7 +1,7 @@
 """What the robot's hands hold, as far as it can know: by what it did with them, and by its fingers.
 
 A hand that has opened, or has closed on nothing, holds nothing. So what a hand held once does not
-count for ever, as in the next trial.
+count for good, as in the next trial.
 """
 from typing import Dict, Optional, Sequence
 

@@ -63,7 +63,7 @@ class Rehearsal(Protocol):
         """Names, in order, and what is done in them."""
 
     def begin(self) -> None:
-        """The script begins anew: it remembers nothing. The robot goes on as it is."""
+        """The script starts over: it remembers nothing. The robot goes on as it is."""
 
 
 class PickAndPlaceRehearsal:

@@ -1,4 +1,4 @@
-"""A rehearsal tries as the script's states do, when one is tried again and when it begins anew."""
+"""A rehearsal tries as the script's states do, when one is tried again and when it starts over."""
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3

@@ -41,6 +41,7 @@ def test_the_same_seed_gives_the_same_trial_also_after_another_one(task, draw, k
 def done_so_far(world, trial, states):
     """Where everything is after the first states of a trial, and how long they took."""
     world.reset(kitchen_scene.draw(1, benign=True))
+    trial.begin()
     begun = world.periods
     for _, work in trial.states[:states]:
         work()
