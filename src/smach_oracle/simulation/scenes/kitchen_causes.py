@@ -30,6 +30,7 @@ EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the frid
 IN_FRIDGE = 'look_at:4'  # the first three are at the door
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
 TARGET = 0  # the drink that is ordered
+FOREMOST = 0.05  # m behind the front of the shelf, where a drink may stand
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
 # sigma of x, y (m) and yaw (rad) that a drive misses its goal by
 STEADY: Vector = (0.008, 0.008, 0.006)
@@ -59,7 +60,10 @@ def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE,
     :param lasting: the share of the causes that last, 0 to 1.
     :param without: kinds that are left out where they are drawn.
     """
-    for kind, generator in drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting):
+    # a drink is moved to where there is room, with all others in their places
+    drawn = sorted(drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting),
+                   key=lambda each: each[0] == 'drink_moved')
+    for kind, generator in drawn:
         if kind not in without:
             draft = MAKERS[kind](draft, generator)
     return declared(draft, KINDS_OF[LASTING])
@@ -162,6 +166,8 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
     ways = [(float(generator.uniform(0.0, 0.06)), side * float(generator.uniform(0.05, 0.09)))
             for _ in range(30) for side in (1.0, -1.0)]
     x, y = draft.drinks[TARGET].position[:2]
+    # what stands behind others may be moved towards the front, but not off the shelf
+    ways += [(-dx, dy) for dx, dy in ways if x - dx > draft.front[0] + FOREMOST]
     dx, dy = max(ways, key=lambda way: min(ROOM, _room_at(draft, x + way[0], y + way[1])))
     values = (('dx', dx), ('dy', dy), ('duration', 0.8))
     return caused(

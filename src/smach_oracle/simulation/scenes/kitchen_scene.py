@@ -24,8 +24,8 @@ COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
 # m to each side of a drink's middle: no other's middle is there, before one that the arm can reach.
-# An open hand is 0.07 to each side, a drink 0.03
-HAND = 0.10
+# An open hand is 0.07 to each side, a drink 0.03, and camera and arm err by 0.01
+HAND = 0.11
 START_TORSO = 0.15  # m
 
 
