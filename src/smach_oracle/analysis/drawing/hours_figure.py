@@ -14,7 +14,8 @@ from ..comparison import SECONDS_PER_HOUR
 from ..figure import BLACK, BLUE, VERMILLION
 from ..sweep_figure import GREEN
 from ..trial_rows import LOST, TrialRow
-from .looks import Happened, legend_above, panels, tasks_of, title_of
+from .looks import Happened, legend_above, panels
+from .titles import tasks_of, title_of
 
 USUAL = StateSettings()
 HEIGHT_IN = 5.6

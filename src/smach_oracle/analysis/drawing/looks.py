@@ -16,18 +16,12 @@ LOOKS: Dict[str, Tuple[str, str, str]] = {
     'bare': (BLACK, 'd', '-.'), 'default': (BLUE, 'o', '-'), 'restart': (VERMILLION, 's', '--')
 }
 OTHERS = (GREEN, '^', ':')
-TITLES = {'pick_and_place': 'Pick and place', 'drink_retrieval': 'Drink retrieval'}
 Happened = Callable[[TrialRow], bool]
 
 
 def look_of(variant: str) -> Tuple[str, str, str]:
     """Return the colour, marker and dashes of a variant."""
     return LOOKS.get(variant, OTHERS)
-
-
-def title_of(task: str) -> str:
-    """Return what a task is called in a figure."""
-    return TITLES.get(task, task.replace('_', ' ').capitalize())
 
 
 class Percent:
@@ -95,15 +89,3 @@ def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:
         figure.savefig(str(paths[0]), metadata={'Date': None, 'Creator': None})
         figure.savefig(str(paths[1]), dpi=DPI, metadata={'Software': None})
     return paths
-
-
-def tasks_of(rows: Sequence[TrialRow]) -> List[str]:
-    """Return the tasks in the order in which the paper has them."""
-    return sorted({row.task for row in rows},
-                  key=lambda task: (task not in TITLES, list(TITLES).index(task)
-                                    if task in TITLES else 0, task))
-
-
-def variants_of(rows: Sequence[TrialRow]) -> List[str]:
-    """Return the variants in the order in which they were begun."""
-    return list(dict.fromkeys(row.variant for row in rows))

@@ -9,7 +9,8 @@ from ..figure import BLACK, BLUE, VERMILLION
 from ..pairing import HINDSIGHT
 from ..sweep_figure import GREEN
 from ..trial_rows import TrialRow
-from .looks import Happened, Percent, legend_above, panels, tasks_of, title_of
+from .looks import Happened, Percent, legend_above, panels
+from .titles import tasks_of, title_of
 
 SHOWN: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('true success', BLUE, 'o', lambda row: row.succeeded),

@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, NullLocator
 
 from ..trial_rows import TrialRow
-from .looks import Happened, Percent, legend_above, look_of, panels, tasks_of, title_of, variants_of
+from .looks import Happened, Percent, legend_above, look_of, panels
 from .policies import memory_of, policy_of
+from .titles import tasks_of, title_of, variants_of
 
 Shown = Tuple[str, Happened]
 INTERVENTIONS: Shown = ('Interventions (% of trials)', lambda row: row.intervened)

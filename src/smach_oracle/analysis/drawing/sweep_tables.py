@@ -7,9 +7,9 @@ from ..intervals import paired_difference
 from ..pairing import DEFAULT, RESTART, paired_counts, trend_of
 from ..trial_rows import TrialRow
 from .cause_tables import share_text
-from .looks import tasks_of, title_of
 from .markdown import titled
 from .policies import memory_of, policy_of
+from .titles import tasks_of, title_of
 
 
 def format_sweeps(kind: str, rows: Sequence[TrialRow]) -> str:

@@ -15,8 +15,8 @@ from ..comparison import (
 from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
 from .cause_tables import by_cause, by_log
-from .looks import tasks_of, title_of
 from .markdown import titled
+from .titles import tasks_of, title_of
 
 SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
           'false success', 'lost or hung')

@@ -3,10 +3,10 @@ import cv2
 import numpy as np
 import pytest
 
+from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.simulation.node import trial_film
 from smach_oracle.simulation.node.settings import read_settings
 from smach_oracle.simulation.node.trial_film import EVERY, TrialFilm
-from smach_oracle.oracle.errors import SettingsError
 
 
 @pytest.fixture

@@ -16,8 +16,8 @@ from smach_oracle.simulation.physics.camera import (
     noisy_depth,
 )
 from smach_oracle.simulation.physics.world import World
-from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.pictures.portrait import portrait
+from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.scene import Body, CameraQuality, RobotStart
 
 BOWED = RobotStart((('head_tilt_joint', 0.9),))
