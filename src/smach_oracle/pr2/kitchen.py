@@ -31,11 +31,12 @@ class Kitchen(NamedTuple):
 
 
 class MapBox(NamedTuple):
-    """A box of the map, in the frame of the base."""
+    """A box of the map, or what is round in it, in the frame of the base."""
 
     centre: np.ndarray  # (3,)
     half: np.ndarray  # (3,)
     yaw: float
+    upright_cylinder: bool = False  # of the wider side's diameter, in place of the box
 
 
 def kitchen_from(settings: object) -> Kitchen:

@@ -12,9 +12,9 @@ from smach_oracle.simulation.scenes.kitchen_scene import draw
 
 
 @pytest.mark.parametrize('motions, degrees, gap', [(6, (0, 5), (0.02, 0.03)),
-                                                   (7, (60, 80), (0.02, 0.03)),
-                                                   (11, (90, 100), (0.02, 0.03)),
-                                                   (13, (90, 100), (0.04, 0.05))])
+                                                   (8, (60, 80), (0.02, 0.03)),
+                                                   (14, (88, 100), (0.02, 0.03)),
+                                                   (16, (88, 100), (0.04, 0.05))])
 def test_a_hand_that_was_stopped_at_the_handle_opens_the_door(motions, degrees, gap):
     """It has closed on the bar, pulled with the arm, with the base, and has come off it."""
     world = World(draw(3, benign=True))

@@ -40,11 +40,14 @@ from ..skills.fridge_pick import (
 )
 from ..skills.hand_over import hand_over
 from ..skills.localise import localise_at_fridge
-from ..skills.pick import FIRM, HeldObject
+from ..skills.pick import FIRM, HeldObject, NoGrasp
 from .frames import box_in_base, pose_in_base, pose_message
 from .manipulation import USUAL, Manipulation, check_is_there, elsewhere_of
 from .skill_server import ReportStatus
 
+# the places of the base from which a pick looks for a grasp, and whether the hand may come straight
+# down there
+PLACES = ((0, False), (1, False), (2, False), (3, False), (0, True))
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
 
 
@@ -93,9 +96,22 @@ class KitchenSkills(Manipulation):
                 report('taking the hand out of the refrigerator')
                 leave(self.context, arm)
             robot.gripper(arm, GRIPPER_OPEN)
-            there = come_near(self.context, self.kitchen, target, arm, goal.attempt)
-            held = self._pick_inside(goal, arm, there, there is not target, report)
+            held = self._pick_from_somewhere(goal, arm, target, report)
         return PickResult(grasp=pose_message(held.grasp))
+
+    def _pick_from_somewhere(self, goal: PickGoal, arm: str, target: UprightBox,
+                             report: ReportStatus) -> HeldObject:
+        """Pick a drink from the first place of the base from which there is a grasp."""
+        for place, from_above in PLACES:
+            there = come_near(self.context, self.kitchen, target, arm, goal.attempt + place,
+                              from_above)
+            try:
+                return self._pick_inside(goal, arm, there, there is not target, from_above, report)
+            except NoGrasp:
+                if (place, from_above) == PLACES[-1]:
+                    raise
+            target = there
+        raise SkillError('there is no place to pick from')
 
     def _is_inside(self, arm: str) -> bool:
         """Whether a hand is in the refrigerator."""
@@ -119,10 +135,11 @@ class KitchenSkills(Manipulation):
             self.hands.feel(self.context.robot)
 
     def _pick_inside(self, goal: PickGoal, arm: str, target: UprightBox, driven: bool,
-                     report: ReportStatus) -> HeldObject:
+                     from_above: bool, report: ReportStatus) -> HeldObject:
         """Pick a drink from where the base stands.
 
         :param driven: whether the base has driven since the drink was seen.
+        :param from_above: whether the hand may come straight down, at the first ways to grasp it.
         """
         report('choosing a grasp in the refrigerator')
         robot = self.context.robot
@@ -134,9 +151,10 @@ class KitchenSkills(Manipulation):
         target = seen_again(target, others) if driven else target
         try:
             with self.firmer_after_slip(goal.attempt) as effort:
+                failed = elsewhere_of(goal.attempt)
                 held = pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others,
-                                        effort, elsewhere_of(goal.attempt),
-                                        grasped=partial(self.hands.keep, arm))
+                                        effort, failed, partial(self.hands.keep, arm),
+                                        from_above or failed > 0)
         except SkillError:
             self.hands.feel(robot)
             raise

@@ -78,7 +78,8 @@ class CollisionWorld:
         """An obstacle. A box of the same name is replaced."""
         self.remove(name)
         self._boxes[name] = self._body(box.half, 0.0, box.centre,
-                                       (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)))
+                                       (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)),
+                                       box.upright_cylinder)
 
     def remove(self, name: str) -> None:
         """Drop an obstacle, if it is there."""
@@ -208,10 +209,16 @@ class CollisionWorld:
                                                      physicsClientId=self._client)
 
     def _body(self, half: VectorLike, mass: float, position: VectorLike,
-              xyzw: Sequence[float]) -> int:
-        shape = pybullet.createCollisionShape(pybullet.GEOM_BOX,
-                                              halfExtents=[float(each) for each in half],
-                                              physicsClientId=self._client)
+              xyzw: Sequence[float], upright_cylinder: bool = False) -> int:
+        if upright_cylinder:
+            shape = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER,
+                                                  radius=float(max(half[0], half[1])),
+                                                  height=2 * float(half[2]),
+                                                  physicsClientId=self._client)
+        else:
+            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX,
+                                                  halfExtents=[float(each) for each in half],
+                                                  physicsClientId=self._client)
         return int(
             pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
                                      [float(each) for each in xyzw], physicsClientId=self._client))

@@ -59,6 +59,11 @@ def others_first(found: List[np.ndarray], failed: int) -> List[np.ndarray]:
     return sorted(found, key=lambda grasp: rank[_inclination(grasp)])
 
 
+def comes_from_above(grasp: np.ndarray) -> bool:
+    """Whether a hand (4x4) comes straight down."""
+    return _inclination(grasp) > FROM_ABOVE
+
+
 def _inclination(grasp: np.ndarray) -> float:
     """rad to two digits, of a hand (4x4) downwards."""
     return round(float(np.arcsin(np.clip(-grasp[2, 0], -1.0, 1.0))), 2)
@@ -77,7 +82,7 @@ def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
 
 def _to_the_faces(box: UprightBox, straight: float) -> np.ndarray:
     """(n,) rad, turns from the straight heading after which the fingers lie flat on two faces."""
-    if _is_round(box):
+    if is_round(box):
         return np.zeros(0)
     turns = box.yaw + np.pi / 2 * np.arange(4) - straight
     turns = (turns + np.pi) % (2 * np.pi) - np.pi
@@ -95,13 +100,13 @@ def width_across(box: UprightBox, heading: float) -> float:
     return _projected(box, heading)
 
 
-def _is_round(box: UprightBox) -> bool:
+def is_round(box: UprightBox) -> bool:
     """Whether the box of something round is meant: it has no heading, see upright_box()."""
     return abs(box.yaw) < NO_HEADING and box.wide - box.narrow < ROUND
 
 
 def _projected(box: UprightBox, heading: float) -> float:
-    if _is_round(box):
+    if is_round(box):
         return box.wide
     angle = heading - box.yaw
     return float(box.size[0] * abs(np.sin(angle)) + box.size[1] * abs(np.cos(angle)))

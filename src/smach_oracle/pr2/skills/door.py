@@ -5,36 +5,42 @@ wide open: where the arm gets no farther, the base takes it along. In the end th
 whether the door stays open.
 """
 from contextlib import contextmanager
-from typing import Callable, Dict, Iterator, Optional, Tuple
+from typing import Iterator
 
 import numpy as np
 
 from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
 
-from ..kitchen import (
-    Kitchen,
-    MapBox,
-    base_from_fridge,
-    door_angle_at,
-    door_frame,
-    fridge_boxes,
-    handle_point,
-    odom_from_pose,
+from ..kitchen import Kitchen, base_from_fridge, door_angle_at, handle_point, odom_from_pose
+from ..perception.door_view import DoorView
+from ..planning.arm import Arm, SkillContext, SkillError, encoder_readings, known_arm, seed_of
+from ..planning.travel import carry, draw_back, drive, stow
+from ..robot import ARMS, FINGER_JOINTS, GRIPPER_OPEN
+from .at_door import (
+    APPROACH_SPEED,
+    BEFORE,
+    BERTH,
+    STEP,
+    against,
+    approach_to,
+    arm_at,
+    is_beside,
+    look,
+    named_boxes,
+    place_door,
+    relax,
+    strain,
+    swing_along,
 )
-from ..perception.door_view import DoorNotSeen, DoorView, find_door
-from ..planning.arm import (
-    READY,
-    Arm,
-    SkillContext,
-    SkillError,
-    encoder_readings,
-    known_arm,
-    seed_of,
+from .hand_off import (
+    AWAY_FOR_GOOD,
+    OFF,
+    RELEASE,
+    go_away,
+    step_back,
+    take_hands_off,
+    withdraw,
 )
-from ..planning.door_swing import DoorSwing, best_swing
-from ..planning.travel import TRAVEL, carry, draw_back, drive, stow
-from ..robot import ARMS, FINGER_JOINTS, GRIPPER_OPEN, Robot
-from .hand_off import AWAY_FOR_GOOD, OFF, RELEASE, step_back, take_hands_off
 
 # x, y in m and yaw in rad of the base, in the fridge's frame
 OPENING = (-0.98, 0.02, 0.0)
@@ -44,27 +50,29 @@ CLOSING = (-0.92, -0.30, 0.0)
 AJAR = np.radians(42.0)  # from here on there is room for a hand behind it: it is pushed
 PULLED = np.radians(68.0)  # as far as the handle is pulled. The hand goes on from inside
 WIDE = np.radians(95.0)  # as far as the door is opened
-STEP = np.radians(4.0)
+PRESS = 0.05  # m that the base presses the door shut, for the hand may be off by some degrees
+OFF_DOOR = 0.25  # m that the base takes the hand back from a door that it has pushed shut
 AHEAD = 0.52  # m before the robot's middle: a hand there may be in the door's way
 # m ahead at least, m to its side at most: a hand there is in the other arm's way
 BEFORE_CHEST = (0.30, 0.20)
 DRAWN = np.radians(92.0)  # as far as the base takes the handle from there
-DRAWS = 4  # drives in which it does
+DRAWS = 6  # drives in which it does
+MOST_LEFT = 0.46  # y of the base then, m in the fridge's frame: farther left there may be people
 LEAST_OPEN = np.radians(82.0)  # the robot gets in, and sees the shelf
 LEAST_PULL = np.radians(30.0)  # less than this is no opening
 GRASP_HEIGHT, PUSH_HEIGHT, CLOSE_HEIGHT = 1.0, 1.0, 1.28  # m
 DOOR_LOOK = np.array([-0.15, 0.05, GRASP_HEIGHT])  # m, in the fridge's frame
 OPEN_LOOK = np.array([-0.30, 0.25, GRASP_HEIGHT])  # m: at the face of an open door
 BEYOND = 0.012  # m that the finger tips reach beyond the bar
-BEFORE = 0.10  # m that the hand comes straight
-PULLS, PUSHES = 2, 2  # until the door is open, or shut
+PULLS, PUSHES = 3, 2  # until the door is open, or shut
 PUSH_REACH, CLOSE_REACH = 0.50, 0.52  # m from the hinge at which the hand pushes
-BERTH = 0.01  # m that the arm keeps from the door on its way to it
 GRIP_EFFORT = 100.0  # N
 LEAST_GAP = 0.008  # m between the tips that a bar keeps
-APPROACH_SPEED, PULL_SPEED, PUSH_SPEED = 0.3, 0.25, 0.25  # share of the joints' speed limits
+PULL_SPEED, PUSH_SPEED = 0.25, 0.25  # share of the joints' speed limits
 
-ToolAt = Callable[[float, float], np.ndarray]
+
+class HandleLost(SkillError):
+    """The hand does not hold the handle."""
 
 
 def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
@@ -84,10 +92,15 @@ def open_door(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
 def _open(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
     view = _look_from_before(context, kitchen)
     angle = view.angle
-    for _ in range(PULLS):
+    for pull in range(PULLS):
         if view.angle < AJAR:
-            angle = _pull(context, kitchen, arm, view)
-            _take_hand_off(context, kitchen, angle)
+            try:
+                angle = _pull(context, kitchen, arm, view)
+                _take_hand_off(context, kitchen, arm, angle)
+            except HandleLost:
+                if pull == PULLS - 1:
+                    raise
+                take_hands_off(context, kitchen)  # it may stand open far enough to be pushed
             view = _look_from_before(context, kitchen)
     if view.angle < AJAR:
         raise SkillError('the door fell shut again, to {:.0f} degrees, when the hand let go '
@@ -124,6 +137,8 @@ def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
     view = look(context.robot, kitchen, np.array([-0.35, 0.20, GRASP_HEIGHT]))
     for push in range(PUSHES):
         if view.angle >= STEP:
+            if push:
+                drive(context, odom_from_pose(kitchen, *CLOSING))
             try:
                 _push_shut(context, kitchen, arm, view)
             except SkillError:
@@ -188,22 +203,6 @@ def _stow_beside(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
     stow(context, ARMS, boxes)
 
 
-def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> DoorView:
-    """Look for the door at a point (3,) of the fridge's frame.
-
-    :raises SkillError: where it is not seen.
-    """
-    expected = base_from_fridge(kitchen, robot.odom_from_base())
-    robot.look_at(apply(expected, point))
-    for attempt in range(tries):
-        try:
-            return find_door(robot.see(), kitchen, expected)
-        except DoorNotSeen as err:
-            if attempt == tries - 1:
-                raise SkillError(str(err)) from err
-    raise SkillError('the door was not looked for: tries is {}'.format(tries))
-
-
 def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
     """Grasp the handle and pull it around the hinge as far as the arm reaches."""
     fridge = view.base_from_fridge
@@ -212,16 +211,16 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
         bar = apply(fridge, handle_point(kitchen, angle, GRASP_HEIGHT))
         return from_rpy(bar, yaw=turn - angle + yaw_of(fridge)) @ from_rpy((BEYOND, 0.0, 0.0))
 
-    with _limb(context, kitchen, arm, view) as limb:
-        swing = _swing(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45),
-                       ('handle',), lambda q: _approach(limb, q) is not None)
+    with arm_at(context, kitchen, arm, view) as limb:
+        swing = swing_along(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45),
+                            ('handle',), lambda q: approach_to(limb, q) is not None)
         if swing is None or swing.angles[-1] < LEAST_PULL:
             raise SkillError(
                 'the handle is out of reach of the {} arm, or cannot be pulled from here'.format(
                     arm))
         context.robot.gripper(arm, GRIPPER_OPEN)
-        _place_door(limb, kitchen, fridge, view.angle)
-        approach = _approach(limb, swing.path[0])
+        place_door(limb, kitchen, fridge, view.angle)
+        approach = approach_to(limb, swing.path[0])
         if approach is None:
             raise SkillError('no straight way to the handle')
         limb.go(approach[0])
@@ -229,14 +228,16 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
         held = context.robot.gripper(arm, 0.0, GRIP_EFFORT)
         if held.position < LEAST_GAP:
             draw_back(limb, BEFORE, ('handle',), APPROACH_SPEED)
-            raise SkillError('the hand closed on nothing: the handle is not where it was seen')
-        _strain(limb, swing, PULL_SPEED)
+            raise HandleLost('the hand closed on nothing: the handle is not where it was seen')
+        strain(limb, swing, PULL_SPEED)
+        relax(limb)
         if sum(encoder_readings(context.robot)[name] for name in FINGER_JOINTS[arm]) < LEAST_GAP:
-            raise SkillError('the handle slipped out of the {} hand'.format(arm))
+            raise HandleLost('the handle slipped out of the {} hand'.format(arm))
         # an arm that pulls against a hinge does not get as far as it was sent
         bar = apply(limb.pose(), np.array([-BEYOND, 0.0, 0.0]))
         reached = _draw_along(context, kitchen, fridge,
                               door_angle_at(kitchen, apply(inverse(fridge), bar)))
+        relax(limb)
         context.robot.gripper(arm, RELEASE)
     return reached
 
@@ -244,29 +245,36 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
 def _draw_along(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray, angle: float) -> float:
     """Take the handle farther around the hinge with the base, the arm being held as it is.
 
+    The base turns with the door. A hand that does not is wedged between bar and door.
+
     :param fridge: 4x4, where it is, in base_footprint.
     :param angle: rad, how far the arm has opened the door.
     :returns: rad, how far it should be open now.
     """
     start = context.robot.odom_from_base()
-    first = apply(fridge, handle_point(kitchen, angle, GRASP_HEIGHT))
-    for further in np.linspace(angle, DRAWN, DRAWS + 1)[1:]:
-        way = apply(fridge, handle_point(kitchen, float(further), GRASP_HEIGHT)) - first
+    hinge = from_rpy(apply(fridge, np.array([0.0, kitchen.width / 2, 0.0])))
+    first = angle
+    for further in np.linspace(first, DRAWN, DRAWS + 1)[1:]:
+        about_hinge = hinge @ from_rpy((0.0, 0.0, 0.0), yaw=first - further) @ inverse(hinge)
+        if (inverse(fridge) @ about_hinge)[1, 3] > MOST_LEFT:
+            break
         try:
-            drive(context, start @ from_rpy((float(way[0]), float(way[1]), 0.0)))
+            drive(context, start @ about_hinge)
         except SkillError:
             break  # the door is at its end, or something is in its way: the camera will tell
         angle = float(further)
     return angle
 
 
-def _take_hand_off(context: SkillContext, kitchen: Kitchen, angle: float) -> None:
-    """Drive the open hand straight back from the bar, and stow the arms. The door is at `angle`."""
-    try:
-        step_back(context, OFF)
-        _stow_beside(context, kitchen, angle)
-    except SkillError:
-        step_back(context, OFF)  # the door is elsewhere: the camera will tell
+def _take_hand_off(context: SkillContext, kitchen: Kitchen, arm: str, angle: float) -> None:
+    """Drive the open hand back from the bar, and stow the arms. The door is at `angle`."""
+    with Arm(context, arm, {}, seed_of(arm, encoder_readings(context.robot))) as limb:
+        withdraw(context, limb, OFF)
+        try:
+            _stow_beside(context, kitchen, angle)
+        except SkillError:
+            relax(limb)
+            go_away(context, kitchen)  # the door is elsewhere: the camera will tell
 
 
 def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> float:
@@ -274,20 +282,20 @@ def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
-        return _against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
+        return against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
-    with _limb(context, kitchen, arm, view) as limb:
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE, (-1.75, 0.6),
-                       ('door',), lambda q: _is_beside(limb, kitchen, view, q))
+    with arm_at(context, kitchen, arm, view) as limb:
+        swing = swing_along(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE,
+                            (-1.75, 0.6), ('door',), lambda q: is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] < view.angle + STEP:
             if view.angle >= LEAST_OPEN:
                 return view.angle  # wide enough, as it stands
             raise SkillError('the {} arm cannot push the door further from here'.format(arm))
-        _place_door(limb, kitchen, fridge, view.angle, BERTH)
+        place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
         context.robot.gripper(arm, 0.0)
-        _strain(limb, swing, PUSH_SPEED)
-        _place_door(limb, kitchen, fridge, swing.angles[-1])
+        strain(limb, swing, PUSH_SPEED)
+        place_door(limb, kitchen, fridge, swing.angles[-1])
         draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
     return float(swing.angles[-1])
 
@@ -297,98 +305,27 @@ def _push_shut(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
     fridge = view.base_from_fridge
 
     def push_at(angle: float, turn: float) -> np.ndarray:
-        return _against(kitchen, fridge, angle, turn, CLOSE_REACH, CLOSE_HEIGHT, inside=False)
+        return against(kitchen, fridge, angle, turn, CLOSE_REACH, CLOSE_HEIGHT, inside=False)
 
-    with _limb(context, kitchen, arm, view) as limb:
+    with arm_at(context, kitchen, arm, view) as limb:
         context.robot.gripper(arm, 0.0)
-        swing = _swing(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4),
-                       ('door',), lambda q: _is_beside(limb, kitchen, view, q))
+        swing = swing_along(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4),
+                            ('door',), lambda q: is_beside(limb, kitchen, view, q))
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
-        _place_door(limb, kitchen, fridge, view.angle, BERTH)
+        place_door(limb, kitchen, fridge, view.angle, BERTH)
         limb.go(swing.path[0])
-        _strain(limb, swing, PUSH_SPEED)
-        _place_door(limb, kitchen, fridge, swing.angles[-1])
-        draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
-        limb.go(TRAVEL[arm])
+        strain(limb, swing, PUSH_SPEED)
+    _press(context)
+    # a hand that is lifted away from there may hook the door, or its handle
+    step_back(context, OFF_DOOR)
+    stow(context, (arm,), named_boxes(
+        kitchen, base_from_fridge(kitchen, context.robot.odom_from_base()), 2 * STEP))
 
 
-def _swing(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float,
-           last: float, turns: Tuple[float, float], touching: Tuple[str, ...],
-           may_begin: Callable[[np.ndarray], bool] = lambda q: True) -> Optional[DoorSwing]:
-    """The best path of the hand along the door between two angles (rad)."""
-    count = int(np.ceil(abs(last - first) / STEP)) + 1
-
-    def is_free(q: np.ndarray, angle: float) -> bool:
-        _place_door(limb, kitchen, fridge, angle)
-        with limb.space.touchable(touching):
-            return limb.space.is_free(q)
-
-    return best_swing(limb.chain, tool_at, np.linspace(first, last, count), turns, READY[limb.name],
-                      limb.generator, is_free, may_begin)
-
-
-def _strain(limb: Arm, swing: DoorSwing, speed: float) -> None:
-    """Follow a swing against resistance. An arm that is held up at the end has not failed."""
-    here = limb.now()
-    turns = limb.chain.nearest_turn(swing.path[0], here) - swing.path[0]
+def _press(context: SkillContext) -> None:
+    """Drive on a little with the hand at the door. A base that is held up has not failed."""
     try:
-        limb.follow(np.vstack([here, swing.path[1:] + turns]), speed)
+        step_back(context, -PRESS)
     except SkillError:
         pass
-
-
-def _limb(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
-    """The arm among the parts of the fridge where they were seen."""
-    boxes = named_boxes(kitchen, view.base_from_fridge, view.angle)
-    return Arm(context, arm, boxes,
-               seed_of(arm, view.angle, view.base_from_fridge, encoder_readings(context.robot)))
-
-
-def _is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bool:
-    """Whether the arm touches nothing at joint positions, with the door where it was seen."""
-    _place_door(limb, kitchen, view.base_from_fridge, view.angle, BERTH)
-    return limb.space.is_free(q)
-
-
-def _approach(limb: Arm, grasp: np.ndarray) -> Optional[np.ndarray]:
-    """A straight path (m, 7) of the hand to joint positions at the handle.
-
-    :returns: None where there is none.
-    """
-    before = limb.chain.forward(grasp) @ from_rpy((-BEFORE, 0.0, 0.0))
-    with limb.space.touchable(('handle',)):
-        path = limb.line(grasp, before)
-    return None if path is None or not limb.space.is_free(path[-1]) else path[::-1]
-
-
-def _against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, reach: float,
-             height: float, inside: bool) -> np.ndarray:
-    """4x4, base from tool: the closed hand beside the door's inner or outer face.
-
-    :param turn: rad, of the hand against the face. At 0 it points straight at it. The more it lies
-        along it, the more room its width needs.
-    :param reach: m from the hinge.
-    :param height: m.
-    """
-    room = 0.01 + 0.07 * abs(np.sin(turn))
-    out = -room if inside else kitchen.door_thickness + room
-    point = apply(fridge @ door_frame(kitchen, angle), np.array([out, reach, height]))
-    outwards = np.pi - angle + yaw_of(fridge)
-    return from_rpy(point, yaw=turn + outwards + (0.0 if inside else np.pi))
-
-
-def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str, MapBox]:
-    """The fridge (4x4, in base_footprint) as obstacles by name, its door open by `angle` rad."""
-    boxes = fridge_boxes(kitchen, fridge, angle)
-    named = {'fridge_{}'.format(index): box for index, box in enumerate(boxes[:-2])}
-    named.update(door=boxes[-2], handle=boxes[-1])
-    return named
-
-
-def _place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float,
-                berth: float = 0.0) -> None:
-    """Have the door at an angle in the arm's map, with `berth` m around it."""
-    boxes = named_boxes(kitchen, fridge, angle)
-    for name in ('door', 'handle'):
-        limb.space.add_box(name, boxes[name]._replace(half=boxes[name].half + berth))

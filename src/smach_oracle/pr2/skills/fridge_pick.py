@@ -12,10 +12,12 @@ from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
 
 from ..kitchen import Kitchen, MapBox, base_from_fridge, odom_from_pose
 from ..planning.arm import FEEL_EFFORT, SLOW, Arm, SkillContext, SkillError, seed_of
+from ..planning.grasps import is_round
 from ..planning.travel import carry, drive, stow
 from ..robot import GRIPPER_OPEN
-from .door import WIDE, named_boxes
-from .pick import FIRM, Grasped, HeldObject, ObjectSlipped, nobody_told, pick, way_up
+from .at_door import named_boxes
+from .door import WIDE
+from .pick import FIRM, Grasped, HeldObject, NoGrasp, ObjectSlipped, nobody_told, pick, way_up
 
 # x, y in m and yaw in rad of the base, in the fridge's frame: from there the right arm reaches
 # far in
@@ -47,7 +49,7 @@ SAME = 0.03  # m between the middles of two boxes that are the same thing
 def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray,
                      arm: str, target: UprightBox, others: Sequence[UprightBox],
                      effort: float = FEEL_EFFORT, elsewhere: int = 0,
-                     grasped: Grasped = nobody_told) -> HeldObject:
+                     grasped: Grasped = nobody_told, from_above: bool = True) -> HeldObject:
     """Pick a drink and take it out, upright. Where that fails, the hand leaves the fridge empty.
 
     :param fridge: 4x4, where it is, in base_footprint.
@@ -55,7 +57,9 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
     :param effort: N, of the grip.
     :param elsewhere: as in pick().
     :param grasped: as in pick().
-    :raises SkillError: with the reason. ObjectSlipped where the drink did not come along.
+    :param from_above: as in pick().
+    :raises SkillError: with the reason. ObjectSlipped where the drink did not come along, NoGrasp
+        where the hand has not begun.
     """
     boxes = {
         name: _padded(box)
@@ -66,13 +70,16 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
         for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
     })
     try:
-        held = pick(context, arm, target, boxes, effort, elsewhere, grasped)._replace(effort=FIRM)
+        held = pick(context, arm, target, boxes, effort, elsewhere, grasped,
+                    from_above)._replace(effort=FIRM)
         grasped(held)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
             hand.close(held.effort)  # so that it does not creep out on the way
         _draw_out(context)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
             _carry(hand, held)
+    except NoGrasp:
+        raise
     except SkillError:
         leave(context, arm)
         raise
@@ -91,7 +98,8 @@ def beside(failed: int) -> np.ndarray:
 
 
 def _kept_off(box: UprightBox, failed: int) -> MapBox:
-    return MapBox(box.centre, np.maximum(box.size / 2 + beside(failed), LEAST_HALF), box.yaw)
+    half = np.maximum(box.size / 2 + beside(failed), LEAST_HALF)
+    return MapBox(box.centre, half, box.yaw, is_round(box))
 
 
 def take_out(context: SkillContext, kitchen: Kitchen, arm: str, held: HeldObject) -> bool:
@@ -131,7 +139,7 @@ def _carry(hand: Arm, held: HeldObject) -> None:
 
 
 def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: str,
-              attempt: int) -> UprightBox:
+              attempt: int, exactly: bool = False) -> UprightBox:
     """Drive to where drinks are picked from, where the base stands beside that. Look at a drink.
 
     Each time that a drink is picked again, the base stands otherwise. What is out of reach from one
@@ -140,6 +148,7 @@ def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: 
     :param target: the drink, in base_footprint.
     :param arm: 'left' or 'right'.
     :param attempt: how often it has been tried before.
+    :param exactly: also where the base stands nearly there.
     :returns: the drink in base_footprint as it is then.
     :raises SkillError: where the base does not get there.
     :raises RobotError: where the head does not turn.
@@ -147,7 +156,7 @@ def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: 
     robot = context.robot
     before = robot.odom_from_base()
     goal = odom_from_pose(kitchen, *_picking_pose(kitchen, before, target, arm, attempt))
-    least = STANDS_THERE if attempt else BESIDE_PICKING[0]
+    least = STANDS_THERE if attempt or exactly else BESIDE_PICKING[0]
     if not least < np.hypot(*(before - goal)[:2, 3]) < BESIDE_PICKING[1]:
         return target
     drive(context, goal)
@@ -179,7 +188,7 @@ def _draw_out(context: SkillContext) -> None:
 
 
 def seen_again(target: UprightBox, things: Sequence[UprightBox]) -> UprightBox:
-    """The drink where it is seen now, if that is a little beside where it should be.
+    """The drink where it is seen now, for a drive misjudges its own way by a centimetre or two.
 
     :param things: what is seen on the shelf.
     """
@@ -187,7 +196,7 @@ def seen_again(target: UprightBox, things: Sequence[UprightBox]) -> UprightBox:
               for number, box in enumerate(things)
               if np.abs(box.size - target.size).max() < SAME_SIZE]
     distance, number = min(beside, default=(np.inf, -1))
-    return things[number] if SAME < distance < MOVED else target
+    return things[number] if distance < MOVED else target
 
 
 def leave(context: SkillContext, arm: str) -> None:

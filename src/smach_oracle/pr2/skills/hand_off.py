@@ -6,17 +6,18 @@ it.
 """
 import numpy as np
 
-from smach_oracle.geometry.transforms import apply, from_rpy, inverse
+from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
 
 from ..fingers import fingers_gap
-from ..kitchen import Kitchen, base_from_fridge
+from ..kitchen import Kitchen, base_from_fridge, odom_from_pose
 from ..planning.arm import SLOW, Arm, SkillContext, SkillError, encoder_readings, seed_of
 from ..planning.travel import draw_back, drive, is_stowed
 from ..robot import ARMS, RobotError
 
 OFF = 0.10  # m that the base takes the hand back from the bar: there may be somebody behind it
 AWAY_FOR_GOOD = 0.40  # m, after a failure
-FARTHEST_BACK = -1.30  # x of the base, m in the fridge's frame: behind it there may be people
+# x and y of the base, m in the fridge's frame: there may be people behind, with a hand held out
+FARTHEST_BACK, FARTHEST_LEFT = -1.30, 0.0
 # m between the tips that lets go of the bar. There is no room for more between bar and door
 RELEASE = 0.045
 BEFORE = 0.10  # m that a hand comes straight to the door
@@ -50,16 +51,33 @@ def take_hands_off(context: SkillContext, kitchen: Kitchen) -> bool:
                 _let_go(context, arm)
             try:
                 draw_back(limb, BEFORE, (), SLOW)  # the way that the hand has come
-                _go_away(context, kitchen)
+                go_away(context, kitchen)
             except SkillError:  # it is hooked on something, and may have come off it by now
-                _go_away(context, kitchen)
+                withdraw(context, limb, BEFORE)
+                go_away(context, kitchen)
     return was_there
 
 
-def _go_away(context: SkillContext, kitchen: Kitchen) -> None:
-    """Drive straight back by AWAY_FOR_GOOD, but not among what stands behind the robot."""
-    here = inverse(base_from_fridge(kitchen, context.robot.odom_from_base()))
-    step_back(context, min(AWAY_FOR_GOOD, max(OFF, float(here[0, 3]) - FARTHEST_BACK)))
+def withdraw(context: SkillContext, limb: Arm, length: float) -> None:
+    """Drive a hand back along its own axis by `length` m, also sideways.
+
+    A base that is held up has not failed yet.
+    """
+    ahead = limb.pose()[:2, 0]
+    back = -length * ahead / max(float(np.hypot(*ahead)), 0.1)
+    try:
+        drive(context, context.robot.odom_from_base() @ from_rpy((*back, 0.0)))
+    except SkillError:
+        pass
+
+
+def go_away(context: SkillContext, kitchen: Kitchen) -> None:
+    """Drive back by AWAY_FOR_GOOD, but not among what stands behind the robot and to its left."""
+    before = context.robot.odom_from_base()
+    here = inverse(base_from_fridge(kitchen, before))
+    length = min(AWAY_FOR_GOOD, max(OFF, float(here[0, 3]) - FARTHEST_BACK))
+    drive(context, odom_from_pose(kitchen, float(here[0, 3]) - length,
+                                  min(float(here[1, 3]), FARTHEST_LEFT), yaw_of(here)))
 
 
 def _let_go(context: SkillContext, arm: str) -> None:

@@ -57,7 +57,7 @@ def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldO
     top = palm.centre + [0.0, 0.0, palm.half[2]]
     try:
         stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM,
-                      level=True)
+                      gently=True)
     except ObjectLost:
         if _is_given(context, arm, expected, held):
             return

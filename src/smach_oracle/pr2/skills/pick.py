@@ -21,7 +21,7 @@ from ..planning.arm import (
     summary,
 )
 from ..planning.collision_map import with_margin
-from ..planning.grasps import grasps, others_first
+from ..planning.grasps import comes_from_above, grasps, others_first
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
 
@@ -32,12 +32,20 @@ LEAST_LIFTS = (0.03,)  # m. Encoders err: what was planned may be a little too h
 FIRM = 100.0
 MISSES = 2  # grasps that may close on nothing before the skill fails
 EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
+# m that the hand is open beyond what it takes, where there is no room for one that is wide open:
+# camera and encoders err by a centimetre
+NARROW = 0.022
+SPARE = 0.004  # m: what is hardly narrower than that is not tried
 TARGET = 'the object'
 WIDTH_ERROR = 0.015  # m by which the camera may mistake a width, and fingers may give way
 
 
 class ObjectSlipped(SkillError):
     """The object did not come along when it was lifted."""
+
+
+class NoGrasp(SkillError):
+    """No grasp can be done from where the robot stands. The hand has not begun."""
 
 
 class HeldObject(NamedTuple):
@@ -65,7 +73,7 @@ class _GraspPath(NamedTuple):
 
 def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
          effort: float = FEEL_EFFORT, elsewhere: int = 0,
-         grasped: Grasped = nobody_told) -> HeldObject:
+         grasped: Grasped = nobody_told, from_above: bool = True) -> HeldObject:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
@@ -74,6 +82,8 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
     :param effort: N, of the grip.
     :param elsewhere: how many of the ways to grasp it have failed: they come last.
     :param grasped: is told what the hand has closed on, before it is lifted.
+    :param from_above: whether the hand may come straight down. What is not quite in the middle of
+        the fingers then creeps out between them.
     :raises SkillError: where that cannot be done, or the object is not in the hand in the end.
     """
     candidates = others_first(grasps(target, arm), elsewhere) if arm in ('left', 'right') else []
@@ -86,7 +96,15 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
                 'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
                     100 * target.size[0], 100 * target.size[1]))
         hand.open()
-        return _pick(hand, target, candidates, effort, grasped)
+        ways = [each for each in candidates if from_above or not comes_from_above(each)]
+        try:
+            return _pick(hand, target, ways, effort, grasped)
+        except NoGrasp:
+            gap = target.wide + NARROW
+            if gap > GRIPPER_OPEN - SPARE:
+                raise
+            hand.open(gap)
+        return _pick(hand, target, ways, effort, grasped)
 
 
 def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float,
@@ -110,7 +128,7 @@ def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: f
             raise SkillError('the gripper closed on nothing, {} times'.format(MISSES))
     if missed:
         raise SkillError('the gripper closed on nothing, and there is no other grasp')
-    raise SkillError('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
+    raise NoGrasp('none of {} grasps can be done: {}'.format(len(candidates), summary(reasons)))
 
 
 def _check_width(hand: Arm, target: UprightBox, gap: float) -> None:

@@ -33,6 +33,12 @@ CAREFUL = 0.25  # of the joints' velocity limits, with what has slipped before
 ABOVE = 0.10  # m over the place, from where the arm goes straight down
 DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
+HOVER = 0.010  # m above its place, from where it is lowered until it stands
+# m that the hand goes down in one step, and so many of them, to feel that the object stands. It
+# does where the hand stays behind by so much
+SETTLE, SETTLES, FELT = 0.003, 9, 0.0015
+GENTLE = 0.1  # of the joints' velocity limits
+LOOSE = 0.006  # m that the fingers open at first
 # m that the gap grows at least when something is let go. Between neighbours it grows no more
 ENOUGH_TO_LET_GO = 0.02
 # rad, of the object about the vertical, against how it stood
@@ -65,14 +71,15 @@ class ObjectLost(SkillError):
 
 def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
           boxes: Mapping[str, MapBox], support: str = 'table',
-          tolerance: float = 0.0, level: bool = False) -> np.ndarray:
+          tolerance: float = 0.0, gently: bool = False) -> np.ndarray:
     """Put the held object down upright, at the free spot nearest to its place.
 
     :param centre: (3,) m, where its centre should be, in base_footprint.
     :param boxes: obstacles, in base_footprint, without the held object.
     :param support: name of the one among them on which it should stand.
     :param tolerance: m that it may stand beside its place. 0 means 2 cm.
-    :param level: whether the hand is kept level on the way, where that can be.
+    :param gently: whether the hand is kept level on the way, where that can be, lowers the object
+        until it is felt to stand, and lets go of it by and by.
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
@@ -83,24 +90,60 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
                 'there is nothing to stand on: the collision map has no {}'.format(support))
         if hand.close(held.effort) == 0:
             raise ObjectLost('the {} hand holds nothing'.format(arm))
-        centre = _on_support(centre, held, boxes[support])
+        centre = _on_support(centre, held, boxes[support], HOVER if gently else DROP)
         hand.space.attach(held.half - 0.004, held.tool_from_object)
         spots, taken = free_spots(centre, tolerance, held.half, boxes, support)
         if not spots:
             raise SkillError('no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} '
                              'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
                                             _who_stands(taken)))
-        centre, path = _find_path(hand, spots, held, support, level)
+        centre, path = _find_path(hand, spots, held, support, gently)
         hand.follow(path.there, FAST if held.effort < FIRM else CAREFUL)
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
         hand.follow(path.down, SLOW)
+        back = path.back
+        if gently:
+            _settle(hand)
+            _let_stand(hand)
+            back = _back_from(hand, back)
         hand.open(path.gap)
         hand.space.detach()
-        hand.follow(path.back, SLOW)
+        hand.follow(back, SLOW)
         if path.gap < GRIPPER_OPEN:
             hand.open()
         return centre
+
+
+def _settle(hand: Arm) -> None:
+    """Lower the object until the arm gives way: what leans in the hand stands straight then.
+
+    An arm that is held up has not failed.
+    """
+    for _ in range(SETTLES):
+        wanted = lifted(hand.pose(), -SETTLE)
+        with hand.space.touchable(hand.space.names()):
+            path = hand.line(hand.now(), wanted)
+        if path is None:
+            return
+        try:
+            hand.follow(path, GENTLE)
+        except SkillError:
+            return
+        if hand.pose()[2, 3] > wanted[2, 3] + FELT:
+            return
+
+
+def _let_stand(hand: Arm) -> None:
+    """Open the fingers a little: what begins to tip over is still between them."""
+    hand.open(min(hand.gap() + LOOSE, GRIPPER_OPEN))
+
+
+def _back_from(hand: Arm, planned: np.ndarray) -> np.ndarray:
+    """A path (m, 7) straight back from where the hand is now. Where there is none, the planned."""
+    with hand.space.touchable(hand.space.names()):
+        path = hand.line(hand.now(), backed_off(hand.pose(), RETREAT))
+    return planned if path is None else path
 
 
 def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[str,
@@ -151,8 +194,8 @@ def _leans(points: np.ndarray, held: HeldObject) -> bool:
     return upright_box(own, float(own[:, 2].min())).wide > 2 * max(held.half[:2]) + LEANING
 
 
-def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.ndarray:
-    """The place asked for, at the height at which the object stands."""
+def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox, drop: float) -> np.ndarray:
+    """The place asked for, `drop` m above the height at which the object stands."""
     top = support.centre[2] + support.half[2]
     inside = beyond(centre, support)
     height = top + held.half[2]
@@ -162,7 +205,7 @@ def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox) -> np.nda
             'there is nothing to stand on at x {:.2f}, y {:.2f}, z {:.2f} m: the support is '
             '{:.2f} m high and the place is {:.0f} cm {} its edge'.format(
                 x, y, z, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'))
-    return np.array([x, y, height + DROP])
+    return np.array([x, y, height + drop])
 
 
 def _who_stands(taken: Sequence[str]) -> str:
