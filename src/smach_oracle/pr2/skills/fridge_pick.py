@@ -34,6 +34,7 @@ STANDS_THERE = 0.02  # m
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
 PADDING = 0.03  # m, for the fridge is not quite where the map has it
 BESIDE = 0.004  # m around things on the shelf
+ROUND = 0.008  # m more around what is round, in place of the corners of its box
 # m that a thing on the shelf may be pushed aside, for each kind of grasp that has failed, and so
 # many of them at most
 PUSHED, MOST_PUSHES = 0.012, 2
@@ -98,8 +99,9 @@ def beside(failed: int) -> np.ndarray:
 
 
 def _kept_off(box: UprightBox, failed: int) -> MapBox:
-    half = np.maximum(box.size / 2 + beside(failed), LEAST_HALF)
-    return MapBox(box.centre, half, box.yaw, is_round(box))
+    is_cylinder = is_round(box)
+    more = beside(failed) + (ROUND if is_cylinder else 0.0)
+    return MapBox(box.centre, np.maximum(box.size / 2 + more, LEAST_HALF), box.yaw, is_cylinder)
 
 
 def take_out(context: SkillContext, kitchen: Kitchen, arm: str, held: HeldObject) -> bool:
