@@ -32,6 +32,8 @@ from ..planning.arm import (
 from ..robot import BASE_FRAME, GRIPPER_OPEN, TOOL_FRAME
 from ..skills.door import close_door, open_door
 from ..skills.fridge_pick import (
+    STANCES,
+    Stance,
     come_near,
     leave,
     pick_from_fridge,
@@ -45,9 +47,6 @@ from .frames import box_in_base, pose_in_base, pose_message
 from .manipulation import USUAL, Manipulation, check_is_there, elsewhere_of
 from .skill_server import ReportStatus
 
-# the places of the base from which a pick looks for a grasp, and whether the hand may come straight
-# down there
-PLACES = ((0, False), (1, False), (2, False), (3, False), (0, True))
 FRIDGE = 'fridge'  # the map_id of goals that pick inside the refrigerator
 
 
@@ -102,13 +101,13 @@ class KitchenSkills(Manipulation):
     def _pick_from_somewhere(self, goal: PickGoal, arm: str, target: UprightBox,
                              report: ReportStatus) -> HeldObject:
         """Pick a drink from the first place of the base from which there is a grasp."""
-        for place, from_above in PLACES:
-            there = come_near(self.context, self.kitchen, target, arm, goal.attempt + place,
-                              from_above)
+        for stance in STANCES:
+            there = come_near(self.context, self.kitchen, target, arm, goal.attempt + stance.place,
+                              stance is not STANCES[0])
             try:
-                return self._pick_inside(goal, arm, there, there is not target, from_above, report)
+                return self._pick_inside(goal, arm, there, there is not target, stance, report)
             except NoGrasp:
-                if (place, from_above) == PLACES[-1]:
+                if stance is STANCES[-1]:
                     raise
             target = there
         raise SkillError('there is no place to pick from')
@@ -135,11 +134,10 @@ class KitchenSkills(Manipulation):
             self.hands.feel(self.context.robot)
 
     def _pick_inside(self, goal: PickGoal, arm: str, target: UprightBox, driven: bool,
-                     from_above: bool, report: ReportStatus) -> HeldObject:
+                     stance: Stance, report: ReportStatus) -> HeldObject:
         """Pick a drink from where the base stands.
 
         :param driven: whether the base has driven since the drink was seen.
-        :param from_above: whether the hand may come straight down, at the first ways to grasp it.
         """
         report('choosing a grasp in the refrigerator')
         robot = self.context.robot
@@ -151,10 +149,9 @@ class KitchenSkills(Manipulation):
         target = seen_again(target, others) if driven else target
         try:
             with self.firmer_after_slip(goal.attempt) as effort:
-                failed = elsewhere_of(goal.attempt)
                 held = pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others,
-                                        effort, failed, partial(self.hands.keep, arm),
-                                        from_above or failed > 0)
+                                        effort, elsewhere_of(goal.attempt),
+                                        partial(self.hands.keep, arm), stance)
         except SkillError:
             self.hands.feel(robot)
             raise

@@ -16,6 +16,7 @@ SPARE = 0.002  # m between the open tips and such corners that is enough
 # x, y in base_footprint, m
 SHOULDER = {'right': np.array([-0.05, -0.19]), 'left': np.array([-0.05, 0.19])}
 HEADINGS = np.linspace(-1.3, 1.3, 14)  # rad, beside the straight one from the shoulder
+FINE_HEADINGS = np.linspace(-1.3, 1.3, 27)  # where there is little room
 PITCHES = (0.0, 0.4, 0.8, np.pi / 2)  # rad, of the hand downwards
 ROUND = 0.006  # m by which the sides of the box of something round differ at most
 NO_HEADING = 0.02  # rad that the base may have turned since its box was seen
@@ -30,14 +31,16 @@ FLAT = 30.0
 DEEP = 0.05
 
 
-def grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
+def grasps(box: UprightBox, arm: str, fine: bool = False) -> List[np.ndarray]:
     """Ways to take a thing, the most natural first, or [] where it is too wide from everywhere.
 
     :param box: in base_footprint.
+    :param fine: whether to try twice as many headings.
     :returns: poses of the tool (4x4, in base_footprint) when the gripper closes.
     """
     straight = float(np.arctan2(*(box.centre[:2] - SHOULDER[arm])[::-1]))
-    found = [(cost, order, grasp) for order, (cost, grasp) in enumerate(_all(box, straight))]
+    found = [(cost, order, grasp) for order, (cost, grasp) in enumerate(
+        _all(box, straight, FINE_HEADINGS if fine else HEADINGS))]
     return [grasp for _, _, grasp in sorted(found, key=lambda item: item[:2])]
 
 
@@ -69,9 +72,9 @@ def _inclination(grasp: np.ndarray) -> float:
     return round(float(np.arcsin(np.clip(-grasp[2, 0], -1.0, 1.0))), 2)
 
 
-def _all(box: UprightBox, straight: float) -> Iterator[tuple]:
+def _all(box: UprightBox, straight: float, headings: np.ndarray) -> Iterator[tuple]:
     for pitch in PITCHES:
-        for turn in np.append(HEADINGS, _to_the_faces(box, straight)):
+        for turn in np.append(headings, _to_the_faces(box, straight)):
             heading = straight + turn
             if width_across(box, heading) <= WIDEST:
                 pose = from_rpy(_middle(box, heading, pitch), pitch=pitch, yaw=heading)

@@ -3,7 +3,7 @@
 Where the program that asked for it was stopped, the drink may be in the hand, in the refrigerator
 or before it. The skill goes on from there.
 """
-from typing import Sequence, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from ..planning.travel import carry, drive, stow
 from ..robot import GRIPPER_OPEN
 from .at_door import named_boxes
 from .door import WIDE
-from .pick import FIRM, Grasped, HeldObject, NoGrasp, ObjectSlipped, nobody_told, pick, way_up
+from .pick import Grasped, HeldObject, NoGrasp, ObjectSlipped, nobody_told, pick, way_up
 
 # x, y in m and yaw in rad of the base, in the fridge's frame: from there the right arm reaches
 # far in
@@ -34,12 +34,15 @@ STANDS_THERE = 0.02  # m
 STEP_BACK = 0.40  # m that the base draws back to take the hand out
 PADDING = 0.03  # m, for the fridge is not quite where the map has it
 BESIDE = 0.004  # m around things on the shelf
-ROUND = 0.008  # m more around what is round, in place of the corners of its box
+ROUND = 0.005  # m more around what is round, in place of the corners of its box
 # m that a thing on the shelf may be pushed aside, for each kind of grasp that has failed, and so
 # many of them at most
 PUSHED, MOST_PUSHES = 0.012, 2
 LEAST_HALF = 0.005  # m of a thing that is left then
 DRAWN_OUT = 0.05  # m that the base need not draw back
+# N, of the grip of what is carried: a wet drink creeps out of a softer one, and pressed harder any
+# drink leans more and more
+CARRIED = 70.0
 OFF_SHELF = 0.03  # m that a drink which is drawn out is lifted, at least
 UP = (0.05, 0.03)  # m that it is lifted otherwise
 SAME_SIZE = 0.02  # m between the sizes of two boxes that are the same thing
@@ -47,10 +50,23 @@ MOVED = 0.08  # m that a drive may misjudge the place of a drink
 SAME = 0.03  # m between the middles of two boxes that are the same thing
 
 
+class Stance(NamedTuple):
+    """A way to stand before a drink, and what the hand may do from there."""
+
+    place: int  # of the base, as an attempt has it
+    from_above: bool = False  # whether the hand may come straight down
+    pushes: int = 0  # how often PUSHED it may push others aside
+
+
+# in this order, until there is a grasp
+STANCES = (Stance(0), Stance(1), Stance(2), Stance(3), Stance(0, from_above=True),
+           Stance(1, pushes=1), Stance(2, pushes=1))
+
+
 def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray,
                      arm: str, target: UprightBox, others: Sequence[UprightBox],
                      effort: float = FEEL_EFFORT, elsewhere: int = 0,
-                     grasped: Grasped = nobody_told, from_above: bool = True) -> HeldObject:
+                     grasped: Grasped = nobody_told, stance: Stance = STANCES[0]) -> HeldObject:
     """Pick a drink and take it out, upright. Where that fails, the hand leaves the fridge empty.
 
     :param fridge: 4x4, where it is, in base_footprint.
@@ -58,7 +74,7 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
     :param effort: N, of the grip.
     :param elsewhere: as in pick().
     :param grasped: as in pick().
-    :param from_above: as in pick().
+    :param stance: what the hand may do, where `elsewhere` is 0. Else it may do all.
     :raises SkillError: with the reason. ObjectSlipped where the drink did not come along, NoGrasp
         where the hand has not begun.
     """
@@ -67,12 +83,13 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
         for name, box in named_boxes(kitchen, fridge, WIDE).items()
     }
     boxes.update({
-        'thing {}'.format(k): _kept_off(box, elsewhere)
+        'thing {}'.format(k): _kept_off(box, max(elsewhere, stance.pushes))
         for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
     })
     try:
         held = pick(context, arm, target, boxes, effort, elsewhere, grasped,
-                    from_above)._replace(effort=FIRM)
+                    stance.from_above or elsewhere > 0)
+        held = held._replace(effort=max(effort, CARRIED))
         grasped(held)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
             hand.close(held.effort)  # so that it does not creep out on the way

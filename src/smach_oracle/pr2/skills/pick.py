@@ -34,7 +34,7 @@ MISSES = 2  # grasps that may close on nothing before the skill fails
 EFFORT = 40000  # collision checks for the choice of a grasp, about 3 s
 # m that the hand is open beyond what it takes, where there is no room for one that is wide open:
 # camera and encoders err by a centimetre
-NARROW = 0.022
+NARROW = 0.018
 SPARE = 0.004  # m: what is hardly narrower than that is not tried
 TARGET = 'the object'
 WIDTH_ERROR = 0.015  # m by which the camera may mistake a width, and fingers may give way
@@ -104,6 +104,8 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
             if gap > GRIPPER_OPEN - SPARE:
                 raise
             hand.open(gap)
+        finer = others_first(grasps(target, arm, fine=True), elsewhere)
+        ways = [each for each in finer if from_above or not comes_from_above(each)]
         return _pick(hand, target, ways, effort, grasped)
 
 

@@ -35,8 +35,8 @@ DROP = 0.004  # m that the object falls when it is let go, more or less
 RETREAT = 0.12  # m straight back afterwards
 HOVER = 0.010  # m above its place, from where it is lowered until it stands
 # m that the hand goes down in one step, and so many of them, to feel that the object stands. It
-# does where the hand stays behind by so much
-SETTLE, SETTLES, FELT = 0.003, 9, 0.0015
+# does where the hand stays behind by so much: less is an edge of what leans
+SETTLE, SETTLES, FELT = 0.003, 10, 0.004
 GENTLE = 0.1  # of the joints' velocity limits
 LOOSE = 0.006  # m that the fingers open at first
 # m that the gap grows at least when something is let go. Between neighbours it grows no more
@@ -120,8 +120,9 @@ def _settle(hand: Arm) -> None:
 
     An arm that is held up has not failed.
     """
+    wanted = hand.pose()
     for _ in range(SETTLES):
-        wanted = lifted(hand.pose(), -SETTLE)
+        wanted = lifted(wanted, -SETTLE)
         with hand.space.touchable(hand.space.names()):
             path = hand.line(hand.now(), wanted)
         if path is None:
