@@ -52,7 +52,7 @@ def outline_of(thing):
 
 
 def test_what_stands_close_or_on_the_place_is_in_the_way_and_there_is_room_elsewhere(world):
-    scene = draw(2, benign=True)
+    scene = draw(4, benign=True)
     things = {body.name: body for body in scene.bodies}
     target = things['object_0']
     table = target.position[2] - target.size[2] / 2

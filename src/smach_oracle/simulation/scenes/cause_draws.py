@@ -10,7 +10,7 @@ from smach_oracle.geometry.transforms import rotation_about
 
 LASTING, PASSING = 'lasting', 'passing'
 LASTING_SHARE = 0.6  # of the causes. A parameter of the world may say otherwise
-ANOTHER = 0.10  # chance of a second cause, where there is one
+ANOTHER = 0.10  # chance of a second cause, where there is one, at least
 WEIGHTS = Mapping[str, float]
 
 
@@ -21,7 +21,7 @@ def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGH
     With another `lasting` the same trials have causes, and a kind has the same values.
 
     :param stream: of random numbers, one for each task.
-    :param amount: chance of a cause.
+    :param amount: chance of a cause. What is beyond 1 is the chance of a second one.
     :param kinds: weights of the kinds that last, and of those that pass.
     :param lasting: chance of a kind that lasts.
     """
@@ -29,7 +29,7 @@ def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGH
     for number in range(2):
         generator = np.random.default_rng([seed, stream, 100 + number])
         there, lasts, which = generator.random(3)
-        if there >= (ANOTHER if number else amount):
+        if there >= (max(ANOTHER, amount - 1.0) if number else amount):
             return
         weights = kinds[LASTING if lasts < lasting else PASSING]
         found.append(_chosen(weights, which))

@@ -30,7 +30,6 @@ def _ball(generator: np.random.Generator) -> Drawn:
 
 
 def _packet(generator: np.random.Generator) -> Drawn:
-    # no wider: things stand CLEAR apart, by their middles
     size = (float(generator.uniform(0.08, 0.11)), float(generator.uniform(0.045, 0.06)),
             float(generator.uniform(0.05, 0.20)))
     return 'box', size, 0.40

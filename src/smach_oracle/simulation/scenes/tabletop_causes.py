@@ -145,7 +145,7 @@ def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> Optional[T
     thing, other = draft.things[TARGET], spare[-1]
     gap = float(generator.uniform(0.014, 0.032))
     away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
-    far = _radius(thing) + _radius(other) + gap
+    far = radius_of(thing) + radius_of(other) + gap
     spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
     moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
     return caused(_with_moved(draft, moved), 'crowded',
@@ -227,7 +227,8 @@ def _with_moved(draft: TabletopDraft, *moved: Body) -> TabletopDraft:
     return draft._replace(things=tuple(places.get(each.name, each) for each in draft.things))
 
 
-def _radius(thing: Body) -> float:
+def radius_of(thing: Body) -> float:
+    """Return the radius, m, of the circle around a thing that stands, seen from above."""
     if thing.shape == 'box':
         return float(np.hypot(*thing.size[:2])) / 2
     return thing.size[0] if thing.shape == 'cylinder' else thing.size[0] / 2

@@ -9,7 +9,7 @@ from .chance import generator_for
 from .clutter import another
 from .kitchen_causes import STEADY
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
-from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, with_causes
+from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, radius_of, with_causes
 from .unlike_the_map import TrueTable, true_table
 
 TASK = 'pick_and_place'
@@ -18,9 +18,14 @@ TABLE_SIZE = (0.70, 1.40, 0.04)
 TOLERANCE = 0.06
 NEAREST_X, NEAREST_Y = (0.53, 0.62), (-0.12, 0.22)  # m, where the object to be picked stands
 OTHERS_X, OTHERS_Y = (0.62, 0.86), (-0.45, 0.40)
-CLEAR = 0.13  # m between the middles of things, where nothing is crowded
-FREE_GOAL = 0.17  # m around the goal
-MASS = (0.15, 0.40)  # kg
+CLEAR = 0.13  # m between the middles of a thing that is put out later and the others
+GAP = 0.033  # m between the outlines of things. Nearer to the one to be picked it is crowded
+FREE_GOAL = 0.085  # m around the goal, without any outline
+OTHERS = (4, 7)  # so many, where there is room
+SPOTS = 60  # that are tried for them
+DENSITY = (100.0, 1100.0)  # kg/m^3: from nearly empty to full of soup
+# coefficient, median and spread of its logarithm, and its limits: what is greased, and rubber
+FRICTION, FRICTION_SPREAD, FRICTIONS = 0.3, 0.6, (0.08, 1.0)
 COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15),
            (0.55, 0.20, 0.60), (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
 WOOD = (0.58, 0.42, 0.27)
@@ -42,10 +47,22 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
 
 
 def fresh_things(seed: int) -> Tuple[Body, ...]:
-    """Return what stands on a table of TABLE_TOP that is set out afresh, the nearest first."""
-    target, *others = _things(np.random.default_rng([seed, 61]))
-    return (target, *(another(generator_for(seed, 'clutter:' + each.name), each, TABLE_TOP)
-                      for each in others))
+    """Return what stands on a table of TABLE_TOP that is set out afresh.
+
+    The nearest thing, which is to be picked, comes first. The others stand beyond it.
+    """
+    generator = np.random.default_rng([seed, 61])
+    colours = [COLOURS[number] for number in generator.permutation(len(COLOURS))]
+    wanted = 1 + int(generator.integers(OTHERS[0], OTHERS[1] + 1))
+    things = [_thing(generator, 'object_0', NEAREST_X, NEAREST_Y, colours[0])]
+    for number in range(1, SPOTS + 1):
+        name = 'object_{}'.format(len(things))
+        drawn = another(generator_for(seed, 'clutter:{}'.format(number)),
+                        _thing(generator, name, OTHERS_X, OTHERS_Y,
+                               colours[len(things) % len(colours)]), TABLE_TOP)
+        if len(things) < wanted and _has_room(drawn, things):
+            things.append(drawn)
+    return tuple(things)
 
 
 def composed(seed: int, draft: TabletopDraft, table: TrueTable, robot: RobotStart) -> Scene:
@@ -76,35 +93,29 @@ def _table(table: TrueTable) -> List[Body]:
     return [top] + legs
 
 
-def _things(generator: np.random.Generator) -> Tuple[Body, ...]:
-    """The object to be picked, which stands nearest, and two to four others beyond it."""
-    colours = generator.permutation(len(COLOURS))
-    spots = [(generator.uniform(*NEAREST_X), generator.uniform(*NEAREST_Y))]
-    wanted = 1 + int(generator.integers(2, 5))
-    for _ in range(300):
-        x, y = generator.uniform(*OTHERS_X), generator.uniform(*OTHERS_Y)
-        beyond = np.hypot(x, y) > np.hypot(*spots[0]) + 0.05
-        if len(spots) < wanted and beyond and _clear((x, y), spots):
-            spots.append((x, y))
-    return tuple(
-        _thing(generator, 'object_{}'.format(k), spot, COLOURS[colours[k]])
-        for k, spot in enumerate(spots))
+def _has_room(thing: Body, things: Sequence[Body]) -> bool:
+    """Whether it stands beyond the first of things, apart from all, and not at the goal."""
+    place, target = np.array(thing.position[:2]), np.array(things[0].position[:2])
+    apart = min(
+        np.hypot(*(place - each.position[:2])) - radius_of(thing) - radius_of(each)
+        for each in things)
+    return bool(np.hypot(*place) > np.hypot(*target) + 0.05 and apart > GAP
+                and np.hypot(*(place - GOAL)) - radius_of(thing) > FREE_GOAL)
 
 
-def _clear(spot: Tuple[float, float], spots: List[Tuple[float, float]]) -> bool:
-    away = [np.hypot(spot[0] - x, spot[1] - y) for x, y in spots]
-    return min(away) > CLEAR and np.hypot(spot[0] - GOAL[0], spot[1] - GOAL[1]) > FREE_GOAL
-
-
-def _thing(generator: np.random.Generator, name: str, spot: Tuple[float, float],
-           colour: Tuple[float, float, float]) -> Body:
-    """A can or a carton."""
+def _thing(generator: np.random.Generator, name: str, deep: Tuple[float, float],
+           wide: Tuple[float, float], colour: Tuple[float, float, float]) -> Body:
+    """Draw a can or a carton at x and y (m) between limits."""
+    x, y = float(generator.uniform(*deep)), float(generator.uniform(*wide))
     tall = float(generator.uniform(0.10, 0.16))
-    wide = float(generator.uniform(0.024, 0.036))
-    mass = float(generator.uniform(*MASS))
-    position = (float(spot[0]), float(spot[1]), TABLE_TOP + tall / 2 + 0.001)
+    half = float(generator.uniform(0.024, 0.036))
+    density = float(generator.uniform(*DENSITY))
+    friction = float(np.clip(generator.lognormal(np.log(FRICTION), FRICTION_SPREAD), *FRICTIONS))
+    thing = Body(name, 'cylinder', (half, half, tall), (x, y, TABLE_TOP + tall / 2 + 0.001),
+                 mass=density * np.pi * half ** 2 * tall, friction=friction, colour=colour)
     if generator.random() < 0.55:
-        return Body(name, 'cylinder', (wide, wide, tall), position, mass=mass, colour=colour)
-    deep = float(generator.uniform(0.6, 1.0)) * wide
-    return Body(name, 'box', (2 * wide, 2 * deep, tall), position,
-                yaw=float(generator.uniform(-1.5, 1.5)), mass=mass, colour=colour)
+        return thing
+    thick = float(generator.uniform(0.6, 1.0)) * half
+    return thing._replace(shape='box', size=(2 * half, 2 * thick, tall),
+                          mass=density * 4 * half * thick * tall,
+                          yaw=float(generator.uniform(-1.5, 1.5)))
