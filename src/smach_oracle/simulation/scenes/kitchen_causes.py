@@ -20,7 +20,7 @@ from .fridge import closing_hinge
 from .scene import Body, ClosingHinge, Disturbance, SceneCause, Vector
 
 # why, and why so often: doc/protocol.md
-AMOUNT = 1.35  # chances that a trial has a cause, and a second one
+AMOUNT = 1.6  # chances that a trial has a cause, and a second one
 KINDS_OF = {
     LASTING: {'base_misplaced': 0.25, 'glare': 0.20, 'crowded': 0.15, 'slippery_drink': 0.15,
               'door_falls_shut': 0.15, 'dim_light': 0.10},
