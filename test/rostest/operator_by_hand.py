@@ -62,7 +62,7 @@ class ByHand(unittest.TestCase):
         return answer.outputs or {}
 
     def test_a_thing_is_shown_taken_and_put_down(self):
-        self.assertTrue(rospy.ServiceProxy('world/reset', ResetWorld)(3).ok)
+        self.assertTrue(rospy.ServiceProxy('world/reset', ResetWorld)(4).ok)
         self.look_at_the_table()
         reveal = rospy.ServiceProxy('world/reveal', Reveal)
         thing = reveal(['object_0']).bodies[0]
