@@ -13,6 +13,7 @@ from ..kitchen import Kitchen, base_from_fridge, odom_from_pose
 from ..planning.arm import SLOW, Arm, SkillContext, SkillError, encoder_readings, seed_of
 from ..planning.travel import draw_back, drive, is_stowed
 from ..robot import ARMS, RobotError
+from .at_door import BEFORE
 
 OFF = 0.10  # m that the base takes the hand back from the bar: there may be somebody behind it
 AWAY_FOR_GOOD = 0.40  # m, after a failure
@@ -20,7 +21,6 @@ AWAY_FOR_GOOD = 0.40  # m, after a failure
 FARTHEST_BACK, FARTHEST_LEFT = -1.30, 0.0
 # m between the tips that lets go of the bar. There is no room for more between bar and door
 RELEASE = 0.045
-BEFORE = 0.10  # m that a hand comes straight to the door
 ABOUT_DOOR = 0.25  # m beyond the door's edge, from the hinge, where a hand may touch bar or door
 
 

@@ -96,17 +96,19 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
                 'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
                     100 * target.size[0], 100 * target.size[1]))
         hand.open()
-        ways = [each for each in candidates if from_above or not comes_from_above(each)]
         try:
-            return _pick(hand, target, ways, effort, grasped)
+            return _pick(hand, target, _allowed(candidates, from_above), effort, grasped)
         except NoGrasp:
             gap = target.wide + NARROW
             if gap > GRIPPER_OPEN - SPARE:
                 raise
             hand.open(gap)
         finer = others_first(grasps(target, arm, fine=True), elsewhere)
-        ways = [each for each in finer if from_above or not comes_from_above(each)]
-        return _pick(hand, target, ways, effort, grasped)
+        return _pick(hand, target, _allowed(finer, from_above), effort, grasped)
+
+
+def _allowed(candidates: List[np.ndarray], from_above: bool) -> List[np.ndarray]:
+    return [each for each in candidates if from_above or not comes_from_above(each)]
 
 
 def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float,

@@ -56,11 +56,12 @@ def fresh_things(seed: int) -> Tuple[Body, ...]:
     wanted = 1 + int(generator.integers(OTHERS[0], OTHERS[1] + 1))
     things = [_thing(generator, 'object_0', NEAREST_X, NEAREST_Y, colours[0])]
     for number in range(1, SPOTS + 1):
-        name = 'object_{}'.format(len(things))
+        if len(things) == wanted:
+            break
         drawn = another(generator_for(seed, 'clutter:{}'.format(number)),
-                        _thing(generator, name, OTHERS_X, OTHERS_Y,
-                               colours[len(things) % len(colours)]), TABLE_TOP)
-        if len(things) < wanted and _has_room(drawn, things):
+                        _thing(generator, 'object_{}'.format(len(things)), OTHERS_X, OTHERS_Y,
+                               colours[len(things)]), TABLE_TOP)
+        if _has_room(drawn, things):
             things.append(drawn)
     return tuple(things)
 
