@@ -139,6 +139,32 @@ def test_trials_with_bags_come_behind_those_that_have_rows_alone(results, tmp_pa
     assert (progress.kept, len(progress.done), progress.next_trial) == (2, 1, 3)
 
 
+@pytest.mark.parametrize('torn', ['a.bag', 'a.bag.active'])
+def test_a_torn_bag_costs_no_row(results, tmp_path, torn):
+    """Where a machine goes on from rows, its first trial may be cut off before it is closed."""
+    results().add([trial(number) for number in range(3)], {}, tmp_path / 'none')
+    records = ReplicateRecords(tmp_path / 'job', FIRST_SEED, 6)
+    (records.folder / torn).touch()
+    progress = records.tidy_up(results().kept())
+    assert (progress.kept, progress.next_trial, progress.dropped) == (3, 3, (torn,))
+    assert not list(records.folder.glob('*.active'))
+    assert json.loads(records.rates.read_text())['containers'] == learned(2)
+
+
+def test_a_torn_bag_before_others_costs_no_row(results, tmp_path, monkeypatch):
+    results().add([trial(number) for number in range(4)], {}, tmp_path / 'none')
+    records = ReplicateRecords(tmp_path / 'job', FIRST_SEED, 6)
+    for name in ('a.bag', 'b.bag'):
+        (records.folder / name).touch()
+    monkeypatch.setattr(records, 'read', lambda path: trial(3) if path.endswith('b.bag') else None)
+    (records.folder / 'truth.jsonl').write_text(json.dumps({
+        'seed': 103, 'task': 't', 'success': True, 'why': '', 'causes': [], 'sim_s': 1.0,
+        'wall_s': 1.0, 'share': {}}) + '\n')
+    progress = records.tidy_up(results().kept())
+    assert (progress.kept, len(progress.done), progress.next_trial) == (3, 1, 4)
+    assert progress.dropped == ('a.bag',)
+
+
 def test_rows_that_do_not_tell_the_rates_are_refused(results, tmp_path):
     append_rows(tmp_path / RESULTS_FILE, [
         read._replace(learned='') for read in _rows_of(results(), tmp_path)])

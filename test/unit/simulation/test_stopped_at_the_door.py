@@ -11,7 +11,7 @@ from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
 from smach_oracle.simulation.scenes.kitchen_scene import draw
 
 
-@pytest.mark.parametrize('motions, degrees, gap', [(6, (0, 5), (0.02, 0.03)),
+@pytest.mark.parametrize('motions, degrees, gap', [(6, (-0.1, 5), (0.02, 0.03)),
                                                    (8, (60, 80), (0.02, 0.03)),
                                                    (14, (88, 100), (0.02, 0.03)),
                                                    (16, (88, 100), (0.04, 0.05))])

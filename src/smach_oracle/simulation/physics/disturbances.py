@@ -17,11 +17,11 @@ Each also takes ``delay`` s (0): how long after its event it begins. All times a
 
 Events are counted since the reset: ``see`` or ``see:1`` is the first image, ``drive:2`` the end of
 the second drive. They are start, follow, follow_left, follow_right, open_left, close_left (and
-right), torso, look_at, drive, see.
+right), torso, look_at, depart, drive, see. A disturbance that has ``near`` counts only those that
+happen near to that place. The place of look_at and see is the camera's, that of depart is where
+the drive goes, and that of all others is the base's.
 """
 import math
-from collections import Counter
-from typing import Counter as CounterOf
 from typing import Dict, List, NamedTuple, Protocol
 
 import numpy as np
@@ -36,8 +36,9 @@ from .easing import eased
 from .pr2_body import PERIOD, Pr2Body, arm_of
 from .pushed_arm import SETTLING_S
 
-EVENTS = ('start', 'follow', 'torso', 'look_at', 'drive', 'see') + tuple(
+EVENTS = ('start', 'follow', 'torso', 'look_at', 'depart', 'drive', 'see') + tuple(
     '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
+SEEING = ('look_at', 'see')  # events that happen where the camera is
 FASTEST = 0.5  # m/s, of a nudge
 LOOK_PERIODS = 30  # control periods from one look at what has become of the causes to the next
 SIGNED = ('dx', 'dy') + light.PLACES  # values that may be negative
@@ -80,6 +81,24 @@ class DisturbedWorld(Protocol):
         """See World."""
 
 
+class _Outstanding:
+    """A disturbance whose event has not come yet."""
+
+    def __init__(self, disturbance: Disturbance) -> None:
+        self.disturbance = disturbance
+        self._event, _, number = _numbered(disturbance.after).partition(':')
+        self._left = int(number)
+
+    def comes_with(self, event: str, place: np.ndarray) -> bool:
+        """Whether an event at a place (3,) is the one. It is counted."""
+        near = self.disturbance.near
+        if event == self._event and (near is None or float(
+                np.linalg.norm(place - near.place)) <= near.within):
+            self._left -= 1
+            return self._left == 0
+        return False
+
+
 class _Due(NamedTuple):
     """A disturbance whose event has come."""
 
@@ -107,23 +126,22 @@ class Disturbances:
         """
         for disturbance in scene.disturbances:
             _check(disturbance, scene, robot)
-        self._waiting = list(scene.disturbances)
-        self._counts: CounterOf[str] = Counter()
+        self._waiting = [_Outstanding(each) for each in scene.disturbances]
         self._due: List[_Due] = []
         self._moving: List[_ActiveDisturbance] = []
         self.lights = light.Lights()
         self.log = CauseLog(scene.causes, [each.cause for each in scene.disturbances])
 
-    def happened(self, event: str, period: int) -> None:
+    def happened(self, event: str, period: int, place: np.ndarray) -> None:
         """Count an event, and set off what waited for it.
 
         :param period: the control period, since the reset.
+        :param place: (3,) m in the world, where it happened.
         """
-        self._counts[event] += 1
-        now = '{}:{}'.format(event, self._counts[event])
-        for disturbance in list(self._waiting):
-            if _numbered(disturbance.after) == now:
-                self._waiting.remove(disturbance)
+        for waiting in list(self._waiting):
+            disturbance = waiting.disturbance
+            if waiting.comes_with(event, place):
+                self._waiting.remove(waiting)
                 begins = period + round(_values(disturbance)['delay'] / PERIOD)
                 if disturbance.kind in light.OPTIONS:
                     self._light(disturbance, begins)
@@ -231,6 +249,10 @@ def _check(disturbance: Disturbance, scene: Scene, robot: Pr2Body) -> None:
     elif event not in EVENTS or not number.isdigit() or int(number) < 1:
         wrong = 'unknown event {!r}; allowed: {}, each with :NUMBER'.format(
             disturbance.after, ', '.join(EVENTS))
+    elif disturbance.near and not (disturbance.near.within > 0 and all(
+            map(math.isfinite, disturbance.near.place))):
+        wrong = 'near is {}; allowed: a place of finite m, within more than 0 m'.format(
+            tuple(disturbance.near))
     elif kind == 'swing' and body not in [
             each.name for each in scene.bodies if each.shape == 'urdf'
     ]:

@@ -130,7 +130,10 @@ class HeadMotion(Trajectory):
 
 
 class BaseMotion:
-    """Drives the base, straight and blindly, to where odometry has the goal."""
+    """Drives the base, straight and blindly, to where odometry has the goal.
+
+    It sets off when the disturbances that its beginning has set off are over.
+    """
 
     def __init__(self, odom_from_goal: np.ndarray) -> None:
         """Take a command.
@@ -141,11 +144,16 @@ class BaseMotion:
         if np.shape(odom_from_goal) != (4, 4) or not np.isfinite(odom_from_goal).all():
             raise ValueError('drive: the goal is no finite 4x4 pose')
         self._goal = np.asarray(odom_from_goal, float)
-        self._begun = -1
+        self._departed, self._begun = False, -1
 
     def tick(self, world: World) -> Optional[MotionResult]:
         """See Motion."""
+        if not self._departed:
+            self._departed = True
+            world.happened('depart', place=(inverse(world.map_error) @ self._goal)[:3, 3])
         if self._begun < 0:
+            if world.disturbed:
+                return None
             self._begin(world)
         done = (world.periods - self._begun) / self._periods
         here, there = (self._place_at(min(1.0, done + more)) for more in (0.0, 1.0 / self._periods))

@@ -10,12 +10,12 @@ import numpy as np
 import pybullet
 
 from smach_oracle.geometry.transforms import from_rpy, inverse, yaw_of
-from smach_oracle.pr2.robot import ARMS, TOOL_FRAME
+from smach_oracle.pr2.robot import ARMS, CAMERA_FRAME, TOOL_FRAME
 
 from ..scenes.scene import Body, Goal, Scene
 from .bodies import PlacedBody, add_body, add_floor, check_scene, pose_of
 from .cause_log import CauseSpan
-from .disturbances import Disturbances
+from .disturbances import SEEING, Disturbances
 from .door_hinges import DoorHinges
 from .harm import HarmWatch
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
@@ -131,10 +131,15 @@ class World:
         """Begin to push an arm as a person would. See PushedArm."""
         self._pushed.append(PushedArm(self._robot, joints, seconds, motors))
 
-    def happened(self, *events: str) -> None:
-        """Count events, such as 'look_at'. They may set off a disturbance of the scene."""
+    def happened(self, *events: str, place: Optional[np.ndarray] = None) -> None:
+        """Count events, such as 'look_at'. They may set off a disturbance of the scene.
+
+        :param place: (3,) m in the world, where. None means where camera or base is.
+        """
         for event in events:
-            self._disturbances.happened(event, self.periods)
+            here = self.link_pose(CAMERA_FRAME) if event in SEEING else self.true_base()
+            self._disturbances.happened(event, self.periods,
+                                        here[:3, 3] if place is None else place)
 
     @property
     def disturbed(self) -> bool:

@@ -10,7 +10,7 @@ from smach_oracle.geometry.transforms import rotation_about
 
 LASTING, PASSING = 'lasting', 'passing'
 LASTING_SHARE = 0.6  # of the causes. A parameter of the world may say otherwise
-ANOTHER = 0.10  # chance of a second cause, where there is one, at least
+ANOTHER = 0.10  # chance of a second cause, where there is one
 WEIGHTS = Mapping[str, float]
 
 
@@ -18,10 +18,11 @@ def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGH
                 lasting: float) -> Iterator[Tuple[str, np.random.Generator]]:
     """The kinds of causes of a trial, each with the generator for its values.
 
-    With another `lasting` the same trials have causes, and a kind has the same values.
+    With another `lasting` the same trials have causes, and a kind has the same values. The second
+    cause is of another kind than the first.
 
     :param stream: of random numbers, one for each task.
-    :param amount: chance of a cause. What is beyond 1 is the chance of a second one.
+    :param amount: chance of a cause, 0 to 1.
     :param kinds: weights of the kinds that last, and of those that pass.
     :param lasting: chance of a kind that lasts.
     """
@@ -29,13 +30,15 @@ def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGH
     for number in range(2):
         generator = np.random.default_rng([seed, stream, 100 + number])
         there, lasts, which = generator.random(3)
-        if there >= (max(ANOTHER, amount - 1.0) if number else amount):
+        if there >= (ANOTHER if number else amount):
             return
-        weights = kinds[LASTING if lasts < lasting else PASSING]
+        weights = {name: weight
+                   for name, weight in kinds[LASTING if lasts < lasting else PASSING].items()
+                   if name not in found}
+        if not weights:
+            return
         found.append(_chosen(weights, which))
-        if found[-1] not in found[:-1]:
-            yield found[-1], np.random.default_rng(
-                [seed, stream, *found[-1].encode('ascii')])
+        yield found[-1], np.random.default_rng([seed, stream, *found[-1].encode('ascii')])
 
 
 def _chosen(weights: WEIGHTS, share: float) -> str:

@@ -17,18 +17,20 @@ from .cause_draws import (
 )
 from .drafts import caused, declared
 from .fridge import closing_hinge
-from .scene import Body, ClosingHinge, Disturbance, SceneCause, Vector
+from .scene import Body, ClosingHinge, Disturbance, Near, SceneCause, Vector
 
 # why, and why so often: doc/protocol.md
-AMOUNT = 1.6  # chances that a trial has a cause, and a second one
+AMOUNT = 0.70  # chance that a trial has a cause
 KINDS_OF = {
     LASTING: {'base_misplaced': 0.25, 'glare': 0.20, 'crowded': 0.15, 'slippery_drink': 0.15,
               'door_falls_shut': 0.15, 'dim_light': 0.10},
     PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
 }
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
-IN_FRIDGE = 'look_at:4'  # the first three are at the door
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
+BEFORE_SHELF = Near((1.08, -0.14, 1.48), 0.25)  # the camera there looks at the drinks
+GOES_IN = Near((1.00, -0.20, 0.0), 0.22)  # where the base then stands. It comes there to look
+HEADINGS = 30  # that are drawn, until there is room beside the drink
 TARGET = 0  # the drink that is ordered
 FOREMOST = 0.05  # m behind the front of the shelf, where a drink may stand
 ROOM = 0.11  # m between the middles of two drinks, or from that of one to a wall, that is enough
@@ -86,7 +88,8 @@ def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> Ki
     angle = float(generator.uniform(0.5, 0.9))
     return caused(draft, 'door_swings_back',
                   'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
-                  Disturbance('swing:fridge', 'drive:9', (('angle', angle), ('duration', 1.5))))
+                  Disturbance('swing:fridge', 'depart',
+                              (('angle', angle), ('duration', 1.5)), near=GOES_IN))
 
 
 def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -100,13 +103,18 @@ def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> Kit
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """A further drink stands right beside the one that is ordered."""
     gap = float(generator.uniform(0.0, 0.012))
-    heading = float(
-        generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2))
     target, other = draft.drinks[TARGET], draft.drinks[-1]
     far = target.size[0] + other.size[0] + gap
-    moved = other._replace(position=(target.position[0] + far * float(np.cos(heading)),
-                                     target.position[1] + far * float(np.sin(heading)),
-                                     other.position[2]))
+    places = []
+    for _ in range(HEADINGS):
+        heading = float(
+            generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2))
+        places.append((target.position[0] + far * float(np.cos(heading)),
+                       target.position[1] + far * float(np.sin(heading)), other.position[2]))
+    between = draft.drinks[1:-1]  # no other is to stand in what is moved
+    moved = other._replace(position=max(places, key=lambda place: min([0.0] + [
+        float(np.hypot(each.position[0] - place[0], each.position[1] - place[1]))
+        - each.size[0] - other.size[0] for each in between])))
     return caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
                   'two drinks stand {:.1f} cm beside each other'.format(100 * gap),
                   until=(target.name, other.name))
@@ -128,10 +136,10 @@ def _reflex(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft
 
 def _dazzled(draft: KitchenDraft, generator: np.random.Generator, kind: str, seconds: float,
              text: str) -> KitchenDraft:
-    """From when the camera turns to the drinks, after it has looked at the door twice."""
+    """From when the camera has turned to the drinks for the first time."""
     values = dazzling(EYE, LOOKS_AT, np.array(draft.drinks[TARGET].position), generator)
-    return caused(draft, kind, text, Disturbance('glare', IN_FRIDGE,
-                                                 values + (('duration', seconds),)))
+    return caused(draft, kind, text, Disturbance(
+        'glare', 'look_at', values + (('duration', seconds),), near=BEFORE_SHELF))
 
 
 def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -140,7 +148,8 @@ def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDr
     values = (('brightness', brightness), ('duration', 60 * minutes))
     text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
         100 * brightness, minutes)
-    return caused(draft, 'dim_light', text, Disturbance('dim', IN_FRIDGE, values))
+    return caused(
+        draft, 'dim_light', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF))
 
 
 def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -149,7 +158,7 @@ def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft
     values = (('brightness', brightness), ('duration', seconds))
     text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
         seconds, 100 * brightness)
-    return caused(draft, 'shadow', text, Disturbance('dim', IN_FRIDGE, values))
+    return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF))
 
 
 def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -174,7 +183,7 @@ def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> Kitchen
         draft, 'drink_moved',
         'somebody moves the ordered drink by {:.0f} cm, once it has been seen'.format(
             100 * float(np.hypot(dx, dy))),
-        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see:4', values))
+        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see', values, near=BEFORE_SHELF))
 
 
 def _room_at(draft: KitchenDraft, x: float, y: float) -> float:

@@ -80,13 +80,13 @@ def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
                 np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
             places.append((float(x), float(y)))
     places.sort()
-    in_reach = [place for place in places if _is_in_reach(place, places)]
+    in_reach = [place for place in places if is_in_reach(place, places)]
     places.insert(0, places.pop(places.index(
         in_reach[int(generator_for(seed, 'ordered').integers(len(in_reach)))])))
     return tuple(drink_at(seed, index, place, kitchen) for index, place in enumerate(places))
 
 
-def _is_in_reach(place: Tuple[float, float], places: Sequence[Tuple[float, float]]) -> bool:
+def is_in_reach(place: Tuple[float, float], places: Sequence[Tuple[float, float]]) -> bool:
     """Whether none of the places (m, in the fridge's frame) is in a hand's way from the front."""
     return not any(x < place[0] and abs(y - place[1]) < HAND for x, y in places)
 

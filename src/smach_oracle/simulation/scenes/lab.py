@@ -7,6 +7,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Seq
 
 import numpy as np
 
+from smach_oracle.geometry.transforms import apply, inverse
 from smach_oracle.pr2.kitchen import Kitchen, odom_from_pose
 
 from . import kitchen_scene, tabletop_scene
@@ -179,7 +180,9 @@ def _drinks_in_fridge(trial: _Trial, kitchen: Kitchen) -> Tuple[Body, ...]:
     places = [(float(generator.uniform(*kitchen_scene.DEPTHS)),
                float(generator.uniform(*kitchen_scene.SIDES))) for _ in range(TRIES)]
     spots = [fresh[0].position[:2]] + [_on_shelf(kitchen, each, 0.0)[:2] for each in places]
-    spot = _free(spots, stayed, kitchen_scene.CLEAR)
+    others = [_in_fridge(kitchen, drink.position) for drink in stayed]
+    spot = _free([each for each in spots if kitchen_scene.is_in_reach(
+        _in_fridge(kitchen, each), others)], stayed, kitchen_scene.CLEAR)
     if spot is None or len(stayed) < len(fresh) - 1 or not _stand_apart(stayed):
         return fresh
     return (fresh[0]._replace(position=(*spot, fresh[0].position[2])), *stayed)
@@ -189,6 +192,13 @@ def _on_shelf(kitchen: Kitchen, place: Tuple[float, float], lift: float) -> Vect
     """Return a place (m) in the fridge's frame, so high (m) above the shelf, in the world."""
     x, y = odom_from_pose(kitchen, place[0], place[1], 0.0)[:2, 3]
     return float(x), float(y), kitchen.shelves[kitchen.drinks_shelf] + lift
+
+
+def _in_fridge(kitchen: Kitchen, place: Sequence[float]) -> Tuple[float, float]:
+    """Return a place (m) in the world, in the fridge's frame."""
+    x, y = apply(inverse(odom_from_pose(kitchen, 0.0, 0.0, 0.0)),
+                 np.array([place[0], place[1], 0.0]))[:2]
+    return float(x), float(y)
 
 
 _SCENES: Dict[str, Callable[[_Trial, RobotStart], Scene]] = {

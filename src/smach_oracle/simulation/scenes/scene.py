@@ -1,5 +1,5 @@
 """The contents of a trial's world: plain data, drawn from the trial's seed."""
-from typing import NamedTuple, Tuple
+from typing import NamedTuple, Optional, Tuple
 
 Vector = Tuple[float, float, float]
 
@@ -44,15 +44,23 @@ class CameraQuality(NamedTuple):
     colour_noise: float = 6.0  # sigma, of 255
 
 
+class Near(NamedTuple):
+    """A place that an event must be near to."""
+
+    place: Vector  # m, in the world
+    within: float  # m
+
+
 class Disturbance(NamedTuple):
     """Something that happens to the world in the course of a trial."""
 
     kind: str  # which, of those that physics/disturbances.py knows
     # the event that sets it off, e.g. 'look_at' (first head motion), 'see:2' (second image),
-    # 'drive:1'
+    # 'drive:1'. Those that are not near to `near` are not counted
     after: str
     values: Tuple[Tuple[str, float], ...] = ()
     cause: str = ''  # kind of the cause that it belongs to
+    near: Optional[Near] = None
 
 
 class SceneCause(NamedTuple):

@@ -3,7 +3,7 @@
 Neither the executive nor the subsystems learn of them.
 """
 import functools
-from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Tuple
+from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -28,7 +28,8 @@ TABLE_TOP = 0.72  # m
 GOAL = (0.60, -0.35)  # m, where the task puts the object
 TORSO = 0.22  # m
 EYE = np.array([-0.05, 0.0, 1.42])  # m, about where the head camera is
-ROOM = 0.12  # m, around where the nearest thing is moved to
+ROOM = 0.12  # m, around where the nearest thing is moved to, that is enough
+WAYS = 30  # that are drawn, until there is room for what is moved
 TARGET = 0  # the thing that stands nearest
 
 EYE_LOOKING = np.array([0.09, 0.02, 1.44])  # m, where it is when it looks at the table
@@ -144,10 +145,12 @@ def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> Optional[T
         return None
     thing, other = draft.things[TARGET], spare[-1]
     gap = float(generator.uniform(0.014, 0.032))
-    away = float(np.arctan2(thing.position[1], thing.position[0]) + generator.uniform(-1.5, 1.5))
     far = radius_of(thing) + radius_of(other) + gap
-    spot = (thing.position[0] + far * np.cos(away), thing.position[1] + far * np.sin(away))
-    moved = other._replace(position=(float(spot[0]), float(spot[1]), other.position[2]))
+    behind = np.arctan2(thing.position[1], thing.position[0])
+    ways = [float(behind + generator.uniform(-1.5, 1.5)) for _ in range(WAYS)]
+    moved = max((_moved_to(other, thing.position[0] + far * np.cos(way),
+                           thing.position[1] + far * np.sin(way)) for way in ways),
+                key=lambda each: min(0.0, _room_of(each, draft.things[1:])))
     return caused(_with_moved(draft, moved), 'crowded',
                   'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap),
                   until=(thing.name, other.name))
@@ -163,25 +166,26 @@ def _slippery_object(draft: TabletopDraft, generator: np.random.Generator) -> Ta
             friction, mass))
 
 
-def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
-    """Somebody moves the nearest thing after it has been detected, to where there is room."""
+def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+    """Somebody moves the nearest thing after it has been detected, to where there is most room."""
     thing = draft.things[TARGET]
-    for _ in range(20):
-        way = float(generator.uniform(0.05, 0.08))
+
+    def room(way: Tuple[float, float]) -> float:
+        return min([ROOM] + [float(np.hypot(other.position[0] - thing.position[0] - way[0],
+                                            other.position[1] - thing.position[1] - way[1]))
+                             for other in draft.things[1:]])
+
+    ways = []
+    for _ in range(WAYS):
+        far = float(generator.uniform(0.05, 0.08))
         heading = float(generator.uniform(-0.9, 0.9))  # away from the robot
-        spot = (thing.position[0] + way * np.cos(heading),
-                thing.position[1] + way * np.sin(heading))
-        if all(
-                np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > ROOM
-                for other in draft.things[1:]):
-            values = (('dx', way * np.cos(heading)), ('dy', way * np.sin(heading)), ('duration',
-                                                                                     0.8))
-            return caused(
-                draft, 'object_moved',
-                'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(100 *
-                                                                                              way),
-                Disturbance('nudge:' + thing.name, 'see', values))
-    return None
+        ways.append((far * float(np.cos(heading)), far * float(np.sin(heading))))
+    dx, dy = max(ways, key=room)
+    return caused(
+        draft, 'object_moved',
+        'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(
+            100 * float(np.hypot(dx, dy))),
+        Disturbance('nudge:' + thing.name, 'see', (('dx', dx), ('dy', dy), ('duration', 0.8))))
 
 
 def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
@@ -189,13 +193,17 @@ def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Opti
     spare = _spare_things(draft)
     if len(spare) < 2:
         return None
-    heading = float(generator.uniform(-np.pi, np.pi))
+    headings = [float(generator.uniform(-np.pi, np.pi)) for _ in range(WAYS)]
     distances = [float(generator.uniform(0.07, 0.11)) for _ in range(2)]
-    moved = []
-    for other, away, side in zip(spare[-2:], distances, (heading, heading + np.pi)):
-        spot = (float(GOAL[0] + away * np.cos(side)), float(GOAL[1] + away * np.sin(side)),
-                other.position[2])
-        moved.append(other._replace(position=spot))
+    pairs = [[_moved_to(other, GOAL[0] + away * np.cos(side), GOAL[1] + away * np.sin(side))
+              for other, away, side in zip(spare[-2:], distances, (heading, heading + np.pi))]
+             for heading in headings]
+    staying = [each for each in draft.things if each not in spare[-2:]]
+    moved = next((pair for pair in pairs if all(
+        _room_of(each, staying) > 0 and _away(each) > _away(draft.things[TARGET])
+        for each in pair)), None)
+    if moved is None:
+        return None
     return caused(_with_moved(draft, *moved), 'goal_occupied',
                   'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
                       *(100 * away for away in distances)),
@@ -219,6 +227,23 @@ def _spare_things(draft: TabletopDraft) -> Tuple[Body, ...]:
     """The things that no cause needs where they stand. The nearest one is none of them."""
     needed = {name for cause in draft.causes for name in cause.until}
     return tuple(each for each in draft.things[TARGET + 1:] if each.name not in needed)
+
+
+def _moved_to(thing: Body, x: float, y: float) -> Body:
+    return thing._replace(position=(float(x), float(y), thing.position[2]))
+
+
+def _away(thing: Body) -> float:
+    """m from the robot, by which the nearest thing is known."""
+    return float(np.hypot(*thing.position[:2]))
+
+
+def _room_of(thing: Body, others: Sequence[Body]) -> float:
+    """m from the outline of a thing to the next one of others. Below 0 they overlap."""
+    return min([np.inf] + [
+        float(np.hypot(thing.position[0] - other.position[0],
+                       thing.position[1] - other.position[1])) - radius_of(thing) - radius_of(other)
+        for other in others if other.name != thing.name])
 
 
 def _with_moved(draft: TabletopDraft, *moved: Body) -> TabletopDraft:

@@ -3,12 +3,14 @@ import numpy as np
 import pytest
 from worlds import scene
 
+from smach_oracle.geometry.transforms import from_rpy
 from smach_oracle.pr2.robot import RobotError
+from smach_oracle.simulation.physics.motions import BaseMotion
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
 from smach_oracle.simulation.scenes.kitchen_scene import draw as draw_kitchen
-from smach_oracle.simulation.scenes.scene import Body, Disturbance
+from smach_oracle.simulation.scenes.scene import Body, Disturbance, Near
 
 IN_VIEW = {
     'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
@@ -116,3 +118,37 @@ def test_a_door_swings_to_its_angle_and_is_then_left_to_itself(world):
     assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(0.7, abs=0.05)
     world.step(60)
     assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(0.7, abs=0.05)
+
+
+def test_an_event_that_is_not_near_enough_is_not_counted(world):
+    """The second image is the first one that the camera takes from there."""
+    world.reset(scene())
+    x, y, z = world.link_pose('wide_stereo_optical_frame')[:3, 3]
+    away = Near((x + 0.5, y, z), 0.3)
+    nudge = Disturbance('nudge:can', 'see', (('dx', 0.05),), near=away)
+    world.reset(scene(disturbances=(nudge,)))
+    robot, before = DirectRobot(world), world.body_pose('can')[0, 3]
+    robot.see()
+    world.step(60)
+    assert world.body_pose('can')[0, 3] == pytest.approx(before, abs=1e-3)
+    world.happened('see', place=np.array([x + 0.3, y, z]))
+    world.step(60)
+    assert world.body_pose('can')[0, 3] > before + 0.03
+
+
+def test_a_drive_sets_off_when_what_its_beginning_has_set_off_is_over(world):
+    nudge = Disturbance('nudge:can', 'depart', (('dx', 0.05), ('duration', 1.0)),
+                        near=Near((-0.5, 0.0, 0.0), 0.1))
+    world.reset(scene(disturbances=(nudge,)))
+    robot, before = DirectRobot(world), world.body_pose('can')[0, 3]
+    robot.drive(from_rpy((-0.2, 0.0, 0.0)))
+    assert world.body_pose('can')[0, 3] == pytest.approx(before, abs=1e-3)
+    motion = BaseMotion(from_rpy((-0.5, 0.0, 0.0)))
+    for _ in range(50):
+        assert motion.tick(world) is None
+        world.step()
+    assert world.true_base()[0, 3] == pytest.approx(-0.2, abs=0.01), 'it waits'
+    while motion.tick(world) is None:
+        world.step()
+    assert world.body_pose('can')[0, 3] > before + 0.03
+    assert world.true_base()[0, 3] == pytest.approx(-0.5, abs=0.01)

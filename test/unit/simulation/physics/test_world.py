@@ -12,7 +12,7 @@ from smach_oracle.pr2.robot import ARM_JOINTS
 from smach_oracle.simulation.physics.bodies import SceneBuildError
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
-from smach_oracle.simulation.scenes.scene import CameraQuality, Disturbance, RobotStart
+from smach_oracle.simulation.scenes.scene import CameraQuality, Disturbance, Near, RobotStart
 
 
 @pytest.fixture(scope='module')
@@ -156,6 +156,10 @@ def test_clients_are_given_back(world):
      "'earthquake': unknown kind; allowed: arm, dim"),
     (scene(disturbances=(Disturbance('dim', 'lunch'),)),
      "'dim': unknown event 'lunch'; allowed: start, follow"),
+    (scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, math.inf), 1.0)),)),
+     'near is .*allowed: a place of finite m'),
+    (scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, 0.0), 0.0)),)),
+     'within more than 0 m'),
     (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
     (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
      "no joint 'l_elbow_joint'"),

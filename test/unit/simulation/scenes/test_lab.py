@@ -52,6 +52,20 @@ def test_what_was_left_is_found_again_and_another_thing_is_put_out(task):
     assert stayed >= 5, 'else there was no room, and all was set out afresh'
 
 
+def test_what_stays_in_the_fridge_is_not_in_the_hands_way_to_the_next_drink():
+    kitchen = true_kitchen(RUN.seed)
+    x, y, yaw = kitchen.place
+    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
+    for seed in range(301, 409):
+        there = carried(lab_scene(TASKS[1], RUN, seed + 1, left(
+            lab_scene(TASKS[1], RUN, seed, None, benign=True)), benign=True))
+        places = {name: turn @ np.subtract(each.position[:2], (x, y))
+                  for name, each in there.items()}
+        ordered = places.pop(kitchen_scene.ORDERED)
+        assert not any(place[0] < ordered[0] - 1e-9 and abs(place[1] - ordered[1]) <
+                       kitchen_scene.HAND for place in places.values()), seed
+
+
 @pytest.mark.parametrize('task', TASKS)
 def test_once_an_hour_all_is_set_anew(task):
     state = left(lab_scene(task, RUN, 309, None, benign=True))
