@@ -86,8 +86,10 @@ class ReplicateRecords:
         :raises ExperimentError: where a bag is of another seed than its place says.
         :raises OSError: where a file cannot be moved or written.
         """
-        paths, truths = self._bags(), self._truths()
-        kept = kept.before(self._first_number(paths))
+        truths = self._truths()
+        bags = self._bags()
+        torn, first_number = self._torn_before(bags) if kept.numbers or kept.lost else (0, 0)
+        paths, kept = bags[torn:], kept.before(first_number)
         lost = {**kept.lost, **self._lost()}
         passed = {*lost, *kept.numbers}
         numbers = [number for number in range(self._trials) if number not in passed]
@@ -101,7 +103,7 @@ class ReplicateRecords:
                 raise ExperimentError('{}: the bag does not contain the learned rates'.format(
                     paths[len(done)]))
             done.append(recorded)
-        dropped = paths[len(done):]
+        dropped = bags[:torn] + paths[len(done):]
         for path in dropped:
             os.replace(path, path + DROPPED)
         next_trial = (numbers + [self._trials])[len(done)]
@@ -112,13 +114,17 @@ class ReplicateRecords:
         return JobProgress(done, self._lost(), tuple(os.path.basename(path) for path in dropped),
                            next_trial, len(kept.numbers))
 
-    def _first_number(self, paths: Sequence[str]) -> int:
-        """Return the number of the first trial that has a bag."""
-        if not paths:
-            return self._trials
-        recorded = self.read(paths[0])
-        cause = recorded.summary.cause if recorded is not None else None
-        return cause.seed - self._first_seed if cause is not None else 0
+    def _torn_before(self, bags: Sequence[str]) -> Tuple[int, int]:
+        """Return how many torn bags come first, and the trial of the first one behind them.
+
+        A bag is torn where it tells no seed. If all are, the trial is the one behind the last, so
+        that they cost no row.
+        """
+        for count, path in enumerate(bags):
+            recorded = self.read(path)
+            if recorded is not None and recorded.summary.cause is not None:
+                return count, recorded.summary.cause.seed - self._first_seed
+        return len(bags), self._trials
 
     def read(self, path: str) -> Optional[RecordedTrial]:
         """The trial of a bag, or None where the bag cannot be read, or is not of one trial."""
