@@ -15,7 +15,7 @@ from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
-from .intervals import Interval, wilson_interval
+from .intervals import Interval, replicate_interval, wilson_interval
 from .pairing import (
     COMPARED,
     HINDSIGHT,
@@ -50,6 +50,7 @@ class Share(NamedTuple):
     interval: Interval  # 95% Wilson score interval
     # the smallest and the largest share of a replicate, or None for fewer than two
     over_replicates: Optional[Interval]
+    of_mean: Optional[Interval] = None  # Student's 95% interval of the mean of the replicates
 
     @property
     def share(self) -> float:
@@ -86,7 +87,8 @@ def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
     number = sum(map(happened, rows))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
     return Share(name, number, len(rows), wilson_interval(number, len(rows)),
-                 (min(shares), max(shares)) if len(shares) > 1 else None)
+                 (min(shares), max(shares)) if len(shares) > 1 else None,
+                 replicate_interval(shares))
 
 
 def costs_of(rows: Sequence[TrialRow]) -> Costs:

@@ -86,8 +86,12 @@ def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
     shares = [float(bars.lines[0].get_xdata()[0]) for bars in axes.containers]
     assert shares[1::4] == [20.0, 10.0, 30.0, 10.0], 'interventions'
     tables = cells_of(format_tables(rows))
-    assert tables[0]['interventions'] == [
+    assert tables[1]['interventions'] == [
         '60.0% (39% to 78%)', '55.0% (34% to 74%)', '30.0% (11% to 60%)']
+    assert tables[0]['variant'][:3] == ['trials', 'true success', 'interventions']
+    assert [tables[0][name][:3] for name in ('bare', 'ladder')] == [
+        ['20', '50.0% (30% to 70%)', '60.0% (39% to 78%)'],
+        ['10', '100.0% (72% to 100%)', '30.0% (11% to 60%)']]
     bounded = next(table for table in tables if 'hindsight' in table.get('', ()))
     assert [cell.split()[0] for cell in bounded['interventions']] == [
         '20.0%', '10.0%', '30.0%', '10.0%']
@@ -119,9 +123,10 @@ def test_the_memory_figure_tells_how_often_the_expert_is_asked():
 def test_the_hours_have_events_counts_and_learned_rates():
     rows = [row._replace(hour=0.5 * number, learned=LEARNED, causes='glare' if number == 3 else '')
             for number, row in enumerate(rows_of('default', 2))]
+    rows[5] = rows[5]._replace(causes='glare', cause_log='[["glare",true,null,null]]')
     with rc_context(STYLE):
         events, needed, rates = draw_hours(rows).axes
-    assert len(events.patches) == 1  # the light of one trial
+    assert len(events.patches) == 1, 'the light of one trial: that of another never came'
     curve = next(line for line in needed.lines if line.get_label() == 'intervention')
     assert curve.get_ydata()[-1] == 2 and curve.get_xdata()[-1] == 4.5
     assert [line.get_label() for line in rates.lines] == ['PICK', 'PLACE']
@@ -151,7 +156,7 @@ def test_a_lost_trial_is_among_the_hours():
 
 def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant():
     told = cells_of(format_tables(rows_of('bare', 0) + rows_of('default', 2, attempts=1,
-                                                               expert_s=6.0)))[0]
+                                                               expert_s=6.0)))[1]
     assert told[''] == ['bare', 'default'] and told['trials'] == ['10', '10']
     assert told['interventions'][1] == '20.0% (6% to 51%)'
     assert [told[name][1] for name in ('attempts a trial', 'expert s a trial',
@@ -162,7 +167,7 @@ def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant
 def test_the_tables_test_the_default_against_each_other_variant():
     rows = [row for name, asked in (('bare', 8), ('default', 1), ('restart', 3), ('ladder', 7))
             for row in rows_of(name, asked)]
-    tests = cells_of(format_tables(rows))[1]
+    tests = cells_of(format_tables(rows))[2]
     assert tests['default against ladder'] == ['10', '1', '0', '6', '3', '0.031']
     assert [name for name in tests if name] == [
         'default against ' + each for each in ('bare', 'restart', 'ladder')]
@@ -174,8 +179,8 @@ def test_over_replicates_stand_the_smallest_and_the_largest_share():
     share = next(each for each in shares_of(rows) if each.name == 'interventions')
     assert share.over_replicates == (0.1, 0.4)
     assert shares_of(rows[:10])[0].over_replicates is None
-    told = cells_of(format_tables(rows + rows_of('ladder', 0)))[0]
-    assert told['interventions, replicates'] == ['10.0% to 40.0%', '-']
+    told = cells_of(format_tables(rows + rows_of('ladder', 0)))[1]
+    assert told['interventions, replicates'] == ['10.0% to 40.0% (0% to 61%)', '-']
     assert 'replicates 10.0% to 40.0%' in format_comparison(rows)
     assert 'interventions, replicates' not in format_tables(rows[:10])
 
@@ -195,7 +200,7 @@ def test_completion_is_compared_on_the_seeds_that_all_three_completed():
     rows = [row._replace(sim_s=10.0 * row.seed, **(
         {'ending': 'failure', 'true_success': False} if name == 'bare' and row.seed > 9 else {}))
         for name in ('bare', 'default', 'restart', 'ladder') for row in rows_of(name, 0)]
-    told = cells_of(format_tables(rows))[0]
+    told = cells_of(format_tables(rows))[1]
     assert told['s to completion, median'] == ['80', '115', '115', '115']
     assert told['s to completion, median, on the 3 seeds that bare, default and restart '
                 'completed'] == ['80', '80', '80', '-']

@@ -2,7 +2,7 @@
 import pytest
 
 from smach_oracle.analysis.comparison import by_variant
-from smach_oracle.analysis.drawing.cause_tables import by_cause, by_log
+from smach_oracle.analysis.drawing.cause_tables import by_cause, by_class, by_log
 from smach_oracle.analysis.lasting.causes_log import LoggedCause, causes_in, causes_of, causes_text
 from smach_oracle.analysis.lasting.checks import check_of
 from smach_oracle.analysis.lasting.tries import (
@@ -102,6 +102,13 @@ def test_a_cause_about_which_something_was_done_does_not_last_in_that_trial():
     assert check.lasting_by_class and check.lasting_by_log == frozenset()
 
 
+def test_a_cause_whose_end_the_log_never_tells_is_not_shown_to_last():
+    tries = [FAILED, StateTry('LOOK', 20.0, None, 1)]
+    assert check_of(row(tries, [('base_misplaced', True, 0.0, None)])).lasting_by_log == frozenset()
+    assert check_of(row(tries, [('base_misplaced', True, 0.0, 30.0)])).lasting_by_log == {
+        'base_misplaced'}
+
+
 def test_a_row_of_an_older_version_tells_nothing():
     assert check_of(TrialRow('pick_and_place', 'restart', 0, 7, 'success', causes='glare')) is None
 
@@ -122,6 +129,29 @@ def test_the_tables_tell_the_shares_by_class_and_by_the_log():
                  'and of 1 as the failed state was not tried'):
         assert told in text
     assert by_log('Pick and place', {'bare': rows}) == []
+
+
+def test_a_kind_that_the_log_gives_no_end_is_not_told():
+    tries = [FAILED, StateTry('LOOK', 20.0, None, 1)]
+    text, = by_log('Kitchen', by_variant([row(tries, [('base_misplaced', True, 0.0, None)])]))
+    assert '| base misplaced | lasts | 1 | 1 | not told | not told |' in text
+    assert 'at least once: 0 of 1' in text and 'The log gives no end to base misplaced' in text
+
+
+def test_interventions_stand_beside_each_other_by_class_and_cause():
+    causes = [[], [GLARE], [REFLEX], [GLARE, REFLEX]]
+    rows = [row([], each, questions=int(variant == 'restart' and bool(each)),
+                lasting=sum(cause[1] for cause in each), true_success=variant != 'bare')._replace(
+                    variant=variant, seed=seed)
+            for variant in ('bare', 'default', 'restart') for seed, each in enumerate(causes)]
+    text, = by_class('Pick and place', by_variant(rows + [rows[0]._replace(seed=9)]))
+    for told in ('| no listed cause | 1 | 1 (100%) | 0 (0%) | 0 (0%) |',
+                 '| passing causes alone | 1 | 1 (100%) | 0 (0%) | 1 (100%) |',
+                 '| a lasting cause | 2 | 2 (100%) | 0 (0%) | 2 (100%) |',
+                 '| with reflex | 2 | 2 (100%) | 0 (0%) | 2 (100%) |',
+                 '| all | 4 | 4 (100%) | 0 (0%) | 3 (75%) |', 'Of the 4 trials that'):
+        assert told in text
+    assert by_class('Pick and place', {'bare': rows}) == []
 
 
 def test_failures_without_a_listed_cause_have_a_line_with_an_interval():

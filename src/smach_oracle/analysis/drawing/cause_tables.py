@@ -1,14 +1,16 @@
 """Tables by the causes that trials were given, and by what the world's log says of them."""
-from typing import Callable, Dict, List, Mapping, Sequence
+from functools import partial
+from typing import Callable, Dict, List, Mapping, Sequence, Tuple
 
 from ..intervals import wilson_interval
 from ..lasting.causes_log import causes_in
-from ..lasting.checks import TrialCheck, checks_of
-from ..pairing import COMPARED, RESTART
+from ..lasting.checks import OPEN_ENDED, TrialCheck, checks_of
+from ..pairing import BARE, COMPARED, RESTART, on_common_seeds
 from ..trial_rows import TrialRow
 from .markdown import titled
 
 NONE = 'none'
+NOT_TOLD = 'not told'
 RETRY = 'retry'  # a variant: the same state again
 Rows = Mapping[str, Sequence[TrialRow]]  # by variant
 
@@ -36,6 +38,40 @@ def _of_variant(title: str, rows: Sequence[TrialRow]) -> str:
     return titled(title, ['cause', 'class', 'trials', 'with a failure', 'interventions',
                           'true success'], lines, [
         'A trial with two causes is in two lines. In parentheses: a 95% Wilson interval.'])
+
+
+def by_class(title: str, variants: Rows) -> List[str]:
+    """Return a table of the interventions under the variants that are compared, by class of cause.
+
+    It is of the trials that all of them ran. Empty where one of them is missing.
+    """
+    if any(name not in variants for name in COMPARED):
+        return []
+    rows = on_common_seeds([row for name in COMPARED for row in variants[name]])
+    bare = [row for row in rows if row.variant == BARE]
+    parts: List[Tuple[str, Callable[[TrialRow], bool]]] = [
+        ('no listed cause', lambda row: not row.causes),
+        ('passing causes alone', lambda row: bool(row.causes) and not row.lasting),
+        ('a lasting cause', lambda row: bool(row.causes) and bool(row.lasting))]
+    kinds = sorted({kind for row in bare for kind in row.causes.split()})
+    parts += [('with ' + kind.replace('_', ' '), partial(_has, kind)) for kind in kinds]
+    parts.append(('all', lambda row: True))
+    lines = []
+    for name, belongs in parts:
+        mine = [row for row in rows if belongs(row)]
+        of = len(mine) // len(COMPARED)
+        if of:
+            counts = [_count([row for row in mine if row.variant == variant],
+                             lambda row: row.intervened) for variant in COMPARED]
+            lines.append([name, str(of), *('{} ({:.0%})'.format(count, count / of)
+                                           for count in counts)])
+    return [titled(title + ': interventions by cause', ['trials', 'number', *COMPARED], lines, [
+        'Of the {} trials that bare, default and restart ran. A trial with two causes is in two '
+        'lines.'.format(len(bare))])]
+
+
+def _has(kind: str, row: TrialRow) -> bool:
+    return kind in row.causes.split()
 
 
 def _count(rows: Sequence[TrialRow], happened: Callable[[TrialRow], bool]) -> int:
@@ -72,13 +108,17 @@ def by_log(title: str, variants: Rows) -> List[str]:
         second = [each.at_second_try for each in others if each.at_second_try is not None]
         lines.append([kind.replace('_', ' '), classes[kind], str(len(mine)),
                       str(sum(each.failed for each in mine)),
-                      '{} of {}'.format(sum(kind in each for each in again), len(again)),
-                      '{} of {}'.format(sum(kind in each for each in second), len(second))])
+                      *(NOT_TOLD if kind in OPEN_ENDED else '{} of {}'.format(
+                          sum(kind in each for each in found), len(found))
+                        for found in (again, second))])
     return [titled(
         title + ": causes that last, by the world's log",
         ['cause', 'class', 'trials of `restart`', 'a state failed',
          'there at that state after a restart', 'there at the second try of `retry`'], lines,
-        _shares(restarted, classes))]
+        _shares(restarted, classes) + [
+            'The log gives no end to {}: so it does not tell whether that lasts, and it does not '
+            'count as lasting by the log.'.format(kind.replace('_', ' '))
+            for kind in sorted(OPEN_ENDED & set(classes))])]
 
 
 def _with(checks: Sequence[TrialCheck], kind: str) -> List[TrialCheck]:

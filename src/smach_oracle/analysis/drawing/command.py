@@ -38,6 +38,16 @@ def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
     return found
 
 
+def tables_page(found: Mapping[str, Sequence[TrialRow]]) -> str:
+    """Return a page of Markdown with the tables of all figures."""
+    parts = ['# Tables of the experiment\n\nThe command `draw_results` has made this page from the '
+             'rows of {:,} trials.\n'.format(sum(map(len, found.values())))]
+    for kind, rows in found.items():
+        parts.append('## {}\n\n{}'.format(kind.capitalize(), '\n'.join(
+            filter(None, [format_sweeps(kind, rows), format_tables(rows, kind)]))))
+    return '\n'.join(parts)
+
+
 def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path]:
     """Draw what there is, and write the tables. Return the paths.
 
@@ -51,10 +61,7 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
         draw_main, draw_persistence, draw_memory, draw_hours)))
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']
-    texts = [[format_sweeps(kind, rows), format_tables(rows, kind)] for kind, rows in found.items()]
-    paths[0].write_text('\n'.join(
-        '## {}\n\n{}'.format(kind.capitalize(), '\n'.join(filter(None, each)))
-        for kind, each in zip(found, texts)), encoding='utf-8')
+    paths[0].write_text(tables_page(found), encoding='utf-8')
     for kind, rows in found.items():
         if kind == 'continuous' and all(row.hour is None for row in rows):
             continue

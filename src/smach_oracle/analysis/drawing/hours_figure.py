@@ -12,6 +12,7 @@ from smach_oracle.oracle.settings.settings import StateSettings
 
 from ..comparison import SECONDS_PER_HOUR
 from ..figure import BLACK, BLUE, VERMILLION
+from ..lasting.causes_log import causes_in
 from ..sweep_figure import GREEN
 from ..trial_rows import LOST, TrialRow
 from .looks import Happened, legend_above, panels
@@ -57,13 +58,23 @@ def draw_hours(rows: Sequence[TrialRow]) -> Figure:
 
 def _beside(rows: Sequence[TrialRow]) -> List[Tuple[Any, str]]:
     """Return the legend of what stands in the upper panels, as far as it is there."""
-    lights = {kind for row in rows for kind in row.causes.split()}
+    lights = {kind for row in rows for kind in lights_of(row)}
     found: List[Tuple[Any, str]] = [
         (Patch(color=colour, alpha=PALE, linewidth=0), kind.replace('_', ' '))
         for kind, colour in LIGHT.items() if kind in lights]
     if any(row.ending == LOST for row in rows):
         found.append((Line2D([], [], **LOST_LOOK), 'lost'))
     return found
+
+
+def lights_of(row: TrialRow) -> List[str]:
+    """Return the kinds of light of LIGHT that came in a trial. Some come after its end.
+
+    A row without a log has those that it lists.
+    """
+    kinds = [cause.kind for cause in causes_in(row.cause_log) if cause.began_s is not None
+             ] if row.cause_log else row.causes.split()
+    return [kind for kind in LIGHT if kind in kinds]
 
 
 def _hours(rows: Sequence[TrialRow]) -> List[float]:
@@ -76,7 +87,7 @@ def _draw_events(axes: Any, rows: Sequence[TrialRow]) -> None:
     widths = [later - hour for hour, later in zip(hours, hours[1:])] + [0.0]
     for row, hour, width in zip(rows, hours, widths):
         for kind, colour in LIGHT.items():
-            if kind in row.causes.split():
+            if kind in lights_of(row):
                 axes.axvspan(hour, hour + width, color=colour, linewidth=0, alpha=PALE)
     axes.vlines(hours, 0, [row.attempts for row in rows], color=BLUE, linewidth=0.9)
     axes.vlines(hours, [-row.questions for row in rows], 0, color=VERMILLION, linewidth=0.9)

@@ -14,7 +14,7 @@ from ..comparison import (
 )
 from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
 from ..trial_rows import TrialRow
-from .cause_tables import by_cause, by_log
+from .cause_tables import by_cause, by_class, by_log
 from .markdown import titled
 from .titles import tasks_of, title_of
 
@@ -34,6 +34,9 @@ COSTS: Tuple[Tuple[str, str], ...] = (
     ('completion_s', 's to completion, median'),
     ('trials_between', 'trials between interventions'),
     ('hours_between', 'robot hours between interventions'))
+SUMMARY = ('true success', 'interventions', 'a question asked', 'recovered')
+# of Costs, in the summary
+SUMMED_UP = ('damage', 'expert_s', 'completion_s')
 COMPARING = ('main', 'persistence')
 SAME_SEEDS = ('true success', 'interventions', 'a question asked')
 
@@ -48,9 +51,10 @@ def format_tables(rows: Sequence[TrialRow], kind: str = 'main') -> str:
     for task in tasks_of(rows):
         for group in (each for each in groups if each[0] == task):
             title, variants = named(group), by_variant(groups[group])
-            texts.append(_main(title, variants))
+            texts += [_summary(title, variants), _main(title, variants)]
             if kind in COMPARING:
                 texts += _tests(title, variants) + _same_seeds(title, groups[group])
+                texts += by_class(title, variants)
                 texts += by_cause(title, variants) if kind == 'main' else []
                 texts += by_log(title, variants)
     return '\n'.join(texts)
@@ -60,6 +64,18 @@ def named(group: Group) -> str:
     """Return what a task and a share of lasting causes are called in a title."""
     task, share = group
     return title_of(task) + ('' if share is None else ', {:.0%} of the causes last'.format(share))
+
+
+def _summary(title: str, variants: Dict[str, List[TrialRow]]) -> str:
+    """Tell the figures that matter most, a line for each variant."""
+    lines = []
+    for name, rows in variants.items():
+        shares, costs = {share.name: share for share in shares_of(rows)}, costs_of(rows)
+        lines.append([name.replace('_', ' '), str(len(rows)),
+                      *(percent(shares[each]) for each in SUMMARY),
+                      *(number(getattr(costs, each)) for each in SUMMED_UP)])
+    return titled(title + ', in short', [
+        'variant', 'trials', *SUMMARY, *(dict(COSTS)[each] for each in SUMMED_UP)], lines)
 
 
 def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
@@ -76,7 +92,8 @@ def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
             lines += _completion(variants)
     return titled(title, _heads(variants), lines, [
         'In parentheses: 95% Wilson intervals over trials.', *(
-            ['Replicates: the smallest and the largest share of a replicate.']
+            ['Replicates: the smallest and the largest share of a replicate. In parentheses: '
+             "Student's 95% interval of their mean."]
             if any(line[0].endswith('replicates') for line in lines) else []),
         'A robot hour is one of world time in which a trial runs. ' + (
             'The time between trials counts, too: the world goes on.'
@@ -128,9 +145,10 @@ def percent(share: Share) -> str:
 
 
 def over_replicates(share: Share) -> str:
-    """Return the smallest and the largest share of a replicate, in percent."""
-    over = share.over_replicates
-    return '-' if over is None else '{:.1%} to {:.1%}'.format(*over)
+    """Return the smallest and largest share of a replicate, and their mean's interval."""
+    over, mean = share.over_replicates, share.of_mean
+    return '-' if over is None or mean is None else '{:.1%} to {:.1%} ({:.0%} to {:.0%})'.format(
+        *over, *mean)
 
 
 def number(value: Optional[float]) -> str:
