@@ -3,10 +3,10 @@ from typing import Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 import numpy as np
 
-from ..scenes.scene import SceneCause
+from ..scenes.scene import LOCALISATION, SceneCause
 from .pr2_body import PERIOD
 
-MOVED = 0.03  # m by which a thing is moved, where that ends a cause
+MOVED = 0.03  # m by which a thing, or a localisation, is moved, where that ends a cause
 ARM_MOVED = 0.1  # rad by which a joint of an arm is moved, likewise
 ARM_PREFIX = 'arm:'  # of what a cause ends by, before the name of a joint
 Start = Union[np.ndarray, float]
@@ -16,6 +16,7 @@ class LoggedWorld(Protocol):
     """The parts of World that the log reads."""
 
     periods: int
+    map_error: np.ndarray
 
     def body_pose(self, name: str) -> np.ndarray:
         """See World."""
@@ -93,6 +94,8 @@ class CauseLog:
 def _place(world: LoggedWorld, name: str) -> Start:
     if name.startswith(ARM_PREFIX):
         return world.joints()[name[len(ARM_PREFIX):]]
+    if name == LOCALISATION:
+        return world.map_error[:3, 3]
     return world.body_pose(name)[:3, 3]
 
 

@@ -17,7 +17,7 @@ from .cause_draws import (
 )
 from .drafts import caused, declared
 from .fridge import closing_hinge
-from .scene import Body, ClosingHinge, Disturbance, Near, SceneCause, Vector
+from .scene import LOCALISATION, Body, ClosingHinge, Disturbance, Near, SceneCause, Vector
 
 # why, and why so often: doc/protocol.md
 AMOUNT = 0.70  # chance that a trial has a cause
@@ -80,7 +80,8 @@ def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> Kitc
         generator.choice([-1.0, 1.0], 3), LOST_FROM, LOST_TO))
     return caused(draft._replace(localisation_error=(x, y, yaw)), 'base_misplaced',
                   'the robot believes to be {:+.1f} cm further on, {:+.1f} cm further left and '
-                  '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)))
+                  '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)),
+                  until=(LOCALISATION,))
 
 
 def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:

@@ -63,12 +63,15 @@ class Disturbance(NamedTuple):
     near: Optional[Near] = None
 
 
+LOCALISATION = 'localisation'  # of what a cause ends by: where the robot believes to stand
+
+
 class SceneCause(NamedTuple):
     """A reason to fail that this world was given, for the analysis afterwards."""
 
     kind: str  # short and stable, e.g. 'crowded', 'arm_in_view', 'sensor_noise', 'slippery_object'
     text: str  # in words, with figures
-    # names of bodies, or 'arm:' and a joint's name: the cause lasts until one of them is moved;
+    # names of bodies, 'arm:' and a joint's name, LOCALISATION: it lasts until one of them is moved;
     # (): it ends with what its disturbance does, and without a disturbance never
     until: Tuple[str, ...] = ()
     # whether it is meant to be there still at a second try, and after the script was started over

@@ -7,7 +7,12 @@ from smach_oracle.pr2.robot import ARM_JOINTS
 from smach_oracle.simulation.physics.passing import pass_time
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
-from smach_oracle.simulation.scenes.scene import Disturbance, SceneCause
+from smach_oracle.simulation.scenes.scene import (
+    LOCALISATION,
+    Disturbance,
+    RobotStart,
+    SceneCause,
+)
 
 PAN = 'l_shoulder_pan_joint'
 
@@ -52,6 +57,17 @@ def test_what_stands_in_the_way_is_there_from_the_start_until_it_is_moved(world)
     assert found['object_moved'].ended_s == pytest.approx(
         found['object_moved'].began_s + 0.4, abs=0.05)
     assert found['slippery'][3:] == (0.0, None)
+
+
+def test_a_wrong_localisation_is_there_until_the_robot_is_told_where_it_stands(world):
+    world.reset(
+        scene(robot=RobotStart(localisation_error=(0.08, 0.0, 0.0)),
+              causes=(SceneCause('base_misplaced', 'pushed', (LOCALISATION,), True),)))
+    pass_time(world, 600)
+    assert spans(world)['base_misplaced'][3:] == (0.0, None)
+    world.localise(world.true_base())
+    pass_time(world, 60)
+    assert spans(world)['base_misplaced'].ended_s == pytest.approx(10.0, abs=0.7)
 
 
 def test_an_arm_that_was_pushed_is_in_the_way_until_it_is_moved(world):

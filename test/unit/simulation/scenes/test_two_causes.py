@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from smach_oracle.simulation.scenes import kitchen_causes, tabletop_causes
+from smach_oracle.simulation.scenes.scene import LOCALISATION
 from smach_oracle.simulation.scenes.tasks import TASKS, draw
 
 CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
@@ -26,7 +27,7 @@ def given(monkeypatch, task, *kinds):
 @pytest.mark.parametrize('task, first, second', PAIRS)
 def test_what_a_cause_waits_for_is_in_the_scene(monkeypatch, task, first, second):
     for scene in given(monkeypatch, task, first, second):
-        there = {body.name for body in scene.bodies}
+        there = {body.name for body in scene.bodies} | {LOCALISATION}
         for cause in scene.causes:
             things = {name for name in cause.until if not name.startswith('arm:')}
             assert things <= there, (scene.seed, cause.kind)
