@@ -6,6 +6,7 @@ from std_msgs.msg import Header
 from worlds import CAN, TABLE, scene
 
 from smach_oracle.geometry.box import UprightBox
+from smach_oracle.pr2.fingers import may_hold
 from smach_oracle.pr2.kitchen import Kitchen, MapBox
 from smach_oracle.pr2.nodes import kitchen_skills
 from smach_oracle.pr2.planning.arm import Arm, SkillContext, SkillError
@@ -52,6 +53,20 @@ def test_a_door_is_pressed_shut_and_the_hand_does_not_open_it_again():
     stow(context, ARMS, {})
     door.close_door(context, Kitchen(), 'left')
     assert world.body_joint('fridge', DOOR_JOINT) < np.radians(1.5)
+    world.close()
+
+
+def test_a_hand_that_has_found_no_grasp_does_not_look_as_if_it_held_something(monkeypatch):
+    monkeypatch.setattr('smach_oracle.pr2.skills.pick.EFFORT', 1000)
+    world = World(scene(TABLE, CAN))
+    context = SkillContext(DirectRobot(world), installed_model())
+    target = UprightBox(np.array(CAN.position), np.array([0.062, 0.062, 0.12]), 0.0)
+    cage = {name: MapBox(target.centre + [x, y, z], np.array([0.08, 0.08, 0.08]), 0.0)
+            for name, x, y, z in (('before', -0.12, 0.0, 0.0), ('left', 0.0, 0.12, 0.0),
+                                  ('right', 0.0, -0.12, 0.0), ('above', 0.0, 0.0, 0.15))}
+    with pytest.raises(NoGrasp):
+        pick(context, 'right', target, {'table': UNDER_CAN, **cage})
+    assert not may_hold(world.joints(), 'right')
     world.close()
 
 

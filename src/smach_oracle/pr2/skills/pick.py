@@ -104,7 +104,11 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
                 raise
             hand.open(gap)
         finer = others_first(grasps(target, arm, fine=True), elsewhere)
-        return _pick(hand, target, _allowed(finer, from_above), effort, grasped)
+        try:
+            return _pick(hand, target, _allowed(finer, from_above), effort, grasped)
+        except NoGrasp:
+            hand.open()  # half open it would look as if it held something
+            raise
 
 
 def _allowed(candidates: List[np.ndarray], from_above: bool) -> List[np.ndarray]:
