@@ -66,8 +66,8 @@ def test_a_wrong_localisation_is_there_until_the_robot_is_told_where_it_stands(w
     pass_time(world, 600)
     assert spans(world)['base_misplaced'][3:] == (0.0, None)
     world.localise(world.true_base())
-    pass_time(world, 60)
-    assert spans(world)['base_misplaced'].ended_s == pytest.approx(10.0, abs=0.7)
+    pass_time(world, 6)
+    assert spans(world)['base_misplaced'].ended_s == pytest.approx(10.1, abs=0.05)
 
 
 def test_an_arm_that_was_pushed_is_in_the_way_until_it_is_moved(world):
