@@ -84,7 +84,9 @@ class WorldNode:
         self._lab = read_lab(settings) if settings.lab != NONE else None
         self._world = World(self._drawn(settings.seed), settings.camera_binning)
         self._truth: Optional[TrialTruth] = None
-        self._film = TrialFilm(Path(settings.film)) if settings.film != NONE else None
+        self._film: Optional[TrialFilm] = None
+        if settings.film != NONE:
+            self._film = TrialFilm(Path(settings.film), settings.film_events)
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
         self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
                                CLOCK_S[settings.lock_step])
@@ -287,7 +289,7 @@ def main() -> None:
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
         '~lasting, ~lab, ~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, '
-        '~camera_rate, ~camera_binning, ~film, ~reveal; see doc/simulation.md.')
+        '~camera_rate, ~camera_binning, ~film, ~film_events, ~reveal; see doc/simulation.md.')
     sys.setswitchinterval(SWITCH_S)
     try:
         # before the node is made: rospy looks at it only then

@@ -3,6 +3,8 @@ import os
 from pathlib import Path
 from typing import Any, Callable, NamedTuple, TypeVar
 
+from rosgraph.names import is_legal_name
+
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.paths import check_writable, path_of
@@ -36,6 +38,8 @@ class WorldSettings(NamedTuple):
     # images per simulated s for those who subscribe. At factor 0 the default is 0: snapshots
     camera_rate: float = 2.0
     film: str = NONE  # folder that gets a video of each trial
+    # topic of a machine's events, which captions of the videos tell
+    film_events: str = NONE
     # offer the truth to everybody, as services world/reveal and world/judge: to try things out
     reveal: bool = False
     # columns and rows of the camera's sensor that make one pixel of its images
@@ -72,6 +76,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
         lab=taken('lab', NONE, _file), film=taken('film', NONE, _folder),
+        film_events=taken('film_events', NONE, _topic),
         state_rate=number('state_rate', 10.0 if factor else 1.0, 0.1, 60.0),
         camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
         camera_binning=taken('camera_binning', 1, _one_or_two))
@@ -96,6 +101,12 @@ def _folder(key: str, value: object) -> str:
             raise SettingsError(key, value, 'a folder that is there, or {}'.format(NONE))
         check_writable(key, os.path.join(path, '0.mp4'))
     return path
+
+
+def _topic(key: str, value: object) -> str:
+    if not isinstance(value, str) or not is_legal_name(value) or not value:
+        raise SettingsError(key, value, 'the name of a topic, or {}'.format(NONE))
+    return value
 
 
 def _writable_file(key: str, value: object) -> str:

@@ -18,35 +18,66 @@ LIGHT_TURN, LIGHT_HEIGHT = np.radians(40.0), 4.0
 FAR = 5.0  # m. The horizon: with a further one the shadows get lost
 BACKGROUND = (236, 238, 241)
 FINER = 2  # times more pixels are drawn, each way, than shown
+Point = Tuple[float, float, float]
 
 
 class Viewpoint(NamedTuple):
     """A place for a camera that watches the world."""
 
-    eye: Tuple[float, float, float]  # m, in the world
-    target: Tuple[float, float, float]  # m, what is in the middle of the picture
+    eye: Point  # m, in the world
+    target: Point  # m, what is in the middle of the picture
     field_of_view: float  # degrees, from top to bottom
 
 
 AT_TABLE = Viewpoint((2.5, -1.75, 1.85), (0.36, -0.02, 0.82), 34.0)
 AT_FRIDGE = Viewpoint((-0.15, -2.6, 1.85), (0.95, 0.1, 0.74), 40.0)
-USUAL = {'drink_retrieval': AT_FRIDGE}  # by task; others: AT_TABLE
+AT_PERSON = Viewpoint((-2.4, -1.0, 1.75), (0.12, 0.42, 0.75), 37.5)
+KITCHEN = 'drink_retrieval'  # the task with these two. Others: AT_TABLE
+# m, x of the robot. Up to the first it is seen from AT_PERSON, from the second on from AT_FRIDGE.
+# It hands over at 0. When it opens and closes the door, it comes back to 0.47
+GLIDE = (0.05, 0.42)
 
 
 def portrait(world: World, size: Tuple[int, int] = SIZE,
              viewpoint: Optional[Viewpoint] = None) -> np.ndarray:
-    """(h, w, 3) uint8 RGB: the world as seen from a viewpoint, or from the usual one of its task.
+    """(h, w, 3) uint8 RGB: the world as seen from a viewpoint, or from that of `usual_viewpoint`.
 
     :param size: width and height, pixels.
     """
     width, height = size
-    eye, target, field_of_view = USUAL.get(world.scene.task,
-                                           AT_TABLE) if viewpoint is None else viewpoint
-    rendered = RenderedView(world, _looking(eye, target), (FINER * width, FINER * height),
-                            field_of_view, FAR, lightDirection=_light(eye, target), **LIGHT)
-    rendered.colour[rendered.bodies < 0] = BACKGROUND
-    blocks = rendered.colour.reshape(height, FINER, width, FINER, 3)
+    view = rendered(world, (FINER * width, FINER * height), viewpoint)
+    view.colour[view.bodies < 0] = BACKGROUND
+    blocks = view.colour.reshape(height, FINER, width, FINER, 3)
     return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
+
+
+def rendered(world: World, size: Tuple[int, int],
+             viewpoint: Optional[Viewpoint] = None) -> RenderedView:
+    """Return the view that a portrait shows, as the renderer draws it."""
+    eye, target, field_of_view = usual_viewpoint(world) if viewpoint is None else viewpoint
+    return RenderedView(world, _looking(eye, target), size, field_of_view, FAR,
+                        lightDirection=_light(eye, target), **LIGHT)
+
+
+def usual_viewpoint(world: World) -> Viewpoint:
+    """Return from where a world's task is seen well, as its robot stands.
+
+    In the kitchen it glides along while the robot drives from the refrigerator to the person.
+    """
+    if world.scene.task != KITCHEN:
+        return AT_TABLE
+    x = world.true_base()[0, 3]
+    share = float(np.clip((x - GLIDE[0]) / (GLIDE[1] - GLIDE[0]), 0.0, 1.0))
+    return _between(AT_PERSON, AT_FRIDGE, share * share * (3.0 - 2.0 * share))
+
+
+def _between(one: Viewpoint, other: Viewpoint, share: float) -> Viewpoint:
+    """Return one viewpoint at share 0, the other at share 1."""
+    def mixed(here: Point, there: Point) -> Point:
+        x, y, z = ((1.0 - share) * a + share * b for a, b in zip(here, there))
+        return x, y, z
+    return Viewpoint(mixed(one.eye, other.eye), mixed(one.target, other.target),
+                     (1.0 - share) * one.field_of_view + share * other.field_of_view)
 
 
 def _light(eye: Sequence[float], target: Sequence[float]) -> List[float]:

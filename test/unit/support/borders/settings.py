@@ -239,7 +239,7 @@ BORDERS = [
     Border('parameters of pr2_world', _nodes({
         'task': words('pick_and_place', 'kitchen'), 'seed': counts, 'benign': flags,
         'real_time_factor': shares, 'idle_speed': seconds, 'idle_grace': seconds,
-        'truth_file': words('none'), 'film': words('none'),
+        'truth_file': words('none'), 'film': words('none'), 'film_events': words('none'),
         'state_rate': seconds, 'camera_rate': seconds,
         'camera_binning': counts}), _take_world),
     Border('parameters of joy_teleoperation', _nodes({
