@@ -149,7 +149,7 @@ def test_interventions_stand_beside_each_other_by_class_and_cause():
                  '| passing causes alone | 1 | 1 (100%) | 0 (0%) | 1 (100%) |',
                  '| a lasting cause | 2 | 2 (100%) | 0 (0%) | 2 (100%) |',
                  '| with reflex | 2 | 2 (100%) | 0 (0%) | 2 (100%) |',
-                 '| all | 4 | 4 (100%) | 0 (0%) | 3 (75%) |', 'Of the 4 trials that'):
+                 '| all | 4 | 4 (100%) | 0 (0%) | 3 (75%) |', 'The 4 trials that'):
         assert told in text
     assert by_class('Pick and place', {'bare': rows}) == []
 

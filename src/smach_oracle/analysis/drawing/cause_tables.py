@@ -66,7 +66,7 @@ def by_class(title: str, variants: Rows) -> List[str]:
             lines.append([name, str(of), *('{} ({:.0%})'.format(count, count / of)
                                            for count in counts)])
     return [titled(title + ': interventions by cause', ['trials', 'number', *COMPARED], lines, [
-        'Of the {} trials that bare, default and restart ran. A trial with two causes is in two '
+        'The {} trials that bare, default and restart ran. A trial with two causes is in two '
         'lines.'.format(len(bare))])]
 
 

@@ -1,0 +1,58 @@
+"""The page of results says what the rows of the experiment say, and the rows are all there."""
+import re
+
+import pytest
+from house import ROOT
+
+from smach_oracle.analysis.drawing.command import find_rows, tables_page
+from smach_oracle.analysis.pairing import COMPARED, on_common_seeds
+from smach_oracle.analysis.trial_rows import read_rows
+from smach_oracle.experiment.freeze import last_freeze
+from smach_oracle.experiment.protocols import ALL, ProtocolChoice, parts_of
+
+TRIALS = ROOT / 'doc/trials'
+PAGE = (ROOT / 'doc/results.md').read_text(encoding='utf-8')
+TABLES = (ROOT / 'doc/results_tables.md').read_text(encoding='utf-8')
+SHOWN = ('drink_retrieval',)  # the tasks whose trials are complete
+PARTS = parts_of(ALL, ProtocolChoice(last_freeze(ROOT).blocks(), 15.0))
+
+
+@pytest.mark.parametrize('part', PARTS, ids=lambda part: part.name)
+def test_each_part_has_all_its_trials_on_the_seeds_of_the_freeze(part):
+    plan, path = part.plan, TRIALS / part.name / 'results.csv'
+    found = [(row.variant, row.replicate, row.seed)
+             for row in (read_rows(path) if path.exists() else [])]
+    planned = {(variant.name, replicate, plan.first_seed(replicate) + number)
+               for variant in plan.variants for replicate in range(plan.replicates)
+               for number in range(plan.trials)}
+    assert len(set(found)) == len(found) and set(found) <= planned
+    assert set(found) == planned or plan.task not in SHOWN
+
+
+def test_no_other_rows_lie_there():
+    assert {path.parent.name for path in TRIALS.rglob('results.csv')} <= {
+        part.name for part in PARTS}
+
+
+def test_the_page_of_tables_is_made_of_the_rows():
+    found = {kind: [row for row in rows if row.task in SHOWN]
+             for kind, rows in find_rows(TRIALS).items()}
+    assert tables_page({kind: rows for kind, rows in found.items() if rows}) == TABLES
+
+
+def test_each_line_of_a_table_of_the_page_stands_in_the_page_of_tables():
+    lines = [line for line in PAGE.splitlines() if line.startswith('|')]
+    assert len(lines) > 50
+    assert [line for line in lines if line not in TABLES.splitlines()] == []
+
+
+def test_the_page_tells_how_it_is_without_two_causes():
+    rows = on_common_seeds(read_rows(TRIALS / 'drink_retrieval_compared/results.csv'))
+    kept = [row for row in rows if not {'glare', 'slippery_drink'} & set(row.causes.split())]
+    counts = {name: sum(row.intervened for row in kept if row.variant == name)
+              for name in COMPARED}
+    told = re.search(r'There are (\d+) trials without these two. '
+                     r'A person was needed in (\d+), (\d+) and (\d+) of them',
+                     ' '.join(PAGE.split()))
+    assert told and tuple(map(int, told.groups())) == (
+        len(kept) // len(COMPARED), *(counts[name] for name in COMPARED))
