@@ -68,3 +68,15 @@ def test_the_truth_is_offered_to_nobody_unless_one_asks_the_world_for_it(task):
 def test_the_operators_time_passes_in_the_world_or_by_the_clock_of_a_paced_one(factor, service):
     config = launched('pr2', 'real_time_factor:={}'.format(factor))
     assert config.params['/scripted_operator/pass_time'].value == service
+
+
+@pytest.mark.parametrize('task', ['pick_and_place', 'drink_retrieval'])
+def test_a_film_hears_the_machine_of_its_task_and_gives_signs_of_life(task):
+    config = launched(task, 'film:=/tmp')
+    machine = next(node for node in config.nodes if node.type == 'oracle_run')
+    events = config.params['/pr2_world/film_events'].value
+    assert '/' + events == '/{}/oracle/events'.format(machine.name)
+    # images take half a second of wall time or more, and there are five in a simulated second
+    often = config.params['/actionlib_status_frequency'].value
+    assert often > launched(task).params['/actionlib_status_frequency'].value
+    assert launched('pr2').params['/pr2_world/film_events'].value == 'none'
