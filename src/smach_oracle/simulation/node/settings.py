@@ -1,6 +1,5 @@
 """The parameters of the world node."""
 import os
-from pathlib import Path
 from typing import Any, Callable, NamedTuple, TypeVar
 
 from rosgraph.names import is_legal_name
@@ -97,7 +96,7 @@ def _file(key: str, value: object) -> str:
 def _folder(key: str, value: object) -> str:
     path = _file(key, value)
     if path != NONE:
-        if not Path(path).is_dir():
+        if not os.path.isdir(path):
             raise SettingsError(key, value, 'a folder that is there, or {}'.format(NONE))
         check_writable(key, os.path.join(path, '0.mp4'))
     return path

@@ -16,7 +16,7 @@ class LoggedWorld(Protocol):
     """The parts of World that the log reads."""
 
     periods: int
-    map_error: np.ndarray
+    map_error: np.ndarray  # 4x4, odom_combined from the world
 
     def body_pose(self, name: str) -> np.ndarray:
         """See World."""

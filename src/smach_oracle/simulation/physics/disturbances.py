@@ -54,6 +54,7 @@ class DisturbedWorld(Protocol):
     """The parts of World that a disturbance moves or needs."""
 
     periods: int  # control periods since the reset
+    map_error: np.ndarray  # 4x4, odom_combined from the world
 
     @property
     def robot(self) -> Pr2Body:
