@@ -146,7 +146,8 @@ def _at_most_twice(attempt: Attempt, bench: Bench) -> Outcome:
     first = attempt()
     if first.ok or bench.runner.stopped:
         return first
-    first_log = _kept(first.log)
+    first_log = _kept(Path(first.log)) if first.log else ''
+    _kept(bench.results / first.name)  # what its nodes have logged
     second = attempt()
     second.attempts = 2
     second.seconds += first.seconds
@@ -155,12 +156,15 @@ def _at_most_twice(attempt: Attempt, bench: Bench) -> Outcome:
     return second
 
 
-def _kept(log: str) -> str:
-    """Keep the log of a first attempt beside that of the second."""
-    path = Path(log)
-    if not path.is_file():
-        return log
-    return str(path.rename(path.with_suffix('.first' + path.suffix)))
+def _kept(path: Path) -> Path:
+    """Keep a file or folder of a first attempt beside that of the second. Return where it is."""
+    if not path.exists():
+        return path
+    kept = path.with_suffix('.first' + path.suffix)
+    if path.is_dir():
+        shutil.rmtree(str(kept), ignore_errors=True)
+    path.rename(kept)
+    return kept
 
 
 def _run_rostest(path: Path, bench: Bench, shown: str, more_env: Optional[Dict[str, str]]

@@ -199,6 +199,7 @@ def test_a_rostest_has_a_second_attempt_that_everybody_sees(
 
     def run(path, *_):
         passed = runs.pop(0) == 'y'
+        (bench.results / path.stem).mkdir()  # with the logs of the nodes
         return Outcome(path.stem, passed=int(passed), failed=int(not passed),
                        detail='' if passed else '1 is not 2')
     monkeypatch.setattr(checks, '_run_rostest', run)
@@ -206,6 +207,8 @@ def test_a_rostest_has_a_second_attempt_that_everybody_sees(
     (bench.root / 'test/rostest/one.test').touch()
     outcome = rostest_checks(bench.root)['rostest/one'](bench)
     assert outcome.ok is ok and not runs
+    assert sorted(path.name for path in bench.results.glob('one*')) == [
+        'one', 'one.first'][:attempts]
     assert ('1 is not 2' in assert_told(outcome, capsys, attempts)) is ('n' in left)
 
 
