@@ -30,7 +30,8 @@ class Process:
         self._output = tempfile.TemporaryFile()
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output,
                                         stderr=subprocess.STDOUT,
-                                        env=dict(os.environ, PYTHONUNBUFFERED='1', **(env or {})))
+                                        env=dict(os.environ, PYTHONUNBUFFERED='1',
+                                                 PYTHONFAULTHANDLER='1', **(env or {})))
 
     def output(self) -> str:
         """What it has said so far."""
@@ -55,6 +56,12 @@ class Process:
     def wait(self, limit_s: float = 30.0) -> int:
         """Its exit code; raises subprocess.TimeoutExpired."""
         return self.process.wait(limit_s)
+
+    def threads(self) -> str:
+        """End it, and return what it has said, with where each of its threads stands."""
+        self.signal(signal.SIGABRT)
+        self.wait()
+        return self.output()
 
     def stop(self) -> None:
         if self.running():

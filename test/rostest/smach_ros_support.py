@@ -27,7 +27,8 @@ class ActionNodeProcess(object):
         self.process = None
 
     def start(self):
-        command = [sys.executable, os.path.join(HERE, 'smach_ros_action_node.py'), self.action_name,
+        command = [sys.executable, '-X', 'faulthandler',
+                   os.path.join(HERE, 'smach_ros_action_node.py'), self.action_name,
                    '__name:=serves_' + self.action_name]
         self.process = subprocess.Popen(command)
         return self

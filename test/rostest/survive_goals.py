@@ -4,8 +4,7 @@ import rospy
 import rostest
 from actionlib.msg import TestActionGoal
 from smach_ros_action_node import Behaviour
-from survive_support import SurvivingCase, Traffic
-from waiting import wait_for
+from survive_support import SurvivingCase
 
 WAITS = 'Waits for goals of the killed program to end: /arm'
 LEFT = 'a goal of /arm may still run'
@@ -14,9 +13,7 @@ LEFT = 'a goal of /arm may still run'
 class GoalsTest(SurvivingCase):
     def killed_while_moving(self, goal):
         """Kill the task while its goal runs; return all goals that are sent from now on."""
-        traffic = Traffic(self)
-        task = self.run_task(goal=goal)
-        self.assertTrue(wait_for(lambda: traffic.active, 40.0), task.output())
+        task, _ = self.run_until_it_moves(goal=goal)
         self.kill(task)
         sent = []
         subscriber = rospy.Subscriber('/arm/goal', TestActionGoal, sent.append, queue_size=10)

@@ -8,7 +8,7 @@ import rostest
 from actionlib_msgs.msg import GoalStatus
 from oracle_support import EventLog, FrontEnd, oracle_run, script
 from smach_ros_action_node import Behaviour
-from survive_support import EXPERTS, SUCCEED, SurvivingCase, Traffic
+from survive_support import EXPERTS, SUCCEED, SurvivingCase
 from waiting import wait_for
 
 from smach_oracle.msg import ExpertDecision, OracleEvent
@@ -17,9 +17,7 @@ from smach_oracle.srv import AnswerQueryRequest
 
 class KilledTest(SurvivingCase):
     def test_a_goal_of_the_killed_program_has_ended_before_anything_is_sent(self):
-        traffic = Traffic(self)
-        task = self.run_task(goal=Behaviour.HANG)
-        self.assertTrue(wait_for(lambda: traffic.active, 30.0), task.output())
+        task, traffic = self.run_until_it_moves()
         self.kill(task)
         again = self.run_task('--resume')
         self.assertTrue(again.says('OUTCOME succeeded', 40.0), again.output())

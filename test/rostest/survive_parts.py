@@ -34,16 +34,10 @@ LAUNCH = '''
 
 
 class PartsTest(SurvivingCase):
-    def killed_while_moving(self, *words):
-        traffic = Traffic(self)
-        task = self.run_task(*words, goal=Behaviour.HANG)
-        self.assertTrue(wait_for(lambda: traffic.active, 40.0), task.output())
-        return traffic, task
-
     def test_the_bags_of_both_parts_are_one_trial(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        _, task = self.killed_while_moving('--record', folder.name)
+        task, _ = self.run_until_it_moves('--record', folder.name)
         self.assertTrue(wait_for(lambda: 'MOVE' in entered(folder.name), 20.0))
         self.kill(task)
         again = self.run_task('--resume', '--record', folder.name)
@@ -64,7 +58,7 @@ class PartsTest(SurvivingCase):
         self.assertIn('1 trials were resumed after their program was stopped', done.stdout)
 
     def test_it_goes_on_from_an_earlier_moment(self):
-        _, task = self.killed_while_moving()
+        task, _ = self.run_until_it_moves()
         self.kill(task)
         store = StoreFile(self.store, read_only=True)
         moment = next(each.number for each in store.moments(1)

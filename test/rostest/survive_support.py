@@ -4,10 +4,12 @@ import signal
 import tempfile
 import unittest
 
+import rosgraph
 import rospy
 from actionlib.msg import TestActionResult
 from actionlib_msgs.msg import GoalStatus, GoalStatusArray
 from oracle_support import oracle_run, script
+from smach_ros_action_node import Behaviour
 from smach_ros_support import ActionNodeProcess
 from waiting import wait_for
 
@@ -53,13 +55,22 @@ class Traffic:
     def __init__(self, test):
         self.results = []
         self.active = set()  # ids of all that ever were
-        for end, kind, note in (('status', GoalStatusArray, self._status),
-                                ('result', TestActionResult, self.results.append)):
-            subscriber = rospy.Subscriber('/arm/' + end, kind, note, queue_size=10)
-            test.addCleanup(subscriber.unregister)
-            test.assertTrue(wait_for(subscriber.get_num_connections))
+        self.statuses = 0  # messages
+        self._listen(test, 'status', GoalStatusArray, self._status)
+        # A server opens all its topics before it sends its first status. While one registers a
+        # publisher, rospy may lose it for whoever subscribes
+        test.assertTrue(wait_for(lambda: self.statuses), 'the server sends no status')
+        results = self._listen(test, 'result', TestActionResult, self.results.append)
+        test.assertTrue(wait_for(results.get_num_connections), 'the server sends no results')
+
+    @staticmethod
+    def _listen(test, end, kind, note):
+        subscriber = rospy.Subscriber('/arm/' + end, kind, note, queue_size=10)
+        test.addCleanup(subscriber.unregister)
+        return subscriber
 
     def _status(self, message):
+        self.statuses += 1
         self.active.update(each.goal_id.id for each in message.status_list
                            if each.status == GoalStatus.ACTIVE)
 
@@ -90,6 +101,26 @@ class SurvivingCase(unittest.TestCase):
     def run_task(self, *words, goal=SUCCEED, told='succeeded'):
         return oracle_run(self, '--checkpoint', self.store, *words, self.script, str(goal), told,
                           '_expert_query_server:=' + EXPERTS)
+
+    def run_until_it_moves(self, *words, goal=Behaviour.HANG):
+        """Return the task once its goal is under way, and what the server says."""
+        traffic = Traffic(self)
+        task = self.run_task(*words, goal=goal)
+        # two limits: a program that starts slowly has lost no goal
+        if not (task.says('LOOKS', 60.0) and wait_for(lambda: traffic.active, 40.0)):
+            self.fail('\n'.join(self._where_it_hangs(task, traffic)))
+        return task, traffic
+
+    def _where_it_hangs(self, task, traffic):
+        """Say of both ends of the action what they do. Both processes end."""
+        yield '{} messages of status; the server {}; this node {}'.format(
+            traffic.statuses, 'runs' if self.server.process.poll() is None else 'is gone',
+            'is shut down' if rospy.is_shutdown() else 'runs')
+        for kind, topics in zip(('publishers', 'subscribers'),
+                                rosgraph.Master(rospy.get_name()).getSystemState()):
+            yield '{}: {}'.format(kind, [each for each in topics if each[0].startswith('/arm/')])
+        self.server.process.send_signal(signal.SIGABRT)  # its threads go to the log of the test
+        yield task.threads()
 
     def kill(self, task):
         task.signal(signal.SIGKILL)
