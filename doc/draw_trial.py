@@ -21,7 +21,7 @@ SEED = 37  # somebody moves the drink, PICK_DRINK fails, and the oracle recovers
 RECOVERED, HANDED_OVER = 'MOVE_OUT', 'HAND_OVER'  # states that are pictured
 FASTER = 3  # times than the film, which is twice as fast as the world
 NOISE = 9  # of 255, by how much the film's codec changes a pixel
-STILL = 0.999  # of the pixels are the same in an image that stands still
+STILL = 0.001  # of the pixels change at most in an image that stands still
 INK, SAME_INK = 180, 25  # of 255: what is no paper, and how much the codec changes it
 COLOURS = 96
 CLEAR = 255  # in the palette: a pixel stays as it was
@@ -110,16 +110,21 @@ def during(images, state):
 
 
 def shown(images, frames_s):
-    """Images, and for how many s each: one of those that stand still, every so many of the others.
+    """Images, and for how many s each: one of those that stand still, the first one with a caption,
+    and every so many of the others.
     """
+    from smach_oracle.simulation.pictures.caption import GREY, HEIGHT
+    working = set(told_in(images, GREY))
     frames, moved = [], 0
-    for image in images:
-        if frames and (image == frames[-1][0]).mean() > STILL:
+    for index, image in enumerate(images):
+        changed = np.abs(image.astype(int) - frames[-1][0]).max(axis=2) > NOISE if frames else None
+        if frames and index not in working and changed.mean() < STILL:
             frames[-1][1] += 1.0 / frames_s
             continue
-        if moved % FASTER == 0:
-            frames.append([image, 1.0 / frames_s])
         moved += 1
+        if not frames or changed[-HEIGHT:].mean() > STILL or moved == FASTER:
+            frames.append([image, 1.0 / frames_s])
+            moved = 0
     return frames
 
 
