@@ -86,9 +86,8 @@ def _draw_events(axes: Any, rows: Sequence[TrialRow]) -> None:
     hours = _hours(rows)
     widths = [later - hour for hour, later in zip(hours, hours[1:])] + [0.0]
     for row, hour, width in zip(rows, hours, widths):
-        for kind, colour in LIGHT.items():
-            if kind in lights_of(row):
-                axes.axvspan(hour, hour + width, color=colour, linewidth=0, alpha=PALE)
+        for kind in lights_of(row):
+            axes.axvspan(hour, hour + width, color=LIGHT[kind], linewidth=0, alpha=PALE)
     axes.vlines(hours, 0, [row.attempts for row in rows], color=BLUE, linewidth=0.9)
     axes.vlines(hours, [-row.questions for row in rows], 0, color=VERMILLION, linewidth=0.9)
     lost = [row.hour for row in rows if row.ending == LOST]
