@@ -126,6 +126,37 @@ class RecordTopics(unittest.TestCase):
             self.assertEqual([message.data for message in self.read(path, '/map_name')],
                              ['kitchen'])
 
+    def test_a_message_on_its_way_at_the_end_is_in_the_bag(self) -> None:
+        report = rospy.Publisher('/report', String, queue_size=10)
+        mood = rospy.Publisher('/mood', String, latch=True, queue_size=10)
+        recorder = self.start('/report', '/mood')
+        for publisher in (report, mood):
+            wait_for(publisher.get_num_connections, 'the connection')
+        self.begin()
+        self.source.emit(EventKind.TRIAL_END, 'TOP')
+        report.publish('on its way')
+        mood.publish('of the next trial')
+        recorder.close(WAIT_S)
+        path, = glob.glob(os.path.join(self.folder, '*.bag'))
+        self.assertEqual([message.data for message in self.read(path, '/report')], ['on its way'])
+        self.assertEqual(self.read(path, '/mood'), [])
+
+    def test_the_next_trial_closes_the_bag_of_the_last_at_once(self) -> None:
+        report = rospy.Publisher('/reports', String, queue_size=10)
+        recorder = self.start('/reports')
+        wait_for(report.get_num_connections, 'the connection')
+        self.begin()
+        self.source.emit(EventKind.TRIAL_END, 'TOP')
+        self.begin()
+        report.publish('of the second')
+        self.wait_until_written(b'of the second')
+        self.source.emit(EventKind.TRIAL_END, 'TOP')
+        recorder.close(WAIT_S)
+        first, second = sorted(glob.glob(os.path.join(self.folder, '*.bag')))
+        self.assertEqual([message.data for message in self.read(second, '/reports')],
+                         ['of the second'])
+        self.assertEqual(self.read(first, '/reports'), [])
+
     def test_the_recorders_own_topics_are_relative_to_the_node(self) -> None:
         recorder = self.start(rates=lambda: OracleRates(trial_id='t'))
         self.begin()

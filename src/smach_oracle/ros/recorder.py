@@ -39,6 +39,7 @@ WEIGHT_OF_A_FILE = 20  # opening and closing one takes as long as writing so man
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 HUNG_AFTER_S = 5.0
 CLOSE_S = 1.0
+LATE_S = 0.5  # a bag stays open after its trial for messages on their way, also on a busy machine
 
 Snapshots = Mapping[str, Callable[[], Optional[genpy.Message]]]  # by topic
 Log = Callable[[str], None]
@@ -83,7 +84,11 @@ class TrialRecorder:
         self._watch = DiskWatch(hung_after_s)
         self._queue = RecorderQueue(max_events, max_message_bytes)
         self._topics = own_topics()
-        self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch)
+        listens = bool(topics) and has_node()
+        self._late_s = LATE_S if listens else 0.0
+        self._last_end = -LATE_S  # of a trial, by time.monotonic()
+        self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch,
+                               self._late_s)
         self._bags.recover()
         self._attached: 'WeakSet[EventSource]' = WeakSet()
         self._hung = False
@@ -91,8 +96,7 @@ class TrialRecorder:
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
         self._thread.start()
-        self._listener = TopicListener(topics, self._take_message,
-                                       types) if topics and has_node() else None
+        self._listener = TopicListener(topics, self._take_message, types) if listens else None
         atexit.register(self.close)
 
     def attach(self, machine: Union['OracleContainer', EventSource],
@@ -124,6 +128,8 @@ class TrialRecorder:
         if not self._queue.put_event(item, self._may_wait, weight):
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
+        if event.kind == EventKind.TRIAL_END:
+            self._last_end = time.monotonic()
 
     def _put_snapshot(self, trial_id: str, topic: str, message: genpy.Message) -> None:
         self._queue.put_event(SnapshotItem(trial_id, topic, message, now()), self._may_wait)
@@ -190,13 +196,15 @@ class TrialRecorder:
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Write what waits, close all bags, also of trials that have not ended, and stop.
 
-        Idempotent, any thread.
+        Idempotent, any thread. Where topics are recorded, it waits until half a second has passed
+        since the end of a trial, for messages on their way.
 
-        :returns: whether all was done within `timeout_s`. It is False where the disk hangs: the
-            bags are mended at the next start.
+        :returns: whether all was done within `timeout_s` after that. It is False where the disk
+            hangs: the bags are mended at the next start.
         """
         if os.getpid() != self._process:
             return True
+        time.sleep(max(0.0, self._last_end + self._late_s - time.monotonic()))
         first, self._closed = not self._closed, True
         done = self._queue.close(timeout_s)
         # unsubscribing talks to the master, which may be gone

@@ -48,13 +48,17 @@ class TrialBags:
     """
 
     def __init__(self, folder: str, topics: RecorderTopics, reporter: Reporter, losses: LossCounter,
-                 watch: DiskWatch) -> None:
+                 watch: DiskWatch, late_s: float = 0.0) -> None:
+        """
+        :param late_s: how long a bag stays open after its trial, for messages on their way.
+        """
         self._folder = folder
         self._topics = topics
         self._reporter = reporter
         self._losses = losses
         self._watch = watch
         self._budget = SyncBudget()
+        self._late_s = late_s
         self._bags: Dict[str, TrialBag] = {}
         self._kept: Dict[KeptKey, MessageItem] = {}
         self._error = ''
@@ -69,7 +73,9 @@ class TrialBags:
         elif isinstance(item, MessageItem):
             self._keep(item)
             for bag in list(self._bags.values()):
-                self._guard(bag, bag.add_raw, item)
+                # a latched message after the end is about what comes next
+                if not (item.latching and bag.over_since is not None):
+                    self._guard(bag, bag.add_raw, item)
         elif item.trial_id in self._bags:
             bag = self._bags[item.trial_id]
             if isinstance(item, EndItem):
@@ -78,6 +84,8 @@ class TrialBags:
                 self._guard(bag, bag.add_message, item.topic, item.message, item.when, True)
 
     def _write_event(self, event: Event, when: Moment) -> None:
+        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
+            self._close_over(0.0)
         bag = self._bags.get(event.trial_id) or self._open(event, when)
         if bag is None:
             self._losses.add_events(event.trial_id, 1)
@@ -88,7 +96,17 @@ class TrialBags:
             if event.trial_id in self._bags:
                 self._works_again(bag)
         if event.kind == EventKind.TRIAL_END and event.trial_id in self._bags:
-            self._close(bag, when)
+            if self._late_s:
+                bag.over_since = time.monotonic()
+            else:
+                self._close(bag, when)
+
+    def _close_over(self, late_s: float) -> None:
+        """Close the bags whose trials have been over for so long."""
+        now = Moment(None, time.time(), time.monotonic())
+        for bag in list(self._bags.values()):
+            if bag.over_since is not None and now.monotonic - bag.over_since >= late_s:
+                self._close(bag, now)
 
     def _open(self, event: Event, when: Moment) -> Optional[TrialBag]:
         if self._error and time.monotonic(
@@ -189,10 +207,13 @@ class TrialBags:
     def wait_s(self) -> Optional[float]:
         """Return how long the writer thread may sleep. None means until something comes."""
         times = [due for due in (bag.due_s() for bag in self._bags.values()) if due is not None]
+        times += [max(0.0, bag.over_since + self._late_s - time.monotonic())
+                  for bag in self._bags.values() if bag.over_since is not None]
         return min(times) if times else None
 
     def tick(self) -> None:
-        """Flush what is due."""
+        """Flush and close what is due."""
+        self._close_over(self._late_s)
         for bag in list(self._bags.values()):
             if bag.due_s() == 0.0:
                 self._guard(bag, bag.flush)
