@@ -11,9 +11,12 @@ from .clusters import Capsule
 
 # links at the ends of each part, the radius (m) within which all of it is, and some noise of the
 # camera
-_PARTS = (('_shoulder_lift_link', '_elbow_flex_link', 0.13),
-          ('_elbow_flex_link', '_wrist_flex_link', 0.11), ('_wrist_flex_link',
-                                                           '_gripper_tool_frame', 0.11))
+_PARTS = (
+    ('_shoulder_pan_link', '_shoulder_lift_link', 0.2),
+    ('_shoulder_lift_link', '_elbow_flex_link', 0.13),
+    ('_elbow_flex_link', '_wrist_flex_link', 0.11),
+    ('_wrist_flex_link', '_gripper_tool_frame', 0.11),
+)
 
 
 def limbs_of(links: Dict[str, Joint], positions: Mapping[str, float]) -> List[Capsule]:

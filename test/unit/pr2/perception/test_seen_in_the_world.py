@@ -12,6 +12,7 @@ from smach_oracle.pr2.model.pr2_model import pr2_urdf
 from smach_oracle.pr2.perception.clusters import NotSeen
 from smach_oracle.pr2.perception.own_limbs import limbs_of
 from smach_oracle.pr2.perception.tabletop import find_tabletop
+from smach_oracle.pr2.planning.collision_map import map_of_image
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.scenes.scene import Body
 
@@ -20,6 +21,10 @@ IN_VIEW = tuple(
     zip(('r_shoulder_pan_joint', 'r_shoulder_lift_joint', 'r_upper_arm_roll_joint',
          'r_elbow_flex_joint', 'r_forearm_roll_joint', 'r_wrist_flex_joint', 'r_wrist_roll_joint'),
         (0.25, 0.5, -0.3, -1.3, 0.0, -0.5, 0.0)))
+# the arm drawn back from a place on the right, at which the camera looks: it sees the shoulder
+DRAWN_BACK = (('torso_lift_joint', 0.22),) + tuple(
+    zip((name for name, _ in IN_VIEW), (0.443, 0.812, -0.506, -1.476, 2.165, -1.277, -2.158)))
+PLACE = (0.6, -0.35, 0.8)
 
 
 @pytest.fixture(scope='module', params=[1, 2], ids=['whole', 'binned'])
@@ -101,6 +106,17 @@ def test_the_robot_knows_its_own_arm_when_it_sees_it(world, links):
     boxes = find_tabletop(seen.image, limbs=limbs_of(links, seen.joints)).objects
     assert len(boxes) == 1
     assert errors_of(boxes, seen, [brick(0.34)])[0] < 0.01
+
+
+def test_its_own_shoulder_is_nothing_in_the_way(world, links):
+    seen = look(world, [TABLE], joints=DRAWN_BACK, at=PLACE)
+
+    def nearest(limbs):
+        boxes = map_of_image(seen.image, limbs).boxes.values()
+        return min(box.centre[0] for box in boxes)
+
+    assert nearest(()) < 0.25  # m before the base. The table begins at 0.5
+    assert nearest(limbs_of(links, seen.joints)) > 0.4
 
 
 def test_what_its_own_hand_hides_in_part_is_not_measured(world, links):
