@@ -39,7 +39,7 @@ WEIGHT_OF_A_FILE = 20  # opening and closing one takes as long as writing so man
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 HUNG_AFTER_S = 5.0
 CLOSE_S = 1.0
-LATE_S = 0.5  # a bag stays open after its trial for messages on their way, also on a busy machine
+LATE_S = 0.4  # a bag stays open after its trial for messages on their way, also on a busy machine
 
 Snapshots = Mapping[str, Callable[[], Optional[genpy.Message]]]  # by topic
 Log = Callable[[str], None]
@@ -129,7 +129,7 @@ class TrialRecorder:
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
         if event.kind == EventKind.TRIAL_END:
-            self._last_end = time.monotonic()
+            self._last_end = item.when.monotonic
 
     def _put_snapshot(self, trial_id: str, topic: str, message: genpy.Message) -> None:
         self._queue.put_event(SnapshotItem(trial_id, topic, message, now()), self._may_wait)
@@ -196,17 +196,19 @@ class TrialRecorder:
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Write what waits, close all bags, also of trials that have not ended, and stop.
 
-        Idempotent, any thread. Where topics are recorded, it waits until half a second has passed
-        since the end of a trial, for messages on their way.
+        Idempotent, any thread. Messages of other topics that are on their way at the end of a trial
+        are waited for, up to half of `timeout_s`, unless the node is shut down: it hears no more.
 
-        :returns: whether all was done within `timeout_s` after that. It is False where the disk
-            hangs: the bags are mended at the next start.
+        :returns: whether all was done within `timeout_s`. It is False where the disk hangs: the
+            bags are mended at the next start.
         """
         if os.getpid() != self._process:
             return True
-        time.sleep(max(0.0, self._last_end + self._late_s - time.monotonic()))
+        deadline = time.monotonic() + timeout_s
+        if not self._closed and self._listener and not rospy.core.is_shutdown_requested():
+            self._queue.wait_while(self._late_may_come, timeout_s / 2)
         first, self._closed = not self._closed, True
-        done = self._queue.close(timeout_s)
+        done = self._queue.close(max(0.0, deadline - time.monotonic()))
         # unsubscribing talks to the master, which may be gone
         if first and self._listener is not None:
             threading.Thread(target=self._listener.close, name='recorder unsubscribes',
@@ -214,6 +216,9 @@ class TrialRecorder:
         if first:
             self._report_closing(done)
         return done
+
+    def _late_may_come(self) -> bool:
+        return time.monotonic() < self._last_end + self._late_s or self._bags.any_over()
 
     def _report_closing(self, done: bool) -> None:
         atexit.unregister(self.close)

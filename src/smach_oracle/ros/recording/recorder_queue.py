@@ -10,6 +10,7 @@ from smach_oracle.oracle.records.events import Event
 from .bag_format import Stamp
 from .bag_writer import MessageType
 
+LATE_POLL_S = 0.02
 BACK_PRESSURE_POLL_S = 0.1  # how soon a blocked machine notices that the disk hangs
 
 
@@ -48,7 +49,10 @@ class EndItem(NamedTuple):
 
 
 class MessageItem(NamedTuple):
-    """A message of another topic, as it came. It goes to the bags of all trials that run."""
+    """A message of another topic, as it came.
+
+    It goes to the bags of all trials that run, and of those that have just ended.
+    """
 
     topic: str
     message_type: MessageType
@@ -122,6 +126,16 @@ class RecorderQueue:
             self._weight = self._message_bytes = 0
             self._changed.notify_all()
             return items, self._closing
+
+    def wait_while(self, condition: Callable[[], bool], timeout_s: float) -> None:
+        """Let items in and out for as long as a condition holds, but no longer than `timeout_s`.
+
+        As in `close`, the lock is let go of meanwhile.
+        """
+        deadline = time.monotonic() + timeout_s
+        with self._changed:
+            while condition() and not self._closing and time.monotonic() < deadline:
+                self._changed.wait(LATE_POLL_S)
 
     def close(self, timeout_s: float) -> bool:
         """Let nothing more in and wait until the writer has finished with what is in.

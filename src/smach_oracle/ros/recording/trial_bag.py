@@ -55,7 +55,7 @@ class TrialBag:
                  budget: SyncBudget) -> None:
         self.trial_id = trial_id
         self.events_written = 0
-        self.over_since: Optional[float] = None  # when its trial ended, by time.monotonic()
+        self.over: Optional[Moment] = None  # when its trial ended
         self._events_in_chunk = 0
         self._events_unsynced = 0
         self._events_at_risk = 0  # events that are lost if the next call to the disk fails

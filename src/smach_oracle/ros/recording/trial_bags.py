@@ -39,7 +39,7 @@ class Reporter(NamedTuple):
 
 
 class TrialBags:
-    """One bag for each trial that runs.
+    """One bag for each trial that runs, or has just ended.
 
     Used by the writer thread alone. It raises nothing on a disk error.
 
@@ -73,8 +73,8 @@ class TrialBags:
         elif isinstance(item, MessageItem):
             self._keep(item)
             for bag in list(self._bags.values()):
-                # a latched message after the end is about what comes next
-                if not (item.latching and bag.over_since is not None):
+                # what every later bag begins with is about the next trial, if this one is over
+                if bag.over is None or kept_key(item) is None:
                     self._guard(bag, bag.add_raw, item)
         elif item.trial_id in self._bags:
             bag = self._bags[item.trial_id]
@@ -97,16 +97,20 @@ class TrialBags:
                 self._works_again(bag)
         if event.kind == EventKind.TRIAL_END and event.trial_id in self._bags:
             if self._late_s:
-                bag.over_since = time.monotonic()
+                bag.over = when
+                self._guard(bag, bag.flush)  # a crash in the time that is left costs no event
             else:
                 self._close(bag, when)
 
+    def any_over(self) -> bool:
+        """Whether a bag waits for messages after the end of its trial. Any thread."""
+        return any(bag.over for bag in list(self._bags.values()))
+
     def _close_over(self, late_s: float) -> None:
         """Close the bags whose trials have been over for so long."""
-        now = Moment(None, time.time(), time.monotonic())
         for bag in list(self._bags.values()):
-            if bag.over_since is not None and now.monotonic - bag.over_since >= late_s:
-                self._close(bag, now)
+            if bag.over and time.monotonic() - bag.over.monotonic >= late_s:
+                self._close(bag, bag.over)
 
     def _open(self, event: Event, when: Moment) -> Optional[TrialBag]:
         if self._error and time.monotonic(
@@ -207,8 +211,8 @@ class TrialBags:
     def wait_s(self) -> Optional[float]:
         """Return how long the writer thread may sleep. None means until something comes."""
         times = [due for due in (bag.due_s() for bag in self._bags.values()) if due is not None]
-        times += [max(0.0, bag.over_since + self._late_s - time.monotonic())
-                  for bag in self._bags.values() if bag.over_since is not None]
+        times += [max(0.0, bag.over.monotonic + self._late_s - time.monotonic())
+                  for bag in self._bags.values() if bag.over]
         return min(times) if times else None
 
     def tick(self) -> None:

@@ -21,9 +21,9 @@ IN_VIEW = tuple(
     zip(('r_shoulder_pan_joint', 'r_shoulder_lift_joint', 'r_upper_arm_roll_joint',
          'r_elbow_flex_joint', 'r_forearm_roll_joint', 'r_wrist_flex_joint', 'r_wrist_roll_joint'),
         (0.25, 0.5, -0.3, -1.3, 0.0, -0.5, 0.0)))
-# the arm drawn back from a place on the right, at which the camera looks: it sees the shoulder
-DRAWN_BACK = (('torso_lift_joint', 0.22),) + tuple(
-    zip((name for name, _ in IN_VIEW), (0.443, 0.812, -0.506, -1.476, 2.165, -1.277, -2.158)))
+# the right arm drawn back from a place at which the camera looks: it sees the shoulder
+DRAWN_BACK = (0.443, 0.812, -0.506, -1.476, 2.165, -1.277, -2.158)
+MIRRORED = (-1, 1, -1, 1, -1, 1, -1)
 PLACE = (0.6, -0.35, 0.8)
 
 
@@ -108,8 +108,13 @@ def test_the_robot_knows_its_own_arm_when_it_sees_it(world, links):
     assert errors_of(boxes, seen, [brick(0.34)])[0] < 0.01
 
 
-def test_its_own_shoulder_is_nothing_in_the_way(world, links):
-    seen = look(world, [TABLE], joints=DRAWN_BACK, at=PLACE)
+@pytest.mark.parametrize('arm', ['right', 'left'])
+def test_its_own_shoulder_is_nothing_in_the_way(world, links, arm):
+    signs = MIRRORED if arm == 'left' else np.ones(7)
+    posture = [(arm[0] + name[1:], sign * angle)
+               for (name, _), sign, angle in zip(IN_VIEW, signs, DRAWN_BACK)]
+    place = (PLACE[0], PLACE[1] * signs[0], PLACE[2])
+    seen = look(world, [TABLE], joints=[('torso_lift_joint', 0.22), *posture], at=place)
 
     def nearest(limbs):
         boxes = map_of_image(seen.image, limbs).boxes.values()
