@@ -271,6 +271,30 @@ def test_every_bag_knows_the_latest_structure_of_each_container(recorder, source
         assert found == {'TOP': ['A', 'B'], 'TOP/SUB': ['X']}
 
 
+def test_while_late_messages_are_waited_for_the_end_is_on_the_disk(recorder, source, tmp_path,
+                                                                   monkeypatch):
+    monkeypatch.setattr(recorder_bag, 'FLUSH_AFTER_S', 60.0)
+    recorder._bags._late_s = 60.0  # as where topics are recorded, and longer
+
+    def on_the_disk(text):
+        return wait_for(lambda: any(text in Path(path).read_bytes() for path in active(tmp_path)))
+
+    trial(source, 'a', end=False)
+    assert on_the_disk(b'recovers')
+    source.emit(EventKind.TRIAL_END, 'TOP', outcome='succeeded')
+    assert on_the_disk(b'succeeded')
+    recorder._take_message(message('late', Moment(None, 5.0)))
+    recorder._take_message(message('the map', Moment(None, 5.0), latching=True, topic='/map'))
+    recorder._take_message(structure('TOP', 'NEXT'))
+    trial(source, 'b', end=False)
+    assert wait_for(lambda: finished(tmp_path))  # the next trial closes it
+    recorder.close(10.0)
+    first, second = finished(tmp_path)
+    topics = ('/talk', '/map', '/robot/smach/container_structure')
+    assert [[len(messages(path, topic)) for topic in topics]
+            for path in (first, second)] == [[1, 0, 0], [0, 1, 1]]
+
+
 def test_other_topics_are_dropped_and_counted_before_an_event_is(tmp_path):
     queue = RecorderQueue(max_events=10, max_message_bytes=25)
     accepted = [queue.put_message(message('x' * 6, Moment(None, 0.0))) for _ in range(4)]
