@@ -85,10 +85,9 @@ class TrialRecorder:
         self._queue = RecorderQueue(max_events, max_message_bytes)
         self._topics = own_topics()
         listens = bool(topics) and has_node()
-        self._late_s = LATE_S if listens else 0.0
         self._last_end = -LATE_S  # of a trial, by time.monotonic()
         self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch,
-                               self._late_s)
+                               LATE_S if listens else 0.0)
         self._bags.recover()
         self._attached: 'WeakSet[EventSource]' = WeakSet()
         self._hung = False
@@ -218,7 +217,7 @@ class TrialRecorder:
         return done
 
     def _late_may_come(self) -> bool:
-        return time.monotonic() < self._last_end + self._late_s or self._bags.any_over()
+        return time.monotonic() < self._last_end + LATE_S or self._bags.any_over()
 
     def _report_closing(self, done: bool) -> None:
         atexit.unregister(self.close)
