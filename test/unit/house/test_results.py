@@ -41,13 +41,17 @@ def test_each_line_of_a_table_of_the_page_stands_in_the_page_of_tables():
     assert [line for line in lines if line not in TABLES.splitlines()] == []
 
 
-def test_the_page_tells_how_it_is_without_two_causes():
-    rows = on_common_seeds(read_rows(TRIALS / 'drink_retrieval_compared/results.csv'))
-    kept = [row for row in rows if not {'glare', 'slippery_drink'} & set(row.causes.split())]
+@pytest.mark.parametrize('task, without, words', [
+    ('pick_and_place', {'glare', 'goal_occupied', 'edge_of_reach', 'slippery_object'},
+     r'In the (\d+) without, it was (\d+), (\d+) and (\d+)'),
+    ('drink_retrieval', {'glare', 'slippery_drink'},
+     r'There are (\d+) trials without these two. '
+     r'A person was needed in (\d+), (\d+) and (\d+) of them')])
+def test_the_page_tells_how_it_is_without_a_few_causes(task, without, words):
+    rows = on_common_seeds(read_rows(TRIALS / (task + '_compared') / 'results.csv'))
+    kept = [row for row in rows if not without & set(row.causes.split())]
     counts = {name: sum(row.intervened for row in kept if row.variant == name)
               for name in COMPARED}
-    told = re.search(r'There are (\d+) trials without these two. '
-                     r'A person was needed in (\d+), (\d+) and (\d+) of them',
-                     ' '.join(PAGE.split()))
+    told = re.search(words, ' '.join(PAGE.split()))
     assert told and tuple(map(int, told.groups())) == (
         len(kept) // len(COMPARED), *(counts[name] for name in COMPARED))
