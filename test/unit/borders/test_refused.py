@@ -170,7 +170,7 @@ def test_diagnostics_of_another_type_are_passed_over(monkeypatch):
         topics._take_diagnostics(Bool(True))
         assert latest.age_s() is None
         topics._take_diagnostics(DiagnosticArray(status=[DiagnosticStatus(name='Power')]))
-        assert latest.heard().level == 0
+        assert latest.newest().what.level == 0
 
 
 def test_a_collision_map_has_no_end_of_objects():

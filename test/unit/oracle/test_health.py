@@ -228,10 +228,10 @@ def test_ctrl_c_ends_the_wait(health):
     watch = machine.machine._oracle.tree.health
     real = watch.why_unwell
 
-    def look(stopped):
+    def look(stopped, since_s=None):
         if notices(machine):
             raise KeyboardInterrupt
-        return real(stopped)
+        return real(stopped, since_s)
     watch.why_unwell = look
     with pytest.raises(KeyboardInterrupt):
         machine.run()

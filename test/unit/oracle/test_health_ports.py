@@ -82,7 +82,7 @@ def test_a_port_for_topics_is_made_once(health):
     heard = []
 
     class Port:
-        def why_unwell(self):
+        def why_unwell(self, since_s=None):
             return health()
 
     def listen(conditions):

@@ -13,8 +13,8 @@ FUNCTION_LIMIT_S = 2.0
 class HealthPort(Protocol):
     """Knows one thing, or several, that must hold. Called from any thread. It does not wait."""
 
-    def why_unwell(self) -> str:
-        """Return what is wrong, '' where all is well."""
+    def why_unwell(self, since_s: Optional[float] = None) -> str:
+        """Return what is wrong, or was since that monotonic time, '' where all is well."""
 
 
 class HealthFunctionPort:

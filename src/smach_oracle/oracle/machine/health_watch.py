@@ -1,4 +1,5 @@
 """Watches the robot's health for a whole tree of machines, and gives the one notice about it."""
+import random
 import threading
 import time
 from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
@@ -15,6 +16,10 @@ from ..settings.health import (
 from .health_ports import HealthFunctionPort, HealthPort
 
 LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
+# A function knows only how the robot is at this moment. It is asked so often in the settle time,
+# at irregular moments, so that a robot that is well at every other moment is not taken as well.
+LOOKS_IN_SETTLE_TIME = 50
+SHORTEST_LOOK_S = 0.002
 FAILED = 'failed'  # what has happened to a state that waits
 
 # makes a port for topics and diagnostics
@@ -97,14 +102,17 @@ class HealthWatch:
                           'its condition holds'.format(', '.join(sources_of(conditions))))
         return self.listen(heard) if heard and self.listen is not None else None
 
-    def why_unwell(self, stopped: Stopped) -> str:
-        """Ask once, and return all that is wrong, '' where all is well or `stopped()`."""
+    def why_unwell(self, stopped: Stopped, since_s: Optional[float] = None) -> str:
+        """Ask once, and return all that is wrong, '' where all is well or `stopped()`.
+
+        :param since_s: from this monotonic time on all must have held, as far as it was heard.
+        """
         # one thread asks at a time, and the others have their look a little later
         while not self._asking.acquire(timeout=0.05):
             if stopped():
                 return ''
         try:
-            wrong = [self._listening.why_unwell()] if self._listening is not None else []
+            wrong = [self._listening.why_unwell(since_s)] if self._listening is not None else []
             wrong += [port.why_unwell(stopped) for port in self._functions]
         finally:
             self._asking.release()
@@ -116,14 +124,15 @@ class HealthWatch:
         What stops a robot may be heard of after what it has stopped: it is looked again until the
         settle time is over, and once after that. `stopped()` ends that.
         """
-        until_s = time.monotonic() + self._settle_s
+        looked_s = time.monotonic()
+        until_s = looked_s + self._settle_s
         while True:
-            is_last = time.monotonic() >= until_s
+            since_s, looked_s = looked_s, time.monotonic()
             phase = self._phase
-            why = phase.why if phase is not None else self.why_unwell(stopped)
-            if why or is_last or stopped():
+            why = phase.why if phase is not None else self.why_unwell(stopped, since_s)
+            if why or looked_s >= until_s or stopped():
                 return why
-            pause(max(0.0, min(LOOK_PERIOD_S, until_s - time.monotonic())))
+            pause(max(0.0, min(self._until_next_look_s(), until_s - time.monotonic())))
 
     def wait_until_well(self, teller: Teller, state: str, what: str, why: str, stopped: Stopped,
                         pause: Pause) -> bool:
@@ -136,14 +145,24 @@ class HealthWatch:
         :returns: False where `stopped()` has ended the wait.
         """
         phase = self._join(teller, state, what, why)
+        looked_s = time.monotonic()
         try:
             while not stopped():
-                if self._has_settled(phase, stopped):
+                since_s, looked_s = looked_s, time.monotonic()
+                if self._has_settled(phase, stopped, since_s):
                     return True
-                pause(LOOK_PERIOD_S)
+                pause(self._until_next_look_s() if phase.well_since_s is not None
+                      else LOOK_PERIOD_S)
             return False
         finally:
             self._leave(phase)
+
+    def _until_next_look_s(self) -> float:
+        """Return how long to wait before the next look of several, in which all must hold."""
+        if not self._functions:
+            return LOOK_PERIOD_S  # what was heard between two looks is known
+        mean_s = max(SHORTEST_LOOK_S, self._settle_s / LOOKS_IN_SETTLE_TIME)
+        return min(LOOK_PERIOD_S, mean_s) * random.uniform(0.2, 1.8)
 
     def _join(self, teller: Teller, state: str, what: str, why: str) -> _UnwellPhase:
         place = '{}/{}'.format(teller.path, state)
@@ -162,9 +181,9 @@ class HealthWatch:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))
         return phase
 
-    def _has_settled(self, phase: _UnwellPhase, stopped: Stopped) -> bool:
+    def _has_settled(self, phase: _UnwellPhase, stopped: Stopped, since_s: float) -> bool:
         """Look once. Return whether the phase is over, by this look or another's."""
-        why = '' if phase.over else self.why_unwell(stopped)
+        why = '' if phase.over else self.why_unwell(stopped, since_s)
         with self._lock:
             if phase.over or (not why and stopped()):
                 return phase.over

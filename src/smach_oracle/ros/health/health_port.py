@@ -1,7 +1,8 @@
 """The port by which the executive learns of topics and diagnostics whether the robot is well."""
 import threading
+import time
 from functools import partial
-from typing import List, NamedTuple, Optional, Sequence
+from typing import Any, List, NamedTuple, Optional, Sequence
 
 import rospy
 
@@ -41,24 +42,26 @@ class TopicHealth:
             timer.daemon = True
             timer.start()
 
-    def why_unwell(self) -> str:
-        """Return what is wrong, '' where all is well."""
+    def why_unwell(self, since_s: Optional[float] = None) -> str:
+        """Return what is wrong, or was since that monotonic time, '' where all is well.
+
+        A topic may change twice between two looks, so every message since then is read.
+        """
         self._warn_of_silence()
-        found = [(heard.condition.name, self._why(heard)) for heard in self._heard]
+        if since_s is None:
+            since_s = time.monotonic()
+        found = [(heard.condition.name, self._why(heard, since_s)) for heard in self._heard]
         return '; '.join('{}: {}'.format(name, why) for name, why in found if why)
 
-    def _why(self, heard: _Heard) -> str:
+    def _why(self, heard: _Heard, since_s: float) -> str:
         condition, age_s = heard.condition, heard.latest.age_s()
         if age_s is None:
             return 'not heard of yet' if condition.max_age_s is not None else ''
-        if condition.max_age_s is not None and age_s > condition.max_age_s:
-            return 'not heard of for {:.0f} s'.format(age_s)
-        if condition.kind is HealthKind.DIAGNOSTICS:
-            return why_unwell_by_status(condition, heard.latest.heard())
-        try:
-            return why_unwell_by_message(condition, decoded(heard.latest.heard()))
-        except UnreadableMessage as err:
-            return 'its messages cannot be read ({})'.format(err)
+        messages = heard.latest.since(since_s)
+        longest_s = max([age_s] + [each.gap_s for each in messages if each.at_s > since_s])
+        if condition.max_age_s is not None and longest_s > condition.max_age_s:
+            return 'not heard of for {:.0f} s'.format(longest_s)
+        return next(filter(None, (_why_by(condition, each.what) for each in messages)), '')
 
     def _warn_of_silence(self) -> None:
         for condition, latest in self._heard:
@@ -67,6 +70,16 @@ class TopicHealth:
                 warned.add(source)
                 rospy.logwarn('healthy: %s has not published yet, so its condition %s', source,
                               'holds' if condition.max_age_s is None else 'does not hold')
+
+
+def _why_by(condition: HealthCondition, what: Any) -> str:
+    """What one message, or one status, says is wrong, '' where it says well."""
+    if condition.kind is HealthKind.DIAGNOSTICS:
+        return why_unwell_by_status(condition, what)
+    try:
+        return why_unwell_by_message(condition, decoded(what))
+    except UnreadableMessage as err:
+        return 'its messages cannot be read ({})'.format(err)
 
 
 def _source_of(condition: HealthCondition) -> str:

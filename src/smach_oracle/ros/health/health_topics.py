@@ -6,7 +6,8 @@ its publisher sends.
 """
 import threading
 import time
-from typing import Any, Callable, Dict, List, Optional, Set, Tuple
+from collections import deque
+from typing import Any, Callable, Deque, Dict, List, NamedTuple, Optional, Set, Tuple
 
 import genpy.dynamic
 import rosgraph
@@ -19,27 +20,43 @@ DIAGNOSTICS = ('/diagnostics', '/diagnostics_agg')
 # for the types of topics that nobody has advertised yet: twice as long after each look
 LOOK_AGAIN_S = 0.5
 LOOK_AGAIN_MOST_S = 10.0
+KEPT = 256  # messages of a topic: those between two looks, at up to 2 kHz
+
+
+class Arrival(NamedTuple):
+    """A message, or a Status. Times are monotonic."""
+
+    what: Any
+    at_s: float
+    gap_s: float  # since the one before
 
 
 class Latest:
-    """The newest message of one topic, or status of one name, and when it came."""
+    """The newest messages of one topic, or statuses of one name."""
 
     def __init__(self) -> None:
-        self._heard: Optional[Tuple[Any, float]] = None
+        self._heard: Deque[Arrival] = deque(maxlen=KEPT)
 
     def put(self, what: Any) -> None:
         """Take what was heard now."""
-        self._heard = (what, time.monotonic())
+        self._heard.append(Arrival(what, time.monotonic(), self.age_s() or 0.0))
 
-    def heard(self) -> Any:
-        """Return what was heard, or None where nothing was."""
-        heard = self._heard
-        return heard[0] if heard is not None else None
+    def newest(self) -> Optional[Arrival]:
+        """Return the newest, or None where nothing was heard."""
+        try:
+            return self._heard[-1]
+        except IndexError:
+            return None
+
+    def since(self, since_s: float) -> List[Arrival]:
+        """Return what was heard after that time, and the newest in any case."""
+        heard = list(self._heard)
+        return [each for each in heard[:-1] if each.at_s > since_s] + heard[-1:]
 
     def age_s(self) -> Optional[float]:
-        """Return how long ago that was, monotonic, or None where nothing was heard."""
-        heard = self._heard
-        return time.monotonic() - heard[1] if heard is not None else None
+        """Return how old the newest is, or None where nothing was heard."""
+        newest = self.newest()
+        return time.monotonic() - newest.at_s if newest is not None else None
 
 
 class HealthTopics:

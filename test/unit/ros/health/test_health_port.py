@@ -82,6 +82,32 @@ def test_all_that_is_wrong_is_named(warnings, now):
     assert not warnings
 
 
+def test_all_that_was_heard_since_the_last_look_counts(warnings, now):
+    topics = FakeTopics()
+    port = port_of(topics, {'topic': '/motors_on', 'name': 'motors'}, {'diagnostics': 'Power'})
+    topics.message('/motors_on').put(Bool(False))
+    topics.status('Power').put(Status(2, 'low voltage'))
+    looked_s = now[0]
+    for says, level in ((True, 1), (False, 2), (True, 0)):
+        now[0] += 0.01
+        topics.message('/motors_on').put(Bool(says))
+        topics.status('Power').put(Status(level, 'low voltage'))
+    assert port.why_unwell() == ''
+    assert port.why_unwell(looked_s) == 'motors: off; Power: error (low voltage)'
+    assert port.why_unwell(now[0]) == ''
+
+
+def test_a_pause_between_two_messages_counts_that_was_too_long(warnings, now):
+    topics = FakeTopics()
+    port = port_of(topics, {'topic': '/motors_on', 'name': 'motors', 'max_age_s': 5})
+    topics.message('/motors_on').put(Bool(True))
+    now[0] += 7.0
+    topics.message('/motors_on').put(Bool(True))
+    assert port.why_unwell() == ''
+    assert port.why_unwell(now[0] - 1.0) == 'motors: not heard of for 7 s'
+    assert port.why_unwell(now[0]) == ''
+
+
 def undecoded(definition, data):
     """A message of a type that is not installed here."""
     message = rospy.AnyMsg()
