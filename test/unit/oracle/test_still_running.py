@@ -330,3 +330,24 @@ def test_the_clocks_thread_lives_only_while_a_state_runs():
     assert machine.run() == 'done'
     assert wait_for(lambda: not any('smach_oracle alarm clock' in thread.name
                                     for thread in threading.enumerate()))
+
+
+def test_a_visit_that_was_cut_short_says_nothing_of_how_long_the_state_takes():
+    """One that overran, that was taken out, or that a preempt has ended."""
+    overran = Watched(chain_of(Scripted(Gate(), 'ok')), expert=FakeExpert(give_up('preempted')),
+                      settings={'states': {'A': {'time_limit_s': 0.05}}, 'max_recoveries': 0})
+    taken_out = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(goto('B')))
+    preempted = watched(Scripted(Gate()))
+    assert overran.run() == 'preempted' and taken_out.run() == 'done'
+    run = in_thread(preempted.run)
+    preempted.machine.request_preempt()
+    assert run.result() == 'preempted'
+    took = [each.machine._oracle.record('A').longest_s for each in (overran, taken_out, preempted)]
+    assert took[0] is None and took[2] is None
+    assert took[1] < 0.05, 'the visit that failed at once'
+
+
+def test_a_visit_that_has_ended_by_itself_says_how_long_the_state_takes():
+    machine = watched(Scripted(lambda state, ud: threading.Event().wait(0.05) or 'ok'))
+    assert machine.run() == 'done'
+    assert machine.machine._oracle.record('A').longest_s >= 0.05

@@ -75,6 +75,10 @@ class WriteWatch:
                 data.pop(key, None)
         self.gate.written.clear()
 
+    def written_in(self, machine: Machine) -> Set[str]:
+        """Return the keys of this machine's userdata that were written: none of another machine."""
+        return self.written() if machine is self._machine else set()
+
     def written(self) -> Set[str]:
         """Return the keys set, deleted or changed so far."""
         now = dict(self._machine.userdata._data)

@@ -1,9 +1,10 @@
 """The way from a failure to a place, and what is told of it before the machine goes there."""
-from typing import Iterable, List, NamedTuple, Optional, Set, Tuple
+from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..machine.write_watch import WriteWatch
 from .handing_over import links_to
 from .levels import levels_above
 from .place import Place
@@ -25,6 +26,13 @@ class Way(NamedTuple):
     def first(self) -> str:
         """Return the label of the state of `meets` that is entered."""
         return self.down[0].label
+
+    def kept(self, watch: WriteWatch) -> FrozenSet[str]:
+        """Return the keys that a recovery wrote and that survive a restore where the ways meet.
+
+        None survives where the container in which they were written is left.
+        """
+        return frozenset(watch.written_in(self.meets.machine))
 
 
 def way_to(node: TreeNode, place: Place) -> Optional[Way]:

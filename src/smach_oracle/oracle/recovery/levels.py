@@ -194,9 +194,8 @@ class OuterLevel:
                    failure_class=int(record.failure_class), rate=record.rate,
                    continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
         record.recoveries += 1
-        written = () if decided.left else self._deciding.watch.written()
-        return OuterDecision(self._node, way, sentence, frozenset(written), facts.wait_s,
-                             facts.action is Action.RESTART)
+        return OuterDecision(self._node, way, sentence, decided.kept(self._deciding.watch),
+                             facts.wait_s, facts.action is Action.RESTART)
 
     def _foreseen(self) -> str:
         node = self._node

@@ -25,7 +25,7 @@ def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
     if answer.kind is AnswerKind.GOTO:
         way = way_of(answer, node)
         return Verdict(VerdictKind.JUMP, way=way, by=answer.by, text=answer.why,
-                       written=frozenset() if way.left else frozenset(watch.written()))
+                       written=way.kept(watch))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by,
                        text=answer.why)

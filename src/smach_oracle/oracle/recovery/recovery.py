@@ -1,6 +1,6 @@
 """One failure, from the policy's question to the verdict (paper, Algorithm 1)."""
 import threading
-from typing import Any, Iterable, List, Mapping, Optional
+from typing import Any, FrozenSet, List, Mapping, Optional
 
 import smach
 
@@ -96,7 +96,7 @@ class Recovery:
             record.recoveries += 1
             return self._wait_and_jump(outer.wait_s, Verdict(
                 VerdictKind.JUMP, way=outer.way, text=outer.text,
-                written=frozenset(outer.written), decided_by=outer.decided_by,
+                written=outer.written, decided_by=outer.decided_by,
                 restarts=outer.restarts))
         return self._give_way(nobody) if nobody else self._ask()
 
@@ -108,9 +108,9 @@ class Recovery:
                                   or Foreseen('the policy asks nobody'))
         self._record.recoveries += 1
         restarts = facts.action is Action.RESTART
-        written = () if restarts else self._written_on(way)
+        written: FrozenSet[str] = frozenset() if restarts else way.kept(self._watch)
         return self._wait_and_jump(facts.wait_s, Verdict(
-            VerdictKind.JUMP, way=way, restarts=restarts, written=frozenset(written)))
+            VerdictKind.JUMP, way=way, restarts=restarts, written=written))
 
     def _wait_and_jump(self, wait_s: float, verdict: Verdict) -> Verdict:
         if wait_s and not self._stop.has_waited(wait_s):
@@ -192,10 +192,6 @@ class Recovery:
                                     level.in_force.failing)
         return None
 
-    def _written_on(self, way: Way) -> Iterable[str]:
-        """Return the keys that survive a restore: none where the container is left."""
-        return () if way.left else self._watch.written()
-
     # -- asking
 
     def _ask(self) -> Verdict:
@@ -261,10 +257,10 @@ class Recovery:
         return self._when_well(verdict_of(answer, self._node, self._record.label, self._watch,
                                           self._natural_ending))
 
-    def _jump(self, way: Way, written: Iterable[str], text: str = '') -> Verdict:
+    def _jump(self, way: Way, text: str = '') -> Verdict:
         """Go to a place, once the robot is well."""
         return self._when_well(Verdict(VerdictKind.JUMP, way=way, text=text,
-                                       written=frozenset(written)))
+                                       written=way.kept(self._watch)))
 
     def _when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""
@@ -316,7 +312,7 @@ class Recovery:
             problem = self._why_not_fall_back(way) or self._budget.take_recovery()
             if way is not None and not problem:
                 self._record.fallbacks += 1
-                return self._jump(way, self._written_on(way), why)
+                return self._jump(way, why)
             self.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
         elif verb == 'give_up':
             if target in self._machine.get_registered_outcomes():

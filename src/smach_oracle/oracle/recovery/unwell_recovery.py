@@ -34,8 +34,7 @@ class UnwellRecovery(Recovery):
         label = self._record.label
         if not repeated_by_going_to(self._node, label):
             self._record.unwell_repeats += 1
-            return self._jump(Way((), self._node, (Place(self._node, label),)),
-                              self._watch.written())
+            return self._jump(Way((), self._node, (Place(self._node, label),)))
         self._judge_anew(self._failure._replace(
             kind=FailureKind.HELD_BACK,
             text='failed while the robot was not well, and is not repeated by itself'))
