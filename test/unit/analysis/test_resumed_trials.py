@@ -7,7 +7,8 @@ from killed_machines import Points, in_a_process
 
 import smach
 from smach_oracle.analysis import what_if
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import Expert, OracleContainer
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 SETTINGS = {'on_resume': 'recover', 'checkpoint_synchronous': 'OFF', 'max_recoveries': 20}
@@ -22,7 +23,14 @@ class Chance(smach.State):
         return 'succeeded' if self._generator.random() < 0.6 else 'aborted'
 
 
-def part(folder, seed, kill_at):
+class ByHand(Expert):
+    """Does by hand whatever it is asked about."""
+
+    def ask(self, question, cancelled, progress):
+        return Answer(AnswerKind.SUPERSEDE, outcome='succeeded')
+
+
+def part(folder, seed, kill_at, expert=None, **settings):
     """Run one trial, or what is left of it, in a process that is killed at an event."""
     def work():
         points, generator = Points(kill_at), random.Random(seed)
@@ -35,8 +43,8 @@ def part(folder, seed, kill_at):
             smach.StateMachine.add('LOOK', Chance(generator), {'succeeded': 'PICK'})
             smach.StateMachine.add('PICK', inner, {'succeeded': 'PLACE'})
             smach.StateMachine.add('PLACE', Chance(generator))
-        OracleContainer.wrap(machine, name='TOP', settings=dict(
-            SETTINGS, checkpoint=str(folder / 'robot.db')))
+        OracleContainer.wrap(machine, name='TOP', expert=expert, settings=dict(
+            SETTINGS, checkpoint=str(folder / 'robot.db'), **settings))
 
         def record(event):
             with open(str(folder / 'events'), 'ab') as stream:
@@ -70,3 +78,10 @@ def test_a_resumed_trial_is_replayed_and_of_what_was_interrupted_nothing_is_know
     assert counts['same'] + counts['not known'] == sum(counts.values())
     if FailureKind.INTERRUPTED in [event.failure_kind for event in events]:
         assert counts['not known'] >= 1
+
+
+@pytest.mark.parametrize('kill_at', range(3, 24))
+def test_a_person_who_did_what_was_interrupted_takes_no_failure_back(tmp_path, kill_at):
+    part(tmp_path, kill_at, kill_at)
+    part(tmp_path, kill_at + 1, 0, ByHand(), on_retry='confirm')
+    what_if.Recorded([events_of(tmp_path)])  # it raises where a rate is another

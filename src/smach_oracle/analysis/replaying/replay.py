@@ -134,13 +134,12 @@ class Replay:
         self._visited(event, VisitResult.FAILURE)
 
     def _superseded(self, event: Event) -> None:
-        if self._state(event).interrupted:
-            return
-        if self._state(event).held_back:
+        state = self._state(event)
+        if state.context is None or state.held_back:  # no failure of this visit was counted
             self._visited(event, VisitResult.SUPERSEDED)
             return
-        self._state(event).estimator.take_back_failure()
-        self._history(event).supersede(event.outcome)
+        state.estimator.take_back_failure()
+        self._history(event).supersede(event.state, event.outcome)
 
     def _left(self, event: Event) -> None:
         state = self._state(event)

@@ -45,7 +45,7 @@ class ArrivingVisit(OracleVisit):
         if self._departure.result_of(self._node) is VisitResult.FAILURE:
             super()._note_superseded(outcome)
         else:
-            self._node.records.history.count_superseded(outcome)
+            self._node.records.history.count_superseded(self._record.label, outcome)
 
     def _across(self, way: Way) -> Mapping[str, str]:
         return {'from': self._departure.failed, **super()._across(way)}

@@ -66,7 +66,7 @@ class OracleVisit:
         verdict = self._recover(meta, TakenOutRecovery(
             self._node, self._record, self._failure, context, answer))
         if verdict.kind is VerdictKind.SUPERSEDE:
-            self._node.records.history.count_superseded(verdict.outcome)
+            self._node.records.history.count_superseded(self._record.label, verdict.outcome)
         return self._leave(meta, verdict)
 
     def _enter(self) -> OracleState:
@@ -99,11 +99,11 @@ class OracleVisit:
 
     def _note_superseded(self, outcome: str) -> None:
         node, record = self._node, self._record
-        if self._failure.is_held_back:
+        if not self._failure.is_counted:
             self._count_superseded(outcome)
             return
         record.take_back_failure()
-        node.records.history.supersede(outcome)
+        node.records.history.supersede(record.label, outcome)
 
     def _count_superseded(self, outcome: str) -> None:
         """Count a visit that was not one before: an expert did the work of the state."""

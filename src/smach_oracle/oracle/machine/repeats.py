@@ -95,11 +95,15 @@ def leave_for(node: TreeNode, target: str, below: Iterable[Tuple[TreeNode, str]]
 
 
 def note_superseded(node: TreeNode, label: str) -> None:
-    """Note that an expert has done the work of a spent state: the author's loops are free again."""
+    """Note that an expert has done the work of a state, now, if not by the machine.
+
+    The author's loops are free again. The oracle does not lead to it again by itself.
+    """
+    if not node.tree.numbers_visits:
+        return
     mark = node.records.marks.of(label)
-    mark.spent = False
-    if mark.done:
-        mark.executed = mark.reached  # it was done then, if not by the machine
+    mark.reached = mark.executed = node.tree.next_visit()
+    mark.done, mark.spent = True, False
 
 
 def why_closed(node: TreeNode, label: str) -> str:

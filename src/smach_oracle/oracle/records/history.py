@@ -145,14 +145,21 @@ class History:
         self._before = self._streak
         self._streak = _Streak(state, successes, anchor, True)
 
-    def supersede(self, outcome: str) -> None:
-        """Count the latest visit, a failure, as neither: an expert did its work."""
+    def supersede(self, state: str, outcome: str) -> None:
+        """Count the latest visit, a failure of `state`, as neither: an expert did its work."""
         self._streak = self._before
-        self.count_superseded(outcome)
+        self.count_superseded(state, outcome)
 
-    def count_superseded(self, outcome: str) -> None:
-        """Count the latest visit, which was no failure, as one whose work an expert did."""
-        self.visits[-1] = self.visits[-1]._replace(outcome=outcome, result=VisitResult.SUPERSEDED)
+    def count_superseded(self, state: str, outcome: str) -> None:
+        """Count the latest visit, that of `state`, as one whose work an expert did.
+
+        Where the program was stopped after the visit, the chain may not have it. It is added then.
+        """
+        visit = Visit(state, outcome, VisitResult.SUPERSEDED)
+        if self.visits and self.visits[-1].state == state:
+            self.visits[-1] = visit
+        else:
+            self.visits.append(visit)
 
     def _latest_other(self, state: str) -> Optional[str]:
         return self.succeeded if self.succeeded != state else self.succeeded_other

@@ -40,6 +40,11 @@ class Failure(NamedTuple):
         """Whether the state was not executed, since it is not to be repeated: no failure."""
         return self.kind is FailureKind.HELD_BACK
 
+    @property
+    def is_counted(self) -> bool:
+        """Whether it is in the rate and in the history, from which it may be taken back."""
+        return self.kind not in (FailureKind.HELD_BACK, FailureKind.INTERRUPTED)
+
 
 class ContainerEnding(NamedTuple):
     """The way a container would end, or go on, without an oracle: exactly one is set."""

@@ -1,0 +1,120 @@
+"""A person does by hand what the program was stopped at: SUPERSEDE of whatever is in doubt."""
+import json
+
+import pytest
+from killed_machines import KilledMachine, Noted
+from killed_trees import ENDS, flat, make, points_of, tree
+
+import smach
+from smach_oracle.oracle import Expert
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
+
+FAILING = {'I': 1, 'X': 1, 'LEFT': 1, 'M2': 1, 'J': 1, 'B': 1}
+
+
+class ByHand(Expert):
+    """Supersedes all that it is asked about, and writes down what that was."""
+
+    def __init__(self, path):
+        self._path = path
+
+    def ask(self, question, cancelled, progress):
+        with self._path.open('a') as stream:
+            stream.write(json.dumps('{}/{}'.format(question.container_path,
+                                                   question.failed_state)) + '\n')
+        return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')
+
+
+def asked(path):
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def failing_tree(diary, points):
+    """The tree of everything, in which a state of each kind of container fails once."""
+    machine = tree(diary, points)
+
+    def prepare(container):
+        for label, state in container.get_children().items():
+            if isinstance(state, smach.Container):
+                prepare(state)
+            elif label in FAILING:
+                state._failures = FAILING[label]
+
+    prepare(machine)
+    return machine
+
+
+@pytest.mark.parametrize('on_resume', ['ask', 'recover'])
+@pytest.mark.parametrize('build, settings', [
+    (tree, {}), (failing_tree, {'max_recoveries': 0}), (tree, {'on_retry': 'never'}),
+    (failing_tree, {'on_retry': 'confirm'})])
+def test_killed_anywhere_what_is_superseded_ends_the_trial_well_and_does_not_run_again(
+        tmp_path, build, settings, on_resume):
+    for point in range(3, points_of(tmp_path, tree), 4):
+        killed = KilledMachine(make(tmp_path / 'killed'), build, on_resume=on_resume, **settings)
+        if killed.run(kill_at=point, expert=ByHand(tmp_path / 'before')) is not None:
+            break
+        (tmp_path / 'killed' / 'diary').touch()
+        begun, path = killed.diary.count('begins'), tmp_path / 'killed' / 'asked'
+        told = killed.run(expert=ByHand(path))
+        assert told.get('outcome') == 'succeeded', (point, told)
+        first = asked(path)[:1]
+        label = first[0].rpartition('/')[2] if first else ''
+        if label and label not in ('I', 'J', 'K') and on_resume == 'ask':
+            assert killed.diary.count('begins')[label] == begun[label], (point, first)
+
+
+def rates(told):
+    return {state: row for _, state, *row in told['rates']}
+
+
+def test_a_failure_of_before_stays_in_the_rate_of_the_state_in_doubt(tmp_path):
+    """B fails once, is tried again, and is in doubt then."""
+    killed = KilledMachine(tmp_path, flat, on_resume='ask')
+    point = 0
+    while killed.diary.count('begins')['B'] < 2:
+        make(tmp_path)
+        point += 1
+        assert killed.run(kill_at=point) is None
+    told = killed.run(expert=ByHand(tmp_path / 'asked'))
+    assert (told['outcome'], asked(tmp_path / 'asked')) == ('succeeded', ['TOP/B'])
+    assert rates(told)['B'] == [0, 1]
+
+
+def test_a_failure_that_was_asked_about_is_taken_back_once(tmp_path):
+    """The program is killed while the question is open. The answer comes in the next one."""
+    killed = KilledMachine(tmp_path, flat, max_recoveries=0)
+    point = 0
+    while not asked(tmp_path / 'asked'):
+        make(tmp_path)
+        point += 1
+        killed.run(kill_at=point, expert=ByHand(tmp_path / 'asked'))
+    told = killed.run(expert=ByHand(tmp_path / 'asked'))
+    assert (told['outcome'], set(asked(tmp_path / 'asked'))) == ('succeeded', {'TOP/B'})
+    assert rates(told).get('B', [0, 0]) == [0, 0]
+    assert killed.diary.count('begins')['B'] == 1
+
+
+def test_a_state_that_had_not_begun_is_not_done_by_the_oracle_once_a_person_has_done_it(tmp_path):
+    """Killed before POUR. A person pours. CARRY keeps failing, and the step back is asked about."""
+    def pouring(diary, points):
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            for label, following, failures in (('LOOK', 'POUR', 0), ('POUR', 'CARRY', 0),
+                                               ('CARRY', 'succeeded', 9)):
+                smach.StateMachine.add(label, Noted(label, diary, points, failures),
+                                       dict(ENDS, succeeded=following))
+        return machine
+
+    point, path = 0, tmp_path / 'killed' / 'asked'
+    while not asked(path) or asked(path)[0] != 'TOP/POUR':
+        killed = KilledMachine(make(tmp_path / 'killed'), pouring, on_resume='ask', prior=0.5,
+                               states={'POUR': {'on_retry': 'confirm'}})
+        point += 1
+        killed.run(kill_at=point)
+        if not killed.diary.count('begins')['POUR']:
+            killed.run(expert=ByHand(path))
+    # CARRY is tried again by itself, but LOOK, from which the way leads to POUR, is not
+    assert asked(path) == ['TOP/POUR', 'TOP/CARRY']
+    assert killed.diary.count('begins') == {'LOOK': 1, 'CARRY': 2}
