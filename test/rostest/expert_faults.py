@@ -1,14 +1,18 @@
 #!/usr/bin/env python3
 """Front ends, servers and askers that die: what becomes of the question."""
 import os
+import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 from unittest import mock
 
+import rosbag
 import rospy
 import rostest
+from actionlib_msgs.msg import GoalStatusArray
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from expert_fixtures import Asked, Process, make_question
@@ -16,7 +20,14 @@ from waiting import stays, wait_for
 
 from smach_oracle.expert import followed_server
 from smach_oracle.expert.front_end import FrontEnd, ServerGoneError, wait_for_question
-from smach_oracle.msg import ExpertDecision, OpenQuery
+from smach_oracle.msg import (
+    ExpertDecision,
+    ExpertQueryActionFeedback,
+    ExpertQueryActionGoal,
+    ExpertQueryActionResult,
+    OpenQueries,
+    OpenQuery,
+)
 from smach_oracle.oracle.asking.question import AnswerKind, StateChoice
 from smach_oracle.ros.expert.client import ExpertQueryClient
 
@@ -29,6 +40,38 @@ PICK:
 POUR: {kind: goto, state: POUR}
 default: {kind: ignore}
 """
+
+
+TOPICS = {'/goal': ExpertQueryActionGoal, '/status': GoalStatusArray, '/open': OpenQueries,
+          '/feedback': ExpertQueryActionFeedback, '/result': ExpertQueryActionResult}
+
+
+class Recording:
+    """All that a server's topics say, to be played as a bag."""
+
+    def __init__(self):
+        self._heard = []
+        self._subscribers = [rospy.Subscriber(SHARED + end, kind, self._note, SHARED + end)
+                             for end, kind in TOPICS.items()]
+
+    def _note(self, message, topic):
+        self._heard.append((topic, message, rospy.Time.now()))
+
+    def has(self, end):
+        return any(topic.endswith(end) for topic, _, _ in self._heard)
+
+    def write(self, path):
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        with rosbag.Bag(path, 'w') as bag:
+            for topic, message, when in self._heard:
+                bag.write(topic, message, when)
+
+
+def play(path):
+    """Play a bag to its end."""
+    subprocess.run(['rosbag', 'play', '--quiet', path], check=True, timeout=60,
+                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
 
 def goto(state='DETECT'):
@@ -93,6 +136,46 @@ class TestExpertFaults(unittest.TestCase):
         self.assertTrue(ann.answer(listed, goto('PICK')).ok)
         self.assertTrue(asked.wait())
         self.assertEqual(asked.answer.state, 'PICK')
+
+    def test_a_played_bag_neither_asks_nor_hides_a_question_nor_takes_it_back(self):
+        server = self.server()
+        ann = self.front_end()
+        client = self.client()
+        recording = Recording()
+        self.addCleanup(client.close)
+        past = Asked(client, make_question('past'))
+        listed = wait_for_question(ann, 40.0)
+        # a claim, so that all topics have something, and the list as it comes again each second
+        self.assertTrue(ann.claim(listed).ok)
+        self.assertTrue(wait_for(lambda: recording.has('/feedback')))
+        self.assertTrue(ann.answer(listed, goto()).ok)
+        self.assertTrue(past.wait())
+        self.assertTrue(wait_for(lambda: recording.has('/result')))
+        with tempfile.TemporaryDirectory() as folder:
+            bag = os.path.join(folder, 'past.bag')
+            recording.write(bag)
+            asked = self.ask(client)
+            self.assertIsNotNone(wait_for_question(ann, 40.0))
+            seen = set()
+            front_ends = [ann, self.front_end('joe', ())]  # one that finds servers by itself
+            self.assertTrue(wait_for(lambda: front_ends[1].questions()))
+            playing = threading.Thread(target=play, args=(bag,))
+            playing.start()
+            while playing.is_alive():
+                seen.update(tuple(each.goal.query_id for each in front_end.questions())
+                            for front_end in front_ends)
+                playing.join(0.01)
+            self.assertEqual(seen, {(self.id(),)})
+            self.assertEqual(asked.progress, [], 'its server was there all the time')
+            self.assertTrue(ann.answer(ann.questions()[0], goto('PICK')).ok)
+            self.assertTrue(asked.wait())
+            server.interrupt()
+            self.assertTrue(wait_for(lambda: not ann.connected(SHARED)))
+            playing = threading.Thread(target=play, args=(bag,))
+            playing.start()
+            while playing.is_alive():
+                self.assertEqual([front_end.questions() for front_end in front_ends], [[], []])
+                playing.join(0.01)
 
     def test_with_no_server_at_all_the_deadline_still_holds(self):
         client = self.client('/nowhere/expert_query')

@@ -3,11 +3,14 @@
 results.
 """
 import os
+import subprocess
 import sys
+import tempfile
 import time
 import unittest
 
 import numpy as np
+import rosbag
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
@@ -17,7 +20,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from teleoperation_fixtures import FakeArm, Person, asker_of_its_own, driver_of_its_own, result_of
 from waiting import wait_for
 
-from smach_oracle.msg import CollisionBoxes
+from smach_oracle.msg import CollisionBoxes, TeleopCommand
 from smach_oracle.ros.userdata_codec import decode_all, encode_all
 
 SERVER = 'manipulation_interface'
@@ -128,6 +131,22 @@ class Teleoperation(unittest.TestCase):
             self.assertIn(says, state.refused)
             self.assertFalse(state.moving)
             self.assertEqual(ROBOT.moved_s, before_s)
+
+    def test_a_bag_that_is_played_does_not_move_the_arm(self):
+        command = TeleopCommand(operator='ann', arm='right', dead_man=True)
+        command.header.frame_id = 'base_footprint'
+        command.twist.linear.z = 0.05
+        with tempfile.NamedTemporaryFile(suffix='.bag') as file:
+            with rosbag.Bag(file.name, 'w') as bag:
+                for number in range(30):
+                    command.seq += 1
+                    bag.write('/' + SERVER + '/command', command,
+                              rospy.Time.from_sec(1000.0 + number / 30.0))
+            before_s = ROBOT.moved_s
+            subprocess.run(['rosbag', 'play', '--quiet', file.name], check=True, timeout=60,
+                           stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        self.assertEqual(ROBOT.moved_s, before_s)
+        self.assertEqual(self.ann.states[-1].operator, '')
 
     def test_a_bad_command_stops_a_good_one(self):
         self.ann.hold(0.2, linear=(0.0, 0.0, 0.05))

@@ -1,13 +1,14 @@
 """One ExpertQuery server as a front end sees it: its open list, and calls to its services."""
 import math
 import time
-from typing import Callable, List, NamedTuple, Optional
+from typing import Callable, FrozenSet, Iterable, List, NamedTuple, Optional
 
 import genpy
 import rospy
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, OpenQueries, OpenQuery
-from smach_oracle.ros.connections import live_connections
+from smach_oracle.ros.introspection.viewer_jump import sender_of
+from smach_oracle.ros.senders.own_messages import is_named_after, publishers_of
 from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
 from smach_oracle.srv import (
     AnswerQuery,
@@ -62,6 +63,8 @@ class FollowedServer:
         self._on_change = on_change
         self._questions: List[ListedQuestion] = []
         self._news: Optional[ListNews] = None
+        self._node = ''  # that sent the list
+        self._servers: FrozenSet[str] = frozenset()  # nodes that take answers, as the master has it
         self._unheard_since_s: Optional[float] = None
         self._unanswered: Optional[ServiceCall] = None
         self._subscriber = self._subscribe()
@@ -69,7 +72,7 @@ class FollowedServer:
     @property
     def connected(self) -> bool:
         """Whether the server's process is there."""
-        return bool(live_connections(self._subscriber))
+        return any(map(self._is_server, publishers_of(self.name + '/open')))
 
     @property
     def news(self) -> Optional[ListNews]:
@@ -82,7 +85,7 @@ class FollowedServer:
     def questions(self) -> List[ListedQuestion]:
         """Return the open questions, oldest first. The list is empty while the server is gone."""
         known = self._questions
-        if self.connected:
+        if self._node in publishers_of(self.name + '/open'):
             return list(known)
         if self._questions is known:
             self._questions = []  # the next server of this name has others
@@ -106,11 +109,15 @@ class FollowedServer:
         return self._call('answer', AnswerQuery, AnswerQueryRequest(query_id, decision),
                           CALL_LIMIT_S)
 
-    def refresh(self, advertised: bool, patience_s: float = 3.0) -> None:
+    def refresh(self, advertised: bool, servers: Iterable[str] = (),
+                patience_s: float = 3.0) -> None:
         """Subscribe again where the master knows the list and we do not hear it.
 
         We were registered with an earlier master, or its address has changed.
+
+        :param servers: the nodes that take answers, as the master has it.
         """
+        self._servers = frozenset(servers)
         if self.connected or not advertised:
             self._unheard_since_s = None
             return
@@ -130,7 +137,15 @@ class FollowedServer:
         return rospy.Subscriber(self.name + '/open', OpenQueries, self._on_list, queue_size=2,
                                 tcp_nodelay=True)
 
+    def _is_server(self, node: str) -> bool:
+        """Whether a node takes the answers. One that plays a bag has questions and no ear."""
+        return is_named_after(self.name, node) or node in self._servers
+
     def _on_list(self, message: OpenQueries) -> None:
+        node = sender_of(message)
+        if not self._is_server(node):
+            return
+        self._node = node
         now_s = time.monotonic()
         self._news = ListNews(now_s, message.header.stamp.to_sec())
         self._questions = [_listed(self.name, entry, now_s) for entry in message.queries]

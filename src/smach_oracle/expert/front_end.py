@@ -1,7 +1,8 @@
 """The ROS part of every front end for experts: open questions, claims and answers."""
 import threading
 import time
-from typing import Dict, List, Optional, Sequence
+from types import MappingProxyType
+from typing import Dict, List, Mapping, Optional, Sequence
 
 import rosgraph
 import rospy
@@ -147,13 +148,16 @@ class FrontEnd:
     def _keep_connected(self) -> None:
         while not rospy.is_shutdown():
             try:
-                self._look_for_servers(rosgraph.Master(rospy.get_name()).getPublishedTopics(''))
+                master = rosgraph.Master(rospy.get_name())
+                self._look_for_servers(master.getPublishedTopics(''),
+                                       dict(master.getSystemState()[2]))
             except (OSError, rosgraph.MasterException) as err:
                 rospy.logdebug('The master does not answer: %s', err)
             if self._stopped.wait(_DISCOVERY_PERIOD_S):
                 return
 
-    def _look_for_servers(self, published: Sequence[Sequence[str]]) -> None:
+    def _look_for_servers(self, published: Sequence[Sequence[str]],
+                          services: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
         lists = {
             topic
             for topic, kind in published if kind == OpenQueries._type and topic.endswith('/open')
@@ -164,7 +168,7 @@ class FrontEnd:
                 if name not in self._servers:
                     self._follow(name)
         for name, server in list(self._servers.items()):
-            server.refresh(name + '/open' in lists)
+            server.refresh(name + '/open' in lists, services.get(name + '/answer', ()))
             if self._discover:
                 self._forget_gone(name, server, name + '/open' in lists)
 

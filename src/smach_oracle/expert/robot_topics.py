@@ -5,7 +5,8 @@ from typing import Any, Callable, Collection
 
 import rosgraph
 import rosgraph.names
-import rospy
+
+from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
 MOST_ROBOTS = 64
 # Read at a time. Each connection waits with a buffer of so many, and cuts it to what came. With
@@ -29,7 +30,7 @@ class RobotTopic:
         :param take: called with each message.
         """
         self._stopped = threading.Event()
-        self._subscribe = lambda: rospy.Subscriber(
+        self._subscribe = lambda: subscribe_to_owner(
             robot + topic, kind, take, queue_size=queue_size, buff_size=buff_size, tcp_nodelay=True)
         if is_node_name(robot):
             threading.Thread(target=self._listen, name='listen to ' + robot, daemon=True).start()

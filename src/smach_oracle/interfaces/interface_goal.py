@@ -20,6 +20,7 @@ from smach_oracle.msg import (
 from smach_oracle.oracle.asking.answer_rules import check_outcome, check_output_keys
 from smach_oracle.oracle.asking.question import names
 from smach_oracle.oracle.errors import AnswerError, OracleError
+from smach_oracle.ros.expert.quiet_action_server import QuietActionServer
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode, encode_all
 from smach_oracle.srv import (
     FinishInterface,
@@ -63,7 +64,7 @@ class InterfaceGoal:
         self._handle: Optional[actionlib.ServerGoalHandle] = None
         self._asker: Optional[_AskerConnection] = None
         self._asker_seen_s = 0.0
-        self._action = actionlib.ActionServer(self.name, SharedAutonomyAction, self._on_goal,
+        self._action = QuietActionServer(self.name, SharedAutonomyAction, self._on_goal,
                                               self._on_cancel, auto_start=False)
         # its callbacks come under it. A second lock would invite a deadlock
         self._lock = self._action.lock

@@ -14,6 +14,8 @@ import rospy
 from actionlib_msgs.msg import GoalStatus
 
 from .connections import Connection, ConnectionGrace, live_connections
+from .introspection.viewer_jump import sender_of
+from .senders.own_messages import listens
 
 # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
 POLL_S = 0.02
@@ -84,6 +86,28 @@ class SentGoal:
         self._events.put(GoalEvent(feedback=feedback))
 
 
+class ServedClient(actionlib.ActionClient):
+    """actionlib's. It believes only a node that listens for goals, and no bag that is played.
+
+    The statuses of a bag do not have the goal, so it would take it for lost.
+    """
+
+    def _status_cb(self, msg: genpy.Message) -> None:
+        if self._is_of_server(msg):
+            super()._status_cb(msg)
+
+    def _result_cb(self, msg: genpy.Message) -> None:
+        if self._is_of_server(msg):
+            super()._result_cb(msg)
+
+    def _feedback_cb(self, msg: genpy.Message) -> None:
+        if self._is_of_server(msg):
+            super()._feedback_cb(msg)
+
+    def _is_of_server(self, msg: genpy.Message) -> bool:
+        return listens(self.pub_goal, sender_of(msg))
+
+
 class GoalLink:
     """An action client that knows whether its server is there."""
 
@@ -97,7 +121,7 @@ class GoalLink:
         self._fast = [rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
                       for end, kind in (('/result', type(action_spec().action_result)),
                                         ('/feedback', type(action_spec().action_feedback)))]
-        self._client = actionlib.ActionClient(name, action_spec)
+        self._client = ServedClient(name, action_spec)
         self._grace = ConnectionGrace()
 
     def ready(self) -> bool:

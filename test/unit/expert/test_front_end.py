@@ -30,7 +30,7 @@ class FakeServer:
         self.listed = []
         self.claims = []  # the actions of all calls
 
-    def refresh(self, advertised):
+    def refresh(self, advertised, servers):
         """Nothing to be done."""
 
     def stop(self):

@@ -55,6 +55,7 @@ LAYERS: Dict[str, List[Layer]] = {
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',
                                                  'hand', 'waiting', 'diagnostics'},
         {'recording', 'interfaces', 'goal_link', 'disk', 'loaded_settings', 'stored'},
+        'senders',
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},

@@ -1,6 +1,5 @@
 """What a person may end the goal of an interface with; no master."""
 import threading
-from types import SimpleNamespace
 
 import pytest
 
@@ -44,7 +43,7 @@ class FakeHandle:
 @pytest.fixture(name='active')
 def make_active(monkeypatch):
     """An interface with an active goal, and the handle of that goal."""
-    monkeypatch.setattr(module, 'actionlib', SimpleNamespace(ActionServer=FakeActionServer))
+    monkeypatch.setattr(module, 'QuietActionServer', FakeActionServer)
     monkeypatch.setattr(module.rospy, 'resolve_name', lambda name: name)
     goal, handle = InterfaceGoal('hand', lambda goal: None, lambda: None), FakeHandle()
     FakeActionServer.made.send_goal(handle)

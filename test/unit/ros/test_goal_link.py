@@ -1,13 +1,12 @@
 """What of a goal on its way counts as lost; no master."""
 import time
 
-import actionlib
 import pytest
 import rospy
 from actionlib import CommState
 
 from smach_oracle.msg import SharedAutonomyAction
-from smach_oracle.ros import connections
+from smach_oracle.ros import connections, goal_link
 from smach_oracle.ros.goal_link import GoalLink, SentGoal, _reaches
 
 
@@ -99,7 +98,7 @@ def client(monkeypatch):
     monkeypatch.setattr(connections, 'GRACE_S', 0.2)
     monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
     client = FakeClient()
-    monkeypatch.setattr(actionlib, 'ActionClient', lambda *_: client)
+    monkeypatch.setattr(goal_link, 'ServedClient', lambda *_: client)
     return client
 
 

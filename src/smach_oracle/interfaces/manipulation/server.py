@@ -15,7 +15,9 @@ from std_msgs.msg import Header
 from smach_oracle.msg import CollisionBoxes, SharedAutonomyGoal, TeleopCommand, TeleopState
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.introspection.viewer_jump import sender_of
 from smach_oracle.ros.master_watch import start_master_watch
+from smach_oracle.ros.senders.own_messages import listens
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode_all
 from smach_oracle.srv import Snapshot
 
@@ -65,7 +67,7 @@ class TeleoperationServer:
         self._services = FinishServices(self._goal, self.outputs)
         self._boxes = rospy.Subscriber('collision_map', CollisionBoxes, self._on_boxes,
                                        queue_size=1)
-        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._commands.put,
+        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._put,
                                             queue_size=10, tcp_nodelay=True)
         self._thread = threading.Thread(target=self._run, name='teleoperation', daemon=True)
         self._thread.start()
@@ -81,6 +83,19 @@ class TeleoperationServer:
             grasped = pose == GRASP_POSE and arm.grasp is not None
             known[key] = arm.grasp if grasped else arm.tool_pose()
         return known
+
+    def _put(self, command: TeleopCommand) -> None:
+        """Take a command. Anybody may stop the arm, but only a node that sees its state moves it.
+
+        The player of a bag does not.
+        """
+        node = sender_of(command)
+        if command.dead_man and node and not listens(self._state, node):
+            rospy.logwarn_throttle(10.0, '{}: ignored commands of {}, which does not listen to the '
+                                   'state. A bag that is played does that'.format(
+                                       rospy.get_name(), node))
+        else:
+            self._commands.put(command)
 
     def _begun(self, goal: SharedAutonomyGoal) -> None:
         self._seq, self._sender, self._refused, self._step = 0, '', '', no_motion()

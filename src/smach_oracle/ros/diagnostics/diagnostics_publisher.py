@@ -12,6 +12,7 @@ from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.store.store_writer import running_writers
 
 from ..connections import quiet_at_shutdown
+from ..senders.own_messages import subscribe_to_owner
 from .statuses import questions_status, recorder_status, states_status, store_status
 
 TOPIC = '/diagnostics'
@@ -28,7 +29,7 @@ class DiagnosticsPublisher:
         self._recorder: Optional[RecorderStatus] = None
         self._listens = False  # to a recorder
         self._publisher = rospy.Publisher(TOPIC, DiagnosticArray, queue_size=1)
-        rospy.Subscriber(server + '/open', OpenQueries, self._take_queries)
+        subscribe_to_owner(server + '/open', OpenQueries, self._take_queries)
         self._period_s = period_s
         threading.Thread(target=self._run, name='diagnostics', daemon=True).start()
 
@@ -36,7 +37,7 @@ class DiagnosticsPublisher:
         """Report the recorder of this node from now on."""
         if not self._listens:
             self._listens = True
-            rospy.Subscriber('~record/status', RecorderStatus, self._take_recorder)
+            subscribe_to_owner('~record/status', RecorderStatus, self._take_recorder)
 
     def watch(self, machine: OracleContainer) -> None:
         """Report the states of a machine from now on."""

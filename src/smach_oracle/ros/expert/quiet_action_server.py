@@ -1,9 +1,17 @@
-"""An action server that tells nothing on topics that rospy has closed."""
+"""An action server that tells nothing on closed topics, and takes no goal of a bag."""
+import time
 from typing import Any
 
 import actionlib
+import genpy
+import rospy
 
 from ..connections import quiet_at_shutdown
+from ..introspection.viewer_jump import sender_of
+from ..senders.own_messages import listens
+
+LISTENS_AFTER_S = 0.5  # a client may be connected a moment before this node knows it
+_LOOK_S = 0.01
 
 
 class QuietActionServer(actionlib.ActionServer):
@@ -11,7 +19,31 @@ class QuietActionServer(actionlib.ActionServer):
 
     actionlib asks `rospy.is_shutdown` before it publishes: rospy has closed the topics by then. Its
     timer and whoever ends a goal would get an error in between.
+
+    A goal counts only if its node listens for the result. The player of a bag does not.
     """
+
+    def internal_goal_callback(self, ros_goal: genpy.Message) -> None:
+        """Take a goal. It runs in the thread of the goal's connection, without a lock."""
+        if self._is_awaited(ros_goal):
+            super().internal_goal_callback(ros_goal)
+
+    def internal_cancel_callback(self, goal_id: genpy.Message) -> None:
+        """Take a request to cancel goals. Of a node that goes down it still cancels its goal."""
+        if goal_id.id or self._is_awaited(goal_id):
+            super().internal_cancel_callback(goal_id)
+
+    def _is_awaited(self, message: genpy.Message) -> bool:
+        node = sender_of(message)
+        until_s = time.monotonic() + LISTENS_AFTER_S
+        while node and not listens(self.result_pub, node):
+            if time.monotonic() > until_s or rospy.is_shutdown():
+                rospy.logwarn('%s: ignored a %s of %s, which does not listen for the result. A bag '
+                              'that is played does that', rospy.resolve_name(self.ns),
+                              'request to cancel' if hasattr(message, 'id') else 'goal', node)
+                return False
+            time.sleep(_LOOK_S)
+        return True
 
     def publish_result(self, *args: Any) -> None:
         """Publish the end of a goal."""

@@ -9,6 +9,7 @@ import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
+from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
 from ...robot_topics import READ_BYTES
 from ..feeds.views import event_of
@@ -66,8 +67,10 @@ class FollowedRobots:
             self._begin(name)
         for name, robot in list(self._robots.items()):
             if name in seen:
-                self._nodes[name] = frozenset(
+                publishers = frozenset(
                     node for suffix in _TOPICS for node in nodes.get(name + suffix, ()))
+                # of a robot that is there, a node that plays its bag shows nothing
+                self._nodes[name] = publishers & {name} or publishers
             self._unseen[name] = 0 if name in seen else self._unseen.get(name, 0) + 1
             robot.set_alive(self._unseen[name] < _GONE_AFTER)
             if self._unseen[name] == _GONE_AFTER:
@@ -106,8 +109,8 @@ class FollowedRobots:
         """Without the lock: a master that hangs must not hold up the writing of sections."""
         robot = FollowedRobot(name)
         self._subscribers[name] = [
-            rospy.Subscriber(name + suffix, message, self._receiver(robot, method),
-                             queue_size=_QUEUE, buff_size=READ_BYTES)
+            subscribe_to_owner(name + suffix, message, self._receiver(robot, method),
+                               queue_size=_QUEUE, buff_size=READ_BYTES)
             for suffix, (message, method) in _TOPICS.items()
         ]
         with self._lock:

@@ -32,6 +32,7 @@ class _LoggedTrial:
         self.robot = robot
         self.robot_gone = False
         self.counts = TrialCounter()
+        self.last_seq = -1  # of the events heard
         self.events = PackedTexts()  # each as JSON
         self.detailed = True  # whether the events are kept
 
@@ -70,6 +71,9 @@ class TrialLog:
             if trial is None:
                 trial = self._trials[event.trial_id] = _LoggedTrial(robot)
                 self._forget()
+            if event.seq <= trial.last_seq:
+                return  # it was heard: a bag of the trial is played
+            trial.last_seq = event.seq
             trial.counts.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
                 before = trial.events.size

@@ -104,6 +104,16 @@ def test_what_the_log_shows_of_a_trial_is_what_the_analysis_of_its_bag_counts():
         assert row['end'] == summary.start_time + summary.duration_s
 
 
+def test_a_trial_whose_bag_is_played_counts_once():
+    log, trials = TrialLog(), run_trials(5)
+    for each in itertools.chain(*trials):
+        log.add('/robot', each)
+    before = log.overview(), log.events(trials[0][0].trial_id, 0)
+    for each in itertools.chain(*trials):
+        log.add('/robot', each)
+    assert (log.overview(), log.events(trials[0][0].trial_id, 0)) == before
+
+
 def test_the_table_counts_trials_in_which_it_happened_and_how_often():
     trials = run_trials(40)
     row, = counts_table(map(count, trials))
@@ -143,8 +153,11 @@ def test_a_trial_whose_start_was_not_heard_counts_as_one_with_an_oracle():
     assert row['oracle'] is True and row['trials'] == 1
 
 
+NUMBERS = itertools.count()
+
+
 def event(kind, state='PICK', trial='t', path='TASK', **fields):
-    return Event(kind, trial, 0, 0.0, path, state, **fields)
+    return Event(kind, trial, next(NUMBERS), 0.0, path, state, **fields)
 
 
 def scored(*events):
