@@ -79,17 +79,16 @@ class OperatorHand:
         """Ask the machine to stop, and lift the pause: what waits ends at once, preempted."""
         top = self._top
         text = '{} is asked to stop'.format(top.path)
-        try:
-            if top.machine.is_running():
-                top.machine.request_preempt()
-            else:
-                text = '{} does not run'.format(top.path)
-                if top.tree.control.paused:
-                    text += '; its pause is lifted'
-        except Exception as err:  # it is the user's
-            text += ', and its request_preempt failed: {!r}'.format(err)
-        finally:
-            top.tree.control.stop()
+        with top.tree.control.stop():
+            try:
+                if top.machine.is_running():
+                    top.machine.request_preempt()
+                else:
+                    text = '{} does not run'.format(top.path)
+                    if top.tree.control.paused:
+                        text += '; its pause is lifted'
+            except Exception as err:  # it is the user's
+                text += ', and its request_preempt failed: {!r}'.format(err)
         return self._told('preempt', text, by)
 
     # -- one state at a time

@@ -3,8 +3,11 @@
 The machines look at the requests before each state. A request wakes them by one flag of their
 engines, `attentive`, which they look at in any case. Without a request a step costs nothing more.
 """
+import contextlib
+import math
 import threading
-from typing import Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
+import time
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
 
 from ..settings.settings import CONFIRM_FIRST
 from .hold import HeldBy, HeldPlace, Hold, LetGo
@@ -42,6 +45,13 @@ class Jump(NamedTuple):
         return '{}/{}'.format(self.container, self.state) if self.container else self.state
 
 
+class _OperatorStop(NamedTuple):
+    """An operator's stop of the machine, until that goes on or its trial ends."""
+
+    ends_s: float  # from when on it ends what waits, though the preempt has not come to that
+    lifts_pause: bool
+
+
 class Control:
     """The part that holds the machines of one tree. Safe to use from several threads.
 
@@ -57,7 +67,7 @@ class Control:
         self._levels: Dict[str, Tuple[PathPattern, str]] = {}
         # where containers go, by key, that are sent from where they wait
         self._moving: Dict[str, HeldPlace] = {}
-        self._stopping = False  # an operator has asked the machine to stop
+        self._stop: Optional[_OperatorStop] = None
         self.paused = False
         self.paused_by = ''
         self.is_set = False
@@ -70,7 +80,7 @@ class Control:
         with self._changed:
             self._jumps.clear()
             self._moving.clear()
-            self._stopping = False  # of a stop that came between two trials
+            self._stop = None  # of a stop that came between two trials
             self.in_trial = True
             self._note_change()
 
@@ -78,7 +88,8 @@ class Control:
         """Tell nothing more of this trial."""
         self.in_trial = False
         with self._changed:
-            self._stopping = False
+            self._stop = None
+            self._note_change()
 
     def attend(self, engine: Engine) -> None:
         """Wake this machine from now on, and at once where something is set."""
@@ -98,20 +109,28 @@ class Control:
         with self._changed:
             engine.attentive = self.is_set or engine.stays_attentive
 
-    def hold_before(self, place: HeldPlace, confirms: bool, breaks: bool = True) -> Optional[Hold]:
+    def hold_before(self, place: HeldPlace, confirms: bool, breaks: bool = True,
+                    asked: bool = False, obeyed: bool = False) -> Optional[Hold]:
         """Return the wait before a state, None where the machine may enter it.
 
         :param confirms: whether the state is entered only once somebody has confirmed it.
         :param breaks: whether breakpoints count.
+        :param asked: whether a preempt of its container stands.
+        :param obeyed: whether the state before has serviced one.
         """
         with self._changed:
-            if self._stopping:
-                return None
-            if self.paused:
+            if self._pauses(asked, obeyed):
                 return Hold(place, HeldBy.PAUSE, confirms)
             if breaks and self._breaks_before(place):
                 return Hold(place, HeldBy.BREAKPOINT, confirms)
             return Hold(place, HeldBy.CONFIRM, confirms) if confirms else None
+
+    def _pauses(self, asked: bool, obeyed: bool) -> bool:
+        """Whether a pause holds a container. A stop lifts it, and runs no state that it held."""
+        stop = self._stop
+        if stop is None:
+            return self.paused
+        return (stop.lifts_pause and asked) or (self.paused and not obeyed)
 
     def _breaks_before(self, place: HeldPlace) -> bool:
         """Pause the tree where a breakpoint is meant."""
@@ -151,8 +170,8 @@ class Control:
                 return ended_by() or let_go  # a preempt that came before it goes before it
 
     def _let_go(self, hold: Hold) -> Optional[LetGo]:
-        if self._stopping:
-            return LetGo.PREEMPTED
+        if self._stop is not None:  # the preempt is on its way, and lets go what it comes to
+            return LetGo.PREEMPTED if time.monotonic() > self._stop.ends_s else None
         if hold.may_be_sent and hold.key in self._jumps:
             return LetGo.SENT
         if hold.stepped:
@@ -197,22 +216,39 @@ class Control:
     def pause(self, by: str = '') -> None:
         """Hold every container of the tree at its next state boundary."""
         with self._changed:
-            self._stopping = False
+            self._stop = None
             if not self.paused:
                 self.paused, self.paused_by = True, by
                 self._note_change()
 
-    def stop(self) -> None:
-        """Lift the pause for a stop: what waits ends, and nothing is held until it is serviced."""
+    @contextlib.contextmanager
+    def stop(self) -> Iterator[None]:
+        """Lift the pause for a stop: what waits ends, and nothing is held until it is serviced.
+
+        The machine is preempted meanwhile. Containers may obey before all have heard of it.
+        """
         with self._changed:
-            self.paused, self.paused_by, self._stopping = False, '', True
-            self._note_change()
+            self._stop = _OperatorStop(math.inf, self.paused)
+        try:
+            yield
+        finally:
+            with self._changed:
+                lifts_pause, self.paused, self.paused_by = self.paused, False, ''
+                self._stop = _OperatorStop(time.monotonic() + _SETTLE_S, lifts_pause)
+                self._note_change()
 
     def stop_is_over(self) -> None:
         """Hold again what is to be held: the machine goes on after a stop that was serviced."""
-        if self._stopping:
+        if self._stop is not None:
             with self._changed:
-                self._stopping = False
+                if self._stop is not None and self._stop.ends_s != math.inf:
+                    self._stop = None
+                    self._note_change()
+
+    @property
+    def holds_all(self) -> bool:
+        """Whether an operator has paused the tree, and asks no stop of it."""
+        return self.paused and self._stop is None
 
     def resume(self) -> Tuple[Hold, ...]:
         """Lift the pause. Return what waited because of it, or was sent from where it waited."""
@@ -329,7 +365,7 @@ class Control:
     def _note_change(self) -> None:
         """Wake who waits, and have machines look that execute."""
         self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps
-                           or self._moving)
+                           or self._moving or (self._stop is not None and self._stop.lifts_pause))
         if self.is_set:
             for engine in list(self._engines.values()):
                 engine.attentive = True

@@ -1,6 +1,6 @@
 """The state boundary as an operator uses it: holds, announcements, jumps that were asked for."""
 import contextlib
-from typing import Iterator, NamedTuple, Optional
+from typing import Iterator, Optional
 
 import smach
 
@@ -12,14 +12,9 @@ from ..records.events import EventKind
 from ..recovery.operator_wait import clocks_stand_still
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
+from .passing_by import pass_by
 from .sending import make_jump
-from .transitions import terminate
-
-
-class Stop(NamedTuple):
-    """The state is not executed now. `outcome`: of the container, None where it goes on."""
-
-    outcome: Optional[str] = None
+from .transitions import Stop, terminate
 
 
 def pass_boundary(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
@@ -46,7 +41,9 @@ def _locked(node: TreeNode) -> Iterator[None]:
 
 def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
-    stops = machine.preempt_requested() or _is_to_stop(node)
+    asked = machine.preempt_requested()
+    obeyed = was_preempted and not asked
+    stops = asked or _is_to_stop(node)
     if not (stops or was_preempted):
         control.stop_is_over()
     jump = None if stops else control.take_jump(node.key)
@@ -56,14 +53,14 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     autonomy = node.record(place.state).settings.autonomy
     level = control.level_of(place, autonomy)
     # what an author does at a preempt waits for no confirmation, and at no breakpoint
-    hold = control.hold_before(place, level == CONFIRM_FIRST and not was_preempted,
-                               not (stops or was_preempted))
+    hold = control.hold_before(place, level == CONFIRM_FIRST and not obeyed,
+                               not (stops or was_preempted), asked, obeyed)
     if hold is not None:
-        hold.autonomy, hold.key, hold.asks = autonomy, node.key, not was_preempted
+        hold.autonomy, hold.key, hold.asks = autonomy, node.key, not obeyed
     else:
         control.arrived(node.key)
-    if hold is not None and (stops or (was_preempted and control.paused)):
-        return _end_preempted(node)
+    if hold is not None and (stops or obeyed):
+        return _preempted_before(node, asked)
     if level == ANNOUNCE:
         _announce(node, place)
     return None if hold is None else _hold(node, hold)
@@ -87,7 +84,18 @@ def _hold(node: TreeNode, hold: Hold) -> Optional[Stop]:
     let_go = _wait(node, hold)
     if let_go in (LetGo.SENT, LetGo.SHUTDOWN, LetGo.LEFT_BEHIND):
         return Stop()  # whoever calls for the next step finds out
-    return _end_preempted(node) if let_go is LetGo.PREEMPTED else None
+    return _preempted_before(node, True) if let_go is LetGo.PREEMPTED else None
+
+
+def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
+    """Go on where a preempt comes before a state that is held: the state is not executed.
+
+    While an operator has paused the tree and somebody else preempts it, no other one is either.
+
+    :param asked: whether the container itself is to obey.
+    """
+    stop = pass_by(node) if asked and not node.tree.control.holds_all else None
+    return stop or _end_preempted(node)
 
 
 def _wait(node: TreeNode, hold: Hold) -> LetGo:

@@ -29,7 +29,7 @@ from .entering import prepare_entry
 from .going_on import ask_to_go_on
 from .oracle_state import OracleState
 from .starting_over import restore_start
-from .transitions import go_to, message_of, stop_left_behind, terminate
+from .transitions import go_to, message_of, obey_preempt, stop_left_behind, terminate
 
 
 class OracleVisit:
@@ -214,6 +214,8 @@ class OracleVisit:
         if self._machine.preempt_requested():
             self._node.tell_preempt()
         if ending.state is not None:  # the author's own transition: the request goes on with it
+            if ending.obeys:
+                obey_preempt(self._machine, meta)
             self._go_on(ending.state)
             return None
         meta.service_preempt()

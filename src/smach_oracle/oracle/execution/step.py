@@ -5,6 +5,7 @@ from typing import Any, Mapping, Optional
 import smach
 
 from ..asking.question import AnswerKind
+from ..branches.passed_over import tell_passed_over
 from ..decision.policy import FailureContext
 from ..machine.repeats import note_visit
 from ..machine.tree_node import TreeNode
@@ -23,19 +24,18 @@ from ..recovery.failure import (
     author_recovers,
     leaving_outcome,
     natural_ending,
+    preempted_ending,
     visit_result,
 )
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.still_running import TakenOut, WatchedVisit
-from ..settings.failing_outcomes import PREEMPTED
 from .arriving_visit import ArrivingVisit
-from .boundary import Stop, pass_boundary
+from .boundary import pass_boundary
 from .departure import Departure, is_settled, take_departure
 from .oracle_visit import OracleVisit
-from .passed_over import tell_passed_over
 from .resumed_visit import ResumedVisit
 from .starting_over import keep_start
-from .transitions import go_to, message_of, stop_left_behind, terminate
+from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
 from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
 
 NO_FACTS: Mapping[str, Any] = {}
@@ -338,12 +338,14 @@ class Step:
     def _preempted_ending(self, failure: Failure) -> ContainerEnding:
         """Return how a failure ends the container while a preempt or a shutdown is under way.
 
-        An overrun, and a state that was held back, end it as preempted, all else as it would.
+        An overrun, and a state that was held back, go as preempted ones, all else as it would.
         """
-        if (failure.kind in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
-                and PREEMPTED in self._machine.get_registered_outcomes()):
-            return ContainerEnding(outcome=PREEMPTED)
-        return self._natural_ending(failure)
+        if failure.kind not in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK):
+            return self._natural_ending(failure)
+        ending = preempted_ending(self._node, failure)
+        if ending.obeys:
+            obey_preempt(self._machine, self._machine._states[failure.state])
+        return ending
 
     def _end_unrecovered(self, ending: ContainerEnding, failure: Failure,
                          facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:

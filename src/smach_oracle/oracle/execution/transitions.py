@@ -1,8 +1,18 @@
 """Moves a machine on: to a state, or to its end."""
+from typing import NamedTuple, Optional
+
 import smach
 
+from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
+from ..machine.workers import recall_preempts
 from ..settings.failing_outcomes import PREEMPTED
+
+
+class Stop(NamedTuple):
+    """The state is not executed now. `outcome`: of the container, None where it goes on."""
+
+    outcome: Optional[str] = None
 
 
 def go_to(node: TreeNode, message: str, target: str) -> None:
@@ -16,6 +26,16 @@ def go_to(node: TreeNode, message: str, target: str) -> None:
 def message_of(source: str, outcome: str, target: str) -> str:
     """Return what SMACH logs of a transition."""
     return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
+
+
+def obey_preempt(machine: Machine, state: smach.State) -> None:
+    """Have a preempt obeyed by the current state, as if it had run and serviced the request.
+
+    The machine sees that before its next state.
+    """
+    recall_preempts(state)
+    machine._preempt_requested = True
+    machine._preempted_state, machine._preempted_label = state, machine._current_label
 
 
 def stop_left_behind(node: TreeNode) -> None:

@@ -24,6 +24,9 @@ UNCOUNTED: Mapping[str, Any] = {'text': 'not counted, as the robot is not well',
 LEFT: Mapping[str, Any] = {'text': 'left for a state of another container',
                            'data': {NOT_COUNTED: True}}
 
+# fields of the TRANSITION from a state that was held, and that a preempt has ended before it began
+PASSED_BY: Mapping[str, Any] = {'text': 'preempted before it began', 'data': {NOT_COUNTED: True}}
+
 _OLD_SPENT = ' spent on it'
 _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
 

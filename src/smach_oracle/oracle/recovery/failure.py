@@ -52,6 +52,7 @@ class ContainerEnding(NamedTuple):
     state: Optional[str] = None
     outcome: Optional[str] = None
     error: Optional[Exception] = None
+    obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
 
 
 def route_of(machine: Machine, label: str, outcome: str) -> Route:
@@ -129,6 +130,36 @@ def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
             return ContainerEnding(outcome=outcome)
     return ContainerEnding(
         error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
+
+
+def route_at_preempt(machine: Machine, label: str) -> Route:
+    """Follow the outcome `preempted` of a state that a preempt ends before it has done anything.
+
+    It leads nowhere where the state has no such outcome, or where it leads to the state itself.
+    """
+    registered = machine._states[label].get_registered_outcomes()
+    outcome = next((each for each in registered if is_preempted(each)), None)
+    route = Route('', False) if outcome is None else route_of(machine, label, outcome)
+    return Route('', False) if route.is_state and route.target == label else route
+
+
+def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
+    """Return how a container ends, or goes on, where a preempt or a shutdown ends a recovery.
+
+    After a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
+    unless the state still runs. Else its own outcome `preempted` ends it.
+    """
+    machine = node.machine
+    registered = machine.get_registered_outcomes()
+    state = machine._states[failure.state]
+    if not (smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)):
+        route = route_at_preempt(machine, failure.state)
+        if route.target:
+            return ContainerEnding(state=route.target, obeys=True) if route.is_state else (
+                ContainerEnding(outcome=route.target))
+    if PREEMPTED in registered:
+        return ContainerEnding(outcome=PREEMPTED)
+    return natural_ending(failure, registered, node.in_force.failing)
 
 
 def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[str]) -> str:

@@ -17,9 +17,8 @@ from ..places.way import Way, way_to, why_closed_on
 from ..records.events import EventKind
 from ..records.facts import DECIDED_BY, Decider
 from ..records.state_record import StateRecord
-from ..settings.failing_outcomes import PREEMPTED
 from .deciding import Decided, Deciding
-from .failure import ContainerEnding, Failure, natural_ending
+from .failure import ContainerEnding, Failure, natural_ending, preempted_ending
 from .levels import (
     Foreseen,
     OuterDecision,
@@ -286,17 +285,13 @@ class Recovery:
         return self._give_up(text)
 
     def _preempted(self) -> Verdict:
-        """End the container as preempted.
+        """Go where the author sends a preempt of the failed state, or end the container.
 
-        Where it has no such outcome, it ends as the failure would have ended it. Where the trial
-        ends early, it has no outcome at all.
+        Where the trial ends early, it has no outcome at all.
         """
         if self._node.tree.early_end.why is not None:
             return Verdict(VerdictKind.PREEMPTED)
-        ending = self._natural_ending()
-        if PREEMPTED in self._machine.get_registered_outcomes():
-            ending = ContainerEnding(outcome=PREEMPTED)
-        return Verdict(VerdictKind.PREEMPTED, ending=ending)
+        return Verdict(VerdictKind.PREEMPTED, ending=preempted_ending(self._node, self._failure))
 
     def _natural_ending(self) -> ContainerEnding:
         return natural_ending(self._failure, self._machine.get_registered_outcomes(),
