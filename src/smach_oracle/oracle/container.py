@@ -25,6 +25,7 @@ from .records.rates_file import read_rates, write_rates
 from .settings.health import HealthFunction
 from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
+from .settings.unfit_names import Strictness
 
 EDGE_TO_ORACLE = 'failure'
 
@@ -53,7 +54,7 @@ class OracleContainer(smach.StateMachine):
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
                  preconditions: PreconditionLists = None, name: str = '',
                  expert: Optional[Expert] = None, recover: bool = True,
-                 strict: bool = True, health: Optional[HealthFunction] = None) -> None:
+                 strict: Strictness = True, health: Optional[HealthFunction] = None) -> None:
         """Make an empty machine under an oracle.
 
         `settings`: a Settings or a dictionary of them. `preconditions`: lists by LABEL or
@@ -70,7 +71,7 @@ class OracleContainer(smach.StateMachine):
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
              settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
+             expert: Optional[Expert] = None, strict: Strictness = True, recover: bool = True,
              health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put `machine` under an oracle and return it.
 

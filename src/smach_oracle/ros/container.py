@@ -21,6 +21,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.patterns import Nested
 from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.unfit_names import Strictness
 
 from .attachment import attachments
 from .expert.failure_text import describe_failure
@@ -33,6 +34,7 @@ from .loaded_settings import (
 )
 from .machine_names import machine_names
 from .main_thread import outside_main_thread
+from .reading.known_names import Complaint
 
 PreconditionLists = Optional[Mapping[str, List[Any]]]
 
@@ -60,7 +62,7 @@ class OracleContainer(BareContainer):
                  output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
                  preconditions: PreconditionLists = None, name: str = '',
                  expert: Optional[Expert] = None, recover: bool = True,
-                 strict: bool = True, health: Optional[HealthFunction] = None) -> None:
+                 strict: Strictness = True, health: Optional[HealthFunction] = None) -> None:
         """See `smach_oracle.oracle.OracleContainer`.
 
         :raises SettingsError: naming key, value and what is allowed.
@@ -73,7 +75,7 @@ class OracleContainer(BareContainer):
     @classmethod
     def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
              settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: bool = True, recover: bool = True,
+             expert: Optional[Expert] = None, strict: Strictness = True, recover: bool = True,
              health: Optional[HealthFunction] = None) -> 'OracleContainer':
         """Put a machine under an oracle and return it: the same object.
 
@@ -141,10 +143,11 @@ def _remember(machine: BareContainer, settings: SettingsLike, preconditions: Pre
         _given[machine] = _GivenSettings(settings, preconditions, nested)
 
 
-def take_parameters(machine: BareContainer) -> None:
+def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
     """Merge the parameter `~oracle` over what the machine was given in code.
 
-    Once, and only in a node.
+    Once, and only in a node. By default it is not strict: one parameter serves every machine of the
+    node, and not each of them has every state.
 
     :raises SettingsError: naming key, value and what is allowed.
     :raises rospy.ROSInterruptException: where the node shuts down meanwhile.
@@ -163,10 +166,12 @@ def take_parameters(machine: BareContainer) -> None:
                 _tell_once('{}: the {} overrides {}'.format(
                     oracle_of(machine).path, name, change))
             settings.put(values, name)
-        # Not strict: one parameter serves every machine of the node, and not each of them has every
-        # state.
+        complain: Strictness = strict
+        if callable(strict):
+            complain = Complaint(strict, settings.located)
         BareContainer.wrap(machine, settings=checked(settings, given.preconditions),
-                           nested=given.nested, strict=False, recover=oracle_of(machine).recovers)
+                           nested=given.nested, strict=complain,
+                           recover=oracle_of(machine).recovers)
     del _given[machine]  # only now: a program that tries again after an error gets it again
 
 

@@ -59,7 +59,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
-        {'sendable_text', 'strict_json', 'master_watch'}
+        {'sendable_text', 'strict_json', 'master_watch', 'reading'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',

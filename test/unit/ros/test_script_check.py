@@ -179,10 +179,10 @@ def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why
 
 
 def test_a_name_that_is_no_outcome_or_state_is_told(check):
-    code, report, _ = check('machine("HOME", "PICK").execute()', 'states: {PIKC: {memory: 4}}')
-    assert code == 0
-    assert "Warning: states.PIKC: 'PIKC' is no state (did you mean PICK?)" in report
-    assert '1 warning: no' in report
+    code, report, errors = check('machine("HOME", "PICK").execute()', 'states: {PIKC: {memory: 4}}')
+    assert code == 2 and 'All is well' not in report
+    assert errors.splitlines()[-1].startswith(
+        "oracle_run: oracle.yaml line 1: states.PIKC: 'PIKC' is no state (did you mean PICK?)")
 
 
 def test_the_real_master_is_asked_for_its_parameters_alone(check, spy):

@@ -1,5 +1,5 @@
 """Checks that the settings of a wrapped machine fit its states."""
-from typing import List, Set, Tuple
+from typing import Any, Iterator, List, Set, Tuple
 
 import smach
 
@@ -8,37 +8,118 @@ from ..machine.nesting import nodes_of, paths_below
 from ..machine.tree_node import TreeNode
 from ..places.fitness import allowed_for, why_unfit
 from ..settings.close_names import did_you_mean
+from ..settings.on_resume import STATE
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec
+from ..settings.unfit_names import UnfitKind, UnfitName
+
+# settings that keep a state from being run where, or for longer than, its author wants
+PROTECTIONS = ('on_retry', 'preconditions', 'time_limit_s')
 
 
-def check_state_names(top: TreeNode) -> None:
-    """Check that the states for which something is set are somewhere in the tree.
+def check_names(top: TreeNode) -> None:
+    """Check that each name in the settings stands for something in the tree.
 
-    :raises SettingsError: where one is not. It is logged instead where the node is not strict.
+    :raises SettingsError: where one does not, if the node is strict (`Strictness`).
     """
+    for unfit in [*_unfit_states(top), *_unfit_nested(top), *_unfit_targets(top),
+                  *_unfit_outcomes(top)]:
+        _complain(top, unfit)
+
+
+def check_preconditions(node: TreeNode) -> None:
+    """Check that preconditions name states that can be run for the state.
+
+    These are others of its container by label, and states of other containers by path.
+
+    :raises SettingsError: where one does not, if the node is strict (`Strictness`).
+    """
+    for label in node.labels():
+        for spec in _preconditions_of(node, label):
+            for named in spec.labels():
+                why_not = why_unfit(node, label, named)
+                if why_not:
+                    _complain(node, UnfitName(SettingsError(
+                        'states.{}.preconditions'.format(label), named, allowed_for(node, label),
+                        problem='is not allowed: ' + why_not), named, UnfitKind.PRECONDITION))
+
+
+def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
+    """Yield the names of states and of states of interfaces that no state has."""
     known = _known_names(top)
-    for key, name in _named_states(top):
+    settings = top.settings
+    named = [('states.' + name, name, UnfitKind.PROTECTION if any(
+        key in given for key in PROTECTIONS) else UnfitKind.NAME)
+             for name, given in settings.states.items()]
+    named += [('interfaces.{}.states'.format(offer.name), name, UnfitKind.NAME)
+              for offer, states in settings.interfaces for name in states]
+    for key, name, kind in named:
         if name not in known and not any(matches(name, each) for each in known):
-            _refuse(top, SettingsError(
-                key, name, 'the states of the machine: ' + ', '.join(sorted(known)),
-                problem='is no state' + did_you_mean(name, known)))
+            yield UnfitName(_no_state(key, name, known), name, kind)
 
 
-def check_nested(top: TreeNode) -> None:
-    """Check that each path or pattern of `nested` stands for something.
-
-    :raises SettingsError: where one does not. It is logged instead where the node is not strict.
-    """
+def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
+    """Yield the paths and patterns of `nested` that stand for nothing."""
     if isinstance(top.nested, bool):
         return
     known = sorted(set(paths_below(top.machine)))
     for name in top.nested:
         if not any(matches(name, path) for path in known):
-            _refuse(top, SettingsError(
+            yield UnfitName(SettingsError(
                 'nested', name, 'a path or a pattern of the machines in {}, and of the states of '
                 'its Concurrences and Iterators: {}'.format(top.path, ', '.join(known) or 'none'),
-                problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known))))
+                problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known))), name)
+
+
+def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
+    """Yield the states to which settings send the machine that are not in the tree."""
+    settings, known = top.settings, _known_names(top)
+    verb, target = settings.on_no_answer
+    named = [('on_no_answer', target, UnfitKind.CHECKED)] if verb == 'goto' else []
+    if settings.on_resume[0] == STATE:
+        named.append(('on_resume', settings.on_resume[1], UnfitKind.CHECKED))
+    named += [('resume_map.' + old, new, UnfitKind.CHECKED)
+              for old, new in settings.resume_map.items()]
+    for key, name, kind in named:
+        if name.strip('/') not in known:
+            yield UnfitName(_no_state(key, name, known), name.strip('/'), kind)
+
+
+def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
+    """Yield the outcomes in the settings that no state, and no container, can end with."""
+    settings = top.settings
+    verb, target = settings.on_no_answer
+    named: List[Tuple[str, str, str, UnfitKind]] = []
+    if verb == 'give_up':
+        named.append(('on_no_answer', '**', target, UnfitKind.CHECKED))
+    named += [('failure_outcomes', '**', each, UnfitKind.CHECKED)
+              for each in settings.defaults.failure_outcomes]
+    named += [('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
+              for name, given in settings.states.items()
+              for each in given.get('failure_outcomes', ())]
+    for key, name, outcome, kind in named:
+        known = _outcomes_of(top, name)
+        if known and outcome not in known:
+            yield UnfitName(SettingsError(
+                key, outcome, 'the outcomes: ' + ', '.join(sorted(known)),
+                problem='is no outcome' + did_you_mean(outcome, known)), outcome, kind)
+
+
+def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
+    """Return the outcomes of the states for which a name stands, and with `**` of the top."""
+    found = set(top.machine.get_registered_outcomes()) if name == '**' else set()
+    for node in nodes_of(top.machine):
+        path = node.relative_path
+        for label in node.labels():
+            if matches(name, '{}/{}'.format(path, label) if path else label):
+                state: Any = node.machine._states[label]
+                found.update(state.get_registered_outcomes())
+    return {each for each in found if isinstance(each, str)}
+
+
+def _no_state(key: str, name: str, known: Set[str]) -> SettingsError:
+    return SettingsError(key, name, 'the states of the machine: ' + ', '.join(sorted(known)),
+                         problem='is no state' + did_you_mean(name, known))
 
 
 def _known_names(top: TreeNode) -> Set[str]:
@@ -50,30 +131,6 @@ def _known_names(top: TreeNode) -> Set[str]:
     return known
 
 
-def _named_states(top: TreeNode) -> List[Tuple[str, str]]:
-    """Each key of the settings that names a state, and the name."""
-    named = [('states.' + name, name) for name in top.settings.states]
-    return named + [('interfaces.{}.states'.format(offer.name), name)
-                    for offer, states in top.settings.interfaces for name in states]
-
-
-def check_preconditions(node: TreeNode) -> None:
-    """Check that preconditions name states that can be run for the state.
-
-    These are others of its container by label, and states of other containers by path.
-
-    :raises SettingsError: where one does not. It is logged instead where the node is not strict.
-    """
-    for label in node.labels():
-        for spec in _preconditions_of(node, label):
-            for named in spec.labels():
-                why_not = why_unfit(node, label, named)
-                if why_not:
-                    _refuse(node, SettingsError(
-                        'states.{}.preconditions'.format(label), named, allowed_for(node, label),
-                        problem='is not allowed: ' + why_not))
-
-
 def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:
     if node.branch is None:
         return node.settings_of(label).preconditions
@@ -83,7 +140,12 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
     return tuple(given or ())
 
 
-def _refuse(node: TreeNode, err: SettingsError) -> None:
-    if node.strict:
-        raise err
-    smach.logwarn(str(err))
+def _complain(node: TreeNode, unfit: UnfitName) -> None:
+    if callable(node.strict):
+        node.strict(unfit)
+    elif unfit.kind is UnfitKind.CHECKED:
+        return
+    elif node.strict:
+        raise unfit.error
+    else:
+        smach.logwarn(str(unfit.error))

@@ -12,13 +12,14 @@ from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..settings.patterns import Nested
 from ..settings.settings import Settings
+from ..settings.unfit_names import Strictness
 from .item_gates import place_gates, remove_gates
-from .settings_check import check_nested, check_preconditions, check_state_names
+from .settings_check import check_names, check_preconditions
 from .wrapped_classes import change_class, two_classes
 
 
 def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: Nested,
-                 name: str, strict: bool) -> WrappedMachine:
+                 name: str, strict: Strictness) -> WrappedMachine:
     """Wrap a machine and what is nested in it. See OracleContainer.wrap.
 
     A machine that is wrapped already keeps its tree, and takes over from `tree` what is new.
@@ -48,7 +49,7 @@ def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, sett
 
 
 def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
-                  strict: bool) -> None:
+                  strict: Strictness) -> None:
     top = machine._oracle
     top.strict = strict
     top.nested = nested
@@ -56,8 +57,6 @@ def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
     _configure(machine, settings)
     for node in nodes_of(machine):
         node.strict = strict
-    check_state_names(top)
-    check_nested(top)
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -70,6 +69,8 @@ def bring_up_to_date(node: TreeNode) -> None:
     node.machine._sync_oracle()
     place_gates(node)
     if len(node.machine._states) != node.checked_states:
+        if node.parent is None:
+            check_names(node)
         check_preconditions(node)
         node.checked_states = len(node.machine._states)
     load_rates(node)
@@ -83,7 +84,7 @@ def _configure(machine: WrappedMachine, settings: Settings) -> None:
 
 
 def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: Nested, name: str,
-                strict: bool) -> WrappedMachine:
+                strict: Strictness) -> WrappedMachine:
     top = machine._oracle
     before = top.settings
     try:

@@ -10,6 +10,7 @@ from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..settings.patterns import Nested, is_nested_at
 from ..settings.settings import Settings, StateSettings
+from ..settings.unfit_names import Strictness
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
@@ -112,7 +113,7 @@ class TreeNode:
         self.below: Labels = ()
         self.is_named = bool(name)
         self.name = name or DEFAULT_NAME
-        self.strict = True
+        self.strict: Strictness = True
         self.nested: Nested = True
         self.inherits = False  # wrapped for being nested: under the settings of the top machine
         self.in_force = ContainerSettings(settings)

@@ -2,17 +2,21 @@
 import functools
 import threading
 from contextlib import ExitStack
-from typing import Any, Callable, Iterator, List, Sequence, Tuple, Type, cast
+from typing import Any, Callable, Iterable, Iterator, List, Sequence, Tuple, Type, cast
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.prospects import ContainerProspect, good_outcome, prospects_of
 from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.unfit_names import Strictness
 
 from ..container import take_parameters
 from ..machine_names import machine_names
 from .check_report import lines_of, wrapped
+from .checked_names import CheckedNames
 from .interception import MARK, family, machines_inside
+from .machine_faults import MachineFaultError, faults_of
+from .precondition_labels import sorted_preconditions
 
 # new machines of one structure after which a script is taken for one that builds them forever
 MAX_ALIKE = 10
@@ -27,10 +31,12 @@ class MachineCheck:
     """
 
     def __init__(self, wrap: Callable[[smach.StateMachine], None],
-                 settings: Callable[[], Settings], tell: Callable[[List[str]], None]) -> None:
+                 settings: Callable[[], Settings], tell: Callable[[List[str]], None],
+                 names: CheckedNames) -> None:
         self._wrap = wrap
         self._settings = settings
         self._tell = tell
+        self._names = names
         self._lock = threading.RLock()
         self._seen: List[smach.Container] = []  # the objects themselves, so that no id comes again
         self._told: List[Tuple[str, ...]] = []  # of each machine, except its name
@@ -42,11 +48,13 @@ class MachineCheck:
 
         :raises StopIteration: where the script begins again.
         :raises SettingsError: where the settings do not fit.
+        :raises MachineFaultError: where SMACH would refuse the container.
         """
         with self._lock:
             if any(container is each for each in self._seen):
                 raise StopIteration('it executes a machine for the second time')
             self._seen.append(container)
+            _refuse_faults(container)
             with ExitStack() as running:  # machines of a Concurrence run at the same time
                 for machine in list(_top_machines(container)):
                     self._check(machine, running)
@@ -56,11 +64,17 @@ class MachineCheck:
                 else 'the outcome {}'.format(outcome)), 0) + [''])
             return outcome
 
+    def _warn(self, texts: Iterable[str]) -> None:
+        for text in texts:
+            self.warnings += 1
+            self._tell(wrapped('Warning: ' + text, 0, 4))
+
     def _check(self, machine: smach.StateMachine, running: ExitStack) -> None:
         with _heard_warnings() as warnings:
             if not isinstance(machine, OracleContainer):
                 self._wrap(machine)
-            name = _prepare(cast(OracleContainer, machine), running)
+            name = _prepare(cast(OracleContainer, machine), running, self._names.complain)
+        self._names.note(sorted_preconditions(machine, oracle_of(machine).settings).placed)
         prospects = prospects_of(machine)
         told = _without_name(prospects, name)
         self._told.append(told)
@@ -72,19 +86,37 @@ class MachineCheck:
         self.machines += 1
         for container in prospects:
             self._tell(lines_of(container) + [''])
-        self.warnings += len(warnings)
-        for warning in warnings:
-            self._tell(wrapped('Warning: ' + warning, 0, 4))
+        self._warn([*warnings, *map(str, faults_of(machine, name))])
 
 
-def _prepare(machine: OracleContainer, running: ExitStack) -> str:
+def _refuse_faults(container: smach.Container) -> None:
+    """Raise what makes SMACH refuse a container.
+
+    :raises MachineFaultError: with a line for each fault.
+    """
+    if any(fault.is_certain for fault in faults_of(container, '')):
+        raise MachineFaultError('\n'.join(
+            str(fault) for fault in faults_of(container, _name_of(container)) if fault.is_certain))
+
+
+def _name_of(container: smach.Container) -> str:
+    """Return the name by which a container is reported."""
+    if isinstance(container, OracleContainer):
+        return oracle_of(container).path
+    name = machine_names().name_of(container) if isinstance(
+        container, smach.StateMachine) else ''
+    return name or type(container).__name__
+
+
+def _prepare(machine: OracleContainer, running: ExitStack, strict: Strictness) -> str:
     """Do what a real run does before the first state, and return the machine's name.
 
     :param running: as long as it is open, no other machine takes the name.
+    :param strict: decides about names in the parameters that the machine does not have.
     :raises SettingsError: where the parameters of the node are wrong.
     """
     running.enter_context(machine_names().running(machine))
-    take_parameters(machine)
+    take_parameters(machine, strict)
     return oracle_of(machine).path
 
 

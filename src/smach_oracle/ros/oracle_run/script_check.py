@@ -15,7 +15,9 @@ from ..shutdown import ShutdownGuard
 from . import check_stubs
 from .check_report import wrapped
 from .check_signals import SignalWatch
+from .checked_names import CheckedNames
 from .machine_check import MachineCheck, intercept
+from .machine_faults import MachineFaultError, refused_while_built
 from .refusal import USAGE_ERROR, Refusal
 from .script_runner import (
     MachineWrapper,
@@ -49,13 +51,14 @@ def check_script(args: Sequence[str], notes: Sequence[str]) -> NoReturn:
         watch.note(note)
     watch.tell([''])
     refusal = Refusal(ShutdownGuard(_nothing, lambda timeout_s: None), tell)
-    wrapper = MachineWrapper(invocation, refusal)
-    check = MachineCheck(wrapper.wrap, lambda: read_settings(load(invocation)), watch.tell)
+    wrapper = MachineWrapper(invocation, refusal, lambda machine, is_first: watch.names.complain)
+    check = MachineCheck(wrapper.wrap, lambda: read_settings(load(invocation)), watch.tell,
+                         watch.names)
 
     def reached(container: smach.Container) -> Any:
         try:
             outcome = check(container)
-        except SettingsError as err:
+        except (SettingsError, MachineFaultError) as err:
             watch.refuse(err)
         except StopIteration as err:
             watch.end('The check ends here: {}.'.format(err))
@@ -92,6 +95,9 @@ def _run(script: str, args: Sequence[str], watch: '_ScriptWatch') -> str:
     except BaseException:
         watch.end_if_signalled()
         sys.excepthook(*sys.exc_info())
+        why_refused = refused_while_built(*sys.exc_info())
+        if why_refused is not None:
+            watch.refuse(why_refused)
         if watch.machines:
             return ('The script has ended in the error above: with the machines not executed, that '
                     'may be no mistake of its own.')
@@ -120,6 +126,7 @@ class _ScriptWatch:
         self._idle = False  # nothing but threads can reach a further machine
         self._latest = time.monotonic()
         self.machines = self.warnings = 0
+        self.names = CheckedNames()
 
     def tell(self, lines: Sequence[str]) -> None:
         with self._lock:
@@ -165,6 +172,12 @@ class _ScriptWatch:
         with self._lock:
             if why:
                 self.tell(wrapped(why, 0))
+            mistakes = self.names.mistakes()
+            if mistakes:
+                self._say_refused(mistakes)
+            for doubt in self.names.doubts():
+                self.warnings += 1
+                self.tell(wrapped('Warning: {}'.format(doubt), 0, 4))
             self.tell(wrapped(_summary(self.machines, self.warnings), 0))
             self._leave(0 if self.machines else NO_MACHINE)
 
@@ -177,10 +190,14 @@ class _ScriptWatch:
                 self._leave(SIGNALLED + number)
 
     def refuse(self, err: Exception) -> NoReturn:
-        """End the process with an error in the settings."""
+        """End the process with an error in the settings, or in a machine."""
         with self._lock:
-            tell(err)
-            self._leave(USAGE_ERROR)
+            self._say_refused([*self.names.mistakes(), err])
+
+    def _say_refused(self, mistakes: Sequence[Exception]) -> NoReturn:
+        for mistake in mistakes:
+            tell(mistake)
+        self._leave(USAGE_ERROR)
 
     def _leave(self, code: int) -> NoReturn:
         sys.stderr.flush()

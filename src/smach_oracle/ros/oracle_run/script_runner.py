@@ -28,12 +28,14 @@ from smach_oracle.oracle.decision.policy import POLICIES
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.paths import check_writable, path_of
 from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
 
 from .. import attachment
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python
 from ..machine_names import machine_names
+from ..reading.known_names import Complaint, NameJudge
 from ..shutdown import ShutdownGuard
-from .precondition_labels import is_label_elsewhere, misplaced_preconditions
+from .precondition_labels import sorted_preconditions
 from .python_names import check_python_name
 from .refusal import USAGE_ERROR, Refusal
 
@@ -251,12 +253,21 @@ def _located(loaded: LoadedSettings) -> Iterator[None]:
         raise loaded.located(err) from err
 
 
-class MachineWrapper:
-    """Wraps the script's machines."""
+Decide = Callable[[UnfitName], None]
 
-    def __init__(self, invocation: Invocation, refusal: Refusal) -> None:
+
+class MachineWrapper:
+    """Wraps the script's machines.
+
+    `judge`: decides about names in the settings that a machine does not have. It is given the
+    machine, and whether it is the first one.
+    """
+
+    def __init__(self, invocation: Invocation, refusal: Refusal,
+                 judge: Callable[[smach.StateMachine, bool], Decide] = NameJudge) -> None:
         self._invocation = invocation
         self._refusal = refusal
+        self._judge = judge
         self._is_first = True
 
     def __call__(self, machine: smach.StateMachine) -> None:
@@ -278,22 +289,14 @@ class MachineWrapper:
             settings = read_settings(loaded)
             if not settings.checkpoint and 'on_resume' in self._invocation.overrides:
                 raise SettingsError('checkpoint', '', 'a file, where a machine is to be resumed')
+            complain = Complaint(self._judge(machine, self._is_first), loaded.located)
             if self._invocation.recover:
-                self._check_preconditions(machine, settings)
-            self._is_first = False
+                for problem in sorted_preconditions(machine, settings).misplaced:
+                    complain(UnfitName(problem, str(problem.value), UnfitKind.MISPLACED))
             OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
-                                 name=machine_names().name_of(machine), strict=False,
+                                 name=machine_names().name_of(machine), strict=complain,
                                  recover=self._invocation.recover)
-
-    def _check_preconditions(self, machine: smach.StateMachine, settings: Settings) -> None:
-        """Refuse undefined names before anything has moved, warn of them at a later machine.
-
-        One file serves all machines of a script, and not each of them has every state.
-        """
-        for problem in misplaced_preconditions(machine, settings):
-            if self._is_first and not is_label_elsewhere(str(problem.value), machine):
-                raise problem
-            smach.logwarn('A machine of the script: {}'.format(problem))
+            self._is_first = False
 
 
 def give_names(invocation: Invocation) -> None:
@@ -342,8 +345,9 @@ def _show_only_frames_of(file_name: str) -> None:
 
 
 def tell(err: Exception) -> None:
-    """Say what is wrong, in one line."""
-    print('oracle_run: {}'.format(err), file=sys.stderr, flush=True)
+    """Say what is wrong, in a line for each thing."""
+    for line in str(err).splitlines():
+        print('oracle_run: {}'.format(line), file=sys.stderr, flush=True)
 
 
 def main(args: Optional[Sequence[str]] = None) -> None:

@@ -1,0 +1,28 @@
+"""Names in the settings that stand for nothing in a machine, and who decides about them. Pure."""
+from enum import Enum
+from typing import Callable, NamedTuple, Union
+
+from ..errors import SettingsError
+
+
+class UnfitKind(Enum):
+    """What follows where nothing has the name."""
+
+    NAME = 'a setting has no effect'
+    PROTECTION = 'a state runs where its author forbids or limits it'
+    PRECONDITION = 'a precondition is never met in one container'
+    MISPLACED = 'a precondition is never met in the whole machine'
+    # only a check of all settings reports it: it is reported when it is used, if it ever is
+    CHECKED = 'a setting has no effect now'
+
+
+class UnfitName(NamedTuple):
+    """A label, a path, a pattern or an outcome in the settings that a machine does not have."""
+
+    error: SettingsError
+    name: str
+    kind: UnfitKind = UnfitKind.NAME
+
+
+# True: such a name is an error. False: it is a warning. A function decides about each one
+Strictness = Union[bool, Callable[[UnfitName], None]]

@@ -1,0 +1,1 @@
+"""Settings files, and the names in them beside those of the machines and of the sources."""
