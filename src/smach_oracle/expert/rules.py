@@ -22,6 +22,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
+from smach_oracle.oracle.settings.written import as_text, plain
 
 DEFAULT = 'default'
 OLD_NAME = 'SM_ROOT'  # of machines that were given none, before they had that of their node
@@ -155,7 +156,7 @@ class RuleExpert(Expert):
 
 def _parse_rules(state: str, value: object) -> Tuple[Rule, ...]:
     if not isinstance(state, str) or not state:
-        raise SettingsError('rules', state, 'labels of states as keys, or "default"')
+        raise checks.no_name('rules', state, 'labels of states as keys, or "default"')
     if not isinstance(value, (list, tuple)):
         return (_parse_rule(state, value),)
     if not value:
@@ -171,11 +172,11 @@ def _parse_rule(key: str, value: object) -> Rule:
     if unknown:
         raise SettingsError('{}.{}'.format(key, unknown[0]), value,
                           'the keys {}'.format(', '.join(_FIELDS)))
-    kind = value.get('kind')
+    kind = as_text(value.get('kind'))
     if not isinstance(kind, str) or (kind != IGNORE and kind not in KINDS):
         raise SettingsError(key + '.kind', kind, ', '.join(sorted(KINDS)) + ' or ' + IGNORE)
     named_by = _NAMED_BY.get(kind)
-    if named_by is not None and not value.get(named_by):
+    if named_by is not None and not as_text(value.get(named_by)):
         raise SettingsError('{}.{}'.format(key, named_by), value.get(named_by),
                           'a name; {} needs one'.format(kind))
     return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'),
@@ -189,7 +190,7 @@ def _text(key: str, value: Mapping[str, Any], field: str) -> str:
 
 
 def _outputs(key: str, value: Mapping[str, Any]) -> Optional[Mapping[str, Any]]:
-    outputs = value.get('outputs') or None
+    outputs = plain(value.get('outputs')) or None
     if outputs is not None and not (isinstance(outputs, Mapping)
                                     and all(isinstance(name, str) for name in outputs)):
         raise SettingsError(key + '.outputs', outputs, 'a mapping from userdata keys to plain data')

@@ -1,10 +1,9 @@
 """An expert without a person: follows the open lists and answers by rules (`rules.py`)."""
 import threading
 import time
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import rospy
-import yaml
 
 from smach_oracle.msg import OpenQuery
 from smach_oracle.oracle.errors import OracleError, SettingsError
@@ -12,8 +11,10 @@ from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.expert.question_messages import to_decision
+from smach_oracle.ros.loaded_settings import LoadedSettings
 from smach_oracle.ros.master_watch import start_master_watch
 from smach_oracle.ros.parameters import name_of
+from smach_oracle.ros.reading.yaml_files import read_yaml
 from smach_oracle.ros.service_calls import ServerGoneError
 
 from .followed_server import ListedQuestion
@@ -130,13 +131,25 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     if not checks.text('~rules_file', path):
         raise SettingsError('~rules', rules,
                           'rules in the parameter ~rules, or a YAML file in ~rules_file')
+    given = LoadedSettings()
+    allowed = 'a YAML file of rules'
     try:
-        with open(path_of(path), encoding='utf-8') as file:
-            content = yaml.safe_load(file)
-    except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
-        raise SettingsError('~rules_file', path, 'a YAML file of rules; {}: {}'.format(
-            type(err).__name__, err)) from err
-    return Rules.parse(content)
+        given.put(*_read(path))
+    except SettingsError as err:
+        raise SettingsError('~rules_file', path, allowed,
+                            '~rules_file: {}; needed: {}'.format(err, allowed)) from err
+    if not given:
+        raise SettingsError('~rules_file', path, allowed + ', and not an empty one')
+    try:
+        return Rules.parse(given)
+    except SettingsError as err:
+        raise given.located(err) from err
+
+
+def _read(path: str) -> Tuple[Mapping[str, Any], str, Mapping[str, int]]:
+    """Return the rules in a file, its name, and the lines of the keys."""
+    values, lines = read_yaml(path_of(path), 'file of rules')
+    return values, path, lines
 
 
 def servers_of(value: object) -> List[str]:

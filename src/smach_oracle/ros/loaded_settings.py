@@ -5,22 +5,21 @@ by key, everything else is replaced. `smach_oracle.oracle` checks the values. He
 learns where the key came from.
 """
 import importlib
-from pathlib import Path
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
 import rospy
-import yaml
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.close_names import did_you_mean
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.oracle.settings.written import plain
 
 from .parameters import read_or_default
+from .reading.yaml_files import read_yaml
 
 DEFAULT_PARAM = '~oracle'
 CHECKPOINT_PARAM = '~checkpoint'  # goes before the key of DEFAULT_PARAM
 PYTHON_PREFIX = 'python:'
-NOT_YAML = '{}: not valid YAML: {}; allowed: a mapping in YAML'
 
 
 class LoadedSettings(Dict[str, Any]):
@@ -51,7 +50,7 @@ class LoadedSettings(Dict[str, Any]):
 
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
-        mine, theirs = dict(_leaves(self)), dict(_leaves(values))
+        mine, theirs = dict(_leaves(plain(self))), dict(_leaves(plain(values)))
         return ['{}: {!r}, now {!r}'.format(key, mine[key], value)
                 for key, value in theirs.items() if key in mine and mine[key] != value]
 
@@ -88,43 +87,6 @@ def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PAR
     if overrides:
         settings.put(overrides, 'command line')
     return settings
-
-
-def read_yaml(path: str) -> Tuple[Dict[str, Any], Dict[str, int]]:
-    """Read a YAML file that holds a mapping.
-
-    :returns: the values, and dotted key -> line number.
-    :raises SettingsError: where it cannot be read, is no YAML, names a key twice or holds something
-        else.
-    """
-    try:
-        text = Path(path).read_text(encoding='utf-8')
-    except FileNotFoundError as err:
-        raise SettingsError('settings file', str(path), 'a readable YAML file',
-                            'settings file: no such file: {}'.format(path)) from err
-    except (OSError, UnicodeDecodeError) as err:
-        raise SettingsError('settings file', str(path),
-                          'a readable YAML file ({})'.format(err)) from err
-    try:
-        lines = _line_numbers(str(path), yaml.compose(text, Loader=yaml.SafeLoader))
-        values = yaml.safe_load(text)
-        list(_dotted_keys(values if isinstance(values, dict) else {}))
-    except SettingsError:
-        raise
-    except yaml.YAMLError as err:
-        why = getattr(err, 'problem', None) or str(err)
-        place = _marked(str(path), err)
-        raise SettingsError(place, why, 'YAML', NOT_YAML.format(place, why)) from err
-    except RecursionError as err:
-        raise SettingsError(str(path), 'something that contains itself',
-                          'a tree of settings') from err
-    except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
-        raise SettingsError(str(path), str(err), 'YAML', NOT_YAML.format(path, err)) from err
-    if values is None:
-        return {}, lines
-    if not isinstance(values, dict):
-        raise SettingsError(str(path), values, 'a mapping of settings')
-    return values, lines
 
 
 def read_param(param: str) -> Dict[str, Any]:
@@ -232,50 +194,3 @@ def _state_entries(states: Mapping[str, Any], prefix: str = '') -> Iterator[Tupl
         if own or not deeper:
             yield prefix + label, own
         yield from _state_entries(deeper, '{}{}/'.format(prefix, label))
-
-
-def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
-    """Dotted key -> line, from 1, of every key in the file, and of each item of a list.
-
-    :raises SettingsError: where a key is given twice in one mapping, which YAML readers otherwise
-        pass over.
-    """
-    lines: Dict[str, int] = {}
-    open_nodes = [('', root)]
-    seen = set()  # an alias may lead back to where it stands
-    while open_nodes:
-        prefix, node = open_nodes.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        if isinstance(node, yaml.SequenceNode):
-            for index, item in enumerate(node.value):
-                place = '{}[{}]'.format(prefix[:-1], index)
-                lines[place] = item.start_mark.line + 1
-                open_nodes.append((place + '.', item))
-        elif isinstance(node, yaml.MappingNode):
-            open_nodes += _entries(path, prefix, node, lines)
-    return lines
-
-
-def _entries(path: str, prefix: str, node: yaml.MappingNode,
-             lines: Dict[str, int]) -> List[Tuple[str, yaml.Node]]:
-    entries = []
-    first_lines: Dict[str, int] = {}
-    for key, value in node.value:
-        dotted = prefix + str(key.value)
-        line = key.start_mark.line + 1
-        if dotted in first_lines and key.tag != 'tag:yaml.org,2002:merge':
-            place, first = '{} line {}: {}'.format(path, line, dotted), first_lines[dotted]
-            raise SettingsError(place, value.value, 'each key once',
-                                '{}: given a second time (first in line {}); allowed: each key '
-                                'once'.format(place, first))
-        first_lines[dotted] = line
-        entries.append((dotted + '.', value))
-    lines.update(first_lines)
-    return entries
-
-
-def _marked(path: str, err: yaml.YAMLError) -> str:
-    mark = getattr(err, 'problem_mark', None)
-    return '{} line {}'.format(path, mark.line + 1) if mark else path

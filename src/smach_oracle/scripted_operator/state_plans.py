@@ -8,6 +8,7 @@ import math
 from typing import Dict, Mapping, NamedTuple, Sequence, Tuple
 
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.checks import choice, flag, whole
 
 DEFAULT = 'default'
@@ -81,7 +82,7 @@ def _plan(state: str, value: object) -> StatePlan:
     choice(sorted(MEANS))(state + '.means', value.get('means'))
     for field in _TEXTS:
         if not isinstance(value.get(field, ''), str):
-            raise SettingsError('{}.{}'.format(state, field), value[field], 'a name')
+            raise checks.no_name('{}.{}'.format(state, field), value[field], 'a name')
     choice(('left', 'right'))(state + '.arm', value.get('arm', 'right'))
     if value['means'] == PUT_DOWN and bool(value.get('place')) == bool(value.get('onto')):
         raise SettingsError(state, dict(value), 'either place or onto')

@@ -62,7 +62,8 @@ def test_robots_do_not_use_up_each_other_s_rules():
     ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
     ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
     ({'PICK': dict(GOTO, confirm='yes')}, "PICK.confirm: 'yes' is not allowed; allowed: true or"),
-    ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed; allowed: a string'),
+    ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed. YAML reads 3 as a number: '
+     'write "3"; allowed: a string'),
     ({3: GOTO}, 'allowed: labels of states as keys')
 ])
 def test_wrong_rules_are_refused_with_what_is_allowed(settings, text):

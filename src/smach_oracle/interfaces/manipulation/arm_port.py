@@ -12,6 +12,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from control_msgs.msg import GripperCommandAction, GripperCommandGoal
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.checks import number
 from smach_oracle.ros.goal_link import GoalLink, SentGoal
 
@@ -41,7 +42,7 @@ class ArmNames(NamedTuple):
                 'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)))
         for field in _FIELDS:
             if not isinstance(value[field], str) or not value[field]:
-                raise SettingsError('{}.{}'.format(key, field), value[field], 'a name')
+                raise checks.no_name('{}.{}'.format(key, field), value[field], 'a name')
         posture = value.get('posture', [])
         if not isinstance(posture, list):
             raise SettingsError(key + '.posture', posture, 'a list of angles, rad')

@@ -209,7 +209,7 @@ def _number(key: str, value: object, least: float, most: float) -> float:
 
 def _text(key: str, value: object, allowed: str, least: int = 1) -> str:
     if not isinstance(value, str) or len(value) < least:
-        raise SettingsError(key, value, allowed)
+        raise checks.no_name(key, value, allowed)
     return value
 
 

@@ -2,6 +2,7 @@
 from typing import Dict, Mapping, NamedTuple
 
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings import checks
 
 # the parts of a marking that a template may name
 OUTPUT_PARTS = {
@@ -30,8 +31,8 @@ def templates_from(settings: object) -> Dict[str, StateTemplate]:
     if not isinstance(settings, Mapping) or not settings:
         raise SettingsError('states', settings, 'a dictionary with one state or more')
     return {
-        str(state): _template('states.{}'.format(state), value)
-        for state, value in settings.items()
+        state: _template('states.{}'.format(state), value)
+        for state, value in checks.mapping('states', settings).items()
     }
 
 
@@ -45,7 +46,7 @@ def _template(where: str, value: object) -> StateTemplate:
                           'only outcome and outputs')
     outcome, outputs = value.get('outcome', 'succeeded'), value.get('outputs')
     if not isinstance(outcome, str) or not outcome:
-        raise SettingsError(where + '.outcome', outcome, 'the name of an outcome')
+        raise checks.no_name(where + '.outcome', outcome, 'the name of an outcome')
     if not isinstance(outputs, Mapping) or not outputs:
         raise SettingsError(where + '.outputs', outputs,
                           'a dictionary from output keys to ' + ', '.join(OUTPUT_PARTS))

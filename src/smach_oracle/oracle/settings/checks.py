@@ -8,6 +8,7 @@ from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 from ..errors import SettingsError
 from ..number_checks import is_number, is_whole
 from .paths import path_of
+from .written import as_text, as_value, read_otherwise
 
 Check = Callable[[str, object], Any]
 
@@ -41,17 +42,24 @@ def flag(key: str, value: object) -> bool:
 
     :raises SettingsError: for anything else.
     """
-    if not isinstance(value, bool):
+    found = as_value(value)
+    if not isinstance(found, bool):
         raise SettingsError(key, value, 'true or false')
-    return value
+    return found
+
+
+def no_name(key: str, value: object, allowed: str) -> SettingsError:
+    """Return the error for a value that is no name, and say how YAML may have made it of one."""
+    return SettingsError(key, value, allowed, problem='is not allowed' + read_otherwise(value))
 
 
 def choice(options: Sequence[str]) -> Check:
     """Check for one of some words. Its SettingsError names them all."""
     def check(key: str, value: object) -> str:
-        if not isinstance(value, str) or value not in options:
-            raise SettingsError(key, value, ', '.join(options))
-        return value
+        word = as_text(value)
+        if not isinstance(word, str) or word not in options:
+            raise no_name(key, value, ', '.join(options))
+        return word
     return check
 
 
@@ -60,9 +68,10 @@ def text(key: str, value: object) -> str:
 
     :raises SettingsError: for anything else.
     """
-    if not isinstance(value, str):
-        raise SettingsError(key, value, 'a string')
-    return value
+    found = as_text(value)
+    if not isinstance(found, str):
+        raise no_name(key, value, 'a string')
+    return found
 
 
 def file(key: str, value: object) -> str:
@@ -75,9 +84,10 @@ def label(key: str, value: object) -> str:
 
     :raises SettingsError: for anything else.
     """
-    if not isinstance(value, str) or not value:
-        raise SettingsError(key, value, 'a string that is not empty')
-    return value
+    found = as_text(value)
+    if not isinstance(found, str) or not found:
+        raise no_name(key, value, 'a string that is not empty')
+    return found
 
 
 def words(key: str, value: object) -> Tuple[str, ...]:
@@ -87,16 +97,19 @@ def words(key: str, value: object) -> Tuple[str, ...]:
     """
     if isinstance(value, str) or not isinstance(value, (list, tuple, set, frozenset)):
         raise SettingsError(key, value, 'a list of strings')
+    found = []
     for entry in value:
-        if not isinstance(entry, str) or not entry:
-            raise SettingsError(key, entry, 'a list of strings, none of them empty')
-    return tuple(sorted(value)) if isinstance(value, (set, frozenset)) else tuple(value)
+        word = as_text(entry)
+        if not isinstance(word, str) or not word:
+            raise no_name(key, entry, 'a list of strings, none of them empty')
+        found.append(word)
+    return tuple(sorted(found)) if isinstance(value, (set, frozenset)) else tuple(found)
 
 
 def optional(check: Check) -> Check:
     """Check that admits None (nothing set) beside what `check` admits."""
     def checked(key: str, value: object) -> object:
-        return None if value is None else check(key, value)
+        return None if as_value(value) is None else check(key, value)
     return checked
 
 
@@ -107,13 +120,13 @@ def mapping(key: str, value: object) -> Mapping[str, Any]:
 
     :raises SettingsError: naming the value, or the key that is no string.
     """
-    if value is None:
+    if as_value(value) is None:
         return {}
     if not isinstance(value, Mapping):
         raise SettingsError(key, value, 'a mapping')
     for name in value:
         if not isinstance(name, str):
-            raise SettingsError(key, name, 'names that are strings')
+            raise no_name(key, name, 'names that are strings')
     return value
 
 
@@ -125,8 +138,11 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     :returns: the word, and what it names or ''.
     :raises SettingsError: for anything else.
     """
+    verb: object
+    target: object
     if isinstance(value, Mapping) and len(value) == 1:
         (verb, target), = value.items()
+        target = as_text(target)
     elif isinstance(value, str):
         verb, _, target = value.partition(':')
     elif isinstance(value, tuple) and len(value) == 2:
@@ -136,7 +152,10 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     named = isinstance(target, str) and bool(target)
     if (verb == 'stop' and not target) or (verb in ('goto', 'give_up') and named):
         return str(verb), str(target or '')
-    raise SettingsError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}")
+    allowed = "'stop', {'goto': LABEL} or {'give_up': OUTCOME}"
+    if verb in ('goto', 'give_up') and target is not None and not named:
+        raise no_name('{}.{}'.format(key, verb), target, allowed)
+    raise SettingsError(key, value, allowed)
 
 
 def deadline(key: str, value: object) -> float:

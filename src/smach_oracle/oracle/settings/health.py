@@ -11,6 +11,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tup
 from ..errors import SettingsError
 from . import checks as values
 from .python_names import PYTHON, Resolver, named_object
+from .written import as_text, as_value
 
 # no arguments. True or '' is well, else what is wrong
 HealthFunction = Callable[[], Union[bool, str]]
@@ -59,7 +60,7 @@ def checked_health(given: object,
 
     :raises SettingsError: naming key, value and what is allowed.
     """
-    if given is None:
+    if as_value(given) is None:
         return ()
     if isinstance(given, Mapping):
         return (_condition('healthy', given, resolver),)
@@ -97,7 +98,7 @@ def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
     topic = values.label(prefix + 'topic', entry['topic'])
     if not _GRAPH_NAME.fullmatch(topic):
         raise SettingsError(prefix + 'topic', topic, 'the name of a topic, such as /motors_on')
-    field = entry.get('field', 'data')
+    field = as_text(entry.get('field', 'data'))
     if not isinstance(field, str) or not _FIELD.fullmatch(field):
         raise SettingsError(prefix + 'field', field, 'a field of the message, such as data or '
                             'status.level')
@@ -121,6 +122,7 @@ def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
 
 
 def _plain(key: str, value: object) -> object:
+    value = as_value(value)
     if isinstance(value, (bool, str)):
         return value
     return _plain_number(key, value)

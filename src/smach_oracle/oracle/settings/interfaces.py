@@ -7,6 +7,7 @@ from typing import Any, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from . import checks as values
+from .written import as_value
 
 _KEYS = ('action', 'args', 'description', 'launch', 'node', 'start_limit_s', 'states')
 _NAME = r'[A-Za-z0-9_.+-]+'
@@ -75,7 +76,7 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
     pattern, allowed = {
         'launch': (_LAUNCH, 'PACKAGE/FILE.launch'), 'node': (_NODE, 'PACKAGE TYPE')
     }[kind]
-    found = pattern.fullmatch(entry[kind]) if isinstance(entry[kind], str) else None
+    found = pattern.fullmatch(values.text(prefix + kind, entry[kind]))
     if found is None or '..' in entry[kind]:
         raise SettingsError(prefix + kind, entry[kind], allowed)
     args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
@@ -87,12 +88,13 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
 def _launch_args(key: str, given: object) -> List[str]:
     args = []
     for name, value in values.mapping(key, given).items():
-        if not _ARGUMENT.fullmatch(name) or not isinstance(value, (str, int, float)):
+        read = as_value(value)
+        if not _ARGUMENT.fullmatch(name) or not isinstance(read, (str, int, float)):
             raise SettingsError('{}.{}'.format(key, name), value,
                               'the name of a launch argument, and text, a number or true or false')
-        args.append('{}:={}'.format(name, str(value).lower() if isinstance(value, bool) else value))
+        args.append('{}:={}'.format(name, str(read).lower() if isinstance(read, bool) else read))
     return args
 
 
 def _node_args(key: str, given: object) -> Tuple[str, ...]:
-    return values.words(key, given if given is not None else ())
+    return values.words(key, given if as_value(given) is not None else ())

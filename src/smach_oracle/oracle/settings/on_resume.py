@@ -2,6 +2,8 @@
 from typing import Dict, Iterator, Mapping, Tuple
 
 from ..errors import SettingsError
+from .checks import no_name
+from .written import as_text
 
 ASK, RECOVER, RESTART, STATE = 'ask', 'recover', 'restart', 'state'
 _MAP = 'a mapping of labels, or of paths of states, to those of now, such as KITCHEN/LOOK: SEARCH'
@@ -37,13 +39,14 @@ def _paths(key: str, value: object, before: str) -> Iterator[Tuple[str, str]]:
         raise SettingsError(key, value, _MAP)
     for old, new in value.items():
         if not isinstance(old, str) or not _is_path(old):
-            raise SettingsError(key, old, _MAP)
+            raise no_name(key, old, _MAP)
+        new = as_text(new)
         if isinstance(new, Mapping):
             yield from _paths(key, new, before + old + '/')
         elif isinstance(new, str) and _is_path(new):
             yield before + old, new
         else:
-            raise SettingsError('{}.{}{}'.format(key, before, old), new, _MAP)
+            raise no_name('{}.{}{}'.format(key, before, old), new, _MAP)
 
 
 def _is_path(text: str) -> bool:

@@ -8,6 +8,8 @@ import re
 from typing import List, Tuple, Union
 
 from ..errors import SettingsError
+from .checks import words
+from .written import as_value
 
 ANY_LABELS = '**'
 Nested = Union[bool, Tuple[str, ...]]
@@ -34,12 +36,12 @@ def checked_nested(key: str, value: object) -> Nested:
 
     :raises SettingsError: for what is neither true or false nor a list of names.
     """
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, str) or not isinstance(value, (list, tuple)) or not all(
-            isinstance(name, str) and name for name in value):
+    given = as_value(value)
+    if isinstance(given, bool):
+        return given
+    if not isinstance(value, (list, tuple)):
         raise SettingsError(key, value, 'true, false, or a list of paths and patterns')
-    return tuple(check_name(key, name) for name in value)
+    return tuple(check_name(key, name) for name in words(key, value))
 
 
 def is_nested_at(nested: Nested, path: str) -> bool:

@@ -10,8 +10,9 @@ from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
-from .checks import is_state
+from .checks import is_state, no_name
 from .python_names import PYTHON, Resolver, named_object
+from .written import as_text
 
 
 class PreconditionKind(Enum):
@@ -77,6 +78,7 @@ def parse_precondition(key: str, given: object,
     """
     if isinstance(given, PreconditionSpec):
         return given
+    given = as_text(given)
     if isinstance(given, str):
         return _parse_text(key, given, resolver)
     if is_state(given) and not isinstance(given, type):
@@ -89,7 +91,7 @@ def parse_precondition(key: str, given: object,
         return PreconditionSpec(PreconditionKind.CALLABLE,
                                 getattr(given, '__name__',
                                         type(given).__name__), given)
-    raise SettingsError(key, given, _ALLOWED)
+    raise no_name(key, given, _ALLOWED)
 
 
 def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> PreconditionSpec:

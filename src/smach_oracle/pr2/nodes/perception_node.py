@@ -4,7 +4,6 @@ from typing import Dict, Iterator, List, Optional
 
 import numpy as np
 import rospy
-import yaml
 from geometry_msgs.msg import Point, PointStamped
 from rosgraph.names import is_legal_name
 from std_msgs.msg import ColorRGBA, Header
@@ -23,8 +22,10 @@ from smach_oracle.msg import (
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.number_checks import is_number
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.oracle.settings.written import plain
 from smach_oracle.ros.command_line import parameters_only
 from smach_oracle.ros.parameters import name_of
+from smach_oracle.ros.reading.yaml_files import read_yaml
 
 from ..kitchen import Kitchen, base_from_fridge, kitchen_from, shelf_point
 from ..perception.clusters import HERE, Capsule, NotSeen
@@ -232,8 +233,7 @@ def kitchen_at(parameter: str) -> Kitchen:
 
 
 def _read(path: str) -> object:
-    with open(path, encoding='utf-8') as file:
-        return yaml.safe_load(file)
+    return plain(read_yaml(path, 'the map of the kitchen')[0])
 
 
 def robot_links(limit_s: float = MODEL_WAIT_S) -> Dict[str, Joint]:
