@@ -63,8 +63,8 @@ REFUSED = {
     'TOP/A: its outcome \'odd\' leads to no state, and is no outcome of TOP':
         lambda: machine(A=(state('ok', 'odd'), {'ok': 'done'})),
     'TOP: it has no states': machine,
-    'TOP: its initial state is NOWHERE, which is none of its states; they are A':
-        lambda: begun_at('NOWHERE'),
+    'TOP: its initial state is LOST, which is none of its states; they are A':
+        lambda: begun_at('LOST'),
     'TOP/A: its outcome \'bad\' leads to no state': lambda: sequence('A', 'B'),
     'TOP: its outcome map waits for the state \'LEFF\', which is none of its states (did you mean '
     'LEFT?)': lambda: concurrence({'done': {'LEFF': 'ok'}}, LEFT=state('ok')),
