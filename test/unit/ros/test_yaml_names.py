@@ -115,7 +115,7 @@ def test_a_key_in_quotation_marks_is_the_same_key(read, text):
 @pytest.mark.parametrize('given, text', [
     ({'failing_outcomes': [True]}, 'YAML reads ON as true: write "ON"'),
     ({'oracle_label': False}, 'YAML reads OFF as false: write "OFF"'),
-    ({'on_no_answer': {'goto': True}}, 'on_no_answer.goto: True is not allowed. YAML reads ON'),
+    ({'on_no_answer': {'goto': True}}, "{'goto': True} is not allowed. YAML reads ON as true"),
     ({'nested': ['A', 2]}, 'nested: 2 is not allowed. YAML reads 2 as a number: write "2"'),
     ({'states': {True: {}}}, 'YAML reads ON as true'),
     ({'states': {'A': {'preconditions': [True]}}}, r'preconditions[0]: True is not allowed. YAML'),

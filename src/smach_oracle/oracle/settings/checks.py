@@ -152,10 +152,9 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     named = isinstance(target, str) and bool(target)
     if (verb == 'stop' and not target) or (verb in ('goto', 'give_up') and named):
         return str(verb), str(target or '')
-    allowed = "'stop', {'goto': LABEL} or {'give_up': OUTCOME}"
-    if verb in ('goto', 'give_up') and target is not None and not named:
-        raise no_name('{}.{}'.format(key, verb), target, allowed)
-    raise SettingsError(key, value, allowed)
+    how_read = read_otherwise(target) if verb in ('goto', 'give_up') else ''
+    raise SettingsError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}",
+                        problem='is not allowed' + how_read)
 
 
 def deadline(key: str, value: object) -> float:
