@@ -10,6 +10,7 @@ from typing import (
     Mapping,
     NamedTuple,
     Optional,
+    Sequence,
     Tuple,
     cast,
 )
@@ -23,6 +24,7 @@ from ..records.facts import BRANCHES
 from ..settings.failing_outcomes import is_preempted
 from .branch import loops
 from .branch_machine import BranchMachine
+from .item_userdata import ItemUserdata
 from .items import TrackedItems
 from .stand_in import StandIn, real
 
@@ -207,7 +209,7 @@ class IteratorBorder(Border):
         self._trial_id = ''  # that of `_items`
         self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
-        self._begun: Dict[str, Any] = {}  # what its io keys were when it began
+        self._userdata = ItemUserdata(container)
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_left = False
         self._is_asked_to_go_on = False
@@ -264,7 +266,7 @@ class IteratorBorder(Border):
         state = iterator._state
         if state is not None:
             iterator._state = StandIn(state, self.machines.get(iterator._state_label),
-                                      self._note_outcome)
+                                      self._note_outcome, self._begin_item)
 
     def mark(self) -> Tuple[int, int]:
         """Return what is different for each item: its number, and that of the round."""
@@ -291,11 +293,10 @@ class IteratorBorder(Border):
                 inner.ask_to_go_on(not self._items.is_finished)
 
     def _tell(self, text: str) -> None:
-        label = self.container._state_label
         if self.top is None:
-            smach.logwarn('{}: {}'.format(label, text))
+            smach.logwarn('{}: {}'.format(self.container._state_label, text))
         else:
-            smach.logwarn('{}/{}: {}'.format(self.top.path, '/'.join(self.below), text))
+            self.top.warn(text, '/'.join(self.below))
 
     def _note_outcome(self, outcome: object) -> None:
         if self._items is not None and isinstance(outcome, str):
@@ -303,6 +304,12 @@ class IteratorBorder(Border):
             self._items.is_finished = (loops(self.container, outcome)
                                        and not is_preempted(outcome)
                                        and not self.container._preempt_requested)
+
+    def _begin_item(self) -> None:
+        machine = self.machines.get(self.container._state_label)
+        record = (None if machine is None
+                  else machine._oracle.records.by_label.get(self.container._state_label))
+        self._userdata.begin_item(record, self._deep_copy_keys(), self._tell)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
@@ -324,28 +331,27 @@ class IteratorBorder(Border):
                     _items=items.given if isinstance(items, TrackedItems) else items)
 
     def __getstate__(self) -> Dict[str, Any]:
-        return dict(super().__getstate__(), _items=None, _begun={}, _ended_with=None,
+        return dict(super().__getstate__(), _items=None, _ended_with=None,
                     _is_asked_to_go_on=False)
 
     # -- userdata
 
     def keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
-        """Return what finished items have left under keys that are inputs and outputs.
+        """Return the values of its keys that its inputs do not replace, as it begins or goes on.
 
-        Where it goes on, and the container above has the value again with which it began, what
-        finished items made of it stays. `userdata`: what its inputs are copied from.
+        `userdata`: what the inputs are copied from.
         """
-        iterator = self.container
-        both = set(iterator.get_registered_input_keys()).intersection(
-            iterator.get_registered_output_keys())
-        given = {key: userdata[key] for key in both if key in userdata} if (
-            userdata is not None) else {}
-        own = iterator.userdata._data
-        if self.goes_on:
-            return {key: own[key] for key, value in given.items()
-                    if key in own and key in self._begun and _same(self._begun[key], value)}
-        self._begun = given
-        return {}
+        deep = self._deep_copy_keys()
+        if not self.goes_on:
+            self._userdata.begin(userdata, deep, self._tell)
+            return {}
+        if (self._items is not None and not self._items.is_finished
+                and self.top is not None and self.top.settings.userdata == 'restore'):
+            self._userdata.take_back(deep)
+        return self._userdata.to_keep(userdata)
+
+    def _deep_copy_keys(self) -> Sequence[str]:
+        return self.top.in_force.deep_copy_keys if self.top is not None else ()
 
 
 def border_of(state: object) -> Optional[Border]:
@@ -367,15 +373,6 @@ def _forget_given_up(container: smach.Container) -> None:
         node = getattr(machine, '_oracle', None)
         if node is not None:
             node.gave_up = False
-
-
-def _same(one: object, other: object) -> bool:
-    if one is other:
-        return True
-    try:
-        return type(one) is type(other) and bool(one == other)
-    except Exception:  # whatever a user's object raises, or an array that is no truth
-        return False
 
 
 def _forget(outcome: object) -> None:

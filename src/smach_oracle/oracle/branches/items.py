@@ -86,8 +86,8 @@ class TrackedItems:
         if self._error is not None:
             self._begin_behind_finished()
         self._is_pending = not self.is_finished
-        self._tell('goes on {} {}'.format('behind' if self.is_finished else 'with',
-                                          self.in_words()))
+        self._tell(('goes on behind {}' if self.is_finished
+                    else 'goes on with {}, which is repeated').format(self.in_words()))
 
     def _look_for_changes(self) -> None:
         if callable(self.given) or not isinstance(self.given, Sized):

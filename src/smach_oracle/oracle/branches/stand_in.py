@@ -16,17 +16,20 @@ class StandIn:
     """
 
     def __init__(self, state: smach.State, machine: Optional[WrappedMachine],
-                 note_outcome: Callable[[object], None]) -> None:
+                 note_outcome: Callable[[object], None],
+                 note_begin: Optional[Callable[[], None]] = None) -> None:
         """`machine`: the branch's, None for a state that has no oracle of its own here."""
         self._state = state
         self._machine = machine
         self._note_outcome = note_outcome
+        self._note_begin = note_begin
         self._lock = threading.Lock()
         self._is_under_way = False
 
     def execute(self, userdata: smach.UserData) -> object:
         """Execute the state, and recover where it fails. Return its outcome."""
-        self._note_outcome(None)
+        if self._note_begin is not None:
+            self._note_begin()
         outcome = self._execute(userdata)
         self._note_outcome(outcome)
         return outcome

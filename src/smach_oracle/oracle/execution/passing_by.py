@@ -64,7 +64,7 @@ def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
 
 
 def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
-    """Return the node of a machine that is a state itself, and begins anew."""
+    """Return the node of a machine that is a state itself, and begins from its start."""
     state = node.machine._states[label]
     if not isinstance(state, node.tree.container_class):
         return None

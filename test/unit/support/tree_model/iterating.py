@@ -18,6 +18,7 @@ class IteratorPart(Part):
         self._branches = [plan.child.label] if isinstance(plan.child, Leaf) else []
         self._runs = False
         self._begun: Dict[str, Any] = {}  # what it was given when it began
+        self._at_item: Dict[str, Any] = {}  # its userdata when the latest item began
         self._is_asked = False  # to go on
         self.ended_with: Optional[str] = None  # None: by an error, or it was left
         self.forget()
@@ -83,6 +84,9 @@ class IteratorPart(Part):
         view.copy_to(self.keys, given)
         if not goes_on:
             self._begun = dict(given)
+        elif not self._is_finished and self.run.plan.userdata == 'restore':
+            self.userdata.clear()
+            self.userdata.update(self._at_item)
         for key, value in given.items():
             if not (goes_on and key in self.userdata and self._begun.get(key) == value):
                 self.userdata[key] = value
@@ -102,6 +106,7 @@ class IteratorPart(Part):
             self._item, self._is_finished = number, False
             if self.flag and not self.run.is_upstream:
                 child.request_preempt()
+            self._at_item = dict(self.userdata)
             outcome = yield from child.execute(View(self.userdata, {}))
             self.settled = child.settled
             loops = outcome in self.plan.loop_outcomes

@@ -1,0 +1,151 @@
+"""An item that is done again finds the userdata as they were when it began, and is an event."""
+import pytest
+from machines import FakeExpert, Scripted, Watched, goto
+
+import smach
+from smach_oracle.oracle.records.events import EventKind
+
+OUTCOMES = ['done', 'stuck', 'aborted', 'preempted']
+
+
+class Adds(smach.State):
+    """Adds 1 to `total`, and the item to `names`, and then ends as told for that visit."""
+
+    def __init__(self, *script, in_place=False):
+        smach.State.__init__(self, ['ok', 'stuck', 'preempted'], io_keys=['total', 'names'],
+                             input_keys=['item'])
+        self.script = list(script)
+        self.in_place = in_place
+
+    def execute(self, ud):
+        ud.total = ud.total + 1
+        if self.in_place:
+            ud.names.append(ud.item)
+        else:
+            ud.names = [*ud.names, ud.item]
+        step = self.script.pop(0) if self.script else 'ok'
+        return step(self) if callable(step) else step
+
+
+def over(state, items=(1, 2, 3), label='item', loop=('ok', 'done')):
+    """An Iterator with the keys total and names, whose break outcome `stuck` is a failure."""
+    iterator = smach.Iterator(OUTCOMES, ['total', 'names'], ['total', 'names'], it=items,
+                              it_label=label, exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=list(loop),
+                                           final_outcome_map={'stuck': 'aborted'})
+    return iterator
+
+
+def machine_of(iterator, first=False):
+    machine = smach.StateMachine(OUTCOMES)
+    machine.userdata.total, machine.userdata.names = 0, []
+    with machine:
+        if first:
+            smach.StateMachine.add('FIRST', Scripted(), {'ok': 'ALL'})
+        smach.StateMachine.add('ALL', iterator, {'done': 'done'})
+    return machine
+
+
+def total_of(machine, *answers, **settings):
+    settings.setdefault('memory', 1000)  # it stays LOW, and is entered again
+    watched = Watched(machine, name='TOP', expert=FakeExpert(*answers), settings=settings)
+    assert watched.run() == 'done'
+    return watched, (machine.userdata.total, machine.userdata.names)
+
+
+def told(watched):
+    return [(event.path, event.state, event.text) for event in watched.of(EventKind.WARNING)
+            if 'repeated' in event.text]
+
+
+WITH_2 = [('TOP', 'ALL', 'goes on with item 2 of 3, which is repeated')]
+
+
+def test_an_item_that_failed_after_it_wrote_counts_once():
+    watched, left = total_of(machine_of(over(Adds('ok', 'stuck'))))
+    assert left == (3, [1, 2, 3])
+    assert told(watched) == WITH_2
+
+
+def test_what_was_changed_inside_is_taken_back_under_deep_copied_keys():
+    _, left = total_of(machine_of(over(Adds('ok', 'stuck', in_place=True))),
+                       deep_copy_keys=['names'])
+    assert left == (3, [1, 2, 3])
+
+
+def test_an_item_may_be_repeated_more_than_once():
+    watched, left = total_of(machine_of(over(Adds('ok', 'stuck', 'stuck', 'ok', 'stuck'))),
+                             max_recoveries=9)
+    assert left == (3, [1, 2, 3])
+    assert told(watched) == 2 * WITH_2 + [
+        ('TOP', 'ALL', 'goes on with item 3 of 3, which is repeated')]
+
+
+def test_keys_that_are_not_given_from_above_are_taken_back_too():
+    iterator = over(Adds('ok', 'stuck'))
+    iterator._input_keys = {'names'}
+    iterator.userdata.total = 0
+    _, left = total_of(machine_of(iterator))
+    assert left == (3, [1, 2, 3])
+
+
+def test_a_machine_in_the_iterator_counts_once_for_an_item():
+    inner = smach.StateMachine(['done', 'stuck', 'preempted'], ['total', 'names', 'item'],
+                               ['total', 'names'])
+    with inner:
+        smach.StateMachine.add('ADD', Adds(), {'ok': 'THEN'})
+        smach.StateMachine.add('THEN', Scripted('ok', 'stuck', outcomes=('ok', 'stuck')),
+                               {'ok': 'done'})
+    watched, left = total_of(machine_of(over(inner, loop=('done',))))
+    assert left == (3, [1, 2, 3])
+    assert told(watched) == WITH_2
+
+
+@pytest.mark.parametrize('fails_at', range(4))
+def test_an_iterator_in_an_iterator_counts_each_of_its_items_once(fails_at):
+    inner = smach.Iterator(['done', 'stuck', 'preempted'], ['total', 'names'], ['total', 'names'],
+                           it=['a', 'b'], it_label='item', exhausted_outcome='done')
+    with inner:
+        smach.Iterator.set_contained_state('IN', Adds(*fails_at * ['ok'], 'stuck'),
+                                           loop_outcomes=['ok'])
+    _, left = total_of(machine_of(over(inner, (1, 2), 'outer', loop=('done',))))
+    assert left == (4, ['a', 'b', 'a', 'b'])
+
+
+@pytest.mark.parametrize('to, repeated', [('ALL', WITH_2), ('FIRST', [
+    ('TOP', 'ALL', 'begins with its first item again: item 1 that had ended is repeated')])])
+def test_one_that_is_left_by_a_jump_counts_each_item_once(to, repeated):
+    inner = smach.StateMachine(['done', 'aborted', 'preempted'], ['total', 'names', 'item'],
+                               ['total', 'names'])
+    with inner:
+        smach.StateMachine.add('ADD', Adds(), {'ok': 'THEN', 'stuck': 'aborted'})
+        smach.StateMachine.add('THEN', Scripted('ok', 'aborted'), {'ok': 'done'})
+    watched, left = total_of(machine_of(over(inner, loop=('done',)), first=True),
+                             goto(to, container='TOP'), max_recoveries=0)
+    assert left == (3, [1, 2, 3])
+    assert told(watched) == repeated
+
+
+def test_with_keep_what_the_unfinished_item_wrote_stays():
+    _, left = total_of(machine_of(over(Adds('ok', 'stuck'))), userdata='keep')
+    assert left == (4, [1, 2, 2, 3])
+
+
+def test_an_item_that_was_finished_before_an_error_keeps_what_it_wrote():
+    class Late:
+        """Its second item can be had at the second try."""
+
+        tries = 0
+
+        def __iter__(self):
+            self.tries += 1
+            yield 1
+            if self.tries == 1:
+                raise ValueError('no second one yet')
+            yield 2
+
+    machine = machine_of(over(Adds(), Late()))
+    _, left = total_of(machine)
+    # to upstream's engine the error is the end of the items
+    assert left in ((2, [1, 2]), (1, [1]))
