@@ -129,6 +129,11 @@ class Border:
         label = machine._branch_label
         machine.take(self._state_of(label), self.container.userdata, self._remapping_of(label))
 
+    def tell_cause(self, error: BaseException) -> None:
+        """Have an error of the container say that a branch has ended the program by it."""
+        if self.top is not None and isinstance(error, smach.InvalidStateError):
+            error.__cause__ = error.__cause__ or self.top.tree.early_end.of_program
+
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
         nodes = self.nodes()

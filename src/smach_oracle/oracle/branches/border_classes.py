@@ -29,6 +29,7 @@ class _Bordered:
             return outcome
         except BaseException as err:
             error = err
+            border.tell_cause(err)
             raise
         finally:
             border.ended(outcome, error)

@@ -61,6 +61,9 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
         return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
     except smach.InvalidUserCodeError as err:
         raised = err
+    except (SystemExit, KeyboardInterrupt) as err:
+        node.tree.early_end.of_program = err
+        raise
     finally:
         dropped = node.tree.control.leave(node.engine, node.key)
         if dropped is not None:

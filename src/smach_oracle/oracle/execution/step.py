@@ -22,6 +22,7 @@ from ..recovery.failure import (
     Failure,
     Route,
     author_recovers,
+    ends_program,
     leaving_outcome,
     natural_ending,
     preempted_ending,
@@ -191,7 +192,8 @@ class Step:
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
             return self._unfinished(judged, outcome)
-        stopping = self._machine.preempt_requested() or smach.is_shutdown()
+        stopping = (self._machine.preempt_requested() or smach.is_shutdown()
+                    or ends_program(error))
         if self._machine.preempt_requested():
             node.tell_preempt()
         if isinstance(judged, Route):

@@ -17,7 +17,7 @@ from ..machine.workers import recall_preempts
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
-from ..recovery.failure import outcome_of_early_end
+from ..recovery.failure import ends_program, outcome_of_early_end
 from .sending import tell_dropped
 from .starting_over import may_start_over
 from .wrapping import adopt, bring_up_to_date
@@ -108,7 +108,7 @@ def _learned(node: TreeNode) -> Dict[str, Any]:
 
 
 def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
-    if isinstance(error, (KeyboardInterrupt, SystemExit)):
+    if ends_program(error):
         return TrialEnd.STOPPED
     if node.tree.early_end.why is not None:
         return node.tree.early_end.why
@@ -132,6 +132,8 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
     except BaseException as err:
         machine._is_running = False  # also after what no engine cleans up after, such as Ctrl-C
         error = err
+        if ends_program(err):
+            node.tree.early_end.of_program = err
         raise
     finally:
         dropped = node.tree.control.leave(node.engine, node.key)

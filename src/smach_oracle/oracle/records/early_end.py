@@ -17,6 +17,8 @@ class EarlyEnd:
 
     def __init__(self) -> None:
         self.why: Optional[TrialEnd] = None  # None: it has not come
+        # sys.exit or Ctrl-C in a thread: the error of a Concurrence need not have it as its cause
+        self.of_program: Optional[BaseException] = None
         self._is_stored = False
         self._is_going_down = False  # the process
         self._asking = 0  # questions that are open
@@ -25,7 +27,7 @@ class EarlyEnd:
     def begin_trial(self, is_stored: bool) -> None:
         """Begin a trial. `is_stored`: it has a store from which it can go on."""
         with self._lock:
-            self.why, self._is_stored = None, is_stored
+            self.why, self.of_program, self._is_stored = None, None, is_stored
 
     @contextlib.contextmanager
     def asking(self) -> Iterator[None]:

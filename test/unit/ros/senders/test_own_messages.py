@@ -1,4 +1,4 @@
-"""Of several nodes that publish on a topic one counts: a bag may be played beside the robot."""
+"""A topic belongs to one of the nodes that publish on it: a bag may be played beside the robot."""
 from types import SimpleNamespace
 
 import pytest

@@ -1,0 +1,101 @@
+"""A state that ends the program by sys.exit: nothing failed, and nothing is done again."""
+import sys
+import threading
+
+import pytest
+from machines import FakeExpert, Scripted, Watched, chain_of
+
+import smach
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.facts import ENDED_BY
+
+
+class Ends(smach.State):
+    """Ends the program."""
+
+    def __init__(self, error=SystemExit):
+        smach.State.__init__(self, ['ok', 'aborted'])
+        self.visits = 0
+        self.error = error
+
+    def execute(self, ud):
+        self.visits += 1
+        if self.error is SystemExit:
+            sys.exit(3)
+        raise self.error
+
+
+def alone(state):
+    return state
+
+
+def nested(state):
+    machine = smach.StateMachine(['ok', 'aborted'])
+    with machine:
+        smach.StateMachine.add('DEEP', state)
+    return machine
+
+
+def concurrent(state):
+    container = smach.Concurrence(['ok', 'aborted'], default_outcome='aborted',
+                                  outcome_map={'ok': {'ONE': 'ok'}})
+    with container:
+        smach.Concurrence.add('ONE', state)
+        smach.Concurrence.add('TWO', Scripted('ok', outcomes=('ok', 'aborted')))
+    return container
+
+
+def iterated(state):
+    container = smach.Iterator(['ok', 'aborted'], [], [], it=lambda: range(3), it_label='item',
+                               exhausted_outcome='ok')
+    with container:
+        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['ok'])
+    return container
+
+
+PLACES = [alone, nested, concurrent, iterated, lambda state: nested(concurrent(state)),
+          lambda state: concurrent(concurrent(state)), lambda state: iterated(nested(state)),
+          lambda state: concurrent(nested(state))]
+NAMES = ['alone', 'nested', 'concurrent', 'iterated', 'concurrent in nested',
+         'concurrent in concurrent', 'nested in iterated', 'nested in concurrent']
+
+
+def error_of(execute):
+    with pytest.raises(BaseException) as raised:
+        execute()
+    return raised.type, getattr(raised.value, 'code', None)
+
+
+@pytest.mark.parametrize('place', PLACES, ids=NAMES)
+@pytest.mark.parametrize('error', [SystemExit, KeyboardInterrupt])
+@pytest.mark.parametrize('limit_s', [None, 30.0])
+def test_a_state_that_ends_the_program_is_no_failure_and_runs_once(place, error, limit_s):
+    bare = error_of(chain_of(Scripted(), place(Ends(error)), Scripted()).execute)
+    state = Ends(error)
+    settings = {'states': {'*': {'time_limit_s': limit_s}}} if limit_s else {}
+    machine = Watched(chain_of(Scripted(), place(state), Scripted()), expert=FakeExpert(),
+                      settings=settings)
+    ended = error_of(machine.machine.execute)
+    assert ended == bare or ended == (error, 3 if error is SystemExit else None)
+    assert state.visits == 1
+    assert not machine.of(EventKind.FAILURE, EventKind.DECISION, EventKind.QUERY_OPENED)
+    end, = machine.of(EventKind.TRIAL_END)
+    assert end.data[ENDED_BY] == 'stopped'
+    assert machine.rate('B').failures == 0
+    assert not machine.machine.is_running() and threading.current_thread().is_alive()
+
+
+def test_an_error_of_the_author_that_hides_an_exit_is_a_failure():
+    class Hides(Ends):
+        def execute(self, ud):
+            try:
+                return super().execute(ud)
+            except SystemExit:
+                return self.has_no_plan()
+
+        def has_no_plan(self):
+            raise ValueError('no plan')
+    machine = Watched(chain_of(Hides()), settings={'max_recoveries': 1})
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine.machine.execute()
+    assert len(machine.of(EventKind.FAILURE)) == 2
