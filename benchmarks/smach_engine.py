@@ -113,7 +113,7 @@ def measure(steps: int, rounds: int) -> Dict[str, float]:
 
 
 def memory_growth_kb(transitions: int) -> int:
-    """Return by how many kB at most the process grew while a machine made that many transitions."""
+    """Return the growth of the process (kB) while a machine made that many transitions."""
     loop = machine_loop(import_silenced(), True)
     loop(10000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

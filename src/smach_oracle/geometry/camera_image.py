@@ -15,5 +15,5 @@ class CameraImage(NamedTuple):
     base_from_camera: np.ndarray  # 4x4; camera: z forward, x right, y down; base: z up
 
     def stride(self, columns: int) -> int:
-        """Of how many columns (and rows) to take one, so that about so many columns are left."""
+        """Return a step between columns (and rows) that leaves about so many columns."""
         return max(1, round(self.depth.shape[1] / columns))

@@ -97,7 +97,7 @@ def read_joints(urdf: str) -> Dict[str, Joint]:
 
 @lru_cache(maxsize=4)
 def _joints_of(urdf: str) -> Mapping[str, Joint]:
-    """Of the same text the same: planners ask for those of their one robot again and again."""
+    """Return the joints of a description. They are kept, since planners ask for them repeatedly."""
     try:
         root = ElementTree.fromstring(urdf)
         joints = [_joint(element) for element in root.findall('joint')]

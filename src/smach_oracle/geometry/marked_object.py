@@ -1,4 +1,4 @@
-"""Of points that were marked as one object: those that are, and the upright box around them."""
+"""Finds the points of an object among marked ones, and the upright box around them."""
 from typing import NamedTuple, Optional
 
 import numpy as np

@@ -8,7 +8,7 @@ import rospy
 from smach_oracle.ros.parameters import number_of
 
 NICE = -10
-"""Of a node that a person waits for: beside a process of nice 0 it gets nine tenths of a core."""
+"""The nice value of a node that a person waits for. It gets 9/10 of a core next to nice 0."""
 
 _THREADS = Path('/proc/self/task')
 # where the system shares its time by sessions first, a nice value counts within a session alone

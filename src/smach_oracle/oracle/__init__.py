@@ -1,10 +1,11 @@
 """The executive. It imports smach and the standard library, its pure parts not even smach.
 
-From the top down, each package above all that follow it: `operator_hand`, for operators;
-`container`, the public face; `execution`, `recovery`, `machine`, `control`, `asking`, `records`,
-`settings`, `decision`. Pure are `decision`, `settings`,
-all of `records` but the rates file, the question of `asking`, `errors`, `background` and
-`number_checks`.
+From the top down, each package above all that follow it: `prospects`, which lists what the oracle
+may do; `operator_hand`, for operators; `container`, the public face; `execution`, `checkpoint`,
+`branches`, `recovery`, `places`, `machine`, `control`, `asking`, `records`, `settings`, `decision`.
+Pure are `decision`, `settings`, all of `records` except the rates file, the question of `asking`,
+`errors`, `background`, `waiting` and `number_checks`.
+
 `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
 """
 from typing import TYPE_CHECKING

@@ -12,7 +12,7 @@ class Waiting(Protocol):
     """Lets time pass. The machine's thread calls it."""
 
     def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
-        """Return after so many seconds, or soon after `stopped()` is true.
+        """Wait so many seconds, or until soon after `stopped()` is true.
 
         :param what: takes the time, as records of it add it up.
         """

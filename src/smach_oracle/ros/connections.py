@@ -61,7 +61,7 @@ class ConnectionGrace:
         self._known: Tuple[socket.socket, ...] = ()
 
     def wait(self, connections: Sequence[Connection]) -> None:
-        """Return at once where all of these were there the last time, else once they are known.
+        """Wait until all of these are known, not at all where they were there the last time.
 
         :param connections: of subscribers of this node.
         """
@@ -74,7 +74,7 @@ class ConnectionGrace:
 
 
 def _wait_until_known(connections: Sequence[Connection]) -> None:
-    """Return once the publishers list all of these, or cannot be asked, or take too long."""
+    """Wait until the publishers list all of these, cannot be asked, or take too long."""
     until = time.monotonic() + HANDSHAKE_S
     while time.monotonic() < until and not rospy.is_shutdown():
         lists: Dict[str, Optional[Set[str]]] = {}

@@ -38,9 +38,9 @@ class UserdataCodecError(OracleError, ValueError):
 
 
 def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
-    """Return every key of a mapping, in the order of the keys.
+    """Return one key and its value, packed as JSON or as ROS messages.
 
-    `limit_bytes` holds for each value.
+    A value that cannot be packed, or takes more than `limit_bytes`, is UNSENT.
 
     :raises UserdataCodecError: if the key is not a string.
     """

@@ -25,7 +25,7 @@ def gap_between(one: SeenThing, other: SeenThing) -> float:
 
 
 def in_the_way(scene: SeenScene, thing: SeenThing) -> Optional[SeenThing]:
-    """The thing that stands so close to another one that a hand has no room, or None."""
+    """Return the thing so close to another one that a hand has no room, or None."""
     close = [(gap_between(thing, other), number) for number, other in enumerate(scene.things)
              if other.movable and other.name != thing.name]
     gap, number = min(close, default=(float('inf'), -1))
@@ -33,7 +33,7 @@ def in_the_way(scene: SeenScene, thing: SeenThing) -> Optional[SeenThing]:
 
 
 def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
-    """The thing nearest to a place (3,) m at which another one should stand, or None."""
+    """Return the thing nearest to a place (3,) m at which another one should stand, or None."""
     beside = [(float(np.hypot(*(thing.box.centre - place)[:2])), number)
               for number, thing in enumerate(scene.things)
               if thing.movable and thing.box is not None and not thing.wanted]

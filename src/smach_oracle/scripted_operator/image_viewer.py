@@ -75,7 +75,7 @@ class ImageViewer:
         ]
 
     def wanted_at(self, stamp: rospy.Time, size: Tuple[int, int]) -> List[SeenThing]:
-        """The thing that the task is about in a published image, as an outline alone, or [].
+        """Return the outline of the task's object in a published image, [] where it is not seen.
 
         :raises ViewError: as `outlines`.
         """

@@ -103,7 +103,7 @@ def _moved(detected: Optional[np.ndarray], seen: np.ndarray) -> bool:
 
 
 class _Search(NamedTuple):
-    """The thing that was looked for, and what was seen with it."""
+    """The result of a search: the thing, and what was seen with it."""
 
     scene: SeenScene
     thing: Optional[SeenThing]  # None: it is not seen anywhere

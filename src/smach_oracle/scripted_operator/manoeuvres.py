@@ -244,7 +244,7 @@ def _beside(pose: np.ndarray, other: UprightBox) -> float:
 
 
 class InHand(NamedTuple):
-    """The thing that the hand holds, as far as it is seen."""
+    """A thing in the hand, as far as it is seen."""
 
     centre: np.ndarray  # (3,) m
     half: float  # m from its middle down to its lowest point

@@ -80,11 +80,11 @@ class SeenScene(NamedTuple):
     limbs: Optional[np.ndarray] = None  # (h, w) bool: where the robot's own limbs are seen
 
     def wanted(self) -> Optional[SeenThing]:
-        """The thing that the task is about, where it is seen."""
+        """Return the object of the task, None where it is not seen."""
         return next((thing for thing in self.things if thing.wanted), None)
 
     def named(self, name: str) -> Optional[SeenThing]:
-        """The thing of that name, where it is seen."""
+        """Return the thing of that name, None where it is not seen."""
         return next((thing for thing in self.things if thing.name == name), None)
 
     def covered(self, thing: SeenThing) -> bool:

@@ -33,8 +33,8 @@ LONGEST = 200  # letters of a value that are shown
 DAMAGE = (ValueError, TypeError, LookupError, AttributeError, RecursionError)
 
 
-class Standing(NamedTuple):
-    """The place at which one container stands."""
+class StoppedPlace(NamedTuple):
+    """The place at which one container was stopped."""
 
     path: str
     label: str  # of the state. Of a container that has ended, its outcome
@@ -57,7 +57,7 @@ class StoppedTrial:
 
     # -- what is there
 
-    def places(self) -> List[Standing]:
+    def places(self) -> List[StoppedPlace]:
         """Return where the containers stand that had begun, the outermost first.
 
         What is in a state counts only while that state is the one under way.
@@ -71,7 +71,7 @@ class StoppedTrial:
                 text = str(at[2] or '') if len(at) > 2 else ''
             if phase != ENDED:
                 path = self._state_path(path, label).rpartition('/')[0]
-            found.append(Standing(path, label, phase, text))
+            found.append(StoppedPlace(path, label, phase, text))
         return found
 
     def items(self) -> Iterator[Tuple[str, int]]:
@@ -293,7 +293,7 @@ def chosen_trial(store: StoreFile, number: Optional[int]) -> StoredTrial:
     return trials[-1]
 
 
-def in_words(standing: Standing) -> str:
+def in_words(standing: StoppedPlace) -> str:
     """Return where a container stands, as a sentence."""
     if standing.phase == ENDED:
         return '{} had ended with {}'.format(standing.path, standing.label)
@@ -305,7 +305,7 @@ def in_words(standing: Standing) -> str:
     return '{}/{} was under way'.format(standing.path, standing.label)
 
 
-def innermost(places: List[Standing]) -> List[Standing]:
+def innermost(places: List[StoppedPlace]) -> List[StoppedPlace]:
     """Return those in which nothing else stands: the states under way, one of each branch."""
     going = [each for each in places if each.phase != ENDED]
     return [each for each in going if not any(

@@ -101,7 +101,7 @@ def inspected(userdata: smach.UserData, response: TriggerResponse) -> str:
 
 
 def wait_for_robot() -> None:
-    """Return once the robot's services are there.
+    """Wait until the robot's services are there.
 
     :raises SystemExit: where they do not come.
     """

@@ -6,7 +6,7 @@ from smach_oracle.ros.container import OracleContainer as RosOracleContainer
 
 
 class NodeSide:
-    """The things that a machine has from its node while it is on the bench."""
+    """Attaches a machine on the bench to its node, and detaches it."""
 
     container_class = RosOracleContainer
 

@@ -1,4 +1,4 @@
-"""What holds forevery file: Python 3.8, a few hundred lines, no shortcut that hides an error or
+"""Rules for every file: Python 3.8, a few hundred lines, no shortcut that hides an error or
 runs foreign code.
 """
 import ast

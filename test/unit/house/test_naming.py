@@ -45,10 +45,12 @@ def test_a_class_name_occurs_once():
 
 
 def test_nothing_has_a_name_that_does_not_say_what_it_is():
+    vague = {name.lower() for name in VAGUE}
     found = ['{}:{} {}'.format(shown(path), node.lineno, node.name) for path, node in definitions()
-             if node.name.lstrip('_') in VAGUE]
+             if node.name.lstrip('_') in VAGUE
+             or isinstance(node, ast.ClassDef) and node.name.lstrip('_').lower() in vague]
     found += [shown(path) for path in PACKAGE + SCRIPTS
-              if path.stem in {name.lower() for name in VAGUE}]
+              if path.stem in vague]
     found += ['{} {}'.format(shown(path), name) for path in SCRIPTS
               for name in names_in_script(path) if name in VAGUE]
     assert not found
@@ -72,6 +74,44 @@ def test_errors_are_documented_in_one_style():
     wrong = ['{}:{}'.format(shown(path), node.lineno) for path, node in definitions()
              if loose.search(ast.get_docstring(node) or '')]
     assert not wrong, 'write a line of its own, `:raises X: when`'
+
+
+# openings that say nothing: the thing itself is the better subject, or what it does
+EMPTY = re.compile(r'The (?:part|parts|thing|things|data) (?:that|which|of which)\b|Of '
+                   r'|Returns? (?:by|of|in) ')
+
+
+def documented():
+    """Every module, class and function with a docstring, as (place, node, docstring)."""
+    found = [(path, parse(path)) for path in PACKAGE] + definitions()
+    return [('{}:{}'.format(shown(path), getattr(node, 'lineno', 1)), node, ast.get_docstring(node))
+            for path, node in found if ast.get_docstring(node)]
+
+
+def test_a_docstring_begins_with_what_the_thing_is_or_does():
+    assert not ['{} {}'.format(place, text.split('\n')[0]) for place, _, text in documented()
+                if EMPTY.match(text)]
+
+
+def test_a_docstring_of_a_function_that_returns_nothing_returns_nothing():
+    silent = {'None', 'NoReturn'}
+    assert not [place for place, node, text in documented()
+                if isinstance(node, ast.FunctionDef) and text.startswith('Return ')
+                and getattr(node.returns, 'id', getattr(node.returns, 'value', '')) in
+                silent | {None}]
+
+
+def test_a_docstring_names_parameters_and_attributes_that_there_are():
+    wrong = []
+    for place, node, text in documented():
+        if isinstance(node, ast.Module):
+            continue
+        named = re.findall(r'(?:^|\n|[.] )`([a-z_]\w*)`:', text)
+        named += re.findall(r':param (\w+):', text)
+        there = {getattr(each, field) for each in ast.walk(node)
+                 for field in ('arg', 'attr', 'id', 'name') if hasattr(each, field)}
+        wrong += ['{} {}'.format(place, name) for name in named if name not in there]
+    assert not wrong
 
 
 def is_long(docstring):

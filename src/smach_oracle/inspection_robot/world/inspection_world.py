@@ -43,7 +43,7 @@ class InspectionWorld:
 
     @property
     def voltage(self) -> float:
-        """Of the battery (V)."""
+        """The voltage of the battery (V)."""
         return SAGGED_V if self.battery_is_low else FULL_V
 
     def step(self, dt_s: float) -> None:

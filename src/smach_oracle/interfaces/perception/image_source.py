@@ -51,8 +51,8 @@ class ImageSource:
         """
         :param rgb: topics. Depth must be registered to colour.
         :param base_frame: the frame of all poses that are handed out. Its z axis points up.
-        :param snapshot: service (Snapshot) that publishes an image and returns its stamp. `none`:
-            take the next one.
+        :param snapshot: service (Snapshot) that publishes an image and returns its stamp, or
+            `none` for the next image.
         :param limit_s: wall time that an image may take.
         """
         self.base_frame = base_frame

@@ -36,7 +36,7 @@ class ObjectInImage(NamedTuple):
 
 
 class ObjectMarking:
-    """Of one goal. A thread of its own takes the first image, since that takes a moment."""
+    """The marking for one goal. A thread of its own takes the first image, which may last."""
 
     def __init__(self, template: StateTemplate, take: Callable[[], TakenImage], base_frame: str,
                  show: Callable[[TakenImage], None]) -> None:

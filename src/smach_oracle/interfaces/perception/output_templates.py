@@ -17,7 +17,7 @@ OF_THE_SCENE = ('objects', 'sizes', 'surface')
 
 
 class StateTemplate(NamedTuple):
-    """Of one state."""
+    """The template of the outputs of one state."""
 
     outcome: str  # the one that comes with outputs: its success
     outputs: Dict[str, str]  # output key: one of OUTPUT_PARTS

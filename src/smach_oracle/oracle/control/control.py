@@ -21,7 +21,7 @@ EndedBy = Callable[[], Optional[LetGo]]
 
 
 class Engine(Protocol):
-    """The part that wakes a machine that executes (`EngineProbe`)."""
+    """Wakes a machine that executes (`EngineProbe`)."""
 
     attentive: bool
     stays_attentive: bool  # whatever the operator wants
@@ -53,9 +53,9 @@ class _OperatorStop(NamedTuple):
 
 
 class Control:
-    """The part that holds the machines of one tree. Safe to use from several threads.
+    """Pauses, breakpoints, autonomy levels and jumps of one tree. Safe to use from several threads.
 
-    `is_set`: whether a machine has to look closer before a state.
+    `is_set`: whether an operator has asked for any of them, so that a machine looks before a state.
     """
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ class Action(str, Enum):
 
 
 class Preconditions(str, Enum):
-    """The standing of the failed state's preconditions when the policy decides."""
+    """Whether the failed state's preconditions are met when the policy decides."""
 
     NONE = 'none'
     MET = 'met'

@@ -87,7 +87,7 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
-    """Return by what the top machine's oracle decides, except what is set for single states."""
+    """Return the settings by which the top oracle decides, without those of single states."""
     settings, defaults = node.settings, node.settings.defaults
     parameters = sorted(settings.policy_parameters.items())
     return {'policy': settings.policy,

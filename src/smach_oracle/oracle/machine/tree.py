@@ -1,6 +1,6 @@
-"""The data that all containers of one wrapped machine share.
+"""The tree of one wrapped machine: what all its containers share.
 
-The trial, its events, the expert, the threads that were left behind.
+These are the trial, its events, the expert and the threads that were left behind.
 """
 import itertools
 import threading

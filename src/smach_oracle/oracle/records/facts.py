@@ -32,7 +32,7 @@ _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')
 
 
 class Decider(str, Enum):
-    """The part that made a decision."""
+    """The source of a decision: the policy, a limit, or the author's transitions."""
 
     POLICY = 'policy'
     MAX_RECOVERIES = 'max_recoveries'  # the limit, outside every policy
@@ -54,7 +54,7 @@ class TrialEnd(str, Enum):
 
 
 def decided_by(event: Event) -> Decider:
-    """Return what made the decision of a DECISION event."""
+    """Return the source of the decision of a DECISION event."""
     stated = _stated(event, DECIDED_BY)
     if stated in [each.value for each in Decider]:
         return Decider(stated)
@@ -63,7 +63,7 @@ def decided_by(event: Event) -> Decider:
 
 
 def told_in_words(data: Any) -> Dict[str, str]:
-    """Return of the data of an event what its sentence tells."""
+    """Return the facts in the data of an event that its sentence tells, too."""
     if not isinstance(data, Mapping):
         return {}
     return {key: data[key] for key in (JUMPED_TO, DECIDED_BY) if isinstance(data.get(key), str)}

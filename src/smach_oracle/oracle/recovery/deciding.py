@@ -28,7 +28,7 @@ def _nothing_above() -> str:
 class Deciding:
     """One decision of one container's oracle. `tried` says what was done before it.
 
-    `place`: where it has decided to go, None where it goes nowhere.
+    `way`: the way to the place where it has decided to go, None where it goes nowhere.
 
     `decide` is called in the machine's thread, `cancel` from any thread.
     """

@@ -30,7 +30,7 @@ class SkillError(Exception):
 
 
 class SkillContext(NamedTuple):
-    """The things that a skill works with: the robot, and the model of its body."""
+    """The robot of a skill, and the model of its body."""
 
     robot: Robot
     model: CollisionModel

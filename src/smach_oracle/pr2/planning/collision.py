@@ -89,7 +89,7 @@ class CollisionWorld:
             pybullet.removeBody(body, physicsClientId=self._client)
 
     def names(self) -> List[str]:
-        """Of all obstacles."""
+        """Return the names of all obstacles."""
         return sorted(self._boxes)
 
     def attach(self, half: VectorLike, tool_from_object: np.ndarray) -> None:

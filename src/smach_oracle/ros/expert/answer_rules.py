@@ -18,7 +18,7 @@ _KINDS = [int(kind) for kind in AnswerKind]
 
 
 def check_decision(goal: ExpertQueryGoal, decision: ExpertDecision) -> None:
-    """Return where the decision fits the question.
+    """Check that a decision fits its question.
 
     :raises AnswerError: where it does not. The text says what would.
     """

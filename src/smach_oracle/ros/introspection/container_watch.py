@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 import smach
 
 CALLBACK_LISTS = ('_start_cbs', '_transition_cbs', '_termination_cbs')
-"""Of a container, on either engine; SMACH has no way to take a callback back."""
+"""Attributes of a container, on either engine. SMACH cannot take a callback back."""
 Report = Callable[['ContainerWatch', str, List[str], Any], None]
 """``report(watch, info, active_states, userdata)``: a container starts, makes a transition or has
 ended.

@@ -9,7 +9,7 @@ from typing import Callable, List, Sequence
 
 HEARTBEAT_S = 2.0
 PARTS = 20
-"""Of a round, at least, where there are as many containers."""
+"""The least number of parts of a round, where there are as many containers."""
 LARGEST_PART = 25
 """Containers that are told of at once: two such parts may be read in one go."""
 GREETING_STEP_S = 0.02

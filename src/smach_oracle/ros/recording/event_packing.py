@@ -61,7 +61,7 @@ def _string(value: object) -> bytes:
 
 
 def choose_packing(md5sum: str) -> Callable[[Event, Stamp], bytes]:
-    """Return the fastest way to serialise an OracleEvent of this definition (its md5).
+    """Return the fastest function that serialises an OracleEvent of this definition (its md5).
 
     The stamp is ROS time, or (0, 0).
     """

@@ -28,7 +28,7 @@ class ServiceWaiting:
         self._by_itself = MonotonicWaiting()
 
     def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
-        """Return after so many seconds, or soon after `stopped()` is true."""
+        """Wait so many seconds, or until soon after `stopped()` is true."""
         left_s = seconds
         while left_s > 0 and not stopped():
             piece_s = min(left_s, _PIECE_S)

@@ -141,7 +141,7 @@ class Controllers:
                           partial(report, self._world), partial(feed, self._world))
 
     def publish_feedback(self) -> None:
-        """Of every motion that is under way."""
+        """Publish the feedback of every motion that is under way."""
         for controller in self._all:
             controller.publish_feedback()
 

@@ -78,7 +78,7 @@ def head(world: World, motion: HeadMotion) -> PointHeadFeedback:
 
 
 def head_result(_world: World, _motion: HeadMotion, _end: MotionEnd) -> PointHeadResult:
-    """Nothing."""
+    """Return the result, which has no fields."""
     return PointHeadResult()
 
 
@@ -91,7 +91,7 @@ def torso(world: World, motion: TorsoMotion) -> SingleJointPositionFeedback:
 
 
 def torso_result(_world: World, _motion: TorsoMotion, _end: MotionEnd) -> SingleJointPositionResult:
-    """Nothing."""
+    """Return the result, which has no fields."""
     return SingleJointPositionResult()
 
 
@@ -103,5 +103,5 @@ def base(world: World, _motion: Motion) -> MoveBaseFeedback:
 
 
 def base_result(_world: World, _motion: Motion, _end: MotionEnd) -> MoveBaseResult:
-    """Nothing."""
+    """Return the result, which has no fields."""
     return MoveBaseResult()

@@ -115,7 +115,7 @@ def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfIn
 
 
 def _area(points: np.ndarray) -> float:
-    """Of the outline around points (n, 2), pixels."""
+    """Return the area within the outline of points (n, 2), pixels."""
     try:
         return float(ConvexHull(points).volume)
     except QhullError:  # all on a line

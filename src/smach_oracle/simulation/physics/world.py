@@ -169,11 +169,11 @@ class World:
         return self._client
 
     def joints(self) -> Dict[str, float]:
-        """Positions of the encoders, rad or m."""
+        """Return the positions of the encoders, rad or m."""
         return self._robot.states(0)
 
     def joint_velocities(self) -> Dict[str, float]:
-        """Of the encoders, rad/s or m/s."""
+        """Return the velocities of the encoders, rad/s or m/s."""
         return self._robot.states(1)
 
     def joint_efforts(self) -> Dict[str, float]:

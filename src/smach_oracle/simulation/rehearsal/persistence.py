@@ -16,7 +16,7 @@ SETTLING = 60  # control periods at the end of a trial, before it is judged
 ROBUST, FUTILE = 0.9, 0.1  # shares: see label()
 
 
-class Course(NamedTuple):
+class RehearsedTrial(NamedTuple):
     """The course of one trial."""
 
     seed: int
@@ -81,7 +81,7 @@ class _Tries:
             span.there_at(now) for span in self._world.cause_spans() if span.kind == self._kind)
 
 
-def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) -> Course:
+def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) -> RehearsedTrial:
     """One trial of a scene with one cause: retries of the state that fails, then restarts."""
     world.reset(scene)
     kind = scene.causes[0].kind
@@ -97,7 +97,7 @@ def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) ->
                 left = tries.go(0, 0, 'restart')
                 cured = 'restart' if left < 0 else ''
     world.step(SETTLING)
-    return Course(scene.seed, kind, tries.failed, cured, tries.there['retry'],
+    return RehearsedTrial(scene.seed, kind, tries.failed, cured, tries.there['retry'],
                   tries.there['restart'], judge(world, scene.goal).success)
 
 
@@ -114,7 +114,7 @@ def scenes_of(draw: Callable[[int], Scene], kind: str, count: int,
     return found
 
 
-def label(courses: Sequence[Course]) -> str:
+def label(courses: Sequence[RehearsedTrial]) -> str:
     """'robust', 'mixed' or 'futile' under plain retries of the state that fails.
 
     Robust: ROBUST of the trials and more end well without a restart. Futile: of those that fail at

@@ -224,7 +224,7 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
 
 
 def _spare_things(draft: TabletopDraft) -> Tuple[Body, ...]:
-    """The things that no cause needs where they stand. The nearest one is none of them."""
+    """Return the things that no cause needs in place, without the nearest one."""
     needed = {name for cause in draft.causes for name in cause.until}
     return tuple(each for each in draft.things[TARGET + 1:] if each.name not in needed)
 

@@ -4,7 +4,12 @@ from worlds import CAN, CARTON, TABLE, scene
 
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal import persistence
-from smach_oracle.simulation.rehearsal.persistence import Course, label, run_scene, scenes_of
+from smach_oracle.simulation.rehearsal.persistence import (
+    RehearsedTrial,
+    label,
+    run_scene,
+    scenes_of,
+)
 from smach_oracle.simulation.rehearsal.pick_and_place import SkillError
 from smach_oracle.simulation.scenes.scene import Disturbance, SceneCause
 
@@ -95,6 +100,6 @@ def test_a_kind_is_labelled_by_what_plain_retries_do(ended, expected):
     courses = []
     for how, count in ended.items():
         failed, cured, success = made[how]
-        courses += [Course(1, 'kind', failed, cured, False, False, success)] * count
+        courses += [RehearsedTrial(1, 'kind', failed, cured, False, False, success)] * count
     assert label(courses) == expected
     assert persistence.RETRIES == 3 and persistence.RESTARTS == 2

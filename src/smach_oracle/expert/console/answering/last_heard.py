@@ -96,7 +96,7 @@ class LastHeard:
         self._pulse.follow({node for found in nodes.values() for node in found})
 
     def _take_clock(self, listed: ListedQuestion) -> None:
-        """Of a server in the robot's own node."""
+        """Take the clock of a server that is in the robot's own node."""
         news = self._front_end.news(listed.server)
         robot = listed.goal.robot
         if self._clocks is not None and news is not None and listed.server.startswith(robot + '/'):

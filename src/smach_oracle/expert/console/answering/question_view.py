@@ -91,5 +91,5 @@ def _item(item: UserdataItem) -> Dict[str, str]:
 
 
 def _end(text: str) -> str:
-    """The end of a long text: of a traceback that is the part that says something."""
+    """Return the end of a long text. In a traceback the end names the error."""
     return text if len(text) <= LONGEST_TEXT else '…' + text[-LONGEST_TEXT:]

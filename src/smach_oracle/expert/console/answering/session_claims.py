@@ -18,7 +18,7 @@ CLAIM_FIRST = 'Claim the question first, so that no two people work on it.'
 
 
 class HeldClaim(NamedTuple):
-    """Of one question."""
+    """The claim of one question."""
 
     session: str  # in short
     expert: str

@@ -1,6 +1,6 @@
 """Checks of single arguments of commands.
 
-A check takes what came and returns what is meant.
+A check takes an argument as it came, and returns its value.
 
 :raises ValueError: (each check) for anything else. The text says what is allowed.
 """
@@ -31,9 +31,10 @@ class TypedOutput(NamedTuple):
 
 
 def text(longest: int, least: int = 0) -> Check:
-    """Text of `least` to `longest` characters, without control characters.
+    """Return a check that admits text of `least` to `longest` characters.
 
-    What is left out is the empty text, where that is allowed.
+    Control characters are refused. An argument that is left out is read as the empty text, if that
+    is allowed.
     """
     def check(value: object) -> str:
         if value is None and not least:
@@ -48,23 +49,23 @@ def text(longest: int, least: int = 0) -> Check:
 
 
 def one_of(allowed: Tuple[str, ...]) -> Check:
-    """Return one of a few words."""
+    """Return a check that admits a few words."""
     return _argument(checks.choice(allowed))
 
 
 def number(low: float, high: float, allowed: str = '') -> Check:
-    """Return a finite number from `low` to `high`. A refusal says `allowed`."""
+    """Return a check that admits a finite number from `low` to `high`. A refusal says `allowed`."""
     return _argument(
         checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high)))
 
 
 def whole(low: int, high: int, allowed: str) -> Check:
-    """Return a whole number from `low` to `high`. A refusal says `allowed`."""
+    """Return a check that admits a whole number from `low` to `high`. A refusal says `allowed`."""
     return _argument(checks.whole(low, allowed, high))
 
 
 def _argument(check: checks.Check) -> Check:
-    """A check of settings as one of arguments: of a value that is refused a part is shown."""
+    """Return a check of arguments made of one of settings. A refusal shows a part of the value."""
     def checked(value: object) -> Any:
         try:
             return check('', value)
@@ -78,7 +79,7 @@ flag = _argument(checks.flag)
 
 
 def optional(check: Check) -> Check:
-    """Return what another check takes, or nothing: then None."""
+    """Return a check that admits None in addition to what another one admits."""
     return lambda value: None if value is None else check(value)
 
 
@@ -87,13 +88,13 @@ seen = optional(number(0.0, 1e12))
 
 
 def shown(value: object) -> str:
-    """Return a value for the text of a refusal: never long."""
+    """Return a value as a short text, for a refusal."""
     whole_text = repr(value)
     return whole_text if len(whole_text) <= 60 else whole_text[:60] + '…'
 
 
 def outputs(value: object) -> List[TypedOutput]:
-    """Values for the userdata. None where they are left out.
+    """Return values for the userdata, [] where they are left out.
 
     :raises ValueError: for what is no list of outputs, too many of them, one twice, or one that is
         nested too deep.

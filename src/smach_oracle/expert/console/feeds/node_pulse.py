@@ -32,7 +32,7 @@ class NodeLink:
         self._uri = ''
 
     def ask(self) -> None:
-        """Return when it has answered.
+        """Wait until the node has answered.
 
         :raises OSError, xmlrpc.client.Error, http.client.HTTPException, NodeUnknownError: where it
             has not.

@@ -133,7 +133,7 @@ class FollowedRobots:
         return take_event
 
     def _forget_gone(self) -> None:
-        """Of very many robots that are gone, such as anonymous nodes, keep the latest."""
+        """Keep the latest of very many robots that are gone, such as anonymous nodes."""
         gone = [name for name, robot in self._robots.items() if not robot.alive]
         for name in gone[:max(0, len(self._robots) - MOST_ROBOTS)]:
             for subscriber in self._subscribers.pop(name):

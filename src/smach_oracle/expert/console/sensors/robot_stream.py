@@ -22,7 +22,7 @@ MOST_JOINTS = 2000
 
 
 def robots_in(parameters: Sequence[str]) -> List[str]:
-    """Of the parameter server's names, those of robot descriptions."""
+    """Return the names of robot descriptions among those of the parameter server."""
     return sorted(name for name in parameters
                   if name.rsplit('/', 1)[-1] == DESCRIPTION)[:MOST_ROBOTS]
 
