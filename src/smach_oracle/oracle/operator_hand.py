@@ -6,6 +6,7 @@ run.
 from typing import List, Mapping, NamedTuple, Sequence, Tuple
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from .control.control import Jump
 from .control.hold import HeldPlace, Hold
@@ -88,7 +89,7 @@ class OperatorHand:
                     if top.tree.control.paused:
                         text += '; its pause is lifted'
             except Exception as err:  # it is the user's
-                text += ', and its request_preempt failed: {!r}'.format(err)
+                text += ', and its request_preempt failed: {}'.format(repr_of(err))
         return self._told('preempt', text, by)
 
     # -- one state at a time

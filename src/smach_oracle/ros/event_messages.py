@@ -6,6 +6,7 @@ import genpy
 import rospy
 from std_msgs.msg import Header
 
+from smach_oracle.foreign import ends_program, error_text, text_of
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
@@ -24,7 +25,7 @@ def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
     return OracleEvent(int(event.kind), header, float(event.wall_time),
                        sendable_text(event.trial_id), event.seq, *map(sendable_text, place),
                        int(event.failure_kind), int(event.failure_class), float(event.rate),
-                       bool(event.continuous), *map(sendable_text, words), _json(event.data))
+                       bool(event.continuous), *map(sendable_text, words), json_of(event.data))
 
 
 def rates_to_msg(trial_id: str, rates: Iterable[StateRateRow],
@@ -53,5 +54,13 @@ def ros_now() -> genpy.Time:
     return rospy.rostime.get_rostime()
 
 
-def _json(data: object) -> str:
-    return json.dumps(data, default=str) if data else ''
+def json_of(data: object) -> str:
+    """Return plain data as JSON. Any other object in it becomes its text."""
+    if not data:
+        return ''
+    try:
+        return json.dumps(data, default=text_of)
+    except BaseException as err:  # such as of a key, or of data that hold themselves
+        if ends_program(err):
+            raise
+        return json.dumps({'not_told': error_text(err)})

@@ -13,7 +13,7 @@ import rospy
 
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.records.events import Event, EventKind, EventSource
+from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
 from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
 from .connections import TOPIC_ERRORS, quiet_at_shutdown
@@ -62,8 +62,11 @@ def _source_of(machine: WatchedMachine) -> RatesSource:
     return oracle_of(machine) if isinstance(machine, OracleContainer) else machine
 
 
-class EventPublisher:
+class EventPublisher(OwnObserver):
     """An observer that publishes every event on `~oracle/events`."""
+
+    observer_name = 'the publisher of ~oracle/events'
+    without_it = 'consoles and other subscribers miss this event'
 
     def __init__(self, topic: str = '~oracle/events', queue_size: int = QUEUE_SIZE) -> None:
         self._publisher = rospy.Publisher(topic, OracleEvent, queue_size=queue_size)
@@ -170,8 +173,11 @@ class RatesPublisher:
             rospy.logerr('~oracle/rates: %r', err)
 
 
-class _RatesObserver:
+class _RatesObserver(OwnObserver):
     """Marks one machine as changed. It publishes at once at the end of a trial."""
+
+    observer_name = 'the publisher of ~oracle/rates'
+    without_it = 'consoles show older rates'
 
     def __init__(self, publisher: RatesPublisher, machine: WatchedMachine) -> None:
         self._publisher = publisher

@@ -7,13 +7,14 @@ import logging
 import os
 import threading
 import time
-from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Set, Tuple, Union
 from weakref import WeakSet
 
 import genpy
 import rospy
 
-from smach_oracle.oracle.records.events import Event, EventKind, EventSource
+from smach_oracle.foreign import error_text, repr_of
+from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
 from smach_oracle.oracle.settings.paths import path_of
 
 from .connections import quiet_at_shutdown
@@ -39,6 +40,7 @@ WEIGHT_OF_A_FILE = 20  # opening and closing one takes as long as writing so man
 MAX_MESSAGE_BYTES = 64 * 1024 * 1024
 HUNG_AFTER_S = 5.0
 CLOSE_S = 1.0
+LONGEST_ITEM = 500  # letters of one that is not recorded, in the log
 LATE_S = 0.4  # a bag stays open after its trial for messages on their way, also on a busy machine
 
 Snapshots = Mapping[str, Callable[[], Optional[genpy.Message]]]  # by topic
@@ -46,7 +48,7 @@ Log = Callable[[str], None]
 StatusCallback = Callable[[RecordingStatus], None]
 
 
-class TrialRecorder:
+class TrialRecorder(OwnObserver):
     """Writes the events of every attached machine, and the messages of other topics, to `folder`.
 
     While the disk works, the machine waits for the recorder where it must (bounded queue). Where
@@ -54,6 +56,9 @@ class TrialRecorder:
     and the robot goes on. With a node (rospy initialised before), topics are subscribed to and
     `~record/status` is published. Without one, the events alone are recorded.
     """
+
+    observer_name = 'the recorder'
+    without_it = 'this event is not in the bag'
 
     def __init__(self, folder: str, topics: Sequence[str] = (), *,
                  types: Optional[Mapping[str, MessageClass]] = None, warn: Optional[Log] = None,
@@ -91,6 +96,7 @@ class TrialRecorder:
         self._bags.recover()
         self._attached: 'WeakSet[EventSource]' = WeakSet()
         self._hung = False
+        self._not_recorded: Set[Tuple[type, str]] = set()  # kinds of items, and why: said once
         self._closed = False
         self._process = os.getpid()
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
@@ -180,7 +186,15 @@ class TrialRecorder:
         except Exception as err:  # one event that cannot be converted must not cost all later ones
             if isinstance(item, EventItem):
                 self.losses.add_events(item.event.trial_id, 1)
-            self._reporter.warn('Not recorded: {!r}: {!r}'.format(item, err))
+            self._tell_not_recorded(item, error_text(err))
+
+    def _tell_not_recorded(self, item: QueueItem, why: str) -> None:
+        told = (type(item), why)
+        if told not in self._not_recorded:
+            self._not_recorded.add(told)
+            self._reporter.warn('Not recorded: {}: {}. The recorder goes on, and counts what it '
+                                'loses. This is said once'.format(
+                                    repr_of(item)[:LONGEST_ITEM], why))
 
     def _report(self, status: RecordingStatus) -> None:
         if status.state is RecorderState.IDLE and not self._closed:
@@ -228,11 +242,13 @@ class TrialRecorder:
                             messages_dropped=self.losses.messages))
 
 
-class _MachineObserver:
+class _MachineObserver(OwnObserver):
     """The observer of one machine.
 
     It knows which trial the machine is in, and takes the snapshots around it.
     """
+
+    observer_name, without_it = TrialRecorder.observer_name, TrialRecorder.without_it
 
     def __init__(self, observe: Callable[[Event], None],
                  put_snapshot: Callable[[str, str, genpy.Message], None],

@@ -1,4 +1,5 @@
 """Texts that rospy can send. Pure."""
+from smach_oracle.foreign import text_of
 
 
 def sendable_text(value: object) -> str:
@@ -7,7 +8,7 @@ def sendable_text(value: object) -> str:
     An exception's text may hold halves of surrogate pairs (from a file name, say). rospy would send
     the message up to there and garble the connection for the messages that follow.
     """
-    text = value if isinstance(value, str) else str(value)
+    text = value if type(value) is str else text_of(value)
     if text.isascii():
         return text
     return text.encode('utf-8', 'backslashreplace').decode('utf-8')

@@ -20,6 +20,7 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Seque
 import genpy
 import roslib.message
 
+from smach_oracle.foreign import ends_program, repr_of, text_of, type_name
 from smach_oracle.msg import UserdataItem
 from smach_oracle.oracle.errors import OracleError
 
@@ -40,20 +41,31 @@ class UserdataCodecError(OracleError, ValueError):
 def encode(key: str, value: object, limit_bytes: int = TRANSFER_BYTES) -> UserdataItem:
     """Return one key and its value, packed as JSON or as ROS messages.
 
-    A value that cannot be packed, or takes more than `limit_bytes`, is UNSENT.
+    A value that cannot be packed, takes more than `limit_bytes`, or raises as it is looked at, is
+    UNSENT.
 
     :raises UserdataCodecError: if the key is not a string.
     """
     if not isinstance(key, str):
-        raise UserdataCodecError('userdata key {!r} is not a string'.format(key))
-    if isinstance(value, genpy.Message):
+        raise UserdataCodecError('userdata key {} is not a string'.format(repr_of(key)))
+    try:
+        return _encoded(key, value, limit_bytes) or _unsent(key, _python_type(value))
+    except BaseException as err:
+        if ends_program(err):
+            raise
+        return _unsent(key, _python_type(value))
+
+
+def _encoded(key: str, value: object, limit_bytes: int) -> Optional[UserdataItem]:
+    """The item, or None where the value does not fit."""
+    if issubclass(type(value), genpy.Message):
         return _encode_messages(key, UserdataItem.ROS_MESSAGE, [value], limit_bytes)
     messages = _message_list(value)
     if messages is not None:
         return _encode_messages(key, UserdataItem.ROS_MESSAGES, messages, limit_bytes)
     text = _json_bytes(value, limit_bytes)
     if text is None:
-        return _unsent(key, _python_type(value))
+        return None
     return UserdataItem(key=key, encoding=UserdataItem.JSON, value=text)
 
 
@@ -62,8 +74,9 @@ def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> 
 
     A key that is no string (SMACH does not mind) is named, and its value UNSENT.
     """
-    return [encode(key, values[key], limit_bytes) if isinstance(key, str)
-            else _unsent(str(key), _python_type(values[key])) for key in sorted(values, key=str)]
+    items = sorted(list(values.items()), key=lambda item: text_of(item[0]))
+    return [encode(key, value, limit_bytes) if isinstance(key, str)
+            else _unsent(text_of(key), _python_type(value)) for key, value in items]
 
 
 def decode(item: UserdataItem) -> Any:
@@ -120,9 +133,10 @@ def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict
     return values
 
 
-def _message_list(value: object) -> Optional[Sequence[genpy.Message]]:
+def _message_list(value: Any) -> Optional[Sequence[genpy.Message]]:
     """The messages in a list of one type, such as the objects of a detection, else None."""
-    if not isinstance(value, (list, tuple)) or not value or not isinstance(value[0], genpy.Message):
+    if not (issubclass(type(value), (list, tuple)) and value
+            and issubclass(type(value[0]), genpy.Message)):
         return None
     return value if all(type(item) is type(value[0]) for item in value) else None
 
@@ -153,9 +167,8 @@ def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
                                                                               start - _LENGTH.size)
             if buffer.tell() > limit_bytes:
                 return _unsent(key, _python_type(messages) if not single else message._type)
-    except (genpy.SerializationError, ValueError, TypeError, AttributeError):
-        return _unsent(key,
-                       messages[0]._type)  # fields of the wrong type: the message itself is broken
+    except Exception:  # fields of the wrong type: the message itself is broken
+        return _unsent(key, messages[0]._type)
     return UserdataItem(key=key, encoding=encoding, type=messages[0]._type,
                         md5sum=messages[0]._md5sum, value=buffer.getvalue())
 
@@ -254,6 +267,5 @@ def _unsent(key: str, type_name: str) -> UserdataItem:
 
 
 def _python_type(value: object) -> str:
-    kind = type(value)
-    return kind.__qualname__ if kind.__module__ == 'builtins' else '{}.{}'.format(
-        kind.__module__, kind.__qualname__)
+    name = type_name(value)
+    return name[len('builtins.'):] if name.startswith('builtins.') else name

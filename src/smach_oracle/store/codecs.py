@@ -6,10 +6,10 @@ Plain data become JSON. What JSON has no word for becomes an object with one key
 import base64
 import dataclasses
 import enum
+import functools
 import hashlib
 import json
 import math
-import sys
 from collections import OrderedDict
 from typing import (
     Any,
@@ -19,9 +19,22 @@ from typing import (
     List,
     Mapping,
     NamedTuple,
+    NoReturn,
     Optional,
     Tuple,
     Type,
+)
+
+from smach_oracle.foreign import ends_program, error_text
+
+from .object_parts import (
+    attributes,
+    class_attribute,
+    found_by_name,
+    has,
+    is_only_attributes,
+    is_set,
+    name_of,
 )
 
 Encode = Callable[[Any], Any]
@@ -31,6 +44,8 @@ FetchBytes = Callable[[bytes], bytes]
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
 SHORT = 256  # bytes: what is no longer stays within the text
 MOST = 1 << 28  # bytes of one value
+MOST_DEPTH = 300  # of lists in lists and the like
+MOST_CONTAINERS = 1 << 20  # lists, mappings and objects of one value: it is written again and again
 DIGEST = 16  # bytes
 _PLAIN = (str, bool, type(None))
 
@@ -83,20 +98,29 @@ class Codecs:
         if not isinstance(of, type) or not callable(encode) or not callable(decode):
             raise TypeError('a codec is a type and two functions, not {!r}, {!r}, {!r}'.format(
                 of, encode, decode))
-        codec = _Registered(name or _name_of(of), encode, decode)
+        codec = _Registered(name or name_of(of), encode, decode)
         self._by_type[of] = codec
         self._by_name[codec.name] = codec
 
-    def encode(self, value: object) -> Encoded:
+    def encode(self, value: object, drops: Optional[Callable[[str], None]] = None) -> Encoded:
         """Return a value as it is stored.
 
-        :raises NotStorable: saying what in it cannot be stored.
+        `drops`: takes the name of each attribute that is not stored with its object.
+
+        :raises NotStorable: saying what in it cannot be stored. Whatever the value itself raises
+            becomes this.
         """
-        writer = _Writer(self)
+        writer = _Writer(self, drops)
         try:
             text = _as_json(writer.plain(value))
+        except NotStorable:
+            raise
         except RecursionError:
-            raise NotStorable('it is nested too deeply, or holds itself') from None
+            _refuse_depth()
+        except BaseException as err:  # whatever an object does as it is looked at
+            if ends_program(err):
+                raise
+            raise NotStorable('looking at it raised {}'.format(error_text(err))) from err
         if len(text) <= SHORT:
             return Encoded(text, None, writer.parts)
         return Encoded(None, writer.part(text.encode('ascii')), writer.parts)
@@ -117,7 +141,7 @@ class Codecs:
         except NotReadable:
             raise
         except Exception as err:  # damaged, or refused by a codec of the user's
-            raise NotReadable('{}: {}'.format(type(err).__name__, err)) from err
+            raise NotReadable(error_text(err)) from err
 
     def codec_of(self, kind: type) -> Optional[_Registered]:
         """Return the codec of a type: its own, or that of the nearest class above it."""
@@ -161,8 +185,9 @@ class Codecs:
 class _Writer:
     """Makes one value plain, and collects the bytes that are kept apart."""
 
-    def __init__(self, codecs: Codecs) -> None:
-        self._codecs = codecs
+    def __init__(self, codecs: Codecs, drops: Optional[Callable[[str], None]]) -> None:
+        self._codecs, self._drops = codecs, drops
+        self._depth = self._containers = 0
         self.parts: Dict[bytes, bytes] = {}
 
     def part(self, data: bytes) -> bytes:
@@ -181,15 +206,29 @@ class _Writer:
             return value
         if kind is float:
             return value if math.isfinite(value) else {'$float': repr(value)}
+        self._go_in()
         if kind is list:
-            return self._list(value)
-        if kind is dict:
-            return self._dict(value)
-        if kind is tuple:
-            return {'$tuple': self._list(value)}
-        return self._other(value, kind)
+            plain = self._list(value)
+        elif kind is dict:
+            plain = self._dict(value)
+        elif kind is tuple:
+            plain = {'$tuple': self._list(value)}
+        else:
+            plain = self._other(value, kind)
+        self._depth -= 1
+        return plain
 
-    def _list(self, values: Iterable[object]) -> List[Any]:
+    def _go_in(self) -> None:
+        """Note one that holds others. Those that hold themselves, or are shared, have no end."""
+        self._depth += 1
+        self._containers += 1
+        if self._depth > MOST_DEPTH:
+            _refuse_depth()
+        if self._containers > MOST_CONTAINERS:
+            raise NotStorable('it has more than {} lists, mappings and objects, and one that '
+                              'stands in several places counts in each'.format(MOST_CONTAINERS))
+
+    def _list(self, values: Iterable[object]) -> Any:
         plain = self.plain
         return [plain(each) for each in list(values)]
 
@@ -200,7 +239,7 @@ class _Writer:
             return {key: plain(each) for key, each in items}
         return {'$map': [[self.plain(key), self.plain(each)] for key, each in items]}
 
-    def _other(self, value: Any, kind: type) -> Any:
+    def _other(self, value: Any, kind: Any) -> Any:
         if kind in (bytes, bytearray):
             return self._bytes(bytes(value), kind)
         if kind in _SIMPLE:
@@ -208,21 +247,38 @@ class _Writer:
             return {tag: self.plain(simple(value))}
         codec = self._codecs.codec_of(kind)
         if codec is not None:
-            try:
-                inner = codec.encode(value)
-            except Exception as err:
-                raise NotStorable('its codec {} failed: {!r}'.format(codec.name, err)) from err
-            return {'$by': [codec.name, self.plain(inner)]}
-        if isinstance(value, enum.Flag) and not _is_member(value):
-            return {'$flag': [_findable(kind), value.value]}
-        if isinstance(value, enum.Enum):
-            return {'$enum': [_findable(kind), value.name]}
-        if dataclasses.is_dataclass(value):
-            fields = {each.name: getattr(value, each.name) for each in dataclasses.fields(value)}
-            return {'$data': [_findable(kind), self._dict(fields)]}
-        if isinstance(value, tuple) and isinstance(getattr(kind, '_fields', None), tuple):
-            return {'$named': [_findable(kind), self._list(value)]}
-        raise NotStorable('no codec is registered for {}'.format(_name_of(kind)))
+            return {'$by': [codec.name, self.plain(_encoded_by(codec, value))]}
+        if issubclass(kind, enum.Flag) and not _is_member(value):
+            return {'$flag': [_findable(kind), value._value_]}
+        if issubclass(kind, enum.Enum):
+            return {'$enum': [_findable(kind), value._name_]}
+        if has(kind, '__dataclass_fields__'):
+            return {'$data': [_findable(kind), self._dict(self._fields(value, kind))]}
+        if issubclass(kind, tuple) and has(kind, '_fields'):
+            self._tell_dropped(value, kind, frozenset(kind._fields))
+            return {'$named': [_findable(kind), self._list(tuple.__iter__(value))]}
+        raise NotStorable('no codec is registered for {}'.format(name_of(kind)))
+
+    def _fields(self, value: Any, kind: type) -> Dict[str, object]:
+        """Return the fields of a dataclass."""
+        if not is_only_attributes(kind):
+            raise NotStorable('{} is a dataclass and holds other data, too'.format(name_of(kind)))
+        names = [each.name for each in dataclasses.fields(kind)]
+        unset = [name for name in names if not is_set(value, name)]
+        if unset:
+            raise NotStorable('{} is not set, a field of {}'.format(
+                ', '.join(unset), name_of(kind)))
+        self._tell_dropped(value, kind, frozenset(names))
+        return {name: getattr(value, name) for name in names}
+
+    def _tell_dropped(self, value: object, kind: type, stored: Iterable[str]) -> None:
+        """Name what an object has besides its fields. A property that was cached is no loss."""
+        if self._drops is None:
+            return
+        for name in attributes(value, kind):
+            if name not in stored and not isinstance(
+                    class_attribute(kind, name), functools.cached_property):
+                self._drops(name)
 
     def _bytes(self, value: bytes, kind: type) -> object:
         if len(value) > SHORT:
@@ -232,13 +288,22 @@ class _Writer:
         return plain if kind is bytes else {'$bytearray': plain}
 
 
-def _name_of(kind: type) -> str:
-    return '{}:{}'.format(kind.__module__, kind.__qualname__)
+def _refuse_depth() -> NoReturn:
+    raise NotStorable('it is nested too deeply, or holds itself') from None
+
+
+def _encoded_by(codec: _Registered, value: object) -> object:
+    try:
+        return codec.encode(value)
+    except BaseException as err:  # the user's, as the value
+        if ends_program(err):
+            raise
+        raise NotStorable('its codec {} failed: {}'.format(codec.name, error_text(err))) from err
 
 
 def _is_member(value: enum.Flag) -> bool:
     """Whether it is one member of its class, not several of its flags, or none."""
-    return type(value).__members__.get(value.name or '') is value
+    return type(value).__members__.get(value._name_ or '') is value
 
 
 def _findable(kind: type) -> str:
@@ -247,24 +312,15 @@ def _findable(kind: type) -> str:
     :raises NotStorable: where a later program would not find the class by it, such as one that a
         function has made.
     """
-    name = _name_of(kind)
-    if _found(name) is not kind:
+    name = name_of(kind)
+    if found_by_name(name) is not kind:
         raise NotStorable('its class cannot be found by its name, {}'.format(name))
     return name
 
 
-def _found(name: str) -> Any:
-    """Return what stands at a place of the program that runs. Nothing is imported for it."""
-    module, _, path = name.partition(':')
-    found: Any = sys.modules.get(module)
-    for part in path.split('.'):
-        found = getattr(found, part, None)
-    return found
-
-
 def _class_named(name: str, wanted: Callable[[type], bool]) -> type:
     """Return a class of the program that runs."""
-    found = _found(name)
+    found = found_by_name(name)
     if not isinstance(found, type) or not wanted(found):
         raise NotReadable('there is no class {} in this program'.format(name))
     return found
@@ -312,7 +368,7 @@ _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),
     complex: ('$complex', lambda value: [value.real, value.imag]),
-    OrderedDict: ('$ordered', lambda value: [list(item) for item in value.items()]),
+    OrderedDict: ('$ordered', lambda value: [list(item) for item in list(value.items())]),
 }
 _TAGS: Dict[str, Callable[[Any], Any]] = {
     '$tuple': tuple,

@@ -12,5 +12,5 @@ GOAL = 'goal:'  # and of one of the whole tree that has a goal's server
 BEFORE, IN, FAILED, ENDED = 'before', 'in', 'failed', 'ended'
 MOVED = 'moved'  # the state at which it stands is in another container now
 # kinds of moments that are no events: made by hand, and the last one of a part of a trial that is
-# kept, as nobody has said how it goes on
-EDIT, KEPT = 'EDIT', 'KEPT'
+# kept, as nobody has said how it goes on, and the last one of a part that was not stored to its end
+EDIT, KEPT, BROKEN = 'EDIT', 'KEPT', 'BROKEN'

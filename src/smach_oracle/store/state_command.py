@@ -88,7 +88,8 @@ def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
     standing = stopped.places()
     if not standing:
         return 'stopped before it began'
-    how = 'kept, as nobody answered' if stopped.is_kept() else 'stopped'
+    how = ('kept, as nobody answered' if stopped.is_kept() else
+           'not stored to its end, last' if stopped.is_broken() else 'stopped')
     return '{}: {}'.format(how, ', '.join(map(in_words, innermost(standing))))
 
 

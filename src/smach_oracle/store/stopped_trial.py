@@ -11,6 +11,7 @@ from .names import (
     ASKED,
     AT,
     BEFORE,
+    BROKEN,
     EDIT,
     ENDED,
     FAILED,
@@ -124,8 +125,15 @@ class StoppedTrial:
 
     def is_kept(self) -> bool:
         """Whether its program ended as nobody had said how it goes on."""
+        return self._last_kind() == KEPT
+
+    def is_broken(self) -> bool:
+        """Whether a fault of the store kept the program from storing the trial to its end."""
+        return self._last_kind() == BROKEN
+
+    def _last_kind(self) -> str:
         moments = self._store.moments(self.trial.number)
-        return bool(moments) and moments[-1].kind == KEPT
+        return moments[-1].kind if moments else ''
 
     def questions(self) -> Iterator[Tuple[str, str]]:
         """Yield path of the state and id of each question that was open."""

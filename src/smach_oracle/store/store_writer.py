@@ -1,11 +1,9 @@
 """Writes moments in a thread of its own, so that no disk holds the machine up for long."""
-import sqlite3
 import threading
 import time
 import weakref
 from typing import Callable, List, MutableSet, NamedTuple, Optional, Union
 
-from .errors import StoreError
 from .rows import NewMoment
 from .store_file import NewTrial, StoreFile
 
@@ -163,7 +161,7 @@ class StoreWriter:
             if self._end is not None and not self._waiting:
                 self._store.end_trial(self._trial, *self._end)
             return ''
-        except (sqlite3.Error, StoreError, OSError, ValueError) as err:  # or a name is no UTF-8
+        except Exception as err:  # this thread lives as long as the trial
             return str(err) or type(err).__name__
 
 

@@ -8,12 +8,12 @@ PACKAGE = ROOT / 'src/smach_oracle'
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': {'store'},
-    'store': set(),  # no ROS, no SMACH
+    'oracle': {'foreign', 'store'},
+    'store': {'foreign'},  # no ROS, no SMACH
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
-            'oracle.oracle_of', 'oracle.waiting', 'packages', 'store'},
+            'oracle.oracle_of', 'oracle.waiting', 'foreign', 'packages', 'store'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -35,6 +35,7 @@ ARROWS: Dict[str, Set[str]] = {
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'documentation': set(),
+    'foreign': set(),
     'packages': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
@@ -73,7 +74,7 @@ LAYERS: Dict[str, List[Layer]] = {
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
         'state_command', {'stopped_trial', 'retention'}, {'store_writer', 'holding'}, 'store_file',
-        'renaming', 'rows', {'codecs', 'errors', 'names'}
+        'renaming', 'rows', 'codecs', {'object_parts', 'errors', 'names'}
     ],
     'pr2': [
         'nodes', {'skills', 'ros_robot', 'checks'},
@@ -91,7 +92,7 @@ LAYERS: Dict[str, List[Layer]] = {
 ROS_FREE = [
     'oracle', 'store', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception',
     'pr2/planning', 'pr2/skills', 'simulation/physics', 'simulation/pictures', 'simulation/scenes',
-    'inspection_robot/world', 'inspection_robot/robot', 'commands', 'packages'
+    'inspection_robot/world', 'inspection_robot/robot', 'commands', 'foreign', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(

@@ -3,6 +3,8 @@ import threading
 import time
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
+from smach_oracle.foreign import repr_of
+
 from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
@@ -172,7 +174,7 @@ class Inquiry:
             if port.error is not None:
                 raise port.error
             return port.result
-        self._asker.warn('the expert\'s port failed: {!r}'.format(port.error))
+        self._asker.warn('the expert\'s port failed: {}'.format(repr_of(port.error)))
         raise _NoAnswer('the expert\'s port failed') from port.error
 
     def _wait_for(self, port: BackgroundCall) -> None:

@@ -16,6 +16,7 @@ from typing import (
 )
 
 import smach
+from smach_oracle.foreign import error_text
 
 from ..machine.nesting import machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine
@@ -138,7 +139,7 @@ class Border:
         """Tell that the container has ended, with an outcome or an error."""
         nodes = self.nodes()
         if nodes:
-            why = ('{}: {}'.format(type(error).__name__, error) if error is not None
+            why = (error_text(error) if error is not None
                    else NO_OUTCOME if outcome is None else '')
             nodes[0].emit(EventKind.CONTAINER_END, text=why,
                           outcome=outcome if isinstance(outcome, str) else '')

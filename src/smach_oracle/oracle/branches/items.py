@@ -1,6 +1,8 @@
 """The items of an Iterator, with a memory of how far it has come."""
 from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
 
+from smach_oracle.foreign import repr_of
+
 Tell = Callable[[str], None]
 Items = Union[Iterable[object], Callable[[], Iterable[object]]]
 
@@ -124,8 +126,8 @@ class TrackedItems:
         except Exception as err:
             self._error = err
             self.is_finished = True  # the one before
-            self._tell('cannot get the item behind {}: {!r}'.format(
-                self.in_words() or 'the beginning', err))
+            self._tell('cannot get the item behind {}: {}'.format(
+                self.in_words() or 'the beginning', repr_of(err)))
             raise
         self._item, self.is_finished = item, False
         self.number += 1

@@ -291,12 +291,17 @@ class Checkpointer:
             yield from self._keys(path, border.container.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
-        if (path, out.key) in self._told or not self._named.add(out.value):
+        told = (path, '{}.{}'.format(out.key, '.'.join(out.attributes)) if out.attributes
+                else out.key)
+        if told in self._told or not self._named.add(out.value):
             return
-        self._told.add((path, out.key))
-        smach.logwarn('{}: userdata key {!r} ({}) of {} cannot be stored: {}. It will be missing '
-                      'where the machine is resumed'.format(
-                          path, out.key, out.kind, self._wrote.get(path, 'the script'), out.why))
+        self._told.add(told)
+        what = ('cannot be stored: {}. It'.format(out.why) if not out.attributes else
+                'is stored without its attributes {}, which are no fields of its class. They'
+                .format(', '.join(out.attributes)))
+        smach.logwarn('{}: userdata key {!r} ({}) of {} {} will be missing where the machine is '
+                      'resumed'.format(path, out.key, out.kind,
+                                       self._wrote.get(path, 'the script'), what))
 
 
 def _userdata_path(node: TreeNode) -> str:

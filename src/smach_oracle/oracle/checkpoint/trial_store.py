@@ -8,7 +8,7 @@ from typing import Callable, List, Optional, Set, Tuple, TypeVar
 import smach
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED, GOAL, KEPT, RENAMED, STRUCTURE
+from smach_oracle.store.names import BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
 from smach_oracle.store.rows import Fact, StoredTrial
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
@@ -27,6 +27,7 @@ from .container_facts import fact_of
 from .damaged import understood
 from .resuming import Resumption, go_on
 from .storable import CODECS
+from .store_observer import StoreObserver
 from .stored_tree import StoredTree, read_tree
 from .structure import structure_of
 
@@ -35,6 +36,8 @@ _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 _Read = TypeVar('_Read')
 BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
+NOT_STORED = ('{}: {} was not written any more after a fault of the store, so other states may '
+              'have run since then. A person is asked before anything moves')
 RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
 
 
@@ -116,6 +119,9 @@ class TrialStore:
                     earlier: int = 0) -> Resumption:
         """Return how a trial goes on. `tree`: what its last moment says."""
         moments = self._store.moments(trial.number)
+        is_broken = moments[-1].kind == BROKEN and not earlier
+        if is_broken:
+            smach.logwarn(NOT_STORED.format(self._top.path, self._store.path))
         # what runs elsewhere, and what was asked, has not become undone
         kept = {name: value for name, value in tree.whole.items()
                 if name.startswith(GOAL) or name == 'questions'}
@@ -127,7 +133,8 @@ class TrialStore:
         tree.whole.update(kept)
         return Resumption(trial, tree, earlier or moments[-1].number,
                           max(each.seq for each in moments), moments[-1].at,
-                          asks or bool(changed.changes and changed.renaming is None),
+                          asks or is_broken or bool(
+                              changed.changes and changed.renaming is None),
                           changed.changes, is_earlier=bool(earlier), renamed=changed.names,
                           structure=changed.before)
 
@@ -144,10 +151,10 @@ class TrialStore:
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
                                    settings.checkpoint_wait_s, smach.logwarn)
-        self._observer = Checkpointer(top, self._writer, CODECS,
-                                      None if resumed is None else resumed.tree,
-                                      resumed.moment if resumed and resumed.is_earlier else None,
-                                      self._facts_of_new_names(resumed))
+        self._observer = StoreObserver(top, self._writer, Checkpointer(
+            top, self._writer, CODECS, None if resumed is None else resumed.tree,
+            resumed.moment if resumed and resumed.is_earlier else None,
+            self._facts_of_new_names(resumed)))
         GOALS.observers.append(self._observer.goal_begins)
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
 

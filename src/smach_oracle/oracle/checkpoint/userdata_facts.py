@@ -1,41 +1,60 @@
 """Finds the keys of a container's userdata that are to be stored again."""
-import contextlib
 import marshal
 import weakref
-from typing import Any, Callable, Dict, FrozenSet, Iterator, NamedTuple, Optional, Union, cast
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    FrozenSet,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Tuple,
+    Union,
+    cast,
+)
 
+from smach_oracle.foreign import ends_program, text_of, type_name
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
 from smach_oracle.store.names import KEPT_OUT, KEY
 from smach_oracle.store.rows import Fact
 
 from ..machine.protocols import Machine
+from .container_facts import fact_of
 
-_WITHOUT_REFERENCES = 2  # a version of marshal's format, in which equal data look equal
-_FIXED = (str, int, float, bool, type(None), bytes)  # the same object has the same value
+# a version of marshal's format that writes what stands in several places once: data that hold
+# themselves have an end
+_WITH_REFERENCES = 4
+# ids of types of which the same object has the same value: classes may compare as they like
+_FIXED = frozenset(map(id, (str, int, float, bool, type(None), bytes)))
 
 
 class KeptOut(NamedTuple):
-    """A value that cannot be stored."""
+    """A value that cannot be stored, or one that is stored without some of its attributes."""
 
     key: str
     kind: str  # its type
     why: str
     value: object
+    attributes: Tuple[str, ...] = ()  # that are not stored, where the rest is
 
 
 class WeakIds:
-    """The objects that were seen. One that cannot be referred to weakly is new each time."""
+    """The objects that were seen. One that has no weak references, such as a list, is kept."""
 
     def __init__(self) -> None:
-        self._seen: Dict[int, 'weakref.ref[Any]'] = {}
+        self._seen: Dict[int, Callable[[], object]] = {}
 
     def add(self, value: object) -> bool:
         """Note an object, and return whether it is new."""
         seen = self._seen.get(id(value))
         if seen is not None and seen() is value:
             return False
-        with contextlib.suppress(TypeError):
-            self._seen[id(value)] = weakref.ref(value)
+        try:
+            self._seen[id(value)] = weakref.ref(cast(Any, value))
+        except TypeError:
+            self._seen[id(value)] = lambda: value
         return True
 
 
@@ -67,7 +86,7 @@ class UserdataFacts:
         for key, value in list(data.items()):
             before = known.get(key)
             if before is not None and before.value is value and (
-                    type(value) in _FIXED or (reached is not None and key not in reached)):
+                    id(type(value)) in _FIXED or (reached is not None and key not in reached)):
                 continue
             yield from self._look(key, value, before)
         for key in [key for key in known if key not in data]:
@@ -81,44 +100,58 @@ class UserdataFacts:
             if before.value is not value:
                 self._known[key] = before._replace(value=value)
             return
+        told = _told(key)
+        dropped: List[str] = []
         try:
-            if _told(key) != str(key):
-                raise NotStorable('its name is no UTF-8')
-            encoded = self._codecs.encode(value)
+            if told != text_of(key):
+                raise NotStorable('its name is no text in UTF-8')
+            encoded = self._codecs.encode(value, dropped.append)
         except NotStorable as err:
             yield from self._keep_out(key, value, str(err), before)
             return
-        self._known[key] = _Known(value, encoded._replace(parts={}), print_)
+        if dropped:
+            self._tell(KeptOut(told, type_name(value), '', value, tuple(sorted(set(dropped)))))
+        self._known[key] = _Known(value, encoded._replace(parts={}),
+                                  print_ if _is_plain(encoded) else None)
         if before is None or isinstance(before.stored, str):
             if before is not None:
-                yield Fact(self._path, KEPT_OUT + str(key), None)
+                yield Fact(self._path, KEPT_OUT + told, None)
         elif before.stored[:2] == encoded[:2]:
             return
-        yield Fact(self._path, KEY + str(key), encoded)
+        yield Fact(self._path, KEY + told, encoded)
 
     def _keep_out(self, key: str, value: object, why: str, before: Optional[_Known]
                   ) -> Iterator[Fact]:
-        kind = '{}.{}'.format(type(value).__module__, type(value).__qualname__)
+        kind, told = type_name(value), _told(key)
         self._known[key] = _Known(value, kind)
         if before is not None and before.stored == kind:
             return
         if before is not None and not isinstance(before.stored, str):
-            yield Fact(self._path, KEY + str(key), None)
-        yield Fact(self._path, KEPT_OUT + _told(key), self._codecs.encode([kind, why]))
-        self._tell(KeptOut(_told(key), kind, why, value))
+            yield Fact(self._path, KEY + told, None)
+        yield fact_of(self._path, KEPT_OUT + told, [kind, why])
+        self._tell(KeptOut(told, kind, why, value))
 
 
 def _told(key: object) -> str:
     """Return a key as a file can hold it: one made of a file's name may be no UTF-8."""
-    return str(key).encode('utf-8', 'backslashreplace').decode('utf-8')
+    return text_of(key).encode('utf-8', 'backslashreplace').decode('utf-8')
 
 
 def _print_of(value: object) -> Optional[bytes]:
     """Return bytes that differ where plain data differ, or None for anything else."""
     try:
-        return marshal.dumps(cast(Any, value), _WITHOUT_REFERENCES)  # to compare, never loaded
-    except ValueError:
+        return marshal.dumps(cast(Any, value), _WITH_REFERENCES)  # to compare, never loaded
+    except BaseException as err:  # a value that lends its memory may raise anything
+        if ends_program(err):
+            raise
         return None
+
+
+def _is_plain(encoded: Encoded) -> bool:
+    """Whether a value has no bytes and no arrays: marshal does not tell these apart."""
+    parts, whole = encoded.parts, encoded.whole
+    text = encoded.text or ('' if whole is None else parts[whole].decode('ascii'))
+    return len(parts) == (whole is not None) and '"$b' not in text
 
 
 def keys_of(machine: Machine, label: str) -> FrozenSet[str]:

@@ -7,6 +7,7 @@ is preempted, and waited for.
 from typing import List, Optional, cast
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..branches.border import IteratorBorder, border_of
 from ..machine.nesting import machines_below
@@ -89,7 +90,7 @@ def _preempt(state: Optional[smach.State]) -> None:
         if state is not None:
             state.request_preempt()
     except Exception as err:  # it is the user's
-        smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
+        smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 
 
 def _leave_way(left: List[TreeNode]) -> None:

@@ -3,6 +3,7 @@ import time
 from typing import Any, Mapping, Optional
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..asking.question import AnswerKind
 from ..branches.passed_over import tell_passed_over
@@ -220,8 +221,8 @@ class Step:
             node.warn('was left for a state of another container, and {}'.format(outcome.text),
                       record.label)
         if error is not None:
-            smach.logwarn('{}/{}: raised {!r} when it was left'.format(
-                node.path, record.label, error))
+            smach.logwarn('{}/{}: raised {} when it was left'.format(
+                node.path, record.label, repr_of(error)))
         node.records.visit_ended(record, told, departure.result_of(node))
         if departure.arrives_at is not node:
             wanted = leaving_outcome(self._machine, node.in_force.failing, None)
@@ -316,8 +317,8 @@ class Step:
         node, record, answer = self._node, self._record, taken.answer
         recall_preempts(self._machine._states[record.label])
         if taken.error is not None:
-            smach.logwarn('{}/{}: raised {!r} when it was preempted'.format(
-                node.path, record.label, taken.error))
+            smach.logwarn('{}/{}: raised {} when it was preempted'.format(
+                node.path, record.label, repr_of(taken.error)))
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
         node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
                                  AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)

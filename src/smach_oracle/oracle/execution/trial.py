@@ -6,6 +6,7 @@ import time
 from typing import Any, Callable, Dict, Optional
 
 import smach
+from smach_oracle.foreign import error_text
 
 from ..checkpoint.resuming import Resumption, tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
@@ -147,5 +148,5 @@ def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
 def _why(outcome: Optional[str], error: Optional[BaseException]) -> str:
     """Return why an execution has no outcome, '' where it has one."""
     if error is not None:
-        return '{}: {}'.format(type(error).__name__, error)
+        return error_text(error)
     return NO_OUTCOME if outcome is None else ''

@@ -4,6 +4,7 @@ from time import monotonic
 from typing import Any, Callable, Dict, Optional, Tuple
 
 import smach
+from smach_oracle.foreign import repr_of
 
 Ring = Callable[[], None]
 
@@ -60,4 +61,4 @@ def _call(ring: Ring) -> None:
     try:
         ring()
     except Exception as err:
-        smach.logerr('an alarm has failed: {!r}'.format(err))
+        smach.logerr('an alarm has failed: {}'.format(repr_of(err)))

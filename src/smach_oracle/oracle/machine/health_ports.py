@@ -2,6 +2,8 @@
 import time
 from typing import Callable, Optional, Protocol
 
+from smach_oracle.foreign import error_text, repr_of
+
 from ..background import BackgroundCall
 from ..settings.health import HealthFunction
 
@@ -49,10 +51,10 @@ class HealthFunctionPort:
 
     def _in_words(self, call: BackgroundCall) -> str:
         if call.error is not None:
-            return '{}: {}: {}'.format(self._name, type(call.error).__name__, call.error)
+            return '{}: {}'.format(self._name, error_text(call.error))
         result = call.result
         if isinstance(result, str):
             return '{}: {}'.format(self._name, result) if result else ''
         if isinstance(result, bool) or type(result).__name__ == 'bool_':  # numpy's, too
             return '' if result else self._name
-        return '{} returned {!r}; True and \'\' are well'.format(self._name, result)
+        return '{} returned {}; True and \'\' are well'.format(self._name, repr_of(result))

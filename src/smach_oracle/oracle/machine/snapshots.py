@@ -3,6 +3,8 @@ import copy
 import pickle
 from typing import Any, Callable, Dict, Iterable, Mapping, Optional
 
+from smach_oracle.foreign import ends_program, error_text
+
 
 def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
                   warn: Callable[[str], None]) -> Dict[str, Any]:
@@ -15,10 +17,12 @@ def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
         if key in snapshot:
             try:
                 snapshot[key] = copy.deepcopy(snapshot[key])
-            except Exception as err:
+            except BaseException as err:
                 # whatever a user's object raises: a reference is better than a dead machine
-                warn('Userdata key {!r} cannot be deep-copied, a reference is kept: {!r}'.format(
-                    key, err))
+                if ends_program(err):
+                    raise
+                warn('Userdata key {!r} cannot be deep-copied, a reference is kept: {}'.format(
+                    key, error_text(err)))
     return snapshot
 
 
@@ -42,7 +46,9 @@ def restore(data: Dict[str, Any], snapshot: Mapping[str, Any], keep: Iterable[st
 def copied(value: object) -> object:
     try:
         return copy.deepcopy(value)
-    except Exception:  # it could not be copied at entry either, and that was said then
+    except BaseException as err:  # it could not be copied at entry either, and that was said then
+        if ends_program(err):
+            raise
         return value
 
 
@@ -50,5 +56,7 @@ def fingerprint(value: object) -> Optional[bytes]:
     """Return bytes that differ where the value differs, or None where that cannot be told."""
     try:
         return pickle.dumps(value)  # written to compare, never loaded
-    except Exception:  # unpicklable: only an assignment can be told
+    except BaseException as err:  # unpicklable: only an assignment can be told
+        if ends_program(err):
+            raise
         return None

@@ -11,6 +11,7 @@ import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..background import BackgroundCall
 from .limited_run import LimitedRun, enter
@@ -142,7 +143,7 @@ class Workers:
         try:
             state.request_preempt()
         except Exception as err:  # a user's request_preempt must not keep the machine from going on
-            smach.logerr('request_preempt of {!r} failed: {!r}'.format(state, err))
+            smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
         try:
             wait(call.done, grace_s)
         finally:
@@ -193,7 +194,7 @@ def _stop_bare_machines(state: smach.State) -> None:
         for child in _children(state):
             _stop_bare_machines(child)
     except Exception as err:  # a user's container may be of any make
-        smach.logwarn('Could not stop what is left of {!r}: {!r}'.format(state, err))
+        smach.logwarn('Could not stop what is left of {}: {}'.format(repr_of(state), repr_of(err)))
 
 
 def _children(state: smach.State) -> List[smach.State]:
@@ -208,4 +209,5 @@ def recall_preempts(state: smach.State) -> None:
         for child in _children(state):
             recall_preempts(child)
     except Exception as err:  # a user's container may be of any make
-        smach.logwarn('Could not take a preempt request back from {!r}: {!r}'.format(state, err))
+        smach.logwarn('Could not take a preempt request back from {}: {}'.format(
+            repr_of(state), repr_of(err)))

@@ -2,13 +2,16 @@
 
 An observer is a callable that takes one `Event`. It is called in the thread in which the step
 happened, in the order of the sequence numbers, before the machine goes on: an observer that blocks
-holds the machine back, which is how a recorder loses nothing. An observer that raises is logged and
-does not stop the machine.
+holds the machine back, which is how a recorder loses nothing. An observer that raises does not stop
+the machine. The log names it once. It gets the events that follow.
 """
 import threading
 import time
 from enum import IntEnum
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional
+from types import MethodType
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+
+from smach_oracle.foreign import ends_program, error_text, repr_of
 
 NAN = float('nan')
 # Text of the TRIAL_END and CONTAINER_END of an execute() that returned None.
@@ -90,6 +93,13 @@ class Event(NamedTuple):
 Observer = Callable[[Event], None]
 
 
+class OwnObserver:
+    """An observer of this package, or an object whose method is one: what the log calls it."""
+
+    observer_name = 'an observer'
+    without_it = 'this event is not told to it'
+
+
 class EventSource:
     """Numbers the events of one trial after another and hands them to the observers.
 
@@ -105,6 +115,7 @@ class EventSource:
         self.observers: List[Observer] = []
         self.trial_id = ''
         self._over = False  # the trial
+        self._told: List[Observer] = []  # those that have failed, which the log has named
 
     def begin_trial(self, trial_id: str) -> None:
         """Number from 0 again under a new trial id."""
@@ -140,9 +151,22 @@ class EventSource:
             for observer in tuple(self.observers):
                 try:
                     observer(event)
-                except Exception as err:  # an observer's fault must not stop the robot
-                    self._log_error('Observer {!r} failed on event {} ({}): {!r}'.format(
-                        observer, event.seq, event.kind.name, err))
+                except BaseException as err:  # an observer's fault must not stop the robot
+                    if ends_program(err):
+                        raise
+                    self._tell_failed(observer, event, err)
+
+    def _tell_failed(self, observer: Observer, event: Event, err: BaseException) -> None:
+        """Log that an observer has failed, the first time that it does."""
+        if any(each is observer for each in self._told):
+            return
+        self._told = [each for each in self._told
+                      if any(each is other for other in self.observers)] + [observer]
+        name, without_it = _in_words(observer)
+        self._log_error('{}: {} failed at {} of {}: {}. So {}. The machine goes on. This is said '
+                        'once'.format(self.trial_id, name, event.kind.name,
+                                      '/'.join(filter(None, (event.path, event.state))),
+                                      error_text(err), without_it))
 
     def __getstate__(self) -> Dict[str, Any]:
         """Without the lock and the observers: neither can travel with a pickled machine."""
@@ -153,3 +177,13 @@ class EventSource:
         self._over = False
         self._lock = threading.RLock()
         self.observers = []
+        self._told = []
+
+
+def _in_words(observer: Observer) -> Tuple[str, str]:
+    """Return what the log calls an observer, and what its failure means for the user."""
+    given: Any = observer
+    owner = given.__self__ if type(given) is MethodType else given
+    if issubclass(type(owner), OwnObserver):
+        return owner.observer_name, owner.without_it
+    return 'the observer {}'.format(repr_of(observer)), 'it has missed this event'

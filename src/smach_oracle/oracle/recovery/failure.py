@@ -7,6 +7,7 @@ import traceback
 from typing import Any, Callable, NamedTuple, Optional, Tuple
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..asking.question import names
 from ..machine.protocols import Machine
@@ -203,7 +204,8 @@ def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
     if isinstance(err, smach.InvalidUserCodeError):
         return err
     wrapped: Exception = smach.InvalidUserCodeError(
-        'Could not execute state {!r} of type {!r}: {}'.format(label, state, traceback_of(err)))
+        'Could not execute state {!r} of type {}: {}'.format(
+            label, repr_of(state), traceback_of(err)))
     wrapped.__cause__ = err
     return wrapped
 
@@ -215,8 +217,8 @@ def traceback_of(err: Exception) -> str:
 
 def unregistered_text(label: str, state: smach.State, outcome: Any) -> str:
     """Say that the state has not registered the outcome."""
-    return 'State {!r} of type {!r} returned {!r}; its registered outcomes are {}'.format(
-        label, state, outcome, names(state.get_registered_outcomes()))
+    return 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
+        label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes()))
 
 
 def unbound_text(label: str, outcome: str, container_outcomes: Tuple[str, ...]) -> str:

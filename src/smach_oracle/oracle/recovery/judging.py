@@ -3,6 +3,7 @@ from functools import lru_cache, partial
 from typing import Any, Callable, NamedTuple, Optional, Union
 
 import smach
+from smach_oracle.foreign import error_text, repr_of
 
 from ..machine.nesting import items_under_way
 from ..machine.tree_node import TreeNode
@@ -48,7 +49,7 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
     label, state = record.label, machine._states[record.label]
     if error is not None:
         return Failure(label, FailureKind.EXCEPTION, '',
-                       '{}: {}'.format(type(error).__name__, error), None,
+                       error_text(error), None,
                        _once(partial(raised_error, label, state, error)), traceback_of(error))
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
@@ -96,7 +97,8 @@ def _description(node: TreeNode, label: str, state: smach.State) -> str:
     try:
         return node.tree.describe_failure(state)
     except Exception as err:  # it looks into states of any make
-        smach.logwarn('{}/{}: cannot say more of its failure: {!r}'.format(node.path, label, err))
+        smach.logwarn('{}/{}: cannot say more of its failure: {}'.format(
+            node.path, label, repr_of(err)))
         return ''
 
 

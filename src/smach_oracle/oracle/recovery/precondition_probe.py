@@ -6,6 +6,8 @@ that nobody waits for.
 """
 from typing import List, NamedTuple, Optional
 
+from smach_oracle.foreign import repr_of
+
 from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
@@ -66,10 +68,11 @@ class LivePreconditionProbe(PreconditionProbe):
         try:
             result = spec.target(behind(self._gate))
         except Exception as err:
-            return PreconditionStatus(None, '{} raised {!r}'.format(spec.name, err))
+            return PreconditionStatus(None, '{} raised {}'.format(spec.name, repr_of(err)))
         if result is None:
             return PreconditionStatus(None, '{} returned None; True is met'.format(spec.name))
-        return PreconditionStatus(bool(result), '{} returned {!r}'.format(spec.name, result)[:300])
+        return PreconditionStatus(bool(result), '{} returned {}'.format(
+            spec.name, repr_of(result))[:300])
 
     def _last(self, name: str) -> str:
         place = place_named(self._node, name)

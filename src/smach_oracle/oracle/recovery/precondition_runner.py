@@ -7,6 +7,7 @@ import threading
 from typing import Any, Iterator, List, NamedTuple, Optional
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..control.hold import HeldPlace
 from ..machine.repeats import note_precondition, repeated_by_running
@@ -106,7 +107,7 @@ class PreconditionRunner:
                                              self._settings.time_limit_s,
                                              self._settings.grace_period_s, self._stopped)
         if isinstance(ended.error, Exception):
-            raise NotMet('{} raised {!r}'.format(spec.name, ended.error)) from ended.error
+            raise NotMet('{} raised {}'.format(spec.name, repr_of(ended.error))) from ended.error
         if ended.error is not None:
             raise ended.error
         if ended.overrun:
@@ -115,7 +116,7 @@ class PreconditionRunner:
         if result is None:
             raise NotMet('{} returned None; True is met'.format(spec.name))
         if not result:
-            raise NotMet('{} returned {!r}'.format(spec.name, result))
+            raise NotMet('{} returned {}'.format(spec.name, repr_of(result)))
 
     def _stopped(self) -> bool:
         return self._cancelled or smach.is_shutdown() or self._node.is_left_behind()
@@ -190,7 +191,7 @@ class PreconditionRunner:
         except NotMet:
             raise
         except Exception as err:
-            raise NotMet('raised {!r}'.format(err)) from err
+            raise NotMet('raised {}'.format(repr_of(err))) from err
         finally:
             site.node.end_precondition(state)
             self._ended(state)
@@ -222,7 +223,7 @@ class PreconditionRunner:
         if self._cancelled:
             raise NotMet('preempted')
         if outcome not in state.get_registered_outcomes():
-            raise NotMet('returned {!r}, which is not one of its outcomes'.format(outcome))
+            raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
         failing = site.node.in_force.failing
         if label:
             listed = site.node.settings_of(label).failure_outcomes

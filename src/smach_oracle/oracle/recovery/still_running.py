@@ -8,6 +8,7 @@ import time
 from typing import Any, List, Mapping, NamedTuple, Optional
 
 import smach
+from smach_oracle.foreign import repr_of
 
 from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry, Reply
@@ -164,7 +165,8 @@ class WatchedVisit:
             try:
                 self._state.request_preempt()
             except Exception as err:  # it is the user's
-                smach.logerr('request_preempt of {!r} failed: {!r}'.format(self._state, err))
+                smach.logerr('request_preempt of {} failed: {}'.format(
+                    repr_of(self._state), repr_of(err)))
         if not self._ended.wait(self._record.settings.grace_period_s):
             self.warn('does not heed its preempt and still runs; the machine waits for its end, '
                       'and then goes as answered')

@@ -1,6 +1,8 @@
 """Objects that settings name by 'python:module:attribute', and what is wrong with such a name."""
 from typing import Any, Callable
 
+from smach_oracle.foreign import error_text
+
 from ..errors import SettingsError
 
 PYTHON = 'python:'
@@ -23,6 +25,6 @@ def named_object(key: str, given: str, wanted: str, resolver: Resolver) -> Any:
     except (ImportError, ValueError) as err:
         why = str(err)
     except Exception as err:
-        why = 'importing it raised {}: {}'.format(type(err).__name__, err)
+        why = 'importing it raised {}'.format(error_text(err))
     raise SettingsError(key, given, _ALLOWED.format(wanted),
                         problem='cannot be found: {}'.format(why))

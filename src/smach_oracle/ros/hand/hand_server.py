@@ -11,7 +11,7 @@ import rospy
 
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.operator_hand import OperatorHand
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event, EventKind, OwnObserver
 from smach_oracle.srv import (
     CommandMachine,
     CommandMachineRequest,
@@ -40,8 +40,11 @@ _CHANGES = frozenset([
 ])
 
 
-class HandServer:
+class HandServer(OwnObserver):
     """Offers the hand on every machine that it watches."""
+
+    observer_name = 'the publisher of ~oracle/control'
+    without_it = 'consoles show an older state of the machine'
 
     def __init__(self) -> None:
         self._machines: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by path

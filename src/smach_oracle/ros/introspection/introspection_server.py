@@ -29,6 +29,7 @@ from smach_msgs.msg import (
     SmachContainerStatus,
     SmachContainerStructure,
 )
+from smach_oracle.foreign import text_of, type_name
 
 from .container_watch import ContainerTree, ContainerWatch
 from .heartbeat_rounds import HeartbeatRounds
@@ -249,7 +250,7 @@ class IntrospectionServer(object):
             self._left_out.add((path, key))
             smach.logwarn(
                 "Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s" %
-                (key, path, _text_of(err)))
+                (text_of(key), path, text_of(err) or type_name(err)))
 
     def _on_init_command(self, command: SmachContainerInitialStatusCmd) -> None:
         watch = self._tree.by_path.get(command.path)
@@ -264,14 +265,6 @@ class IntrospectionServer(object):
         if set_initial_states(watch, list(command.initial_states), data, sender_of(command)):
             confirm = functools.partial(self._current_status, command.path, watch, 'REMOTE_INIT')
             self._publish(self._status_pub, command.path, confirm)
-
-
-def _text_of(err: BaseException) -> str:
-    """Its text. That of an object of somebody's own may raise."""
-    try:
-        return str(err)
-    except Exception:
-        return type(err).__name__
 
 
 def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any],

@@ -8,13 +8,13 @@ import base64
 import binascii
 import io
 import pickle
-from typing import Any, Callable, Dict, Mapping
+from typing import Any, Callable, Dict, Mapping, Optional, Tuple
+
+from smach_oracle.foreign import ends_program
 
 PROTOCOL = 2
 """What Python 2 viewers can read too."""
 LONGEST_TEXT = 16 * 1024 * 1024
-UNPICKLABLE = (Exception, SystemExit, GeneratorExit)
-"""What the classes of a script may raise where they are pickled."""
 
 
 class RefusedDataError(ValueError):
@@ -85,23 +85,27 @@ def encode_userdata(data: Mapping[str, Any],
 
     A key that cannot be pickled is left out and handed to ``leave_out(key, error)``.
     """
-    try:
-        return _encode(dict(data))
-    except UNPICKLABLE:
+    whole, _ = _pickled(dict(data))
+    if whole is None:
         # Which key it was, and whether the others are well, only shows one by one.
         picklable = {}
         for key, value in dict(data).items():
-            try:
-                pickle.dumps(value, PROTOCOL)
+            text, error = _pickled(value)
+            if text is not None:
                 picklable[key] = value
-            except UNPICKLABLE as err:
-                leave_out(key, err)
+            elif error is not None:
+                leave_out(key, error)
+        whole, error = _pickled(picklable)
+        if error is not None:
+            leave_out('*', error)
+    return base64.b64encode(whole or pickle.dumps({}, PROTOCOL)).decode('ascii')
+
+
+def _pickled(value: object) -> Tuple[Optional[bytes], Optional[BaseException]]:
+    """Return a value pickled, or else what its classes raised, ``sys.exit`` among it."""
     try:
-        return _encode(picklable)
-    except UNPICKLABLE as err:
-        leave_out('*', err)
-        return _encode({})
-
-
-def _encode(data: Dict[str, Any]) -> str:
-    return base64.b64encode(pickle.dumps(data, PROTOCOL)).decode('ascii')
+        return pickle.dumps(value, PROTOCOL), None
+    except BaseException as err:
+        if ends_program(err) and not isinstance(err, SystemExit):
+            raise
+        return None, err

@@ -3,7 +3,6 @@
 Through a message object an event costs five times as much, and the machine waits.
 """
 import io
-import json
 import struct
 from typing import Callable, Optional
 
@@ -13,6 +12,7 @@ from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.records.events import Event
 
 from .. import event_messages
+from ..sendable_text import sendable_text
 from .bag_format import Stamp
 from .bag_writer import MessageType
 
@@ -52,11 +52,11 @@ def _pack_directly(event: Event, stamp: Stamp) -> bytes:
          _string(event.target),
          _FAILURE.pack(event.failure_kind, event.failure_class, event.rate,
                        bool(event.continuous)), _string(event.query_id), _string(event.by),
-         _string(event.text), _string(json.dumps(event.data, default=str) if event.data else '')))
+         _string(event.text), _string(event_messages.json_of(event.data))))
 
 
 def _string(value: object) -> bytes:
-    data = (value if isinstance(value, str) else str(value)).encode('utf-8', 'backslashreplace')
+    data = sendable_text(value).encode('utf-8')
     return _LENGTH.pack(len(data)) + data
 
 

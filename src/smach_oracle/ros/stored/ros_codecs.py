@@ -83,7 +83,10 @@ def _of_array(array: 'numpy.ndarray') -> List[object]:
 def _to_array(told: List[Any]) -> 'numpy.ndarray':
     import numpy
     described, shape, data = told
-    return numpy.frombuffer(data, _to_dtype(described)).reshape(shape).copy()
+    dtype = _to_dtype(described)
+    if not dtype.itemsize:  # such as of empty texts, which frombuffer refuses
+        return numpy.zeros(shape, dtype)
+    return numpy.frombuffer(data, dtype).reshape(shape).copy()
 
 
 def _of_scalar(scalar: 'numpy.generic') -> List[object]:
@@ -91,9 +94,9 @@ def _of_scalar(scalar: 'numpy.generic') -> List[object]:
 
 
 def _to_scalar(told: List[Any]) -> 'numpy.generic':
-    import numpy
     described, data = told
-    return numpy.frombuffer(data, _to_dtype(described))[0]
+    scalar: 'numpy.generic' = _to_array([described, (), data])[()]
+    return scalar
 
 
 def _of_dtype(dtype: 'numpy.dtype') -> object:
