@@ -13,7 +13,7 @@ from .execution.step import Step, before_step
 from .execution.trial import run_container
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
-from .machine.nesting import nodes_of
+from .machine.learned_rates import read_by_hand, write_by_hand
 from .machine.oracle import oracle_of
 from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
@@ -21,7 +21,6 @@ from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
-from .records.rates_file import read_rates, write_rates
 from .settings.health import HealthFunction
 from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
@@ -160,14 +159,14 @@ class OracleContainer(smach.StateMachine):
 
         :raises OSError: where it cannot be written. An old file is then untouched.
         """
-        write_rates(path, nodes_of(self))
+        write_by_hand(self._oracle, path)
 
     def load_rates(self, path: str) -> None:
         """Take over the learned rates of a file that `save_rates` wrote.
 
         A missing or damaged file is logged and changes nothing.
         """
-        read_rates(path, nodes_of(self))
+        read_by_hand(self._oracle, path)
 
     # -- structure
 

@@ -55,10 +55,13 @@ class ContainerFacts:
 
     def _of_state(self, record: StateRecord) -> Dict[str, Any]:
         mark = self._node.records.marks.of(record.label)
-        return {'learned': record.learned(), 'counts': [
+        told = {'learned': record.learned(), 'counts': [
             record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
                 'longest_s': record.longest_s,
                 'mark': [mark.reached, mark.executed, mark.done, mark.spent]}
+        if record.shared:
+            told['shared'] = record.shared
+        return told
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits = history.visits

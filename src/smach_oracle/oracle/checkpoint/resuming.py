@@ -194,6 +194,7 @@ def _begin_at(top: TreeNode, resumption: Resumption) -> None:
 def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
     """Have what was learned and counted of a state, and return the number of its latest visit."""
     record.restore(told['learned'])
+    record.shared = told.get('shared', record.shared)
     record.go_on(told['counts'], told['longest_s'])
     mark = node.records.marks.of(record.label)
     mark.reached, mark.executed, mark.done, mark.spent = told['mark']

@@ -2,6 +2,7 @@
 import copy
 from typing import Any, Dict, Mapping
 
+from ..decision.merged_rates import base_of
 from ..decision.policy import FailureContext
 from ..records.history import History
 from ..records.state_record import FastEdge, StateRecord
@@ -22,32 +23,41 @@ class ContainerRecords:
         self.marks = VisitMarks()
         self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
-        self._to_come: Dict[str, Dict[str, Any]] = {}
+        self.to_come: Dict[str, Dict[str, Any]] = {}
 
     def make(self, label: str, settings: StateSettings, special: bool) -> StateRecord:
         """Make the record of a state, with what a rates file says of it."""
         record = self.by_label[label] = StateRecord(label, settings, special)
-        learned = self._to_come.pop(label, None)
+        learned = self.to_come.pop(label, None)
         if learned is not None:
             record.restore(learned)
+            record.shared = base_of(learned)
         return record
 
     def learned(self) -> Dict[str, Any]:
-        """Return what was learned of each state, as plain data."""
-        learned = dict(self._to_come)
-        learned.update((label, record.learned()) for label, record in list(self.by_label.items()))
-        return learned
+        """Return what was learned of each state that is there, as plain data."""
+        return {label: record.learned() for label, record in list(self.by_label.items())}
 
-    def take_over(self, label: str, settings: StateSettings, learned: Mapping[str, Any]) -> None:
+    def take_over(self, label: str, settings: StateSettings, learned: Mapping[str, Any],
+                  is_shared: bool) -> None:
         """Take over what was learned of a state, which may not be there yet.
+
+        `is_shared`: whether the rates file has it.
 
         :raises ValueError: where it cannot be read.
         """
         StateRecord(label, settings).restore(learned)  # raises here, not in the middle of a trial
-        if label in self.by_label:
-            self.by_label[label].restore(learned)
-        else:
-            self._to_come[label] = dict(learned)
+        if label not in self.by_label:
+            self.to_come[label] = dict(learned)
+            return
+        self.by_label[label].restore(learned)
+        if is_shared:
+            self.by_label[label].shared = base_of(learned)
+
+    def forget_shared(self) -> None:
+        """Note that another rates file is used from now on, which has nothing of this yet."""
+        for record in self.by_label.values():
+            record.shared = {}
 
     def begin_trial(self) -> None:
         """Forget what belongs to a trial. The rates stay."""
@@ -99,5 +109,5 @@ class ContainerRecords:
         twin.history = copy.deepcopy(self.history)
         twin.marks = VisitMarks()
         twin.oracle_edges = dict(self.oracle_edges)
-        twin._to_come = dict(self._to_come)
+        twin.to_come = dict(self.to_come)
         return twin

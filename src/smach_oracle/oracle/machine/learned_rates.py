@@ -1,11 +1,11 @@
 """The rates file of a tree: written and read where the settings name one."""
-from ..records.rates_file import read_rates, write_rates
+from ..records.rates_file import read_rates, share_rates, write_rates
 from .nesting import nodes_of
 from .tree_node import TreeNode
 
 
 def save_rates(node: TreeNode) -> None:
-    """Write the rates file of the top machine, if there is one.
+    """Add what was learned to the rates file of the top machine, if there is one.
 
     What goes wrong is logged and stops nothing.
     """
@@ -15,7 +15,7 @@ def save_rates(node: TreeNode) -> None:
         return
     try:
         with node.tree.rates_lock:
-            write_rates(path, nodes_of(top.machine))
+            share_rates(path, _name(top), nodes_of(top.machine))
     except OSError as err:
         node.warn('rates file {} cannot be written: {}'.format(path, err))
 
@@ -25,4 +25,21 @@ def load_rates(node: TreeNode) -> None:
     path = node.settings.rates_file
     if node.parent is None and node.tree.rates_loaded != path:
         node.tree.rates_loaded = path
-        read_rates(path, nodes_of(node.machine))
+        read_rates(path, _name(node), nodes_of(node.machine), is_shared=True)
+
+
+def write_by_hand(node: TreeNode, path: str) -> None:
+    """Write what a machine has learned to a file.
+
+    :raises OSError: where it cannot be written.
+    """
+    write_rates(path, _name(node.top()), nodes_of(node.machine))
+
+
+def read_by_hand(node: TreeNode, path: str) -> None:
+    """Take over what a file has of a machine."""
+    read_rates(path, _name(node.top()), nodes_of(node.machine), is_shared=False)
+
+
+def _name(top: TreeNode) -> str:
+    return top.name if top.is_named else ''

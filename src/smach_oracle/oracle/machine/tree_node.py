@@ -349,16 +349,12 @@ class TreeNode:
 
     # -- learned rates, for a rates file (rates_file.Learner)
 
-    def learned_rates(self) -> Dict[str, Any]:
-        """Return what was learned of each state, as plain data."""
-        return self.records.learned()
-
-    def learn(self, label: str, learned: Mapping[str, Any]) -> None:
-        """Take over what was learned of a state.
+    def learn(self, label: str, learned: Mapping[str, Any], is_shared: bool) -> None:
+        """Take over what was learned of a state. `is_shared`: whether the rates file has it.
 
         :raises ValueError: where it cannot be read.
         """
-        self.records.take_over(label, self.settings_of(label), learned)
+        self.records.take_over(label, self.settings_of(label), learned, is_shared)
 
     def twin_for(self, machine: WrappedMachine) -> 'TreeNode':
         """Return a node for a shallow copy of the machine.

@@ -1,25 +1,64 @@
-"""Learned rates, kept from program to program in a JSON file.
+"""Learned rates, kept from program to program in a JSON file that several machines may share.
 
-A crash at any moment leaves the old file or the new one.
+A crash at any moment leaves the old file or the new one. Who writes reads the file first, and adds
+what its machine has learned since it last read or wrote. A lock on the folder keeps others out
+meanwhile.
 
 Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STATE: estimator
-snapshot}}}, with PATH relative to the top machine ('' itself), so that renaming the machine loses
-nothing.
+snapshot}}, "machines": {NAME: containers}}, with PATH relative to the top machine ('' itself).
+"machines" is there once a machine with a name has written. "containers" has all states of all
+machines then, for programs that do not know "machines". A machine without a name goes by ''.
 """
 import json
 import os
 import tempfile
-from typing import Any, Dict, Iterable, Mapping, Protocol
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence
 
 import smach
+
+from .folder_lock import folder_lock
 
 FORMAT = 'smach_oracle rates'
 VERSION = 1
 DAMAGED = '.damaged'
+States = Dict[str, Any]  # what was learned, by label
+Containers = Dict[str, States]  # by path below the top machine
+Machines = Dict[str, Containers]  # by name, '' for one that has none
+
+
+class Record(Protocol):
+    """What is learned of one state."""
+
+    def learned(self) -> Dict[str, Any]:
+        """Return it as plain data."""
+
+    def merged_with(self, theirs: Mapping[str, Any]) -> Dict[str, Any]:
+        """Return what others have learned, with what is new here.
+
+        :raises ValueError: where theirs cannot be read.
+        """
+
+    def share(self, before: Mapping[str, Any], written: Mapping[str, Any]) -> None:
+        """Have what is shared now. `before`: what was learned here when it was merged."""
+
+
+class Records(Protocol):
+    """What is learned in one container. `to_come`: of states that are not there yet."""
+
+    by_label: Any
+    to_come: Dict[str, Dict[str, Any]]
+
+    def learned(self) -> Dict[str, Any]:
+        """Return what was learned of each state that is there, as plain data."""
+
+    def forget_shared(self) -> None:
+        """Note that another file is used from now on."""
 
 
 class Learner(Protocol):
     """A container that learns rates."""
+
+    records: Any  # Records
 
     @property
     def path(self) -> str:
@@ -29,41 +68,109 @@ class Learner(Protocol):
     def relative_path(self) -> str:
         """Its path below the top machine, '' for that itself."""
 
-    def learned_rates(self) -> Dict[str, Any]:
-        """Return what was learned of each state, as plain data."""
+    def labels(self) -> Iterable[str]:
+        """Return the labels of its states."""
 
-    def learn(self, label: str, learned: Mapping[str, Any]) -> None:
+    def learn(self, label: str, learned: Mapping[str, Any], is_shared: bool) -> None:
         """Take over what was learned of a state.
 
         :raises ValueError: where it cannot be read.
         """
 
 
-def learned_by(containers: Iterable[Learner]) -> Dict[str, Dict[str, Any]]:
+class _Written(NamedTuple):
+    """What was learned of one state, here and in all."""
+
+    record: Record
+    before: Dict[str, Any]
+    written: Dict[str, Any]
+
+
+def learned_by(containers: Iterable[Learner]) -> Containers:
     """Return what was learned, as the "containers" of a rates file."""
-    learned: Dict[str, Dict[str, Any]] = {}
-    for container in containers:  # the branches of a Concurrence have one path, each a state of it
-        learned.setdefault(container.relative_path, {}).update(container.learned_rates())
+    learners = list(containers)
+    learned: Containers = {}
+    # the branches of a Concurrence have one path, and each is a state of it
+    for learner in learners:
+        learned.setdefault(learner.relative_path, {}).update(learner.records.to_come)
+    for learner in learners:
+        learned[learner.relative_path].update(learner.records.learned())
     return learned
 
 
-def write_rates(path: str, learners: Iterable[Learner]) -> None:
-    """Write what was learned to `path`, atomically and durably.
+def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
+    """Add to `path` what a machine has learned since it was last read or written, and take over
+    what others have added there. Written atomically and durably.
 
-    :raises OSError: where it cannot be written. The old file is
-    then untouched.
+    :raises OSError: where it cannot be written, or another program keeps the file locked. The old
+        file is then untouched, and the next call adds what this one did not.
     """
-    write_learned(path, learned_by(learners))
+    learners = list(learners)
+    path = os.path.realpath(path)
+    with folder_lock(os.path.dirname(path)):
+        machines = _machines_or_none(path)
+        done = _merge(path, machines.setdefault(name, {}), learners)
+        _write(path, machines, name)
+    for each in done:
+        each.record.share(each.before, each.written)
 
 
-def write_learned(path: str, containers: Mapping[str, Any]) -> None:
-    """Write what `learned_by` returned, as `write_rates` does.
+def _merge(path: str, containers: Containers, learners: Sequence[Learner]) -> List[_Written]:
+    """Put what is new of a machine into what its file has."""
+    done = []
+    for learner in learners:
+        states = containers.setdefault(learner.relative_path, {})
+        for label, record in list(learner.records.by_label.items()):
+            before = record.learned()
+            written = before
+            if label in states:
+                try:
+                    written = record.merged_with(states[label])
+                except ValueError as err:
+                    _tell_unusable(path, label, learner, err)
+            done.append(_Written(record, before, written))
+            states[label] = written
+    for learner in learners:
+        states = containers[learner.relative_path]
+        for label, learned in learner.records.to_come.items():
+            states.setdefault(label, learned)
+    return done
+
+
+def write_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
+    """Write what a machine has learned to `path`, in place of what the file had of it.
+
+    Atomically and durably. What the file has of other machines stays.
 
     :raises OSError: where it cannot be written. The old file is then untouched.
     """
-    text = json.dumps({'format': FORMAT, 'version': VERSION, 'containers': containers}, indent=1,
-                      sort_keys=True)
-    folder = os.path.dirname(os.path.abspath(path))
+    path = os.path.realpath(path)
+    with folder_lock(os.path.dirname(path)):
+        machines = _machines_or_none(path)
+        machines[name] = learned_by(learners)
+        _write(path, machines, name)
+
+
+def write_learned(path: str, containers: Mapping[str, Any]) -> None:
+    """Write what `learned_by` returned, in place of all that the file had.
+
+    :raises OSError: where it cannot be written. The old file is then untouched.
+    """
+    path = os.path.realpath(path)
+    with folder_lock(os.path.dirname(path)):
+        _write(path, {'': dict(containers)}, '')
+
+
+def _write(path: str, machines: Machines, name: str) -> None:
+    """Write all. In "containers" the machine of this name wins, as the latest."""
+    content: Dict[str, Any] = {'format': FORMAT, 'version': VERSION, 'containers': {}}
+    for each in [each for each in machines if each != name] + [name]:
+        for place, states in machines[each].items():
+            content['containers'].setdefault(place, {}).update(states)
+    if set(machines) != {''}:
+        content['machines'] = machines
+    text = json.dumps(content, indent=1, sort_keys=True)
+    folder = os.path.dirname(path)
     descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp',
                                              dir=folder)
     try:
@@ -100,39 +207,92 @@ def _sync_folder(folder: str) -> None:
         os.close(descriptor)
 
 
-def read_rates(path: str, learners: Iterable[Learner]) -> None:
-    """Take over the rates in `path`.
+def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: bool) -> None:
+    """Take over the rates in `path`. `is_shared`: the machine adds to this file later.
 
-    A file that is not there is no matter. One that cannot be read is warned of. A damaged one is
-    set aside as PATH.damaged and warned of, and the states start from their priors.
+    A machine that the file does not know takes over what a machine with the same states has
+    learned: it was renamed. A file that is not there is no matter. One that cannot be read is
+    warned of. A damaged one is set aside as PATH.damaged and warned of, and the states start from
+    their priors.
+    """
+    learners = list(learners)
+    if is_shared:
+        for learner in learners:
+            learner.records.forget_shared()
+    machines = _machines(path)
+    if machines is None:
+        return
+    containers = machines[name] if name in machines else _of_the_same_states(machines, learners)
+    for learner in learners:
+        for label, learned in containers.get(learner.relative_path, {}).items():
+            try:
+                learner.learn(label, learned, is_shared)
+            except (ValueError, TypeError, AttributeError) as err:
+                _tell_unusable(path, label, learner, err)
+
+
+def _of_the_same_states(machines: Machines, learners: Sequence[Learner]) -> Containers:
+    """Return what a machine under another name has learned, and else one without a name."""
+    own = {(learner.relative_path, label) for learner in learners for label in learner.labels()}
+    found = [containers for name, containers in machines.items() if name and own.issuperset(
+        (place, label) for place, states in containers.items() for label in states)]
+    return max(found, key=_size, default=machines.get('', {}))
+
+
+def _size(containers: Containers) -> int:
+    return sum(len(states) for states in containers.values())
+
+
+def _tell_unusable(path: str, label: str, learner: Learner, err: Exception) -> None:
+    smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(
+        path, label, learner.path, err))
+
+
+def _machines_or_none(path: str) -> Machines:
+    """Return what the file has, nothing where it has nothing that can be read.
+
+    :raises OSError: where it is there and cannot be read: it is not to be written then.
     """
     try:
         with open(path, encoding='utf-8') as stream:
-            containers = _checked(json.load(stream))
+            return _checked(json.load(stream))
     except FileNotFoundError:
-        return
+        return {}
+    except (ValueError, RecursionError) as err:
+        smach.logwarn('Rates file {} is damaged ({}), {}; a new one is written'.format(
+            path, err, _set_aside(path)))
+        return {}
+
+
+def _machines(path: str) -> Any:
+    """Return what the file has by machine, None where that cannot be read."""
+    try:
+        with open(path, encoding='utf-8') as stream:
+            return _checked(json.load(stream))
+    except FileNotFoundError:
+        return None
     except OSError as err:
         smach.logwarn('Rates file {} cannot be read, starting from the priors: {}'.format(
             path, err))
-        return
+        return None
     except (ValueError, RecursionError) as err:
         smach.logwarn('Rates file {} is damaged ({}), {}; starting from the priors'.format(
             path, err, _set_aside(path)))
-        return
-    for learner in learners:
-        _hand_over(path, learner, containers.get(learner.relative_path, {}))
+        return None
 
 
-def _checked(content: Any) -> Dict[str, Dict[str, Any]]:
+def _checked(content: Any) -> Machines:
     if not isinstance(content, dict) or content.get('format') != FORMAT:
         raise ValueError('it is no file of {}'.format(FORMAT))
     if content.get('version') != VERSION:
         raise ValueError('it has version {!r}, known is {}'.format(content.get('version'), VERSION))
-    containers = content.get('containers')
-    if not isinstance(containers, dict) or not all(
-            isinstance(states, dict) for states in containers.values()):
+    machines = content.get('machines', {'': content.get('containers')})
+    if not isinstance(machines, dict) or not all(
+            isinstance(containers, dict) and all(
+                isinstance(states, dict) for states in containers.values())
+            for containers in machines.values()):
         raise ValueError('it has no states')
-    return containers
+    return machines
 
 
 def _set_aside(path: str) -> str:
@@ -141,12 +301,3 @@ def _set_aside(path: str) -> str:
     except OSError as err:
         return 'it could not be set aside ({})'.format(err)
     return 'it is kept as {}'.format(path + DAMAGED)
-
-
-def _hand_over(path: str, learner: Learner, states: Dict[str, Any]) -> None:
-    for label, learned in states.items():
-        try:
-            learner.learn(label, learned)
-        except (ValueError, TypeError, AttributeError) as err:
-            smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(
-                path, label, learner.path, err))

@@ -3,6 +3,7 @@ import threading
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
 from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
+from ..decision.merged_rates import base_of, merged
 from ..records.events import FailureKind
 from ..records.visits import Visit
 from ..settings.settings import StateSettings
@@ -81,7 +82,7 @@ class StateRecord:
                  'unwell_repeats',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
                  'way_down', 'unfinished', 'open_question', '_is_special', '_estimator', '_lock',
-                 '_learned',
+                 '_learned', 'shared',
                  '_retired',
                  '_edges', '_visits', '_visits_before')
 
@@ -104,6 +105,8 @@ class StateRecord:
         self.unfinished: Optional[Unfinished] = None  # in place of the coming visit
         self.open_question = ''  # id of one that was open when the program was stopped
         self._learned = 0  # successes by way of edges that the estimator knows
+        # what of it the rates file has, as `base_of` tells it
+        self.shared: Dict[str, Any] = {}
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
         self._visits = 0  # not counted by an FastEdge
@@ -203,6 +206,24 @@ class StateRecord:
         """Return what was learned as plain data."""
         with self._lock:
             return self._up_to_date().snapshot()
+
+    def merged_with(self, theirs: Mapping[str, Any]) -> Dict[str, Any]:
+        """Return what others have learned, with what was learned here since it was last shared.
+
+        :raises ValueError: where theirs cannot be read.
+        """
+        with self._lock:
+            return merged(self._up_to_date().snapshot(), self.shared, theirs,
+                          self.settings.memory)
+
+    def share(self, before: Mapping[str, Any], written: Mapping[str, Any]) -> None:
+        """Have what is shared now. `before`: what was learned here when it was merged."""
+        with self._lock:
+            estimator = self._up_to_date()
+            if before != written:
+                estimator.restore(merged(estimator.snapshot(), base_of(before), written,
+                                         self.settings.memory))
+            self.shared = base_of(written)
 
     @property
     def rate(self) -> float:

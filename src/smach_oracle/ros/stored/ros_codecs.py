@@ -95,7 +95,8 @@ def _of_scalar(scalar: 'numpy.generic') -> List[object]:
 
 def _to_scalar(told: List[Any]) -> 'numpy.generic':
     described, data = told
-    scalar: 'numpy.generic' = _to_array([described, (), data])[()]
+    array: Any = _to_array([described, (), data])
+    scalar: 'numpy.generic' = array[()]
     return scalar
 
 

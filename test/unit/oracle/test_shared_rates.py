@@ -1,0 +1,217 @@
+"""Machines that have one rates file, in one process and in several."""
+import json
+import os
+import stat
+import subprocess
+import sys
+import threading
+
+import pytest
+from machines import Scripted, Watched, chain_of
+
+from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
+from smach_oracle.oracle.decision.merged_rates import base_of, merged
+from smach_oracle.oracle.records import folder_lock as lock_module
+from smach_oracle.oracle.records.folder_lock import folder_lock
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def machine(path, name, *scripts, **settings):
+    return Watched(chain_of(*[Scripted(*script) for script in scripts]), name=name,
+                   settings=dict(settings, rates_file=str(path)))
+
+
+def learned(path, name, label='A', place=''):
+    told = json.loads(path.read_text())['machines'][name][place][label]
+    return told['successes'], told['failures']
+
+
+def test_two_machines_keep_what_both_have_learned(tmp_path):
+    path = tmp_path / 'rates.json'
+    pick, place = machine(path, 'PICK', ['aborted']), machine(path, 'PLACE', [], ['aborted'])
+    for each in (pick, place, pick):
+        each.run()
+    assert learned(path, 'PICK') == (2, 1)
+    assert (learned(path, 'PLACE'), learned(path, 'PLACE', 'B')) == ((1, 0), (1, 1))
+    again = machine(path, 'PICK', [])
+    assert (again.rate('A').successes, again.rate('A').failures) == (2, 1)
+
+
+@pytest.mark.parametrize('settings', [{}, {'estimator': 'exponential'}, {'memory': 3}])
+def test_two_objects_of_one_machine_add_what_each_has_learned(tmp_path, settings):
+    path = tmp_path / 'rates.json'
+    one, two = (machine(path, 'TASK', ['aborted', 'ok'], **settings) for _ in range(2))
+    for each in (one, two, one, two, two):
+        each.run()
+    assert learned(path, 'TASK') == (5, 2)
+    assert (two.rate('A').successes, two.rate('A').failures) == (5, 2), 'each learns of the other'
+    single = machine(path, 'TASK', [], **settings)
+    assert single.rate('A').rate == pytest.approx(two.rate('A').rate)
+
+
+def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):
+    path = tmp_path / 'rates.json'
+    machine(path, 'OLD', ['aborted', 'aborted']).run()
+    machine(path, 'OTHER', ['aborted'], [], []).run()
+    new = machine(path, 'NEW', [])
+    assert new.rate('A').failures == 2
+    new.run()
+    assert learned(path, 'NEW') == (2, 2)
+    assert learned(path, 'OLD') == (1, 2)
+
+
+def test_a_file_of_before_is_read_and_keeps_its_states(tmp_path):
+    path = tmp_path / 'rates.json'
+    good = {'estimator': 'window', 'successes': 3, 'failures': 1, 'window': [0, 1, 0, 0]}
+    path.write_text(json.dumps({'format': 'smach_oracle rates', 'version': 1,
+                                'containers': {'': {'A': good, 'GONE': good}}}))
+    task = machine(path, 'TASK', ['aborted'])
+    assert task.rate('A').successes == 3
+    task.run()
+    assert learned(path, 'TASK') == (4, 2)
+    assert learned(path, 'TASK', 'GONE') == learned(path, '', 'GONE') == (3, 1)
+    assert json.loads(path.read_text())['containers']['']['A']['failures'] == 2
+
+
+def test_rates_saved_by_hand_leave_other_machines_alone(tmp_path):
+    path = tmp_path / 'rates.json'
+    machine(path, 'OTHER', ['aborted']).run()
+    mine = Watched(chain_of(Scripted('aborted')), name='MINE')
+    mine.run()
+    for _ in range(2):
+        mine.machine.save_rates(str(path))
+    assert (learned(path, 'OTHER'), learned(path, 'MINE')) == ((1, 1), (1, 1))
+
+
+def test_what_could_not_be_written_is_written_later(tmp_path, monkeypatch, log):
+    path = tmp_path / 'rates.json'
+    one, two = machine(path, 'TASK', ['aborted']), machine(path, 'TASK', ['aborted'])
+    monkeypatch.setattr(os, 'fsync', lambda descriptor: (_ for _ in ()).throw(OSError(28, 'full')))
+    one.run()
+    monkeypatch.undo()
+    two.run()
+    one.run()
+    assert learned(path, 'TASK') == (3, 2)
+
+
+def test_a_file_that_others_hold_stops_no_machine(tmp_path, monkeypatch, log):
+    monkeypatch.setattr(lock_module, 'WAIT_S', 0.05)
+    path = tmp_path / 'rates.json'
+    task = machine(path, 'TASK', ['aborted'])
+    with folder_lock(str(tmp_path)):
+        assert task.run() == 'done'
+    assert any('another program holds the lock' in text for level, text in log if level == 'warn')
+    assert not path.exists()
+    task.run()
+    assert learned(path, 'TASK') == (2, 1)
+
+
+def test_a_link_leads_to_one_file(tmp_path):
+    path = tmp_path / 'rates.json'
+    (tmp_path / 'link.json').symlink_to(path)
+    machine(tmp_path / 'link.json', 'ONE', ['aborted']).run()
+    machine(path, 'TWO', ['aborted']).run()
+    assert (tmp_path / 'link.json').is_symlink()
+    assert {'ONE', 'TWO'} == set(json.loads(path.read_text())['machines'])
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason='root may write everywhere')
+def test_a_folder_that_is_read_only_is_warned_of(tmp_path, log):
+    path = tmp_path / 'rates.json'
+    os.chmod(str(tmp_path), stat.S_IRUSR | stat.S_IXUSR)
+    assert machine(path, 'TASK', ['aborted']).run() == 'done'
+    assert any('cannot be written' in text for level, text in log if level == 'warn')
+
+
+def test_a_damaged_file_is_kept_aside_also_while_the_machine_runs(tmp_path, log):
+    path = tmp_path / 'rates.json'
+    task = machine(path, 'TASK', ['aborted'])
+    path.write_text('{"format": "smach_ora')
+    task.run()
+    assert (tmp_path / 'rates.json.damaged').exists()
+    assert learned(path, 'TASK') == (1, 1)
+
+
+HAMMER = '''
+import sys
+sys.path[:0] = {path!r}
+import smach
+smach.set_loggers(*[lambda text: None] * 4)
+from machines import Scripted, Watched, chain_of
+path, name, runs = sys.argv[1], sys.argv[2], int(sys.argv[3])
+state = Scripted()
+machine = Watched(chain_of(state), name=name, settings={{'rates_file': path}})
+print('ready', flush=True)
+sys.stdin.readline()
+for _ in range(runs):
+    state.script = ['aborted']
+    machine.run()
+    machine.events.clear()
+'''
+
+
+@pytest.mark.parametrize('names', [('ONE', 'TWO', 'THREE'), ('SAME', 'SAME', 'SAME'),
+                                   ('SAME', 'SAME', 'OTHER')])
+def test_processes_that_hammer_one_file_lose_nothing(tmp_path, names):
+    path, runs = tmp_path / 'rates.json', 30
+    code = HAMMER.format(path=[HERE] + sys.path)
+    programs = [subprocess.Popen([sys.executable, '-c', code, str(path), name, str(runs)],
+                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE) for name in names]
+    for each in programs:
+        assert each.stdout.readline() == b'ready\n'
+    for each in programs:
+        each.stdin.write(b'go\n')
+        each.stdin.flush()
+    for each in programs:
+        assert each.wait(120) == 0
+        each.stdin.close()
+        each.stdout.close()
+    for name in set(names):
+        count = runs * names.count(name)
+        assert learned(path, name) == (count, count)
+    assert os.listdir(str(tmp_path)) == ['rates.json'], 'no lock and no other file stays'
+
+
+def test_threads_of_one_process_lose_nothing(tmp_path):
+    path = tmp_path / 'rates.json'
+    machines = [machine(path, 'TASK', ['aborted'] * 2, memory=100) for _ in range(3)]
+    threads = [threading.Thread(target=each.run) for each in machines]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join(60)
+    assert learned(path, 'TASK') == (3, 6)
+
+
+def estimator(kind, results, memory=5):
+    made = ESTIMATORS[kind](memory, 0.1)
+    for failed in results:
+        made.add(failed)
+    return made
+
+
+@pytest.mark.parametrize('kind', sorted(ESTIMATORS))
+@pytest.mark.parametrize('shared, theirs, own', [
+    ('', '', '101'), ('110', '', ''), ('110', '01', ''), ('110', '', '0001'),
+    ('1101010', '0001', '11011')])
+def test_what_is_merged_is_what_one_would_have_learned(kind, shared, theirs, own):
+    def of(text):
+        return estimator(kind, [letter == '1' for letter in text]).snapshot()
+
+    found = merged(of(shared + own), base_of(of(shared)), of(shared + theirs), 5)
+    wanted = of(shared + theirs + own)
+    assert {key: pytest.approx(value) for key, value in wanted.items()
+            if key != 'estimator'} == {key: value for key, value in found.items()
+                                       if key != 'estimator'}
+
+
+@pytest.mark.parametrize('kind', sorted(ESTIMATORS))
+def test_a_failure_that_is_taken_back_is_taken_out(kind):
+    mine = estimator(kind, [False, True])
+    base = base_of(mine.snapshot())
+    others = estimator(kind, [False, True, False]).snapshot()
+    mine.take_back_failure()
+    found = merged(mine.snapshot(), base, others, 5)
+    assert (found['successes'], found['failures']) == (2, 0)
+    assert found.get('window', [0, 0]) == [0, 0] and found.get('rate', 0) < 0.1
