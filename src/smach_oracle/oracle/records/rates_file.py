@@ -26,39 +26,10 @@ Containers = Dict[str, States]  # by path below the top machine
 Machines = Dict[str, Containers]  # by name, '' for one that has none
 
 
-class Record(Protocol):
-    """What is learned of one state."""
-
-    def learned(self) -> Dict[str, Any]:
-        """Return it as plain data."""
-
-    def merged_with(self, theirs: Mapping[str, Any]) -> Dict[str, Any]:
-        """Return what others have learned, with what is new here.
-
-        :raises ValueError: where theirs cannot be read.
-        """
-
-    def share(self, before: Mapping[str, Any], written: Mapping[str, Any]) -> None:
-        """Have what is shared now. `before`: what was learned here when it was merged."""
-
-
-class Records(Protocol):
-    """What is learned in one container. `to_come`: of states that are not there yet."""
-
-    by_label: Any
-    to_come: Dict[str, Dict[str, Any]]
-
-    def learned(self) -> Dict[str, Any]:
-        """Return what was learned of each state that is there, as plain data."""
-
-    def forget_shared(self) -> None:
-        """Note that another file is used from now on."""
-
-
 class Learner(Protocol):
-    """A container that learns rates."""
+    """A container that learns rates. `records`: its `ContainerRecords`."""
 
-    records: Any  # Records
+    records: Any
 
     @property
     def path(self) -> str:
@@ -81,7 +52,7 @@ class Learner(Protocol):
 class _Written(NamedTuple):
     """What was learned of one state, here and in all."""
 
-    record: Record
+    record: Any  # StateRecord
     before: Dict[str, Any]
     written: Dict[str, Any]
 
@@ -99,8 +70,9 @@ def learned_by(containers: Iterable[Learner]) -> Containers:
 
 
 def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
-    """Add to `path` what a machine has learned since it was last read or written, and take over
-    what others have added there. Written atomically and durably.
+    """Add to `path` what a machine has learned, and take over what others have added.
+
+    It is written atomically and durably.
 
     :raises OSError: where it cannot be written, or another program keeps the file locked. The old
         file is then untouched, and the next call adds what this one did not.
