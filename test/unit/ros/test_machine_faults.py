@@ -157,6 +157,16 @@ def test_an_error_of_smach_while_a_machine_is_built_is_told_with_its_line(build,
     assert 'SMACH refuses the machine: Invalid' in str(error_of(build))
 
 
+def test_the_outcome_map_is_told_that_smach_refuses_by_a_key_alone(monkeypatch):
+    monkeypatch.setattr(smach.Container, '_construction_stack', [])
+
+    def build():
+        with smach.Concurrence(['done'], 'done', outcome_map={'done': {'LEFF': 'ok'}}):
+            smach.Concurrence.add('LEFT', state('ok'))
+    assert "its outcome map waits for the state 'LEFF', which is none of its states (did you " in (
+        str(error_of(build)))
+
+
 def test_an_error_of_the_script_itself_is_none_of_smach():
     def build():
         raise ValueError('no robot')

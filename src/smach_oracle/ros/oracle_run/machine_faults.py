@@ -50,9 +50,16 @@ def refused_while_built(kind: Optional[Type[BaseException]], error: Optional[Bas
         return None
     of_script = [(frame.f_code.co_filename, number) for frame, number in frames
                  if _package_of(frame.f_globals.get('__name__')) not in _ENGINE]
-    file_name, number = of_script[-1] if of_script else ('the script', 0)
-    return MachineFaultError('{} line {}: SMACH refuses the machine: {}: {}'.format(
-        file_name, number, type(error).__name__, ' '.join(str(error).split())))
+    place = '{} line {}'.format(*of_script[-1]) if of_script else 'the script'
+    # SMACH checks what is complete. Its KeyError does not say what is wrong
+    built = [frame.f_locals.get('self') for frame, _ in frames
+             if frame.f_code.co_name == 'check_consistency']
+    faults = [str(fault) for each in built if isinstance(each, smach.Container)
+              for fault in faults_of(each, type(each).__name__) if fault.is_certain]
+    why = faults or ['SMACH refuses the machine: {}: {}'.format(
+        type(error).__name__, ' '.join(str(error).split()))]
+    return MachineFaultError('\n'.join('{}: {}'.format(place, each)
+                                       for each in dict.fromkeys(why)))
 
 
 class MachineFault(NamedTuple):
