@@ -1,4 +1,5 @@
 """Finds bags, and reads the executive's events and the worlds' causes with rosbags, without ROS."""
+import contextlib
 import json
 import math
 import os
@@ -13,6 +14,9 @@ CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
 UNFINISHED = (  # why a bag is not used
     'still being recorded, or its recorder died: start the recorder again in this folder, or run '
     '`rosbag reindex` on it and take the .active off its name')
+MENDING = ('`rosbag reindex` on it keeps what lies before the damage; named .bag.active, the next '
+           'recorder in this folder saves what can be read behind it, too')
+_MAGIC = b'#ROSBAG V2.0'
 _EVENTS = '/oracle/events'
 _KINDS = {int(kind): kind for kind in EventKind}
 
@@ -128,7 +132,7 @@ class EventReader:
             raise
         except Exception as err:
             # a damaged file can make rosbags raise anything, assertions among it
-            raise BagError('damaged, or no bag: {}'.format(_words(err))) from err
+            raise BagError(why_unreadable(path, _words(err))) from err
 
     def _read(self, path: str) -> BagContent:
         events: List[Event] = []
@@ -163,6 +167,14 @@ class EventReader:
         return BagContent(
             events, {trial_id: cause
                      for trial_id, cause in found.items() if cause is not None}, nodes, stamps)
+
+
+def why_unreadable(path: str, why: str) -> str:
+    """Say why a bag cannot be read, and what may save it where it is one."""
+    with contextlib.suppress(OSError), open(path, 'rb') as source:
+        if source.read(len(_MAGIC)) == _MAGIC:
+            return 'cut off, or damaged: {}; {}'.format(why, MENDING)
+    return 'damaged, or no bag: {}'.format(why)
 
 
 def _latest(causes: Sequence[Tuple[int, RecordedCause]], end: int) -> Optional[RecordedCause]:

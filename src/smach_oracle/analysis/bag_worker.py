@@ -13,6 +13,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import NOT_COUNTED, told_in_words
+from smach_oracle.oracle.records.short_text import shortened
 
 from .bag_events import BagError, EventReader
 from .bag_machines import FailureImage, RecordedContainer, RecordedMachines, read_machines
@@ -149,12 +150,10 @@ def _event(event: Event) -> List[Any]:
 
 
 def _shortened(events: Sequence[Event]) -> List[Event]:
-    """With the ends of long texts, the longer the fewer events there are."""
+    """With long texts without their middle, the longer the fewer events there are."""
     longest = max(200, MOST_TEXT // max(1, len(events)))
-    return [
-        event if len(event.text) <= longest else event._replace(text='…' + event.text[-longest:])
-        for event in events
-    ]
+    return [event if len(event.text) <= longest
+            else event._replace(text=shortened(event.text, longest)) for event in events]
 
 
 def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
@@ -166,7 +165,7 @@ def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
             machines = read_machines(path)
         except Exception as err:
             # a damaged file can make rosbags raise anything. The events are there
-            problem = '{!r}'.format(err)[:300]
+            problem = shortened('{!r}'.format(err), 300)
             continue
         found.containers.update(machines.containers)
         found.frames.extend(machines.frames)
@@ -213,7 +212,7 @@ def _reply(request: BagRequest) -> str:
 
 
 def _refusal(text: str, position: Optional[int] = -1) -> str:
-    return json.dumps({'error': text[:1000], 'position': position})
+    return json.dumps({'error': shortened(text, 1000), 'position': position})
 
 
 def main() -> None:

@@ -79,6 +79,21 @@ def test_skipped_bags_are_named_and_the_exit_code_tells(record, capsys):
     assert 'broken.bag' in err and 'magic' in err
 
 
+def test_a_bag_that_is_cut_off_names_what_may_save_it(record, capsys):
+    folder = record('bags', 2)
+    bag = sorted(Path(folder).glob('*.bag'))[0]
+    whole = bag.read_bytes()
+    for end in (len(whole) - 100, len(whole) // 2, 20):
+        Path(folder, 'cut.bag').write_bytes(whole[:end])
+        assert bag_statistics.main([folder]) == 1
+        err = capsys.readouterr().err
+        assert 'cut.bag: cut off, or damaged' in err and '`rosbag reindex`' in err
+    Path(folder, 'cut.bag').write_bytes(b'no bag')
+    assert bag_statistics.main([folder]) == 1
+    err = capsys.readouterr().err
+    assert 'damaged, or no bag' in err and 'reindex' not in err
+
+
 @pytest.mark.parametrize('prepare, words', [
     (lambda folder: None, 'no such folder'),
     (lambda folder: folder.mkdir(), 'no bags'),

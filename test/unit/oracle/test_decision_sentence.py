@@ -1,6 +1,8 @@
 """Every decision is one sentence that a person understands."""
 import pytest
+from machines import Scripted, Watched
 
+import smach
 from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.decision.sentence import (
     DecisionFacts,
@@ -8,6 +10,7 @@ from smach_oracle.oracle.decision.sentence import (
     going_would_repeat,
     ran_in_words,
 )
+from smach_oracle.oracle.records.events import EventKind
 
 
 def facts(action, **fields):
@@ -45,11 +48,31 @@ def facts(action, **fields):
      'PICK failed (1 of its last 10); trying it again would repeat ARM/CUT: asking an expert'),
     (facts(Action.REVISIT, target='PICK', recent=(1, 1)),
      'PICK failed (its first result): trying it again'),
+    (facts(Action.REVISIT, target='PICK', recent=(4, 4), tried='going back to DETECT'),
+     'PICK failed again after going back to DETECT (4 of its last 4): trying it again'),
     (facts(Action.REVISIT, target='PICK', recent=(0, 0), rate=0.255),
      'PICK failed (failure rate 26%): trying it again'),
 ])
 def test_a_decision_is_told_in_a_sentence(given, sentence):
     assert decision_sentence(given) == sentence
+
+
+def test_a_failure_that_is_no_continuous_one_says_what_was_tried_before():
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('DETECT', Scripted('ok', 'aborted'), {'ok': 'GRASP'})
+        smach.StateMachine.add('GRASP', Scripted(*['aborted'] * 3), {'ok': 'done'})
+    watched = Watched(machine, settings={'memory': 1000})
+    assert watched.run() == 'done'
+    assert [event.text for event in watched.of(EventKind.DECISION)] == [
+        'GRASP failed (its first result): trying it again',
+        'GRASP keeps failing (2 of its last 2): going back to DETECT',
+        'DETECT failed (1 of its last 2): trying it again',
+        'GRASP failed again after going back to DETECT (3 of its last 3): trying it again']
+    watched.machine._states['GRASP'].script.append('aborted')
+    watched.events.clear()
+    assert watched.run() == 'done'
+    assert watched.of(EventKind.DECISION)[0].text.startswith('GRASP failed (4 of its last 5)')
 
 
 @pytest.mark.parametrize('ran_s, longest_s, words', [

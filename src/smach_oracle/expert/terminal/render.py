@@ -19,6 +19,7 @@ from smach_oracle.msg import (
     UserdataItem,
     VisitedState,
 )
+from smach_oracle.oracle.records.short_text import shortened
 
 from ..followed_server import ListedQuestion
 from ..wording import clean, failure_words, still_runs
@@ -29,6 +30,8 @@ _VISITS = {VisitedState.SUCCESS: ('✓', '#2e9e3f'), VisitedState.FAILURE: ('✗
            VisitedState.SUPERSEDED: ('☞', '#3b7dd8'), VisitedState.PREEMPTED: ('⏹', 'dim')}
 _SHOWN_VISITS = 12
 _SHOWN_LINES = 12
+_FIRST_LINES = 3
+_LONGEST_LINE = 1000  # letters
 
 
 def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
@@ -83,7 +86,7 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
         Text.assemble((clean(goal.failed_state), 'bold'), ' ' + failure_words(goal))
     ]
     if goal.text:
-        lines.append(Text(_last_lines(goal.text), 'italic'))
+        lines.append(Text(_without_middle(goal.text), 'italic'))
     facts = Text.assemble(
         'failure rate ', rate_bar(goal.rate), ' ',
         (CLASS_NAMES.get(goal.failure_class, '?'), 'bold ' + rate_colour(goal.rate)))
@@ -186,7 +189,7 @@ def _userdata(items: Sequence[UserdataItem]) -> Table:
 def _value(item: UserdataItem) -> Text:
     if item.encoding == UserdataItem.JSON:
         text = clean(bytes(item.value).decode('utf-8', 'replace'))
-        return Text(text if len(text) <= 200 else text[:199] + '…')
+        return Text(shortened(text, 200))
     if item.encoding == UserdataItem.UNSENT:
         return Text('({}, not sent)'.format(clean(item.type)), 'dim')
     return Text(
@@ -223,7 +226,11 @@ def _list(items: Iterable[str]) -> str:
     return ', '.join(clean(item) for item in items)
 
 
-def _last_lines(text: str) -> str:
-    """The end of a long text, which is the useful part of a traceback."""
-    lines = clean(text.strip(), lines=True).split('\n')
-    return '\n'.join(lines if len(lines) <= _SHOWN_LINES else ['…'] + lines[-_SHOWN_LINES:])
+def _without_middle(text: str) -> str:
+    """A long text without its middle: of a traceback the call, and what was raised and why."""
+    lines = [shortened(line, _LONGEST_LINE)
+             for line in clean(text.strip(), lines=True).split('\n')]
+    if len(lines) <= _SHOWN_LINES:
+        return '\n'.join(lines)
+    tail = _SHOWN_LINES - _FIRST_LINES
+    return '\n'.join([*lines[:_FIRST_LINES], '…', *lines[-tail:]])

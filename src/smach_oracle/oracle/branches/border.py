@@ -315,7 +315,7 @@ class IteratorBorder(Border):
         machine = self.machines.get(self.container._state_label)
         record = (None if machine is None
                   else machine._oracle.records.by_label.get(self.container._state_label))
-        self._userdata.begin_item(record, self._deep_copy_keys(), self._tell)
+        self._userdata.begin_item(record, self._deep_copy_keys(), self._warn_not_copied)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
@@ -349,12 +349,16 @@ class IteratorBorder(Border):
         """
         deep = self._deep_copy_keys()
         if not self.goes_on:
-            self._userdata.begin(userdata, deep, self._tell)
+            self._userdata.begin(userdata, deep, self._warn_not_copied)
             return {}
         if (self._items is not None and not self._items.is_finished
                 and self.top is not None and self.top.settings.userdata == 'restore'):
             self._userdata.take_back(deep)
         return self._userdata.to_keep(userdata)
+
+    def _warn_not_copied(self, key: str, why: str) -> None:
+        if self.top is not None:
+            self.top.warn_not_copied(key, why)
 
     def _deep_copy_keys(self) -> Sequence[str]:
         return self.top.in_force.deep_copy_keys if self.top is not None else ()

@@ -6,13 +6,13 @@ import smach
 from ..machine.snapshots import restore, take_snapshot
 from ..records.state_record import StateRecord
 
-Warn = Callable[[str], None]
+Warn = Callable[[str, str], None]
 
 
 class ItemUserdata:
     """Remembers what an Iterator was given, and its userdata at the beginning of the item.
 
-    `deep_copy_keys`: see the setting. `warn` takes words for the log.
+    `deep_copy_keys`: see the setting. `warn`: see `take_snapshot`.
     """
 
     def __init__(self, iterator: Any) -> None:

@@ -23,6 +23,7 @@ class DecisionFacts(NamedTuple):
     held_back: str = ''  # why the state was not executed, where it has not failed
     asked: str = ''  # who is asked, and how long: "an expert, 300 s"
     wait_s: float = 0.0  # waited before
+    tried: str = ''  # what was done after its failure before, where it has not succeeded since
 
 
 def decision_sentence(facts: DecisionFacts) -> str:
@@ -77,8 +78,10 @@ def _failed(facts: DecisionFacts) -> str:
     if facts.spent > 0:
         return '{} failed again after {} of this trial'.format(
             facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent))
-    return '{} {} ({})'.format(facts.state, 'keeps failing' if facts.continuous else 'failed',
-                               _rate(facts))
+    if facts.continuous:
+        return '{} keeps failing ({})'.format(facts.state, _rate(facts))
+    return '{} failed{} ({})'.format(
+        facts.state, ' again after ' + facts.tried if facts.tried else '', _rate(facts))
 
 
 def _rate(facts: DecisionFacts) -> str:
@@ -107,10 +110,11 @@ def _does(facts: DecisionFacts) -> str:
     if facts.action is Action.GIVE_UP:
         return 'giving up, and asking nobody'
     waiting = 'in {:g} s '.format(facts.wait_s) if facts.wait_s else ''
-    return waiting + _goes(facts)
+    return waiting + goes(facts)
 
 
-def _goes(facts: DecisionFacts) -> str:
+def goes(facts: DecisionFacts) -> str:
+    """Return where a decision leads that asks nobody."""
     if facts.action is Action.RESTART:
         return 'starting over from ' + facts.target
     return 'trying it again' if facts.target == facts.state else 'going back to ' + facts.target

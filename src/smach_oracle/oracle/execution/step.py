@@ -158,8 +158,9 @@ class Step:
         node, label = self._node, self._record.label
 
         def on_late_write(key: str) -> None:
-            smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and is '
-                          'dropped'.format(node.path, label, key))
+            if node.tree.is_new(node.path, label, 'late write', key):
+                smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and '
+                              'is dropped'.format(node.path, label, key))
 
         gate = UserdataGate(self._machine, on_late_write)
         result = node.tree.workers.run(

@@ -17,7 +17,7 @@ def save_rates(node: TreeNode) -> None:
         with node.tree.rates_lock:
             share_rates(path, _name(top), nodes_of(top.machine))
     except OSError as err:
-        node.warn('rates file {} cannot be written: {}'.format(path, err))
+        node.warn_once(path, 'rates file {} cannot be written: {}'.format(path, err))
 
 
 def load_rates(node: TreeNode) -> None:

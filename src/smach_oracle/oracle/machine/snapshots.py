@@ -5,12 +5,15 @@ from typing import Any, Callable, Dict, Iterable, Mapping, Optional
 
 from smach_oracle.foreign import ends_program, error_text
 
+NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
+
 
 def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
-                  warn: Callable[[str], None]) -> Dict[str, Any]:
+                  warn: Callable[[str, str], None]) -> Dict[str, Any]:
     """Return the userdata as it is now.
 
-    It holds references. `deep_copy_keys` are copied through and through.
+    It holds references. `deep_copy_keys` are copied through and through. `warn` takes each key that
+    cannot be, with the reason.
     """
     snapshot = dict(data)
     for key in deep_copy_keys:
@@ -21,8 +24,7 @@ def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
                 # whatever a user's object raises: a reference is better than a dead machine
                 if ends_program(err):
                     raise
-                warn('Userdata key {!r} cannot be deep-copied, a reference is kept: {}'.format(
-                    key, error_text(err)))
+                warn(key, error_text(err))
     return snapshot
 
 

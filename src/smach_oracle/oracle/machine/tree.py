@@ -5,7 +5,7 @@ These are the trial, its events, the expert and the threads that were left behin
 import itertools
 import threading
 import uuid
-from typing import Any, Callable, Dict, Mapping, Optional
+from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
 
 import smach
 
@@ -68,6 +68,7 @@ class Tree:
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
         self._questions = 0
+        self._said: Set[Tuple[str, ...]] = set()  # in this trial
         self._lock = threading.Lock()
 
     def begin_trial(self, trial_id: str) -> None:
@@ -76,7 +77,15 @@ class Tree:
         self.trials += 1
         self.is_resumed = False
         self._questions = 0
+        self._said.clear()
         self.events.begin_trial(trial_id)
+
+    def is_new(self, *about: str) -> bool:
+        """Whether something has not been said in this trial. It may come at each visit."""
+        with self._lock:
+            is_new = about not in self._said
+            self._said.add(about)
+            return is_new
 
     def go_on_counting(self, visits: int, whole: Mapping[str, Any]) -> None:
         """Number visits behind `visits`, and go on with what the stored trial had spent."""

@@ -16,7 +16,7 @@ from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
 from .limited_run import LimitedRun, runs_of_thread
 from .protocols import Labels, Machine
-from .snapshots import take_snapshot
+from .snapshots import NOT_COPIED, take_snapshot
 from .tree import Tree
 
 DEFAULT_NAME = 'SM_ROOT'
@@ -311,6 +311,15 @@ class TreeNode:
         smach.logwarn('{}{}: {}'.format(self.path, '/' + label if label else '', text))
         self.emit(EventKind.WARNING, state=label, text=text)
 
+    def warn_once(self, about: str, text: str, label: str = '') -> None:
+        """Warn once in a trial of what may come at each visit. `about`: what it is about."""
+        if self.tree.is_new(self.path, label, about):
+            self.warn(text, label)
+
+    def warn_not_copied(self, key: str, why: str) -> None:
+        """Say that a key of `deep_copy_keys` is kept as it is."""
+        self.warn_once('copy of ' + key, NOT_COPIED.format(key, why))
+
     def tell_preempt(self) -> None:
         """Emit PREEMPT, once for each request."""
         if not self.preempt_told:
@@ -345,7 +354,7 @@ class TreeNode:
     def snapshot(self) -> Dict[str, Any]:
         """Return the userdata as it is now."""
         return take_snapshot(self.machine.userdata._data, self.in_force.deep_copy_keys,
-                             smach.logwarn)
+                             self.warn_not_copied)
 
     # -- learned rates, for a rates file (rates_file.Learner)
 

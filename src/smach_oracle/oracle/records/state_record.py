@@ -79,7 +79,7 @@ class StateRecord:
     """
 
     __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
-                 'unwell_repeats',
+                 'unwell_repeats', '_tried',
                  'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
                  'way_down', 'unfinished', 'open_question', '_is_special', '_estimator', '_lock',
                  '_learned', 'shared',
@@ -99,6 +99,7 @@ class StateRecord:
         # s, of the visits that ended by themselves and were timed, a plain success that nobody
         # observes is not
         self.longest_s: Optional[float] = None
+        self._tried = '', 0
         self.entered_by_oracle = False  # at the coming visit
         # at the coming visit: the state in which each container below it begins
         self.way_down: Tuple[Any, ...] = ()
@@ -257,6 +258,7 @@ class StateRecord:
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
+        self._tried = '', 0
         self.forget_unfinished()  # of a trial that ended before the visit
         self.forget_entry()
         self._visits_before = self._visits + self._by_edges()
@@ -265,6 +267,16 @@ class StateRecord:
     def most_repeats(self) -> int:
         """Return how often it is repeated in a trial without a counted failure, at least once."""
         return max(1, self.settings.max_recoveries)
+
+    def note_tried(self, what: str) -> None:
+        """Note what the oracle does after a failure."""
+        self._tried = what, self.totals[0]
+
+    @property
+    def tried(self) -> str:
+        """Return what the oracle did after its latest failure, '' where it has succeeded since."""
+        what, successes = self._tried
+        return what if what and successes == self.totals[0] else ''
 
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""

@@ -2,7 +2,7 @@
 from typing import Any, Callable, List, Optional, Tuple
 
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
-from ..decision.sentence import DecisionFacts, going_would_repeat
+from ..decision.sentence import DecisionFacts, goes, going_would_repeat
 from ..machine.repeats import has_visited
 from ..machine.tree_node import TreeNode
 from ..machine.write_watch import WriteWatch
@@ -94,8 +94,9 @@ class Deciding:
         if why_not:
             return decider, self.facts_of(Action.ASK, blocked=why_not)
         self.way = way
-        return decider, self.facts_of(action, target=self._named(way),
-                                      wait_s=policy.wait_s(situation))
+        facts = self.facts_of(action, target=self._named(way), wait_s=policy.wait_s(situation))
+        record.note_tried(goes(facts))
+        return decider, facts
 
     def _past(self) -> Past:
         record, tree = self._record, self._node.tree
@@ -164,7 +165,7 @@ class Deciding:
         """Return what has led to a decision."""
         record = self._record
         return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
-                             met=self._met, not_met=self._not_met,
+                             met=self._met, not_met=self._not_met, tried=record.tried,
                              held_back=self.failure.text if self.failure.is_held_back else '',
                              **fields)
 

@@ -12,6 +12,7 @@ from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
 from ..places.place import place_named
+from ..records.short_text import shortened
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 
@@ -71,8 +72,8 @@ class LivePreconditionProbe(PreconditionProbe):
             return PreconditionStatus(None, '{} raised {}'.format(spec.name, repr_of(err)))
         if result is None:
             return PreconditionStatus(None, '{} returned None; True is met'.format(spec.name))
-        return PreconditionStatus(bool(result), '{} returned {}'.format(
-            spec.name, repr_of(result))[:300])
+        return PreconditionStatus(bool(result), shortened(
+            '{} returned {}'.format(spec.name, repr_of(result)), 300))
 
     def _last(self, name: str) -> str:
         place = place_named(self._node, name)

@@ -2,6 +2,7 @@
 from typing import Any, NamedTuple
 
 from smach_oracle.oracle.number_checks import is_number
+from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.health import HealthCondition
 
 # diagnostic_msgs/DiagnosticStatus
@@ -29,7 +30,7 @@ def why_unwell_by_message(condition: HealthCondition, message: Any) -> str:
     if condition.equals is not None:
         return '' if value == condition.equals else _in_words(value)
     if not is_number(value):
-        return '{} is no number'.format(_cut(repr(value)))
+        return '{} is no number'.format(shortened(repr(value), LONGEST))
     if condition.at_least <= value <= condition.at_most:
         return ''
     return ('{:g}, at least {:g}'.format(value, condition.at_least)
@@ -54,12 +55,7 @@ def _field(message: Any, path: str) -> Any:
 def _in_words(value: object) -> str:
     if isinstance(value, bool):
         return 'on' if value else 'off'
-    return _cut(str(value)) or 'empty'
-
-
-def _cut(text: str) -> str:
-    """The text, or its beginning: a field may be a whole image."""
-    return text if len(text) <= LONGEST else text[:LONGEST] + '...'
+    return shortened(str(value), LONGEST) or 'empty'
 
 
 def why_unwell_by_status(condition: HealthCondition, status: Status) -> str:

@@ -18,6 +18,7 @@ import rospy
 
 from smach_oracle.msg import InterfaceOutput
 from smach_oracle.oracle.errors import InterfaceError
+from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 
 from ..connections import quiet_at_shutdown
@@ -128,7 +129,8 @@ class StartedInterface:
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
-            text = _ESCAPE_SEQUENCE.sub('', line.decode('utf-8', 'replace')).rstrip()[:LONGEST_LINE]
+            text = shortened(_ESCAPE_SEQUENCE.sub('', line.decode('utf-8', 'replace')).rstrip(),
+                             LONGEST_LINE)
             with self._lock:
                 self._lines.append(text)
             self._changed.set()

@@ -98,13 +98,14 @@ def test_what_a_robot_sends_cannot_steer_the_terminal():
         assert '[bold]x[/bold]' in text, 'markup is shown, not obeyed'
 
 
-def test_only_the_end_of_a_long_traceback_and_a_long_history_is_shown():
+def test_head_and_tail_of_a_long_traceback_and_the_end_of_a_long_history_are_shown():
     visits = tuple(Visit('S{}'.format(number), 'ok', VisitResult.SUCCESS) for number in range(30))
     text = shown(
         render.question(
             goal(text='\n'.join('line {}.'.format(number) for number in range(50)),
                  history=visits)))
-    assert 'line 49.' in text and 'line 38.' in text and 'line 37.' not in text
+    assert 'line 0.' in text and 'line 2.' in text and 'line 3.' not in text
+    assert 'line 49.' in text and 'line 41.' in text and 'line 40.' not in text
     assert '… → S18✓' in text and 'S17' not in text
 
 

@@ -8,6 +8,7 @@ from typing import Any, Callable, Deque, Dict, Mapping, NamedTuple, Optional, Se
 import rospy
 
 from smach_oracle.msg import ConsoleCommand
+from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.ros.event_messages import ros_now
 from smach_oracle.ros.recording.recorder_topics import audit_topic
 
@@ -96,7 +97,7 @@ class Audit:
         record = ConsoleCommand(
             wall_time=time.time(), console=rospy.get_name(), client=person.client,
             session=person.session, role=person.role, expert=person.expert, command=command, ok=ok,
-            message=message[:1000], arguments=json.dumps(arguments or {},
+            message=shortened(message, 1000), arguments=json.dumps(arguments or {},
                                                          default=str)[:LONGEST_ARGUMENTS])
         record.header.stamp = ros_now()
         if listed is not None:

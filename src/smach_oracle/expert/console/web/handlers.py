@@ -4,6 +4,8 @@ from typing import Any, Callable, Dict, Optional, Protocol
 
 import tornado.web
 
+from smach_oracle.oracle.records.short_text import shortened
+
 from . import sessions
 from .access import ClientRateLimits, Identity, network_of
 from .access_control import AccessControl
@@ -96,7 +98,7 @@ class SignedInHandler(CheckedHandler):
         """Answer 422 with a text: the thing asked for cannot be shown."""
         self.set_status(422)
         self.set_header('Content-Type', 'text/plain; charset=utf-8')
-        self.finish(str(err)[:500])
+        self.finish(shortened(str(err), 500))
 
 
 class NotFoundHandler(CheckedHandler):

@@ -68,7 +68,8 @@ export function breakable(name, sign) {
  */
 function lastLine(text) {
   const lines = text.trim().split('\n');
-  return lines[lines.length - 1].slice(-300);
+  const line = lines[lines.length - 1];
+  return line.length <= 300 ? line : `${line.slice(0, 149)} … ${line.slice(-148)}`;
 }
 
 /**
