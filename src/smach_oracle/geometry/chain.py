@@ -129,7 +129,7 @@ class JointChain:
         return self._solve(pose, seed, generator, restarts, iterations, first=False)
 
     def inverses(self, poses: np.ndarray, seed: np.ndarray, iterations: int = 50) -> np.ndarray:
-        """For each pose the solution next to the seed, all tried at the same time.
+        """Return for each pose the solution next to the seed, all tried at the same time.
 
         :param poses: (k, 4, 4), root from tip.
         :param seed: (n,), as for inverse().

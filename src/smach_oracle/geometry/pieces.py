@@ -16,7 +16,7 @@ FARTHEST = 6.0  # m from the first corner. Whatever is further away is taken to 
 
 
 def piece_labels(points: np.ndarray, cell: float) -> np.ndarray:
-    """For each of the points (n, 3), n >= 1, the number of the piece that it belongs to, from 1.
+    """Return for each of the points (n, 3), n >= 1, the number of its piece, from 1.
 
     :param cell: m: points in cells that do not touch are in different pieces.
     """

@@ -102,7 +102,7 @@ class Attachments:
 
     @contextmanager
     def trial(self, machine: OracleContainer) -> Iterator[None]:
-        """Within it the bags stay open, until the trial has told its end."""
+        """Keep the bags open until the trial has told its end."""
         self._trials.append(machine)
         try:
             yield

@@ -37,7 +37,7 @@ def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
 
 @contextmanager
 def quiet_at_shutdown() -> Iterator[None]:
-    """Within it one publishes. Nothing is raised where the node goes down meanwhile.
+    """Let the body publish. Nothing is raised where the node goes down meanwhile.
 
     rospy closes the topics before `rospy.is_shutdown` says so. Whoever publishes in between meets a
     closed topic, or one that is being taken apart.

@@ -59,7 +59,7 @@ class MachineNames:
 
     @contextmanager
     def running(self, machine: OracleContainer) -> Iterator[None]:
-        """Within it the machine has a name, which no other machine takes."""
+        """Give the machine a name for the body, which no other machine takes."""
         with self._lock:
             oracle = oracle_of(machine)
             if not oracle.is_named:

@@ -28,7 +28,7 @@ KINDS_THAT_CHANGE_RATES = frozenset([
 
 
 class RatesSource(Protocol):
-    """Has learned rates: a wrapped machine, or its oracle."""
+    """A source of learned rates: a wrapped machine, or its oracle."""
 
     @property
     def trial_id(self) -> str:

@@ -50,7 +50,7 @@ class Watcher(Protocol):
 
 
 class ManoeuvreError(Exception):
-    """It did not work. The text says what came of it."""
+    """A manoeuvre did not work. The text says what came of it."""
 
 
 class Attempt(NamedTuple):

@@ -139,7 +139,7 @@ class _SoakRunner:
 
     @contextlib.contextmanager
     def unchanged(self) -> Iterator[None]:
-        """Within it each trial finds the machine as it is now, and so does who comes after."""
+        """Let each trial of the body find the machine as it is now, and whoever comes after it."""
         machine = self._plan.machine
         if not isinstance(machine, smach.StateMachine):
             yield

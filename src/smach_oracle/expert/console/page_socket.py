@@ -119,7 +119,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._tasks: Set['asyncio.Task[None]'] = set()
 
     def set_default_headers(self) -> None:
-        """On every answer."""
+        """Set the headers of every answer."""
         set_security_headers(self)
 
     def write_error(self, status_code: int, **_: object) -> None:

@@ -32,7 +32,7 @@ class ArmNames(NamedTuple):
 
     @classmethod
     def parse(cls, key: str, value: object) -> 'ArmNames':
-        """From a dictionary.
+        """Make names from a dictionary.
 
         :raises SettingsError: naming the key, its value and what is allowed.
         """

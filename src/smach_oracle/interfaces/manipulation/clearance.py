@@ -178,7 +178,7 @@ class ClearanceModel:
 
 
 class ArmClearance:
-    """Called with an arm's joint positions, returns what the arm is nearest to."""
+    """Returns what an arm is nearest to, when called with its joint positions."""
 
     def __init__(self, model: ClearanceModel, chain: JointChain, within: float) -> None:
         """See ClearanceModel.arm."""

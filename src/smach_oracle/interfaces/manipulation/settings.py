@@ -60,7 +60,7 @@ class TeleoperationSettings(NamedTuple):
 
     @classmethod
     def from_parameters(cls) -> 'TeleoperationSettings':
-        """From the node's private parameters.
+        """Read the settings from the node's private parameters.
 
         :raises SettingsError: naming the parameter, its value and what is allowed.
         """

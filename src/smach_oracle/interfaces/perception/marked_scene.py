@@ -26,7 +26,7 @@ class MarkedSceneError(Exception):
 
 
 class MarkedScene(NamedTuple):
-    """In the frame of the base."""
+    """The marked object and what surrounds it, in the frame of the base."""
 
     surface: UprightBox  # what is seen of it. Its height is 0
     others: List[UprightBox]  # other things on it, nearest to the base first

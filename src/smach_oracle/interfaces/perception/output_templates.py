@@ -24,7 +24,9 @@ class StateTemplate(NamedTuple):
 
 
 def templates_from(settings: object) -> Dict[str, StateTemplate]:
-    """By state, from a dictionary such as {'DETECT_DRINK': {'outputs': {'drink': 'object'}}}.
+    """Return templates by state, from a dictionary.
+
+    An example is {'DETECT_DRINK': {'outputs': {'drink': 'object'}}}.
 
     :raises SettingsError: naming the setting, its value and what is allowed.
     """

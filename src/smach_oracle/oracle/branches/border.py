@@ -182,7 +182,7 @@ class Border:
 
 
 class ConcurrenceBorder(Border):
-    """Beside a Concurrence."""
+    """The data kept for a Concurrence."""
 
     _own: Optional[Dict[str, Any]] = None  # its table of states, while another has its place
 
@@ -207,7 +207,7 @@ class ConcurrenceBorder(Border):
 
 
 class IteratorBorder(Border):
-    """Beside an Iterator."""
+    """The data kept for an Iterator."""
 
     def __init__(self, container: smach.Container) -> None:
         super().__init__(container)

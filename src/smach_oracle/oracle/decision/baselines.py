@@ -126,7 +126,7 @@ class Random(Baseline):
 
 
 class Ladder(Baseline):
-    """As deployed robots do: wait and try again, step back a few times, then ask."""
+    """Does as deployed robots do: wait and try again, step back a few times, then ask."""
 
     name = 'ladder'
     parameters: Mapping[str, float] = {'wait_s': 5.0, 'tries': 1, 'steps_back': 3}

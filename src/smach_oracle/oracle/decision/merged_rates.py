@@ -1,4 +1,4 @@
-"""What two have learned of one state, as one. Pure."""
+"""Merges what two machines have learned of one state. Pure."""
 from typing import Any, Dict, List, Mapping
 
 Learned = Mapping[str, Any]  # the snapshot of an estimator

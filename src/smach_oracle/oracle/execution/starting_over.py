@@ -1,4 +1,4 @@
-"""To start a script over: its userdata as it was at first, in all containers of the tree."""
+"""Starts a script over: its userdata as it was at first, in all containers of the tree."""
 from ..machine.nesting import nodes_of
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode

@@ -79,7 +79,7 @@ class DeparturePort(Protocol):
 
     @property
     def arrives_at(self) -> 'TreeNode':
-        """That level."""
+        """The level to which it leads."""
 
 
 class EntryPort(Protocol):
@@ -345,7 +345,7 @@ class TreeNode:
             self.resuming.take_over_records(self)
 
     def begin_stepping(self) -> None:
-        """At the first state of an execution, look at what the engine is like."""
+        """Find out at the first state of an execution what the engine is like."""
         self.engine.look(self.machine)
         self.engine.stays_attentive |= self.in_force.limits_autonomy()
         self.tree.control.attend(self.engine)

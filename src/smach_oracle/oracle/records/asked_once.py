@@ -8,7 +8,7 @@ NOT_BEGUN = 'the program was stopped before it began'
 
 
 class AskedOnce:
-    """Has a person asked once, before the first state that any of some containers comes to."""
+    """Makes the oracle ask a person once, before the first state of any of some containers."""
 
     def __init__(self, why: str, passes: Sequence[StateRecord]) -> None:
         """`passes`: states that are entered before, once each, on the way to where it stood."""

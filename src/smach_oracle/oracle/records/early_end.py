@@ -31,7 +31,7 @@ class EarlyEnd:
 
     @contextlib.contextmanager
     def asking(self) -> Iterator[None]:
-        """Within it a question is open: a shutdown has the trial go on later."""
+        """Mark a question as open: after a shutdown the trial then goes on later."""
         with self._lock:
             self._asking += 1
         try:

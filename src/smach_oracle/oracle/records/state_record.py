@@ -10,7 +10,7 @@ from ..settings.settings import StateSettings
 
 
 class Unfinished(NamedTuple):
-    """In place of an execution: how a state stood when the program was stopped."""
+    """The progress of a state when the program was stopped, in place of an execution."""
 
     kind: FailureKind
     outcome: str

@@ -22,13 +22,13 @@ from .failure import (
 
 
 class Overrun(NamedTuple):
-    """In place of the outcome of a state that overran its time limit, or still runs."""
+    """Stands in place of the outcome of a state that overran its time limit, or still runs."""
 
     text: str
 
 
 class HeldBack(NamedTuple):
-    """In place of the outcome of a state that was not executed, since it is not to be repeated."""
+    """Stands in place of the outcome of a state that was not executed, to not repeat it."""
 
     text: str
 

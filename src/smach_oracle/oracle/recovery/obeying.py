@@ -1,4 +1,4 @@
-"""From an expert's answer to the verdict that obeys it."""
+"""Makes a verdict of an expert's answer."""
 from typing import Callable, Optional
 
 import smach

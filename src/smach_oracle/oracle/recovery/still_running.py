@@ -24,7 +24,7 @@ from .stop import why_stopped
 
 
 class TakenOut(NamedTuple):
-    """In place of the outcome of a state that an expert's answer ended while it still ran."""
+    """Stands in place of the outcome of a state that an answer ended while it still ran."""
 
     answer: Answer
     failure: Failure  # as if it had failed, for giving up as the failure would

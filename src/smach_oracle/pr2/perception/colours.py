@@ -36,7 +36,7 @@ def names_of(colours: np.ndarray) -> np.ndarray:
 
 
 def name_of(colour: np.ndarray) -> str:
-    """As names_of(), of one colour (3,)."""
+    """Return the name of one colour (3,). See names_of()."""
     return str(names_of(np.asarray(colour)))
 
 

@@ -18,7 +18,7 @@ from .pick import HeldObject
 
 
 class HandMemory:
-    """What each hand holds."""
+    """Remembers what each hand holds."""
 
     def __init__(self) -> None:
         self._held: Dict[str, HeldObject] = {}
@@ -28,7 +28,7 @@ class HandMemory:
         self._held[arm] = held
 
     def find(self, arm: str) -> Optional[HeldObject]:
-        """What a hand holds, or None where nothing is known of it."""
+        """Return what a hand holds, or None where nothing is known of it."""
         return self._held.get(arm)
 
     def forget(self, arm: str) -> None:

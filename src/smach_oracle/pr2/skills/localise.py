@@ -21,7 +21,7 @@ FARTHEST, MOST_TURNED = 0.35, 0.12  # m, rad: a correction beyond that is taken 
 
 
 class Correction(NamedTuple):
-    """By how much the robot was wrong about where it stands, along its own axes."""
+    """The error of the robot's localisation, along its own axes."""
 
     x: float  # m
     y: float  # m

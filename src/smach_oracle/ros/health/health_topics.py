@@ -60,7 +60,7 @@ class Latest:
 
 
 class HealthTopics:
-    """Those of one process. Each topic is subscribed to once. Not for the main thread."""
+    """The topics of health of one process, each subscribed to once. Not for the main thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -138,7 +138,7 @@ class _Window:
         self._block = b''
 
     def read(self, position: int, size: int) -> bytes:
-        """At most `size` bytes. Fewer at the end of the file."""
+        """Return at most `size` bytes. There are fewer at the end of the file."""
         offset = position - self._start
         if offset < 0 or offset + size > len(self._block):
             self._source.seek(position)

@@ -49,7 +49,7 @@ def _point(positions: List[float]) -> JointTrajectoryPoint:
 
 
 def arm_result(_world: World, _motion: Trajectory, end: MotionEnd) -> FollowJointTrajectoryResult:
-    """By whether it failed on the way or at its end."""
+    """Return the result, by whether it failed on the way or at its end."""
     if end.result is None or end.result.ok:
         return FollowJointTrajectoryResult(FollowJointTrajectoryResult.SUCCESSFUL, end.text)
     return FollowJointTrajectoryResult(CODES[end.result.missed], end.text)

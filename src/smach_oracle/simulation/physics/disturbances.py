@@ -118,7 +118,7 @@ class _ActiveDisturbance(NamedTuple):
 
 
 class Disturbances:
-    """Those of one trial."""
+    """The disturbances of one trial."""
 
     def __init__(self, scene: Scene, robot: Pr2Body) -> None:
         """Check the scene's disturbances.

@@ -99,7 +99,7 @@ class Trajectory:
 
     @property
     def joints(self) -> List[str]:
-        """Those that it moves."""
+        """Return the joints that it moves."""
         return self._joints
 
     def refusal(self, world: World) -> str:

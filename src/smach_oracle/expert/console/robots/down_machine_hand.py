@@ -10,7 +10,7 @@ from .down_machines import DownMachines
 
 
 class DownMachineHand:
-    """For all pages. Any thread may use it."""
+    """Changes machines that are down, for all pages. Any thread may use it."""
 
     def __init__(self, machines: DownMachines, audit: Audit) -> None:
         self._machines, self._audit = machines, audit

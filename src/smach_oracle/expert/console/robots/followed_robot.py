@@ -27,7 +27,7 @@ _ENDS_WAIT = (OracleEvent.HEALTH_WAIT_END, OracleEvent.TRIAL_START, OracleEvent.
 
 
 class FollowedRobot:
-    """Fed by ROS threads. One thread calls `write_sections`."""
+    """A robot whose topics are followed. ROS threads feed it. One thread calls `write_sections`."""
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -33,7 +33,7 @@ _Key = Tuple[str, str, str]
 
 
 class MachineHand:
-    """For all pages."""
+    """Sends the commands of operators to machines, for all pages."""
 
     def __init__(self, holdable: Holdable, audit: Audit, refusal: Refusal,
                  calls: Optional[StopCalls] = None,

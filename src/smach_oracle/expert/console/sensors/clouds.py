@@ -53,7 +53,9 @@ def encode_points(cloud: Cloud, of: int) -> BrowserFile:
 
 
 def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
-    """At most so many points of a cloud, evenly taken, with their colours, else coloured by height.
+    """Return at most so many points of a cloud, evenly taken.
+
+    They have their colours, or are coloured by their heights.
 
     :raises CloudError: for a message that contradicts itself, or too large a one.
     """

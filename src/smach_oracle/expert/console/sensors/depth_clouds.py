@@ -98,7 +98,7 @@ class DepthCloudStream(SensorStream):
 
 def cloud_of_depth(depth: Image, info: CameraInfo, colour: Optional[Image] = None,
                    most: int = MOST_SHOWN) -> Cloud:
-    """At most so many points, evenly taken, in the camera's optical frame.
+    """Return at most so many points, evenly taken, in the camera's optical frame.
 
     :param colour: gives colours where it is of the same moment and size, else distance does.
     :raises ImageError: for what is no depth image, too large a one, or a camera that is not

@@ -164,7 +164,7 @@ def stored_images(files: ImageStore, topics: Sequence[str],
 
 
 def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
-    """As plain data.
+    """Return an image as plain data.
 
     :param asked_s: when the question was put, by the robot's ROS clock. 0 means not known.
     """

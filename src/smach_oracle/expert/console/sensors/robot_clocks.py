@@ -21,7 +21,7 @@ class ClockReading(NamedTuple):
 
 
 class RobotClocks:
-    """Fed by several threads."""
+    """The clocks of robots. Several threads feed them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

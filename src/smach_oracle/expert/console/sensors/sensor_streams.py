@@ -171,7 +171,7 @@ class SensorStreams:
             sensor.update_subscription(listened < MOST_LISTENED)
 
     def view(self) -> List[Dict[str, Any]]:
-        """As plain data, by topic."""
+        """Return the streams as plain data, by topic."""
         return [{'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}
                 for each in sorted(self._all(), key=lambda sensor: (sensor.topic, sensor.number))]
 

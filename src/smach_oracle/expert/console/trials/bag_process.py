@@ -1,4 +1,4 @@
-"""Has bags read by a process of their own, and ends it where it takes too long."""
+"""Reads bags in a process of its own, and ends that where it takes too long."""
 import contextlib
 import json
 import os

@@ -41,7 +41,7 @@ def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[
 
 
 def unwell(trials: Iterable[Union[TrialCounter, TrialSummary]]) -> float:
-    """For how long (s) they waited, all together, until the robot was well."""
+    """Return the time (s) for which all together waited until the robot was well."""
     return round(sum(trial.unwell_s for trial in trials), 1)
 
 

@@ -43,7 +43,7 @@ class _LoggedTrial:
 
 
 class TrialLog:
-    """Fed by ROS threads, read by the one that serves the pages."""
+    """The log of trials. ROS threads feed it, and the thread that serves the pages reads it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -41,7 +41,7 @@ class CheckedHandler(tornado.web.RequestHandler):
         return access_of(self)
 
     def set_default_headers(self) -> None:
-        """On every answer, errors among them."""
+        """Set the headers of every answer, errors among them."""
         set_security_headers(self)
 
     def prepare(self) -> None:

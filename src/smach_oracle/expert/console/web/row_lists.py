@@ -18,7 +18,7 @@ class RowList(NamedTuple):
 
 
 class RowLists:
-    """Written by any thread, read by the one that serves the pages."""
+    """Lists of rows. Any thread writes them, and the thread that serves the pages reads them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

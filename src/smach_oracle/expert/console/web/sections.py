@@ -17,7 +17,7 @@ class _PageSection(NamedTuple):
 
 
 class PageSections:
-    """Written by any thread, read by the one that serves the pages."""
+    """Sections of the page. Any thread writes them, the thread that serves the pages reads them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

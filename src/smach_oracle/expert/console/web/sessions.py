@@ -27,7 +27,7 @@ class BrowserSession(NamedTuple):
 
     @property
     def left_s(self) -> float:
-        """For how long it is still good, s. Below 0 where it has become too old."""
+        """Return the time (s) for which it is still valid. Below 0 where it has become too old."""
         return self.began_s + 3600.0 * HOURS - time.time()
 
 
@@ -40,7 +40,7 @@ def new_session(identity: Optional[Identity] = None) -> BrowserSession:
 
 
 def to_text(session: BrowserSession) -> str:
-    """For the cookie, which is signed by others."""
+    """Return the text for the cookie, which others sign."""
     return json.dumps(list(session))
 
 
