@@ -23,6 +23,15 @@ class QuietActionServer(actionlib.ActionServer):
     A goal counts only if its node listens for the result. The player of a bag does not.
     """
 
+    def initialize(self) -> None:
+        """Begin, with a timer that goes on where simulated time is set back."""
+        super().initialize()
+        timer = self.status_timer
+        if timer is not None:
+            timer.shutdown()
+            self.status_timer = rospy.Timer(rospy.Duration(1.0 / self.status_frequency),
+                                            self.publish_status_async, reset=True)
+
     def internal_goal_callback(self, ros_goal: genpy.Message) -> None:
         """Take a goal. It runs in the thread of the goal's connection, without a lock."""
         if self._is_awaited(ros_goal):
