@@ -11,6 +11,7 @@ from .errors import SettingsError
 from .execution.oracle_state import OracleState
 from .execution.step import Step, before_step
 from .execution.trial import run_container
+from .execution.unwrapping import execute_bare
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.learned_rates import read_by_hand, write_by_hand
@@ -257,6 +258,8 @@ class OracleContainer(smach.StateMachine):
 
         It raises what a StateMachine raises.
         """
+        if self._oracle.tree.is_parents and not self.is_running():
+            return execute_bare(self, *args, **kwargs)
         return run_container(self, lambda: super(OracleContainer, self).execute(*args, **kwargs))
 
     def call_start_cbs(self) -> None:

@@ -27,6 +27,7 @@ from typing import (
 import rospy
 
 import smach
+from smach_oracle.forking import in_child
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.settings.paths import path_of
@@ -95,6 +96,26 @@ class Attachments:
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
         self._node_started = False
+        # called when the last trial that ran has ended
+        self.trials_ended: Callable[[], None] = _nothing
+        self.has_parents_node = False  # a forked child cannot use it
+        in_child(self._let_go)
+
+    def _let_go(self) -> None:
+        """Leave a child without what its parent has, and the node to its parent."""
+        self.options, self._recorder, self._recorder_wanted = RecordingOptions(), None, True
+        self.refusing, self.trials_ended = nullcontext, _nothing
+        self._lock = threading.RLock()
+        for server in self._introspection.values():
+            server.leave_to_parent()
+        self._machines.clear()
+        self._on_ros.clear()
+        self._introspection.clear()
+        self._shown.clear()
+        self._expert = self._events = self._rates = self._hand = self._diagnostics = None
+        self._node_started = False
+        self.has_parents_node = rospy.core.is_initialized()
+        leave_node_to_parent()
 
     def has(self, machine: OracleContainer) -> bool:
         """Whether a machine is attached to the node."""
@@ -108,6 +129,16 @@ class Attachments:
             yield
         finally:
             self._trials.remove(machine)
+            if not self._trials:
+                self.trials_ended()
+
+    def after_preempt_s(self) -> float:
+        """Return for how long the machines that run may go on after they are preempted.
+
+        It takes no lock: a signal's handler asks.
+        """
+        return max((oracle_of(machine).settings.after_preempt_s for machine in list(self._trials)),
+                   default=0.0)
 
     def attach(self, machine: OracleContainer) -> None:
         """Attach a top-level machine. It does nothing the second time.
@@ -278,12 +309,37 @@ class Attachments:
         self.close(CLOSE_S)
 
 
+def _nothing() -> None:
+    """Nobody waits for the end of the trials."""
+
+
+def leave_node_to_parent() -> None:
+    """Let a forked child end without closing what its parent's node has open.
+
+    rospy would close the connections under the parent, and unregister its topics.
+    """
+    core = rospy.core
+    hooks = ((core._client_shutdown_hooks, ('smach_oracle.',)),
+             (core._preshutdown_hooks, ('rospy.', 'rosgraph.')),
+             (core._shutdown_hooks, ('rospy.', 'rosgraph.')))
+    for registered, modules in hooks:
+        registered[:] = [each for each in registered
+                         if not str(getattr(each, '__module__', '')).startswith(modules)]
+    del core._shutdown_threads[:]
+    if _bare_loggers:
+        smach.set_loggers(*_bare_loggers)
+
+
+_bare_loggers: List[Callable[..., None]] = []  # of SMACH, where rospy's are in their place
+
+
 def log_through_rospy() -> None:
     """Hand rospy's loggers to SMACH, as `import smach_ros` does.
 
     So the levels of the node's standard services apply. Loggers of the program's own stay.
     """
     if getattr(smach.loginfo, '__module__', '').split('.')[0] == 'smach':
+        _bare_loggers[:] = [smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr]
         smach.set_loggers(rospy.loginfo, rospy.logwarn, rospy.logdebug, rospy.logerr)
 
 

@@ -97,11 +97,11 @@ class OracleContainer(BareContainer):
         :raises OSError: where the folder for the bags cannot be made or written.
         """
         oracle = oracle_of(self)
-        if not oracle.is_top or self.is_running():
+        if not oracle.is_top or self.is_running() or oracle.is_parents:
             return super().execute(*args, **kwargs)
         oracle.describe_failure = describe_failure
         with attachments().refusing(), machine_names().running(self):
-            if not attachments().has(self):
+            if not (attachments().has(self) or attachments().has_parents_node):
                 self._attach()
             with attachments().trial(self):
                 return super().execute(*args, **kwargs)

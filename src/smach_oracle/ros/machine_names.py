@@ -12,6 +12,7 @@ from typing import Any, Iterator, List, NamedTuple, Set, Tuple
 import rospy
 
 import smach
+from smach_oracle.forking import in_child
 from smach_oracle.oracle import OracleContainer, oracle_of
 
 # what every script is called that oracle_run.launch runs and nobody has named
@@ -45,6 +46,10 @@ class MachineNames:
         self._named: List[_Named] = []
         self._promised: Set[str] = set()
         self._running: List[OracleContainer] = []
+        self._lock = threading.Lock()
+        in_child(self._let_go)
+
+    def _let_go(self) -> None:
         self._lock = threading.Lock()
 
     def name_of(self, machine: smach.StateMachine) -> str:

@@ -19,6 +19,8 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
+from smach_oracle.forking import in_child
+
 POLL_S = 1.0
 CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch forever
 
@@ -185,6 +187,15 @@ def start_master_watch() -> MasterWatch:
             _watch = MasterWatch(link, _own_registrations, _connect)
             _watch.start()
         return _watch
+
+
+def _forget_watch() -> None:
+    """Let a forked child that becomes a node have a watch of its own."""
+    global _watch, _watch_lock
+    _watch, _watch_lock = None, threading.Lock()
+
+
+in_child(_forget_watch)
 
 
 def _own_registrations() -> Registrations:

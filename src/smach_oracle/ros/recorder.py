@@ -14,6 +14,7 @@ import genpy
 import rospy
 
 from smach_oracle.foreign import error_text, repr_of
+from smach_oracle.forking import in_child
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -98,11 +99,15 @@ class TrialRecorder(OwnObserver):
         self._hung = False
         self._not_recorded: Set[Tuple[type, str]] = set()  # kinds of items, and why: said once
         self._closed = False
-        self._process = os.getpid()
+        self._is_parents = False
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
         self._thread.start()
         self._listener = TopicListener(topics, self._take_message, types) if listens else None
         atexit.register(self.close)
+        in_child(self._let_go)
+
+    def _let_go(self) -> None:
+        self._is_parents = True  # a child has no writer thread, and the bag is its parent's
 
     def attach(self, machine: Union['OracleContainer', EventSource],
                snapshots: Optional[Snapshots] = None) -> None:
@@ -125,8 +130,8 @@ class TrialRecorder(OwnObserver):
         self._observe(event)
 
     def _observe(self, event: Event) -> None:
-        if os.getpid() != self._process:
-            return  # a forked child has no writer thread, and the bag is its parent's
+        if self._is_parents:
+            return
         item = EventItem(event, now()._replace(wall=event.wall_time))
         weight = (WEIGHT_OF_A_FILE
                   if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED) else 1)
@@ -215,7 +220,7 @@ class TrialRecorder(OwnObserver):
         :returns: whether all was done within `timeout_s`. It is False where the disk hangs: the
             bags are mended at the next start.
         """
-        if os.getpid() != self._process:
+        if self._is_parents:
             return True
         deadline = time.monotonic() + timeout_s
         if not self._closed and self._listener and not rospy.core.is_shutdown_requested():

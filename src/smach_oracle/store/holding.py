@@ -5,6 +5,8 @@ import os
 import time
 from typing import Optional
 
+from smach_oracle.forking import in_child, let_go_of
+
 from .errors import StoreError
 
 TAKE_S = 0.2  # who only looks whether it is held has it for less than this
@@ -24,6 +26,7 @@ class MachineLock:
         # a link leads to the store that it names, and to its lock
         self._file = '{}-lock-{}'.format(os.path.realpath(path), digest)
         self._descriptor: Optional[int] = None
+        in_child(self._let_go)
 
     def take(self) -> None:
         """Take the lock.
@@ -54,6 +57,11 @@ class MachineLock:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
+
+    def _let_go(self) -> None:
+        # a child that outlives its parent would hold the machine
+        if self._descriptor is not None:
+            let_go_of(self._descriptor)
 
     def is_held_elsewhere(self) -> bool:
         """Whether another process holds it now. It makes and changes no file.

@@ -5,10 +5,13 @@ earlier one, those between stay, too, and count for nothing that follows. A mome
 that changed with it. What is large is kept once, by its content.
 """
 import contextlib
+import ctypes
 import os
 import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 from urllib.parse import quote
+
+from smach_oracle.forking import in_child
 
 from .errors import StoreDamaged, StoreError, told_error
 from .names import RENAMED
@@ -67,6 +70,11 @@ class StoreFile:
             self._db = self._opened(synchronous)
         except sqlite3.Error as err:
             raise told_error(path, err) from err
+        in_child(self._let_go)
+
+    def _let_go(self) -> None:
+        # Never close a parent's database, nor let it be freed: SQLite would take it for its own.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._db))
 
     def _opened(self, synchronous: str) -> sqlite3.Connection:
         where = os.path.abspath(self.path)

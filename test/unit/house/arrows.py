@@ -8,12 +8,12 @@ PACKAGE = ROOT / 'src/smach_oracle'
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': {'foreign', 'store'},
-    'store': {'foreign'},  # no ROS, no SMACH
+    'oracle': {'foreign', 'forking', 'store'},
+    'store': {'foreign', 'forking'},  # no ROS, no SMACH
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
             'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
-            'oracle.oracle_of', 'oracle.waiting', 'foreign', 'packages', 'store'},
+            'oracle.oracle_of', 'oracle.waiting', 'foreign', 'forking', 'packages', 'store'},
     'geometry': set(),
     'analysis': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
                  'packages'},
@@ -36,6 +36,7 @@ ARROWS: Dict[str, Set[str]] = {
     'commands': {'documentation', 'packages', '__version__'},
     'documentation': set(),
     'foreign': set(),
+    'forking': set(),
     'packages': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
@@ -60,7 +61,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
-        {'sendable_text', 'strict_json', 'master_watch', 'reading'}
+        {'sendable_text', 'strict_json', 'master_watch', 'reading', 'signals'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',
@@ -92,7 +93,7 @@ LAYERS: Dict[str, List[Layer]] = {
 ROS_FREE = [
     'oracle', 'store', 'geometry', 'analysis', 'experiment', 'pr2/model', 'pr2/perception',
     'pr2/planning', 'pr2/skills', 'simulation/physics', 'simulation/pictures', 'simulation/scenes',
-    'inspection_robot/world', 'inspection_robot/robot', 'commands', 'foreign', 'packages'
+    'inspection_robot/world', 'inspection_robot/robot', 'commands', 'foreign', 'forking', 'packages'
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(

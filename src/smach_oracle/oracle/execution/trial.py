@@ -3,10 +3,11 @@
 Also what one execution of any container begins and ends.
 """
 import time
-from typing import Any, Callable, Dict, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 import smach
 from smach_oracle.foreign import error_text
+from smach_oracle.forking import in_child
 
 from ..checkpoint.resuming import Resumption, tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
@@ -18,10 +19,13 @@ from ..machine.workers import recall_preempts
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
+from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.failure import ends_program, outcome_of_early_end
 from .sending import tell_dropped
 from .starting_over import may_start_over
 from .wrapping import adopt, bring_up_to_date
+
+_running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
 def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
@@ -68,23 +72,33 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
     try:
-        outcome = _run(node, execute)
+        _running.append(node)
+        try:
+            outcome = _run(node, execute)
+        finally:
+            _running.remove(node)
         return outcome
     except BaseException as err:
         error = err
         raise
     finally:
-        node.tree.control.end_trial()
-        why = _trial_end(node, outcome, error)
-        if why is TrialEnd.KEPT:
-            node.machine.service_preempt()
-            for state in node.machine._states.values():
-                recall_preempts(state)
-        node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
-                  data={ENDED_BY: why.value, **_learned(node)})
-        save_rates(node)
-        if store is not None:
-            store.end(why, outcome or '', time.time())
+        if not node.tree.is_parents:
+            _end_trial(node, outcome, error, store)
+
+
+def _end_trial(node: TreeNode, outcome: Optional[str], error: Optional[BaseException],
+               store: Optional[TrialStore]) -> None:
+    node.tree.control.end_trial()
+    why = _trial_end(node, outcome, error)
+    if why is TrialEnd.KEPT:
+        node.machine.service_preempt()
+        for state in node.machine._states.values():
+            recall_preempts(state)
+    node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
+              data={ENDED_BY: why.value, **_learned(node)})
+    save_rates(node)
+    if store is not None:
+        store.end(why, outcome or '', time.time())
 
 
 def _settings(node: TreeNode) -> Dict[str, Any]:
@@ -150,3 +164,21 @@ def _why(outcome: Optional[str], error: Optional[BaseException]) -> str:
     if error is not None:
         return error_text(error)
     return NO_OUTCOME if outcome is None else ''
+
+
+def _leave_to_parent() -> None:
+    """Have no part in the trials that ran when this process was forked.
+
+    Where the state that has forked returns in the child too, its machine goes on there and tells
+    nobody.
+    """
+    for top in _running:
+        tree = top.tree.silent_twin()
+        for node in nodes_of(top.machine):
+            node.join(tree)
+            for record in node.records.by_label.values():
+                record.__setstate__(record.__getstate__())  # nobody holds its lock
+    GOALS.__dict__.update(RunningGoals().__dict__)
+
+
+in_child(_leave_to_parent)

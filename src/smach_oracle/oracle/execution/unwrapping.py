@@ -1,5 +1,5 @@
 """Takes a machine out of its oracle again: the opposite of wrapping."""
-from typing import Any, cast
+from typing import Any, Optional, cast
 
 import smach
 
@@ -8,6 +8,7 @@ from ..errors import TrialError
 from ..machine.nesting import machines_below, nodes_of
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..settings.settings import Settings
 from .item_gates import remove_gates
 from .wrapped_classes import two_classes
 
@@ -42,6 +43,11 @@ def _strip(machine: WrappedMachine) -> None:
             _strip(wrapped)
         else:
             _stand_alone(wrapped)
+    _strip_alone(machine)
+
+
+def _strip_alone(machine: WrappedMachine) -> None:
+    """Give a machine back as it was before it was wrapped, but not those that are nested in it."""
     release_branches(machine)
     machine._remove_oracle()
     remove_gates(cast(smach.StateMachine, machine))
@@ -59,3 +65,31 @@ def _stand_alone(machine: WrappedMachine) -> None:
     for each in nodes_of(machine):
         each.join(tree)
     node.parent, node.below = None, ()
+
+
+def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -> Optional[str]:
+    """Execute a machine in a child process of its program, as its author wrote it.
+
+    All that is kept of the machine belongs to the program, and its threads are not in the child.
+    """
+    wrapped = cast(WrappedMachine, machine)
+    smach.logwarn('{}: runs in a child process of the program, and without an oracle there'.format(
+        wrapped._oracle.path))
+    _make_bare(wrapped)
+    outcome: Optional[str] = machine.execute(*args, **kwargs)
+    return outcome
+
+
+def _make_bare(machine: WrappedMachine) -> None:
+    """Take a machine, and those nested in it, out of the oracle.
+
+    One that was built as an OracleContainer gets an oracle that only observes.
+    """
+    tree, name = machine._oracle.tree, machine._oracle.name
+    for _, child in list(machines_below(machine)):
+        if isinstance(child, tree.container_class):
+            _make_bare(cast(WrappedMachine, child))
+    _strip_alone(machine)
+    if isinstance(machine, tree.container_class):
+        machine._oracle = TreeNode(machine, Tree(tree.container_class, recover=False), Settings(),
+                                   name)

@@ -77,6 +77,11 @@ class Oracle:
         return self._node.settings
 
     @property
+    def is_parents(self) -> bool:
+        """Whether this is a child process of the program in which the machine has its oracle."""
+        return self._node.tree.is_parents
+
+    @property
     def events(self) -> EventSource:
         """Return the events of the whole tree.
 

@@ -3,11 +3,13 @@
 These are the trial, its events, the expert and the threads that were left behind.
 """
 import itertools
+import os
 import threading
 import uuid
 from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
 
 import smach
+from smach_oracle.forking import is_child
 
 from ..asking.question import Expert
 from ..control.control import Control
@@ -69,7 +71,19 @@ class Tree:
         self.describe_failure: Callable[[smach.State], str] = no_description
         self._questions = 0
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
+        self._process = os.getpid()
         self._lock = threading.Lock()
+
+    @property
+    def is_parents(self) -> bool:
+        """Whether this is a child process of the program to which the tree belongs."""
+        return self._process != os.getpid() and is_child()
+
+    def silent_twin(self) -> 'Tree':
+        """Return a tree for the same machines in a child process, with nothing of this one."""
+        twin = Tree(self.container_class, recover=False)
+        twin.trial_id, twin._process = self.trial_id, self._process
+        return twin
 
     def begin_trial(self, trial_id: str) -> None:
         """Number events and questions again."""

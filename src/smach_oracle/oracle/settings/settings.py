@@ -88,6 +88,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'oracle_label': values.label,
     'nested': checked_nested,
     'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
+    'after_preempt_s': values.number(0, 3600, 'seconds from 0 to 3600'),
 }
 
 
@@ -136,6 +137,8 @@ class Settings:
     resume_from: int = 0  # number of the stored moment, 0: the last one of a trial
     # paths of states by those that they had in the script that was stopped
     resume_map: Mapping[str, str] = field(default_factory=dict)
+    # how long states behind a preempt may run after Ctrl-C or SIGTERM, under oracle_run
+    after_preempt_s: float = 0.0
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

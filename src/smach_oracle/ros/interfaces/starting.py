@@ -16,6 +16,7 @@ import roslib.packages
 import rospkg
 import rospy
 
+from smach_oracle.forking import in_child, let_go_of
 from smach_oracle.msg import InterfaceOutput
 from smach_oracle.oracle.errors import InterfaceError
 from smach_oracle.oracle.records.short_text import shortened
@@ -87,9 +88,15 @@ class StartedInterface:
                 stderr=subprocess.STDOUT, env=environment, start_new_session=True)
         except OSError as err:
             raise InterfaceError('it cannot be started: {}'.format(err)) from err
+        in_child(self._let_go)
         self.publish_status(InterfaceOutput.STARTING, 'started: ' + ' '.join(command))
         for target in (self._read, self._publish_changes):
             threading.Thread(target=target, name='output of ' + offer.name, daemon=True).start()
+
+    def _let_go(self) -> None:
+        # the end of this pipe tells the keeper that the program is gone
+        if self._process.stdin is not None and not self._process.stdin.closed:
+            let_go_of(self._process.stdin.fileno())
 
     @property
     def exit_code(self) -> Optional[int]:

@@ -124,6 +124,10 @@ class IntrospectionServer(object):
         self._init_sub.unregister()  # type: ignore[union-attr]
         self._status_pub = self._structure_pub = self._init_sub = None
 
+    def leave_to_parent(self) -> None:
+        """In a forked child: show nothing on the topics of the parent."""
+        self._thread = self._status_pub = None
+
     def clear(self) -> None:
         """Forget all containers. ``construct`` adds some again."""
         self._tree.clear()

@@ -5,6 +5,7 @@ asks whether the machine is to be wrapped. What is called is always the outermos
 an author's override runs once.
 """
 import functools
+import os
 import threading
 import weakref
 from typing import Any, Callable, Iterator, List, Tuple, Type
@@ -29,6 +30,7 @@ class Interception:
 
     def __init__(self, wrap: WrapFunction) -> None:
         self._wrap = wrap
+        self._process = os.getpid()  # in a child of it machines stay as they are
         self._left_bare: 'weakref.WeakSet[smach.StateMachine]' = weakref.WeakSet()
         self._lock = threading.RLock()  # machines may start in several threads at once
 
@@ -43,7 +45,7 @@ class Interception:
 
         :returns: whether it was wrapped just now.
         """
-        if isinstance(machine, OracleContainer):
+        if isinstance(machine, OracleContainer) or os.getpid() != self._process:
             return False
         with self._lock:
             if machine in self._left_bare:

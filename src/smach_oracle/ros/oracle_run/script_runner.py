@@ -30,11 +30,10 @@ from smach_oracle.oracle.settings.paths import check_writable, path_of
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
 
-from .. import attachment
+from .. import attachment, shutdown
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python
 from ..machine_names import machine_names
 from ..reading.known_names import Complaint, NameJudge
-from ..shutdown import ShutdownGuard
 from .precondition_labels import sorted_preconditions
 from .python_names import check_python_name
 from .refusal import USAGE_ERROR, Refusal
@@ -334,6 +333,7 @@ def _show_only_frames_of(file_name: str) -> None:
     show = sys.excepthook
 
     def excepthook(kind: type, error: BaseException, trace: Optional[types.TracebackType]) -> None:
+        shutdown.hide_from(trace)
         inside = trace
         while inside is not None and inside.tb_frame.f_code.co_filename != file_name:
             inside = inside.tb_next
@@ -365,11 +365,13 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     from .interception import Interception
     attachment.configure(invocation.options)
     give_names(invocation)
-    guard = ShutdownGuard(attachment.attachments().preempt, attachment.attachments().close)
+    attachments = attachment.attachments()
+    guard = shutdown.ShutdownGuard(attachments.preempt, attachments.close,
+                                   after_preempt_s=attachments.after_preempt_s)
     guard.install()
-    atexit.register(attachment.attachments().close, 1.0)
+    atexit.register(attachments.close, 1.0)
     refusal = Refusal(guard, tell)
-    attachment.attachments().refusing = refusal.of_errors
+    attachments.refusing, attachments.trials_ended = refusal.of_errors, guard.trials_ended
     Interception(MachineWrapper(invocation, refusal)).install()
     with refusal.decides_exit_code():
         run_script(invocation.script, invocation.script_args)

@@ -12,6 +12,8 @@ import fcntl
 import os
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
+from smach_oracle.forking import in_child, let_go_of
+
 from . import bag_format
 from .bag_format import ChunkInfo, Stamp
 
@@ -68,6 +70,12 @@ class BagWriter:
             os.close(self._fd)
             os.unlink(path)  # holds nothing
             raise
+        in_child(self._let_go)
+
+    def _let_go(self) -> None:
+        # a child that outlives its parent would keep the lock, and the bag would not be mended
+        if self._fd >= 0:
+            let_go_of(self._fd)
 
     @property
     def has_chunks(self) -> bool:

@@ -1,0 +1,1 @@
+"""The signals of a process, and what hears them."""

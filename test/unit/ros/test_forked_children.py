@@ -1,0 +1,218 @@
+"""A script that starts processes, and ends them, runs under oracle_run as it runs by itself.
+
+Its children touch nothing of it. Real processes, real signals.
+"""
+import fcntl
+import json
+import os
+import re
+import signal
+import sqlite3
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import forking_script
+import pytest
+import rosbag
+from waiting import wait_for
+
+RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
+SCRIPT = str(Path(forking_script.__file__))
+ENVIRONMENT = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
+
+
+def run(*command):
+    return subprocess.run([sys.executable, *command], env=ENVIRONMENT, timeout=60,
+                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+
+
+def said(process):
+    return re.findall('SAID .*', process.stdout), process.returncode
+
+
+def first_said(program):
+    """The next that a program says, the lines of SMACH's log left out."""
+    for line in program.stdout:
+        if line.startswith(b'SAID '):
+            return line.decode()[len('SAID '):].strip()
+    raise AssertionError('it has ended without a word')
+
+
+@pytest.fixture
+def under_oracle(tmp_path):
+    """Run a script under oracle_run, with all that a program keeps in files."""
+    def run_script(*script):
+        return run('-c', RUNNER, '--record', str(tmp_path / 'bags'), '--checkpoint',
+                   str(tmp_path / 'store'), '--rates-file', str(tmp_path / 'rates'), *script)
+    return run_script
+
+
+@pytest.fixture
+def script(tmp_path):
+    """Write a script beside the one that starts processes, whose names it has."""
+    def write(text):
+        path = tmp_path / 'task.py'
+        path.write_text('import sys; sys.path.insert(0, {!r})\nfrom forking_script import *\n'
+                        .format(os.path.dirname(SCRIPT)) + textwrap.dedent(text))
+        return str(path)
+    return write
+
+
+def events_of(bag):
+    with rosbag.Bag(str(bag)) as recorded:
+        return [event for _, event, _ in recorded.read_messages('/oracle/events')]
+
+
+@pytest.mark.parametrize('kind', sorted(forking_script.KINDS))
+def test_children_start_and_end_as_without_an_oracle(under_oracle, kind, tmp_path):
+    ended = under_oracle(SCRIPT, kind)
+    assert said(ended) == said(run(SCRIPT, kind)), ended.stderr
+    for bag in (tmp_path / 'bags').iterdir():
+        seqs = [event.seq for event in events_of(bag)]
+        assert seqs == list(range(len(seqs)))  # none is missing, and none is there twice
+    with sqlite3.connect(str(tmp_path / 'store')) as store:
+        assert store.execute('PRAGMA integrity_check').fetchone() == ('ok',)
+        assert not store.execute('SELECT * FROM trials WHERE ended IS NULL').fetchall()
+    paths = json.loads((tmp_path / 'rates').read_text())['containers']
+    assert paths['']
+
+
+def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(script, tmp_path):
+    path = script('''
+        class Start(smach.State):
+            def __init__(self):
+                smach.State.__init__(self, outcomes=['succeeded'])
+            def execute(self, userdata):
+                child = multiprocessing.get_context('fork').Process(target=sleep)
+                child.start()
+                said(child.pid)
+                os.kill(os.getpid(), signal.SIGKILL)
+        top = smach.StateMachine(outcomes=['succeeded'])
+        with top:
+            smach.StateMachine.add('START', Start())
+        top.execute()
+        ''')
+    program = subprocess.Popen([sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'),
+                                '--checkpoint', str(tmp_path / 'store'), path],
+                               stdout=subprocess.PIPE, env=ENVIRONMENT)
+    child = json.loads(first_said(program))
+    try:
+        assert program.wait(30) == -signal.SIGKILL
+        os.kill(child, 0)  # it lives
+        for locked in [*(tmp_path / 'bags').iterdir(), *tmp_path.glob('store-lock-*')]:
+            with open(str(locked), 'r+b') as file:
+                # the child lets go as soon as it runs, which may be a little later
+                assert wait_for(lambda: can_lock(file)), locked
+    finally:
+        os.kill(child, signal.SIGKILL)
+        program.stdout.close()
+
+
+def can_lock(file):
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+ASYNCIO = '''
+import asyncio
+heard = []
+async def main():
+    loop = asyncio.get_running_loop()
+    stop = asyncio.Event()
+    loop.add_signal_handler(signal.SIGUSR1, lambda: (heard.append('usr1'), stop.set()))
+    os.kill(os.getpid(), signal.SIGUSR1)
+    await asyncio.wait_for(stop.wait(), 10)
+    loop.add_signal_handler(signal.SIGTERM, lambda: (heard.append('term'), done.set()))
+    done = asyncio.Event()
+    os.kill(os.getpid(), signal.SIGTERM)
+    await asyncio.wait_for(done.wait(), 10)
+    loop.remove_signal_handler(signal.SIGUSR1)
+    loop.remove_signal_handler(signal.SIGTERM)
+asyncio.run(main())
+said(heard)
+said(signal.getsignal(signal.SIGTERM))
+said(signal.set_wakeup_fd(-1))
+'''
+
+
+def test_a_loop_of_asyncio_hears_its_signals(under_oracle, script):
+    path = script(ASYNCIO)
+    assert said(under_oracle(path)) == said(run(path)) == ([
+        "SAID ['usr1', 'term']", 'SAID {}'.format(signal.SIG_DFL), 'SAID -1'], 0)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_signals_are_heard_after_a_loop_of_asyncio(script, number, tmp_path):
+    path = script(ASYNCIO + '''
+class Deaf(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded'])
+    def execute(self, userdata):
+        while True:
+            try:
+                said('ready')
+                while True:
+                    time.sleep(0.1)
+            except BaseException:
+                pass
+top = smach.StateMachine(outcomes=['succeeded'])
+with top:
+    smach.StateMachine.add('DEAF', Deaf())
+top.execute()
+''')
+    program = subprocess.Popen([sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'),
+                                path], stdout=subprocess.PIPE, env=ENVIRONMENT)
+    try:
+        while first_said(program) != 'ready':
+            pass
+        program.send_signal(number)
+        assert program.wait(30) == 128 + number
+    finally:
+        program.kill()
+        program.stdout.close()
+    bag, = (tmp_path / 'bags').iterdir()
+    assert bag.suffix == '.bag', 'it is closed'
+
+
+def test_a_program_that_is_ended_by_force_leaves_no_child(script):
+    path = script('''
+        class Deaf(smach.State):
+            def __init__(self):
+                smach.State.__init__(self, outcomes=['succeeded'])
+            def execute(self, userdata):
+                workers = multiprocessing.get_context('fork').Pool(2)
+                said([each.pid for each in workers._pool])
+                while True:
+                    try:
+                        time.sleep(1)
+                    except BaseException:
+                        pass
+        top = smach.StateMachine(outcomes=['succeeded'])
+        with top:
+            smach.StateMachine.add('DEAF', Deaf())
+        top.execute()
+        ''')
+    program = subprocess.Popen([sys.executable, '-c', RUNNER, path], stdout=subprocess.PIPE,
+                               env=ENVIRONMENT)
+    children = json.loads(first_said(program))
+    try:
+        program.send_signal(signal.SIGTERM)
+        assert program.wait(30) == 128 + signal.SIGTERM
+        assert wait_for(lambda: not any(map(lives, children)))
+    finally:
+        program.stdout.close()
+        for each in filter(lives, children):
+            os.kill(each, signal.SIGKILL)
+
+
+def lives(pid):
+    try:
+        with open('/proc/{}/stat'.format(pid)) as stat:
+            return stat.read().rsplit(')', 1)[1].split()[0] != 'Z'
+    except FileNotFoundError:
+        return False
