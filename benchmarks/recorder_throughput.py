@@ -3,7 +3,9 @@
 memory.
 
 A two-state loop without work in its states: the executive at its full speed, the worst case for a
-recorder. Needs no ROS master. `recorder_throughput.py --help` shows the options.
+recorder. With --trials many short trials follow each other, one bag each, and the exit status is 1
+where a later trial takes more memory, files, threads or time than an early one. Needs no ROS
+master. `recorder_throughput.py --help` shows the options.
 """
 import argparse
 import glob
@@ -12,8 +14,9 @@ import resource
 import shutil
 import sys
 import tempfile
+import threading
 import time
-from typing import Any, Callable, List, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 from rosbags.rosbag1 import Reader
 
@@ -21,6 +24,9 @@ import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.recorder import TrialRecorder
+
+# what the last tenth of many trials may take of what the first took
+MOST_GROWTH = {'ms per trial': 2.0, 'peak memory, MB': 1.1, 'threads': 1.0, 'open files': 1.2}
 
 
 class Step(smach.State):
@@ -85,6 +91,31 @@ def peak_rss_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
 
+def growth_of(trials: int, folder: str) -> int:
+    """Run many trials of one process. Compare what they take with what the first tenth took."""
+    recorder = TrialRecorder(folder + '/bags')
+    tenth = max(trials // 10, 1)
+    readings: List[Dict[str, float]] = []
+    for _ in range(10):
+        begin = time.perf_counter()
+        for _ in range(tenth):
+            run(5, recorder)
+        readings.append({
+            'ms per trial': (time.perf_counter() - begin) / tenth * 1e3,
+            'peak memory, MB': peak_rss_mb(), 'threads': threading.active_count(),
+            'open files': len(os.listdir('/proc/self/fd'))})
+    closed = recorder.close(60.0)
+    bags = len(glob.glob(folder + '/bags/*.bag'))
+    print('{} trials, {} bags'.format(10 * tenth, bags))
+    early, late, grown = readings[0], readings[-1], False
+    for name, most in MOST_GROWTH.items():
+        ratio = late[name] / early[name]
+        grown = grown or ratio > most
+        print('{:<16} {:8.2f} at a tenth {:8.2f} at the end {:6.2f} x (at most {:.1f})'.format(
+            name, early[name], late[name], ratio, most))
+    return 0 if closed and bags == 10 * tenth and not grown else 1
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -92,11 +123,14 @@ def main() -> int:
                         help='of the recorded trial (default: %(default)s)')
     parser.add_argument(
         '--folder', help='for the bags, to try a certain disk (default: that for temporary files)')
+    parser.add_argument('--trials', type=int, default=0,
+                        help='run so many short trials instead, e.g. 10000')
     args = parser.parse_args()
     smach.set_loggers(*[lambda text: None] * 4)
     folder = tempfile.mkdtemp(dir=args.folder)
     try:
-        return measure(args.transitions, folder)
+        return (growth_of(args.trials, folder) if args.trials
+                else measure(args.transitions, folder))
     finally:
         shutil.rmtree(folder)
 
