@@ -56,6 +56,8 @@ def _parser() -> argparse.ArgumentParser:
     go_to.add_argument('label', metavar='LABEL', help='of a state, or its path below the top '
                        'machine')
     _add(works, 'drop', _drop, 'end the trial: it is never resumed')
+    works.add_parser('accept', help='go on with what can be read of a store that has lost some '
+                     'of it').set_defaults(work=_accept)
     return parser
 
 
@@ -164,6 +166,16 @@ def _drop(given: argparse.Namespace) -> None:
     with trial_to_change(given.path, given.trial) as stopped:
         stopped.drop(_user_name())
     _say('trial {} is dropped'.format(stopped.trial.number))
+
+
+def _accept(given: argparse.Namespace) -> None:
+    store = StoreFile(given.path, accept=True)
+    try:
+        trials = store.trials()
+    finally:
+        store.close()
+    _say('{} is accepted as it is, with {} trial{}'.format(
+        given.path, len(trials), '' if len(trials) == 1 else 's'))
 
 
 def _user_name() -> str:

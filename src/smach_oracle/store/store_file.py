@@ -9,37 +9,19 @@ import ctypes
 import os
 import sqlite3
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
-from urllib.parse import quote
 
 from smach_oracle.forking import in_child
 
-from .errors import StoreDamaged, StoreError, told_error
+from .errors import StoreDamaged, told_error
 from .names import RENAMED
+from .opening import Opening
 from .renaming import Renaming, containers_of, told_renaming
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
+from .soundness import CLOSED, Content, Mark
+from .tables import content_of
 
-FORMAT = 1
-MAGIC = 0x534D4F53  # "SMOS": which program's file it is, where SQLite keeps that
 SYNCHRONOUS = ('FULL', 'NORMAL', 'OFF')
 LAST = 1 << 62  # behind the number of any moment
-BUSY_S = 5.0  # how long one process waits for another that writes
-_SCHEMA = '''
-CREATE TABLE IF NOT EXISTS structures (id TEXT PRIMARY KEY, description TEXT NOT NULL);
-CREATE TABLE IF NOT EXISTS trials (number INTEGER PRIMARY KEY, machine TEXT NOT NULL,
-    trial_id TEXT NOT NULL UNIQUE, structure TEXT NOT NULL, begun REAL NOT NULL, ended REAL,
-    outcome TEXT NOT NULL DEFAULT '');
-CREATE INDEX IF NOT EXISTS trials_of ON trials (machine, number);
-CREATE TABLE IF NOT EXISTS moments (number INTEGER PRIMARY KEY, trial INTEGER NOT NULL,
-    at REAL NOT NULL, seq INTEGER NOT NULL, kind TEXT NOT NULL, path TEXT NOT NULL,
-    label TEXT NOT NULL, after INTEGER);
-CREATE INDEX IF NOT EXISTS moments_of ON moments (trial, number);
-CREATE TABLE IF NOT EXISTS facts (moment INTEGER NOT NULL, path TEXT NOT NULL, name TEXT NOT NULL,
-    text TEXT, whole BLOB);
-CREATE INDEX IF NOT EXISTS facts_of ON facts (moment);
-CREATE TABLE IF NOT EXISTS parts (digest BLOB PRIMARY KEY, data BLOB NOT NULL) WITHOUT ROWID;
-CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, at REAL NOT NULL, who TEXT NOT NULL,
-    what TEXT NOT NULL);
-'''
 
 
 class NewTrial(NamedTuple):
@@ -54,20 +36,25 @@ class NewTrial(NamedTuple):
 class StoreFile:
     """An open store. To be used in one thread at a time."""
 
-    def __init__(self, path: str, synchronous: str = 'FULL', read_only: bool = False) -> None:
-        """Open the store at `path`, made if it is not there.
+    def __init__(self, path: str, synchronous: str = 'FULL', read_only: bool = False,
+                 accept: bool = False) -> None:
+        """Open the store at `path`, made if there is nothing of one.
 
         `synchronous`: FULL survives a power cut, NORMAL may lose the last moments by one, OFF by a
-        crash of the operating system may be damaged.
+        crash of the operating system may be damaged. `accept`: take what can be read of a store
+        that has lost some of it.
 
         :raises StoreError: where it cannot be opened or written, is no store, or of a later
             version.
-        :raises StoreDamaged: where SQLite says so.
+        :raises StoreDamaged: where SQLite says so, and where some of it is missing.
         """
         self.path = path
         self.read_only = read_only
+        where = os.path.realpath(path)
+        self._mark = Mark(where, synchronous)
+        self._has = Content()
         try:
-            self._db = self._opened(synchronous)
+            self._db = Opening(path, where, read_only, accept, self._begin).opened(synchronous)
         except sqlite3.Error as err:
             raise told_error(path, err) from err
         in_child(self._let_go)
@@ -76,60 +63,24 @@ class StoreFile:
         # Never close a parent's database, nor let it be freed: SQLite would take it for its own.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._db))
 
-    def _opened(self, synchronous: str) -> sqlite3.Connection:
-        where = os.path.abspath(self.path)
-        if self.read_only and not os.path.exists(where):
-            raise StoreError('{}: there is no such store'.format(self.path))
-        try:
-            return self._connected(where, synchronous)
-        except sqlite3.OperationalError:
-            if not self.read_only or os.path.exists(where + '-wal'):
-                raise
-        # such as on a medium that is read only, where SQLite can write no log
-        return self._connected('file:{}?immutable=1'.format(quote(where)), synchronous)
-
-    def _connected(self, where: str, synchronous: str) -> sqlite3.Connection:
-        database = sqlite3.connect(where, timeout=BUSY_S, isolation_level=None,
-                                   check_same_thread=False, uri=where.startswith('file:'))
-        try:
-            self._check(database)
-            if self.read_only:
-                database.execute('PRAGMA query_only = ON')
-            else:
-                database.execute('PRAGMA journal_mode = WAL')
-                database.execute('PRAGMA synchronous = ' + synchronous)
-                self._make(database)
-                _try_to_write(database)
-            return database
-        except BaseException:
-            database.close()
-            raise
-
-    def _check(self, database: sqlite3.Connection) -> None:
-        magic, = database.execute('PRAGMA application_id').fetchone()
-        version, = database.execute('PRAGMA user_version').fetchone()
-        tables, = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
-        if (tables or self.read_only) and magic != MAGIC:
-            raise StoreError('{}: is no store of smach_oracle'.format(self.path))
-        if version > FORMAT:
-            raise StoreError('{}: has format {}, and this program knows {}'.format(
-                self.path, version, FORMAT))
-
-    def _make(self, database: sqlite3.Connection) -> None:
-        tables, = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
-        if tables:
-            return
-        database.execute('BEGIN IMMEDIATE')
-        for statement in _SCHEMA.split(';'):
-            if statement.strip():
-                database.execute(statement)
-        database.execute('PRAGMA application_id = {}'.format(MAGIC))
-        database.execute('PRAGMA user_version = {}'.format(FORMAT))
-        database.execute('COMMIT')
+    def _begin(self, content: Content) -> None:
+        self._has = content
+        self._mark.write(content, log='')
 
     def close(self) -> None:
-        """Close it."""
+        """Close it. Where nobody else has it open, no log stays behind, and its file says so."""
+        if not self.read_only:
+            with contextlib.suppress(sqlite3.Error):
+                self._db.execute('PRAGMA busy_timeout = 0')
+                mode, = self._db.execute('PRAGMA journal_mode = DELETE').fetchone()
+                if mode == 'delete':
+                    self._mark.write(self._has, log=CLOSED)
+        self._mark.close()
         self._db.close()
+
+    def _note(self, **changed: int) -> None:
+        self._has = self._has._replace(**changed)
+        self._mark.write(self._has)
 
     # -- writing
 
@@ -143,7 +94,9 @@ class StoreFile:
             row = self._db.execute(
                 'INSERT INTO trials (machine, trial_id, structure, begun) VALUES (?, ?, ?, ?)',
                 (trial.machine, trial.trial_id, trial.structure[0], trial.begun))
-            return int(row.lastrowid or 0)
+        number = int(row.lastrowid or 0)
+        self._note(trial=number)
+        return number
 
     def keep_structure(self, structure: Tuple[str, str]) -> None:
         """Keep the id and the description of a structure that a trial goes on with.
@@ -159,10 +112,13 @@ class StoreFile:
         :raises sqlite3.Error: where they cannot be written.
         """
         with _Transaction(self._db):
-            self._add(trial, moments)
+            number = self._add(trial, moments)
+        self._note(moment=number)
 
-    def _add(self, trial: int, moments: Sequence[NewMoment]) -> None:
+    def _add(self, trial: int, moments: Sequence[NewMoment]) -> int:
+        """Add moments of a trial, and return the number of the last one."""
         database = self._db
+        number: Optional[int] = None
         for moment in moments:
             number = database.execute(
                 'INSERT INTO moments (trial, at, seq, kind, path, label, after) VALUES '
@@ -180,6 +136,7 @@ class StoreFile:
             if parts:
                 database.executemany('INSERT OR IGNORE INTO parts VALUES (?, ?)',
                                      list(parts.items()))
+        return self._has.moment if number is None else number
 
     def end_trial(self, trial: int, at: float, outcome: str) -> None:
         """Note that a trial has ended, so that it is never resumed.
@@ -188,6 +145,7 @@ class StoreFile:
         """
         with _Transaction(self._db):
             self._end(trial, at, outcome)
+        self._note(ended=self._has.ended + 1)
 
     def edit(self, trial: int, moment: NewMoment, who: str, what: str) -> None:
         """Commit a moment that somebody has made by hand, with a line in the log.
@@ -197,7 +155,8 @@ class StoreFile:
         try:
             with _Transaction(self._db):
                 self._log(moment.at, who, what)
-                self._add(trial, [moment])
+                number = self._add(trial, [moment])
+            self._note(moment=number)
         except sqlite3.Error as err:
             raise told_error(self.path, err) from err
 
@@ -210,6 +169,7 @@ class StoreFile:
             with _Transaction(self._db):
                 self._log(at, who, 'trial {}: {}'.format(trial, outcome))
                 self._end(trial, at, outcome)
+            self._note(ended=self._has.ended + 1)
         except sqlite3.Error as err:
             raise told_error(self.path, err) from err
 
@@ -326,6 +286,7 @@ class StoreFile:
         :raises StoreError: where that cannot be done, as another program reads.
         """
         try:
+            self._note(**content_of(self._db)._asdict())  # trials may have gone
             self._db.execute('VACUUM')
             self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')
         except sqlite3.Error as err:
@@ -341,15 +302,6 @@ class StoreFile:
                 yield row  # not `yield from`, which closes the cursor, also of a closed database
         except sqlite3.Error as err:
             raise told_error(self.path, err) from err
-
-
-def _try_to_write(database: sqlite3.Connection) -> None:
-    """Find out whether it can be written. It changes nothing."""
-    database.execute('BEGIN IMMEDIATE')
-    try:
-        database.execute('PRAGMA user_version = {}'.format(FORMAT))
-    finally:
-        database.execute('ROLLBACK')
 
 
 @contextlib.contextmanager

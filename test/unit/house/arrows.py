@@ -75,7 +75,8 @@ LAYERS: Dict[str, List[Layer]] = {
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
         'state_command', {'stopped_trial', 'retention'}, {'store_writer', 'holding'}, 'store_file',
-        'renaming', 'rows', 'codecs', {'object_parts', 'errors', 'names'}
+        'opening', 'tables', 'soundness', 'renaming', 'rows', 'codecs',
+        {'object_parts', 'errors', 'names'}
     ],
     'pr2': [
         'nodes', {'skills', 'ros_robot', 'checks'},

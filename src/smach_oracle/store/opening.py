@@ -1,0 +1,139 @@
+"""Opens the database of a store, after a look at whether all of it is there."""
+import os
+import sqlite3
+import time
+from typing import Callable
+from urllib.parse import quote
+
+from .errors import StoreDamaged, StoreError
+from .soundness import ACCEPT, LOG, Content, Files, examined, missed, set_log_aside
+from .tables import (
+    FORMAT,
+    MAGIC,
+    connect,
+    content_of,
+    make_store,
+    make_tables,
+    needs_log,
+    try_to_write,
+)
+
+
+class Opening:
+    """How one store is opened."""
+
+    def __init__(self, path: str, where: str, read_only: bool, accepts: bool,
+                 begin: Callable[[Content], None]) -> None:
+        """`path`: as the user has named it. `where`: of its own file.
+
+        `begin`: takes what it has before its log is begun.
+        """
+        self.path, self._where, self.read_only = path, where, read_only
+        self._accepts, self._begin = accepts, begin
+
+    def _look_at_files(self) -> None:
+        """Make a new store where there is none. Refuse one that has lost some of it.
+
+        :raises StoreError: for no store.
+        :raises StoreDamaged: for one that has lost some of it.
+        """
+        if self._accepts:
+            self._accept()
+            return
+        files = self._examined()
+        if files.is_there:
+            return
+        if self.read_only:
+            raise StoreError('{}: there is no such store'.format(self.path))
+        make_store(self._where)
+
+    def _examined(self) -> Files:
+        for waits_s in (0.05, 0.2):
+            try:
+                return self._checked()
+            except StoreDamaged:  # a program that begins or ends changes several files
+                time.sleep(waits_s)
+        return self._checked()
+
+    def _checked(self) -> Files:
+        files = examined(self._where, self.path)
+        if files.is_there:
+            self._check_content(files)
+        return files
+
+    def _check_content(self, files: Files) -> None:
+        """Check that a store has what its mark says. This changes nothing, not even its log."""
+        if files.mark is None and not files.lacks_log:
+            return
+        database = None
+        try:
+            database = connect('file:{}?{}'.format(
+                quote(self._where), 'immutable=1' if files.lacks_log else 'mode=ro'))
+            content = content_of(database)
+            is_lost = files.lacks_log and needs_log(database)
+        except sqlite3.OperationalError:
+            return  # such as in a folder that cannot be written: who opens it says so
+        finally:
+            if database is not None:
+                database.close()
+        if missed(files.mark, content) if files.mark else is_lost:
+            raise StoreDamaged(
+                '{0}: {1}. Put its files back from a copy. {2}'.format(
+                    self.path, 'its log, {}{}, is missing, and with it the latest moments'.format(
+                        self.path, LOG) if files.lacks_log else
+                    'its latest moments are missing: it or its log was damaged or replaced',
+                    ACCEPT.format(self.path)))
+
+    def _accept(self) -> None:
+        try:
+            examined(self._where, self.path)
+        except StoreDamaged:
+            if not os.path.exists(self._where + LOG):
+                raise
+            set_log_aside(self._where)
+
+    def opened(self, synchronous: str) -> sqlite3.Connection:
+        """Return its database.
+
+        :raises StoreError: for what is no store, or of a later version.
+        :raises StoreDamaged: for one that has lost some of it.
+        :raises sqlite3.Error: where SQLite cannot open it.
+        """
+        self._look_at_files()
+        if not self.read_only:
+            return self._connected(self._where, synchronous)
+        where = quote(self._where)
+        try:  # who reads leaves the log to who writes
+            return self._connected('file:{}?mode=ro'.format(where), synchronous)
+        except sqlite3.OperationalError:
+            if os.path.exists(self._where + LOG):
+                raise
+        # such as on a medium that is read only, where SQLite can write no log
+        return self._connected('file:{}?immutable=1'.format(where), synchronous)
+
+    def _connected(self, where: str, synchronous: str) -> sqlite3.Connection:
+        database = connect(where)
+        try:
+            self._check(database)
+            if self.read_only:
+                database.execute('PRAGMA query_only = ON')
+            else:
+                make_tables(database)
+                self._begin(content_of(database))
+                database.execute('PRAGMA journal_mode = WAL')
+                database.execute('PRAGMA synchronous = ' + synchronous)
+                try_to_write(database)
+            return database
+        except BaseException:
+            database.close()
+            raise
+
+    def _check(self, database: sqlite3.Connection) -> None:
+        magic, = database.execute('PRAGMA application_id').fetchone()
+        version, = database.execute('PRAGMA user_version').fetchone()
+        tables, = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
+        if (tables or self.read_only) and magic != MAGIC:
+            raise StoreError('{}: is no store of smach_oracle'.format(self.path))
+        if version > FORMAT:
+            raise StoreError('{}: has format {}, and this program knows {}'.format(
+                self.path, version, FORMAT))
