@@ -111,7 +111,7 @@ class TrialBag:
             self.flush()
 
     def due_s(self) -> Optional[float]:
-        """Return in how many seconds `flush` is due, or None while there is nothing to flush."""
+        """Return the seconds until `flush` is due, or None while there is nothing to flush."""
         if self._chunk_since is None:
             return None
         return max(0.0, self._chunk_since + self._flush_after_s - time.monotonic())
