@@ -8,6 +8,7 @@ import rosgraph
 import rospy
 
 from smach_oracle.msg import ExpertDecision, OpenQueries, OpenQuery
+from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
 
@@ -148,7 +149,7 @@ class FrontEnd:
     def _keep_connected(self) -> None:
         while not rospy.is_shutdown():
             try:
-                master = rosgraph.Master(rospy.get_name())
+                master = timed_master()
                 self._look_for_servers(master.getPublishedTopics(''),
                                        dict(master.getSystemState()[2]))
             except (OSError, rosgraph.MasterException) as err:

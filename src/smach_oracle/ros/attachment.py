@@ -43,7 +43,6 @@ from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
 from .introspection.container_watch import CALLBACK_LISTS, is_watched
 from .introspection.introspection_server import IntrospectionServer
-from .main_thread import keep_log_from_master
 from .master_watch import start_master_watch
 from .parameters import private_flag, private_names, private_number, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of
@@ -204,11 +203,10 @@ class Attachments:
         if self._node_started:
             return
         self._node_started = True
-        keep_log_from_master()
+        start_master_watch()
         log_through_rospy()
         track_goals_from_the_start()
         rospy.on_shutdown(self._on_shutdown)
-        start_master_watch()
         self._events = EventPublisher()
         self._rates = RatesPublisher()
         self._hand = HandServer()

@@ -8,12 +8,9 @@ import threading
 from typing import Callable, List, TypeVar
 
 import rospy
-from rospy.impl.paramserver import get_param_server_cache
 
 from smach_oracle.oracle.background import BackgroundCall
 
-# rospy asks for it at each line of the log
-_ROSOUT_PARAM = '/rosout_disable_topics_generation'
 _LOOK_S = 0.1
 SHUTDOWN_WAIT_S = 2.0  # for a call that had begun before the shutdown was requested
 
@@ -43,13 +40,3 @@ def outside_main_thread(function: Callable[[], Result]) -> Result:
     if call.error is not None:
         raise call.error
     return results[0]
-
-
-def keep_log_from_master() -> None:
-    """Let rospy remember that the parameter of its log is not set.
-
-    It forgets, and asks the master again at each line of the log, in whichever thread. A value that
-    is set later arrives anyway: rospy has subscribed to the parameter.
-    """
-    if rospy.get_param_cached(_ROSOUT_PARAM, None) is None:
-        get_param_server_cache().set(_ROSOUT_PARAM, False)

@@ -12,6 +12,7 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 
 import rosgraph
 import rospy
+from rospy.impl.paramserver import get_param_server_cache
 from rospy.impl.registration import (
     RegManager,
     get_registration_listeners,
@@ -23,6 +24,8 @@ from smach_oracle.forking import in_child
 
 POLL_S = 1.0
 CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch forever
+# rospy asks for it at each line of the log
+_ROSOUT_PARAM = '/rosout_disable_topics_generation'
 
 
 class MasterCallError(Exception):
@@ -172,8 +175,17 @@ _watch_lock = threading.Lock()
 _watch: Optional[MasterWatch] = None
 
 
+def timed_master(limit_s: float = CALL_LIMIT_S) -> rosgraph.Master:
+    """Return this node's master. A call of a master that hangs ends in an OSError."""
+    master = rosgraph.Master(rospy.get_name())
+    master.handle = xmlrpc.client.ServerProxy(master.master_uri, transport=TimedTransport(limit_s))
+    return master
+
+
 def start_master_watch() -> MasterWatch:
     """Watch the master on behalf of this node, one watch per process, however often called.
+
+    From then on no line of this node's log waits for the master.
 
     :raises rospy.ROSInitException: before rospy.init_node.
     """
@@ -182,6 +194,7 @@ def start_master_watch() -> MasterWatch:
         raise rospy.ROSInitException('start_master_watch needs rospy.init_node first')
     with _watch_lock:
         if _watch is None:
+            _keep_log_from_master()
             link = MasterLink(rosgraph.get_master_uri(), rospy.get_name(),
                               rospy.core.get_node_uri())
             _watch = MasterWatch(link, _own_registrations, _connect)
@@ -196,6 +209,17 @@ def _forget_watch() -> None:
 
 
 in_child(_forget_watch)
+
+
+def _keep_log_from_master() -> None:
+    """Let rospy remember that the parameter of its log is not set.
+
+    It forgets, and asks the master again at each line of the log, in whichever thread. A master
+    that hangs would hold up each thread that logs. A value that is set later arrives anyway: rospy
+    has subscribed to the parameter.
+    """
+    if rospy.get_param_cached(_ROSOUT_PARAM, None) is None:
+        get_param_server_cache().set(_ROSOUT_PARAM, False)
 
 
 def _own_registrations() -> Registrations:

@@ -66,7 +66,7 @@ LAYERS: Dict[str, List[Layer]] = {
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',
         {'followed_server', 'interface_outputs', 'rules', 'wording', 'interface_goal'},
-        'robot_topics'
+        {'robot_topics', 'stop_calls', 'repeating'}
     ],
     'expert/console': [
         'server', 'page_socket', {'answering', 'robots'}, 'trials', 'sensors',

@@ -17,6 +17,8 @@ from smach_oracle.ros.command_line import init_beside_others, parameters_only
 from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
+from ..repeating import repeat
+from ..stop_calls import StopCalls
 from .answering.interface_commands import InterfaceCommands
 from .answering.last_heard import LastHeard
 from .answering.precondition_sections import PreconditionStatuses
@@ -26,7 +28,6 @@ from .answering.sensor_discovery import SensorDiscovery
 from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
 from .feeds.node_pulse import NodePulse
-from .feeds.repeating import repeat
 from .graphs.layout_worker import LayoutWorker
 from .page_socket import OpenPages, PageSocket
 from .robots.down_machine_hand import DownMachineHand
@@ -103,7 +104,9 @@ class Console:
         self._audit = Audit()
         layouts = LayoutWorker()
         self._clocks = RobotClocks()
-        self._robots = FollowedRobots(self._sections, self._log, layouts, self._clocks)
+        stop_calls = StopCalls()
+        self._robots = FollowedRobots(self._sections, self._log, layouts, self._clocks,
+                                      stop_calls.look_up)
         self._down = DownMachines(settings.stores, self._sections)
         self._front_end = FrontEnd('expert_console')
         self._discovery = SensorDiscovery(self._sections, self._front_end, settings.cameras)
@@ -122,7 +125,7 @@ class Console:
         self._question_sections = QuestionSections(self._front_end, self._log,
                                                    questions.sessions.session_of)
         self._machine_hand = MachineHand(self._robots.holdable, self._audit,
-                                         self._last_heard.robot_refusal)
+                                         self._last_heard.robot_refusal, stop_calls)
         self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation,
                                 self._machine_hand,
                                 DownMachineHand(self._down, self._audit))
@@ -143,7 +146,6 @@ class Console:
         self._discovery.start()
         self._teleoperation.start()
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
-        repeat(self._machine_hand.look_up, ROBOTS_PERIOD_S)
         repeat(self._down.look, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
         threading.Thread(target=self._catalogue.run, name='bags', daemon=True).start()

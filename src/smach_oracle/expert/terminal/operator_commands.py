@@ -1,6 +1,7 @@
 """The lines by which an operator holds robots: `pause`, `resume`, `goto PATH STATE` and the like.
 
-Calls go to all robots at once: one that hangs delays no other.
+Calls go to all robots at once: one that hangs delays no other. `pause` and `preempt` need no
+master. They reach the robots that it has known before.
 """
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -9,6 +10,7 @@ import rospy
 
 from smach_oracle.msg import ControlStatus, MachineControl
 from smach_oracle.ros.main_thread import outside_main_thread
+from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
 from smach_oracle.srv import (
     CommandMachine,
@@ -21,8 +23,12 @@ from smach_oracle.srv import (
     SetBreakpointRequest,
 )
 
+from ..stop_calls import StopCalls
+
 TOPIC = '/oracle/control'
 _STATUS_LIMIT_S = 1.0
+_FORGET_LOOKS = 40  # a robot that is gone. One that a new master does not know yet comes back
+_MASTER_LIMIT_S = 2.0  # a stop waits so long for one that hangs
 _ALL = 'all'
 Told = List[Tuple[str, str]]  # text and style
 Robots = Callable[[], Sequence[str]]
@@ -38,6 +44,7 @@ class _Word(NamedTuple):
     kind: type
     of_all: bool  # whether it means all robots where none is named
     request: Callable[..., Any]  # of who commands, and the words that follow
+    stops: bool = False  # whether it is for the robots known last while no master answers
 
 
 def _machine(by: str, path: str = '') -> CommandMachineRequest:
@@ -63,12 +70,14 @@ def _autonomy(by: str, pattern: str, level: str = '') -> SetAutonomyRequest:
 
 
 _WORDS: Dict[str, _Word] = {
-    'pause': _Word('hold at the next state', 1, 0, 'pause', CommandMachine, True, _machine),
+    'pause': _Word('hold at the next state', 1, 0, 'pause', CommandMachine, True, _machine,
+                   stops=True),
     'resume': _Word('lift the pause', 1, 0, 'resume', CommandMachine, False, _machine),
     'step': _Word('enter one state [PATH]', 1, 0, 'step', CommandMachine, False, _machine),
     'confirm': _Word('let a state be entered [PATH]', 1, 0, 'confirm', CommandMachine, False,
                      _machine),
-    'preempt': _Word('stop the machine', 1, 0, 'preempt', CommandMachine, True, _machine),
+    'preempt': _Word('stop the machine', 1, 0, 'preempt', CommandMachine, True, _machine,
+                     stops=True),
     'goto': _Word('PATH STATE [repeat]: go there', 3, 2, 'go_to', SendMachine, False, _send),
     'break': _Word('PATTERN: pause before these states', 1, 1, 'breakpoint', SetBreakpoint, False,
                    _breakpoint),
@@ -92,7 +101,7 @@ def robots_of_master() -> Sequence[str]:
     """
     try:
         published = outside_main_thread(
-            lambda: rosgraph.Master(rospy.get_name()).getPublishedTopics(''))
+            lambda: timed_master(_MASTER_LIMIT_S).getPublishedTopics(''))
     except (OSError, rosgraph.MasterException) as err:
         raise ServerGoneError('the master does not answer: {}'.format(err)) from err
     return sorted(topic[:-len(TOPIC)] for topic, kind in published
@@ -102,10 +111,23 @@ def robots_of_master() -> Sequence[str]:
 class OperatorCommands:
     """Carries out the lines of one expert."""
 
-    def __init__(self, expert: str, robots: Robots = robots_of_master) -> None:
+    def __init__(self, expert: str, robots: Robots = robots_of_master,
+                 stop_calls: Optional[StopCalls] = None) -> None:
         """`expert`: the name under which to command."""
         self._expert = expert
         self._robots = robots
+        self._stop_calls = stop_calls or StopCalls()
+        self._unlisted: Dict[str, int] = {}  # by robot the looks at which no master had it
+
+    def look_up(self) -> None:
+        """Learn which robots there are, and where. Call it again and again, in another thread.
+
+        :raises ServerGoneError: where the master does not answer.
+        """
+        listed = self._robots()
+        self._unlisted = {robot: 0 if robot in listed else looks + 1 for robot, looks in {
+            **dict.fromkeys(listed, 0), **self._unlisted}.items() if looks < _FORGET_LOOKS}
+        self._stop_calls.look_up(listed)
 
     def carry_out(self, line: str) -> Optional[Told]:
         """Carry a line out, and return the text to show, or None where it commands nothing."""
@@ -122,7 +144,7 @@ class OperatorCommands:
 
     def _meant(self, name: str, words: List[str]) -> Tuple[Sequence[str], List[str]]:
         """The robots that are meant, and the words without their name."""
-        robots = self._robots()
+        robots = self._now(name)
         if not robots:
             raise _UsageError('no robot is there')
         if words and (words[0] in robots or words[0] == _ALL):
@@ -131,13 +153,24 @@ class OperatorCommands:
             raise _UsageError('name one of {}, or all, first'.format(', '.join(robots)))
         return robots, words
 
+    def _now(self, name: str) -> Sequence[str]:
+        """The robots that there are. A stop is also for those that a master has listed before."""
+        known = set(self._unlisted) if name in _WORDS and _WORDS[name].stops else set()
+        try:
+            return sorted(known.union(self._robots()))
+        except ServerGoneError:
+            if not known:
+                raise
+            return sorted(known)
+
     def _call(self, robots: Sequence[str], word: _Word, words: List[str]) -> Iterator[
             Tuple[str, str]]:
         if not word.fewest <= len(words) <= word.most:
             raise _UsageError(word.meaning)
         request = word.request(self._expert, *words)
         calls = [(robot, ServiceCall('{}/oracle/{}'.format(robot, word.service), word.kind,
-                                     request)) for robot in robots]
+                                     request, self._stop_calls.address_of(robot)
+                                     if word.stops else '')) for robot in robots]
         for robot, call in calls:
             try:
                 response = call.result(CALL_LIMIT_S)

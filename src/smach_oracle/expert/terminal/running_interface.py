@@ -7,6 +7,7 @@ import rosgraph.names
 import rospy
 
 from smach_oracle.msg import TeleopState
+from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.service_calls import call_service
 from smach_oracle.srv import (
     FinishInterface,
@@ -81,7 +82,7 @@ class RunningInterface:
         if self._state_subscriber is not None:
             return
         try:
-            types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
+            types = dict(timed_master().getTopicTypes())
         except (OSError, rosgraph.MasterException):
             return
         if types.get(self._action + '/state') == TeleopState._type:

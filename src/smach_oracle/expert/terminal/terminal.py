@@ -18,6 +18,8 @@ from smach_oracle.ros.userdata_codec import encode
 
 from ..followed_server import ListedQuestion
 from ..front_end import FrontEnd, wait_for_question
+from ..repeating import repeat
+from ..stop_calls import LOOK_UP_PERIOD_S
 from ..wording import clean, next_step_words
 from . import render
 from .interface_dialog import InterfaceDialog
@@ -343,5 +345,8 @@ def main() -> None:
     except KeyboardInterrupt:
         return
     start_master_watch()
-    Terminal(FrontEnd(options_given.name, options_given.server), console, Prompts()).run()
+    operator = OperatorCommands(options_given.name)
+    repeat(operator.look_up, LOOK_UP_PERIOD_S)
+    Terminal(FrontEnd(options_given.name, options_given.server), console, Prompts(),
+             operator=operator).run()
     rospy.signal_shutdown('the expert has left')

@@ -29,6 +29,7 @@ from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 
 from ..goal_link import POLL_S, GoalEvent, GoalLink, SentGoal, lost
 from ..interfaces.starting import InterfaceStarter, StartedInterface
+from ..master_watch import timed_master
 from ..userdata_codec import UserdataCodecError, decode_all
 from .failure_images import FailureCameras
 from .precondition_watch import PreconditionWatch
@@ -289,7 +290,7 @@ def _wait_until_ready(link: GoalLink, timeout_s: float, cancelled: threading.Eve
 def _advertised(link: GoalLink) -> bool:
     """Whether the master knows of an action server there. One that has died may still be listed."""
     try:
-        published = rosgraph.Master(rospy.get_name()).getPublishedTopics('')
+        published = timed_master().getPublishedTopics('')
     except (OSError, rosgraph.MasterException):
         return link.ready()
     return any(topic == link.name + '/status' for topic, _ in published)

@@ -55,6 +55,7 @@ class HandServer(OwnObserver):
         self._offer('go_to', SendMachine, self._on_send)
         self._offer('breakpoint', SetBreakpoint, self._on_breakpoint)
         self._offer('autonomy', SetAutonomy, self._on_autonomy)
+        self._status.start()  # last: whom it reaches may look the services up at once
 
     @staticmethod
     def _offer(name: str, kind: type, handle: Callable[[Any], genpy.Message]) -> None:

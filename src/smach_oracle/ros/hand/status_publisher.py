@@ -24,6 +24,9 @@ class ControlPublisher:
         self._hands = hands
         self._changed = threading.Event()
         self._has_moved = False
+
+    def start(self) -> None:
+        """Advertise the topic, and publish from now on."""
         self._topic = rospy.Publisher(TOPIC, ControlStatus, queue_size=1, latch=True)
         threading.Thread(target=self._run, name='operator status', daemon=True).start()
 

@@ -22,8 +22,11 @@ def called(monkeypatch):
     calls = []
 
     class FakeCall:
-        def __init__(self, name, kind, request):
+        addresses = {}
+
+        def __init__(self, name, kind, request, address):
             calls.append((name, request))
+            self.addresses[name] = address
             self._name = name
 
         def result(self, limit_s):
@@ -45,6 +48,58 @@ def test_a_pause_goes_to_all_robots_and_says_what_each_answers(called):
                                                            'green')]
     assert [name for name, _ in called] == ['/hangs/oracle/pause', '/robot/oracle/pause']
     assert called[1][1].by == 'ann'
+
+
+class FakeStopCalls:
+    def __init__(self):
+        self.looked_up = []
+
+    def look_up(self, robots):
+        self.looked_up += robots
+
+    def address_of(self, robot):
+        return 'at ' + robot if robot in self.looked_up else ''
+
+
+def test_a_stop_needs_no_master_and_what_lets_go_does(called):
+    def robots():
+        if not there:
+            raise ServerGoneError('the master does not answer')
+        return there
+    there = ['/a', '/b']
+    operator = OperatorCommands('ann', robots, FakeStopCalls())
+    operator.look_up()
+    operator.carry_out('pause')
+    there = []
+    for _ in range(3):
+        with pytest.raises(ServerGoneError):
+            operator.look_up()
+    assert [style for _, style in operator.carry_out('pause')] == ['green', 'green']
+    assert operator.carry_out('preempt /b') == [('  /b: runs now: B in task', 'green')]
+    addresses = operator_commands.ServiceCall.addresses
+    assert addresses['/a/oracle/pause'] == 'at /a' and addresses['/b/oracle/preempt'] == 'at /b'
+    before = len(called)
+    for line in ('resume /a', 'step /a', 'goto /a task PICK', 'status'):
+        (text, style), = operator.carry_out(line)
+        assert style == 'red' and 'the master does not answer' in text
+    assert len(called) == before
+    there = ['/a', '/b']
+    operator.carry_out('resume /a')
+    assert addresses['/a/oracle/resume'] == '', 'asked at the master'
+
+
+def test_a_stop_is_also_for_robots_that_a_new_master_does_not_know_yet(called):
+    there = ['/a', '/gone']
+    operator = OperatorCommands('ann', lambda: there, FakeStopCalls())
+    operator.look_up()
+    there = ['/b']
+    operator.look_up()
+    assert len(operator.carry_out('pause')) == 3
+    assert operator.carry_out('resume') == [('  /b: runs now: B in task', 'green')]
+    there = ['/a', '/b']
+    for _ in range(operator_commands._FORGET_LOOKS):
+        operator.look_up()
+    assert len(operator.carry_out('pause')) == 2, 'what is gone for long is forgotten'
 
 
 def test_what_lets_go_names_its_robot_where_there_are_several(called):

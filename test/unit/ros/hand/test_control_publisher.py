@@ -44,6 +44,7 @@ def hand():
 
 def test_a_change_is_published_and_a_transition_only_where_anybody_listens(topic):
     publisher = ControlPublisher(lambda: [('task', hand())])
+    publisher.start()
     publisher.changed()
     assert wait_for(lambda: len(topic.messages) == 1)
     assert topic.messages[0].machines[0].path == 'task'

@@ -23,6 +23,9 @@ class Silent:
     def moved(self):
         pass
 
+    def start(self):
+        self.offered_before = set(self.offered)
+
     def listen_for(self, machine):
         pass
 
@@ -33,6 +36,7 @@ def services(monkeypatch):
     monkeypatch.setattr(rospy, 'Service',
                         lambda name, kind, handle: offered.__setitem__(name, handle))
     monkeypatch.setattr(hand_server, 'ControlPublisher', Silent)
+    monkeypatch.setattr(Silent, 'offered', offered, raising=False)
     monkeypatch.setattr(hand_server, 'ViewerCommands', Silent)
     return offered
 
@@ -46,6 +50,11 @@ def machine(name):
 
 def is_paused(each):
     return OperatorHand(each).status().paused
+
+
+def test_the_status_is_advertised_after_the_services(services):
+    server = HandServer()
+    assert server._status.offered_before == set(services) != set()
 
 
 def test_a_path_means_one_machine_and_no_path_all(services):

@@ -3,14 +3,13 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, Dict, Mapping, Sequence, Set
 
-import rosgraph
-import rospy
 import rosservice
 
+from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.srv import SegmentObject
 
 from ...front_end import FrontEnd
-from ..feeds.repeating import repeat
+from ...repeating import repeat
 from ..sensors.depth_clouds import AS_A_CLOUD, DepthCloudStream, depth_cameras
 from ..sensors.depth_clouds import TYPE as DEPTH_TYPE
 from ..sensors.robot_cameras import PARAMETER, RobotCameras, declared_in
@@ -47,7 +46,7 @@ class SensorDiscovery:
 
     def discover(self) -> None:
         """Ask the master once."""
-        master = rosgraph.Master(rospy.get_name())
+        master = timed_master()
         published = master.getPublishedTopics('')
         parameters = master.getParamNames()
         self.sensors.follow(published, [

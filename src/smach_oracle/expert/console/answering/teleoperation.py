@@ -4,18 +4,17 @@ import threading
 import time
 from typing import Any, Dict, Optional, Set
 
-import rosgraph
-import rosgraph.names
 import rospy
 
 from smach_oracle.msg import TeleopCommand, TeleopState
+from smach_oracle.ros.master_watch import timed_master
 
 from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
 from ...interface_outputs import InterfaceOutputs
+from ...repeating import repeat
 from ..commands.checks import shown
 from ..commands.commands import CommandReply, PageCommand
-from ..feeds.repeating import repeat
 from ..feeds.views import number
 from ..web.audit import Audit, Person
 from ..web.sections import PageSections
@@ -133,7 +132,7 @@ class Teleoperation:
 
     def discover(self) -> None:
         """Ask the master once for interfaces, and for those among them that move an arm."""
-        types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
+        types = dict(timed_master().getTopicTypes())
         self._interfaces = interface_actions(types.items())
         running = {
             listed.key: action_of(listed)

@@ -4,11 +4,11 @@ from collections import OrderedDict
 from types import MappingProxyType
 from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set, Tuple
 
-import rosgraph
 import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
+from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
 from ...robot_topics import READ_BYTES
@@ -23,9 +23,10 @@ from .same_machine import copies
 MOST_ROBOTS = 100
 _GONE_AFTER = 2  # rounds without any of its topics
 _QUEUE = 2000
+CONTROL = '/oracle/control'
 _TOPICS: Dict[str, Tuple[Any, str]] = {
     '/oracle/events': (OracleEvent, 'on_event'), '/oracle/rates': (OracleRates, 'on_rates'),
-    '/oracle/control': (ControlStatus, 'on_control'),
+    CONTROL: (ControlStatus, 'on_control'),
     '/smach/container_structure': (SmachContainerStructure, 'on_structure'),
     '/smach/container_status': (SmachContainerStatus, 'on_status')}
 
@@ -34,7 +35,10 @@ class FollowedRobots:
     """Follows all topics of four types and names. The name in front of them is the robot's."""
 
     def __init__(self, sections: PageSections, log: TrialLog, layouts: LayoutWorker,
-                 clocks: Optional[RobotClocks] = None) -> None:
+                 clocks: Optional[RobotClocks] = None,
+                 look_up: Callable[[Sequence[str]], None] = lambda robots: None) -> None:
+        """`look_up`: learns where robots are stopped, before they are followed."""
+        self._look_up = look_up
         self._clocks = clocks or RobotClocks()
         self._sections = sections
         self._log = log
@@ -47,8 +51,11 @@ class FollowedRobots:
 
     def discover(self) -> None:
         """Ask the master once. Call it in a thread of its own, since a master may hang."""
-        master = rosgraph.Master(rospy.get_name())
+        master = timed_master()
         published = master.getPublishedTopics('')
+        # a machine that can be held can be stopped from then on, whatever becomes of the master
+        self._look_up([topic[:-len(CONTROL)] for topic, kind in published
+                       if topic.endswith(CONTROL) and kind == ControlStatus._type])
         self.follow(published, dict(master.getSystemState()[0]))
 
     def follow(self, published: Sequence[Sequence[str]],

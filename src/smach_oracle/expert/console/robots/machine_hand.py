@@ -14,10 +14,10 @@ from smach_oracle.srv import (
     SetBreakpointRequest,
 )
 
+from ...stop_calls import StopCalls, StopError, in_thread
 from ..commands.commands import CommandReply, PageCommand
 from ..commands.holding import MACHINE_STARTS
 from ..web.audit import Audit, Person
-from .stop_calls import StopCalls, StopError, in_thread
 
 MOST_AT_ONCE = 4  # equal stops that are under way: a robot that hangs needs no more of them
 SERVICES = {'stop_machine': 'preempt', 'pause_machine': 'pause', 'resume_machine': 'resume',
@@ -49,10 +49,6 @@ class MachineHand:
         self._calls = calls or StopCalls()
         self._call = call
         self._under_way: Dict[_Key, List['Future[Any]']] = {}  # of the loop alone
-
-    def look_up(self) -> None:
-        """Learn where robots are stopped. Call it again and again, in a thread of its own."""
-        self._calls.look_up(list(self._holdable()))
 
     async def stop(self, command: PageCommand, person: Person) -> CommandReply:
         """Stop or pause, whatever else is at work. It is called in the loop."""

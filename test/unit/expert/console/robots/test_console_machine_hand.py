@@ -6,11 +6,13 @@ import pytest
 import rosgraph
 import rospy
 
+from smach_oracle.expert import stop_calls
 from smach_oracle.expert.console.commands.commands import PageCommand
-from smach_oracle.expert.console.robots import machine_hand, stop_calls
+from smach_oracle.expert.console.robots import machine_hand
 from smach_oracle.expert.console.robots.machine_hand import MachineHand
-from smach_oracle.expert.console.robots.stop_calls import StopCalls, StopError
 from smach_oracle.expert.console.web.audit import Person
+from smach_oracle.expert.stop_calls import StopCalls, StopError
+from smach_oracle.ros import service_calls
 from smach_oracle.srv import CommandMachineRequest, CommandMachineResponse
 
 ANN, NOBODY = Person('::1', 's', 'operator', 'ann'), Person('::1', 's', 'viewer', '')
@@ -136,8 +138,6 @@ class Direct(Proxy):
 class Master:
     address = 'rosrpc://here:1'
 
-    def __init__(self, name):
-        pass
 
     def lookupService(self, service):
         if service != '/alpha/oracle/preempt':
@@ -146,9 +146,9 @@ class Master:
 
 
 def test_a_stop_needs_no_master_once_it_is_known_where_the_robot_is(monkeypatch):
-    monkeypatch.setattr(stop_calls.rospy, 'ServiceProxy', Proxy)
-    monkeypatch.setattr(stop_calls, '_AtAddress', Direct)
-    monkeypatch.setattr(stop_calls.rosgraph, 'Master', Master)
+    monkeypatch.setattr(rospy, 'ServiceProxy', Proxy)
+    monkeypatch.setattr(service_calls, '_AtAddress', Direct)
+    monkeypatch.setattr(stop_calls, 'timed_master', Master)
     monkeypatch.setattr(Proxy, 'reached', [])
     calls = StopCalls()
     calls.look_up(['/alpha', '/beta'])

@@ -1,4 +1,4 @@
-"""Calls that stop a robot's machine: each in a thread of its own, also while the master is away.
+"""Calls that stop a robot's machine, also while the master is away or hangs.
 
 All services of a node have one address. It is looked up while the master answers.
 """
@@ -10,25 +10,16 @@ import rosgraph
 import rospy
 
 from smach_oracle.oracle.errors import OracleError
+from smach_oracle.ros.master_watch import timed_master
+from smach_oracle.ros.service_calls import NOT_REACHED, call_where_it_was
 from smach_oracle.srv import CommandMachine, CommandMachineRequest, CommandMachineResponse
 
 PREEMPT = '/oracle/preempt'
-NOT_REACHED = (rospy.ServiceException, rospy.ROSException, OSError)
+LOOK_UP_PERIOD_S = 1.5
 
 
 class StopError(OracleError):
     """A service that stops could not be reached. The text says why."""
-
-
-class _AtAddress(rospy.ServiceProxy):
-    """Calls a service at a known address, and asks no master."""
-
-    def __init__(self, name: str, kind: type, address: str) -> None:
-        super().__init__(name, kind)
-        self._address = address
-
-    def _get_service_uri(self, request: object) -> str:
-        return self._address
 
 
 class StopCalls:
@@ -39,12 +30,16 @@ class StopCalls:
 
     def look_up(self, robots: Iterable[str]) -> None:
         """Ask the master where their services are. What is known stays where it does not say."""
-        master = rosgraph.Master(rospy.get_name())
+        master = timed_master()
         for robot in robots:
             try:
                 self._addresses[robot] = str(master.lookupService(robot + PREEMPT))
             except rosgraph.MasterError as err:
                 rospy.logdebug('%s: %s', robot, err)
+
+    def address_of(self, robot: str) -> str:
+        """Return where its services were found last, or '' where they never were."""
+        return self._addresses.get(robot, '')
 
     def call(self, robot: str, service: str,
              request: CommandMachineRequest) -> CommandMachineResponse:
@@ -52,14 +47,8 @@ class StopCalls:
 
         :raises StopError: where it cannot be reached.
         """
-        address = self._addresses.get(robot)
-        if address:
-            try:
-                return _AtAddress(service, CommandMachine, address)(request)
-            except NOT_REACHED as err:
-                rospy.logdebug('%s is not at %s: %s', service, address, err)
         try:
-            return rospy.ServiceProxy(service, CommandMachine)(request)
+            return call_where_it_was(self.address_of(robot), service, CommandMachine, request)
         except NOT_REACHED as err:
             raise StopError('{} cannot be reached: {}'.format(service, err)) from err
 

@@ -6,6 +6,8 @@ from typing import Callable
 import rosgraph
 import rospy
 
+from smach_oracle.ros.service_calls import ServerGoneError
+
 
 def repeat(step: Callable[[], None], period_s: float) -> threading.Thread:
     """Start a thread that calls `step` again and again, with a pause of `period_s`.
@@ -22,7 +24,7 @@ def _run(step: Callable[[], None], period_s: float) -> None:
     while not rospy.is_shutdown():
         try:
             step()
-        except (OSError, rosgraph.MasterException, rospy.ROSException) as err:
+        except (OSError, rosgraph.MasterException, rospy.ROSException, ServerGoneError) as err:
             rospy.logdebug('%s did not succeed: %s', step.__qualname__, err)
         except Exception as err:
             rospy.logerr_throttle(10, '{} failed: {!r}'.format(step.__qualname__, err))
