@@ -41,6 +41,26 @@ const look = () => {
   done(key);
 };
 look();'''
+# opened in the very frame in which it is listed, and left at once
+OPEN_AND_LEAVE = '''
+const [row, done] = arguments;
+const shown = () => Boolean(document.querySelector(".detail"));
+const look = () => {
+  const found = document.querySelector(row);
+  if (!found) { requestAnimationFrame(look); return; }
+  const it = { bubbles: true, cancelable: true, detail: 1 };
+  found.dispatchEvent(new PointerEvent("pointerdown", it));
+  found.dispatchEvent(new MouseEvent("click", it));
+  const opened = shown();
+  const key = (name) => document.body.dispatchEvent(
+    new KeyboardEvent("keydown", { key: name, bubbles: true }));
+  key("Escape");
+  key("n");
+  const openedByKey = shown();
+  key("Escape");
+  done([opened, openedByKey, shown(), Number(document.body.dataset.refused || 0)]);
+};
+look();'''
 MOVE_AND_TAP = '''
 const [selector] = arguments;
 const box = document.createElement("div");
@@ -133,6 +153,31 @@ class OnPurpose(ConsolePage, unittest.TestCase):
     def open_question(self):
         self.browser.click(QUESTION)
         self.assertTrue(wait_for(lambda: self.browser.settled(self.browser.find(GO_TO_PLACE))))
+
+    def claims(self):
+        return [told for told in self.audited if told.command == 'claim']
+
+    def test_0_to_open_a_question_is_never_refused_and_claims_it_once_it_has_been_seen(self):
+        browser = self.browser
+        browser.find(QUESTION)
+        browser.driver.refresh()
+        browser.driver.set_script_timeout(40)
+        self.assertEqual(browser.driver.execute_async_script(OPEN_AND_LEAVE, QUESTION),
+                         [True, True, False, 0])
+        self.assertTrue(stays(lambda: not self.claims(), 1.5), 'who leaves at once sends nothing')
+        browser.driver.refresh()
+        self.assertEqual(self.press_at_once(QUESTION), 0)
+        self.assertTrue(browser.says('It is yours.'))
+        self.assertEqual(len(self.claims()), 1)
+        self.assertEqual(self.press_at_once(GIVE_UP), 0, 'it only asks')
+        self.assertTrue(browser.says('Give up? The work of PICK stays undone'))
+        self.assertEqual(self.press_at_once('[data-action=confirm-give-up]'), 1, 'this sends')
+        self.press('\ue00c')
+        self.press('\ue00c')
+        self.assertTrue(wait_for(lambda: not browser.run(
+            'return document.querySelector(".detail")')))
+        browser.driver.refresh()
+        self.assertEqual(self.answers(), [])
 
     def test_1_the_second_tap_of_a_double_tap_answers_nothing(self):
         browser = self.browser

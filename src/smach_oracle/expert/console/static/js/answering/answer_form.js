@@ -109,11 +109,15 @@ export class AnswerForm {
    * @param {string} name of the state, outcome or interface
    * @param {string} key that presses it, '' for none
    * @param {Child} words
-   * @param {() => void} [act] sends it at once, where it is left out
+   * @param {string} [container] of a state that is another container's
+   * @param {() => void} [ask] comes before it is sent
    */
-  choice(kind, name, key, words, act = () => this.send(kind, name)) {
+  choice(kind, name, key, words, container = '', ask = undefined) {
+    const which = (container ? container + '/' : '') + name;
     const button = h('button', { class: 'choice ' + kind, type: 'button', 'data-kind': kind,
-      'data-name': name, 'data-deliberate': kind + ' ' + name, onclick: act },
+      'data-name': name, 'data-container': container || null,
+      'data-deliberate': ask ? null : kind + ' ' + which,
+      onclick: ask || (() => this.send(kind, name, container)) },
     h('kbd', {}, key), h('span', { class: 'choice-text' }, words));
     if (key) this.keys.set(key, button);
     this.buttons.push(button);
@@ -179,12 +183,7 @@ export class AnswerForm {
       this.preconditions.set(state, list);
       words.push(list.root);
     }
-    const button = this.choice('goto', state, key, words,
-      () => this.send('goto', state, container));
-    if (container) {
-      button.dataset['container'] = container;
-      button.dataset['deliberate'] = 'goto ' + container + '/' + state;
-    }
+    const button = this.choice('goto', state, key, words, container);
     if (blocked) button.dataset['blocked'] = 'yes';
     return button;
   }
@@ -212,7 +211,7 @@ export class AnswerForm {
 
   makeGiveUp() {
     return new GiveUp(this.question,
-      (outcome, key, words, act) => this.choice('give_up', outcome, key, words, act),
+      (outcome, key, words, ask) => this.choice('give_up', outcome, key, words, '', ask),
       { send: (outcome, container) => this.send('give_up', outcome, container),
         changed: () => this.enable(this.on) });
   }

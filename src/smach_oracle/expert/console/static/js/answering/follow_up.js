@@ -1,5 +1,6 @@
 // @ts-check
 // What the robot does after an answer: until its trial ends, or it asks again.
+import { wasMeant } from '../page/deliberate.js';
 import { h, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { added } from '../page/format.js';
@@ -12,8 +13,9 @@ import { redraw } from '../page/redraw.js';
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').TrialEvent} TrialEvent */
 /**
- * Where one may go from a question: to the list, or to another one, by its key.
- * @typedef {{ leave: () => void, choose: (key: string) => void }} Ways
+ * Where one may go from a question: to the list, or to another one, by its key and whether that was
+ * meant.
+ * @typedef {{ leave: () => void, choose: (key: string, meant: boolean) => void }} Ways
  */
 
 /** @type {Set<EventKind>} */
@@ -143,8 +145,8 @@ export class FollowUp {
     const free = focusIsFree(this.title, this.next, ...this.given);
     this.next.hidden = !next;
     redraw(this.next, next && h('button', { class: 'primary', key: next.key,
-      'data-action': 'next-question', 'data-deliberate': 'choose ' + next.key,
-      onclick: () => this.ways.choose(next.key) },
+      'data-action': 'next-question', 'data-deliberate': 'open ' + next.key,
+      onclick: (/** @type {Event} */ event) => this.ways.choose(next.key, wasMeant(event)) },
     'Next question: ' + next.state + ' of ' + next.robot));
     if (free && this.last && this.app.current === 'questions') this.focusNext();
   }

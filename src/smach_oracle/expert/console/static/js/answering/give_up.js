@@ -7,7 +7,7 @@ import { focusIsFree, moveFocus } from '../page/focus.js';
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Question} Question */
 /**
- * Makes a button of the form: the outcome, its key, its words, and what it does.
+ * Makes a button of the form: the outcome, its key, its words, and what it asks. It sends nothing.
  * @typedef {(outcome: string, key: string, words: Child, act: () => void) => HTMLButtonElement}
  *   MakeButton
  */
@@ -52,7 +52,6 @@ export class GiveUp {
       const button = makeButton(outcome, '', h('strong', {}, container, ' with ', outcome),
         () => this.ask(outcome, container));
       button.dataset['container'] = container;
-      button.dataset['deliberate'] = 'give_up ' + container + '/' + outcome;
       return button;
     });
     return [h('div', { class: 'choices' }, makeButton('', 'g', asFailed, () => this.ask(''))),

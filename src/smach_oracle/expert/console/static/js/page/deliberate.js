@@ -5,8 +5,9 @@
 // is a key that presses what has the focus, where the page has just put the focus there.
 //
 // The attribute's value says what a click would do: where it changes, the element is another one.
-// What is held begins with `hold`, and is refused as it is pressed. What stops or lets go never has
-// the attribute.
+// What is held begins with `hold`, and is refused as it is pressed. What only shows something begins
+// with `open`. It is never refused: `wasMeant` says whether something may be sent with it at once.
+// What stops or lets go never has the attribute.
 import { toast } from './dom.js';
 import { justGiven } from './focus.js';
 
@@ -21,6 +22,7 @@ export const SETTLING_MS = 700;
 export const PERIOD_MS = 100;
 const SELECTOR = '[data-deliberate]';
 const HELD = /^hold /;
+const OPENS = /^open /;
 const HOLDING = new Set(['Enter', ' ']); // the keys that press what has the focus
 const STILL = 4; // px by which an element may move and yet lie under the same finger
 const TOO_SOON = 'Not sent: the page had just changed there. Press again.';
@@ -29,6 +31,8 @@ const TOO_SOON = 'Not sent: the page had just changed there. Press again.';
 let rests = new Map(); // of those that can be pressed
 /** @type {{ element: HTMLElement, meaning: string, settled: boolean } | null} */
 let pressed = null;
+/** @type {Event | null} the newest click that has opened something, and came too soon */
+let hasty = null;
 
 /** Begin: once a page. */
 export function watchOverClicks() {
@@ -58,6 +62,12 @@ function settled(element) {
  * @param {number} sinceMs
  */
 export function longSince(sinceMs) { return performance.now() - sinceMs >= SETTLING_MS; }
+
+/**
+ * Whether what was clicked had lain there for long enough.
+ * @param {Event} event a click on an element that opens something
+ */
+export function wasMeant(event) { return event !== hasty; }
 
 /** Say that a press was refused, for that it came too soon. */
 export function sayTooSoon() {
@@ -158,5 +168,7 @@ function judge(event) {
   const ofPointer = event.detail > 0 && before && before.element === element;
   const meant = ofPointer ? before.settled && before.meaning === meaningOf(element)
     : settledForKeys(element);
-  if (!meant) refuse(event);
+  if (meant) return;
+  if (OPENS.test(meaningOf(element))) hasty = event;
+  else refuse(event);
 }

@@ -1,7 +1,7 @@
 // @ts-check
-// Keys that act on whatever is there, such as the next question. What a key would do must have been
-// the same for a while: before that it is refused.
-import { PERIOD_MS, SETTLING_MS, sayTooSoon } from './deliberate.js';
+// Keys that open whatever is there, such as the next question. They are never refused. Where what a
+// key does has not been the same for a while, nothing is sent with it at once.
+import { PERIOD_MS, longSince } from './deliberate.js';
 
 export class SettledKey {
   /** @param {() => string} meaningOf what the key would do now, '' for nothing */
@@ -23,12 +23,9 @@ export class SettledKey {
     this.sinceMs = performance.now();
   }
 
-  /** Whether it is pressed on purpose; where it is not, the page says so. */
-  get pressed() {
+  /** Whether it would have done the same for long enough to be meant. */
+  get meant() {
     this.look();
-    if (!this.meaning) return false;
-    const meant = performance.now() - this.sinceMs >= SETTLING_MS;
-    if (!meant) sayTooSoon();
-    return meant;
+    return longSince(this.sinceMs);
   }
 }

@@ -5,6 +5,7 @@ import { FollowUp } from '../answering/follow_up.js';
 import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
 import { NoReply, unlessLost } from '../page/connection.js';
+import { SETTLING_MS } from '../page/deliberate.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
@@ -106,14 +107,26 @@ export class QuestionDetail {
     return Boolean(now && now.status === 'claimed' && this.app.isMine(now));
   }
 
-  /** Take the question, unless somebody else works on it. */
-  begin() {
+  /**
+   * Take the question, unless somebody else works on it.
+   * @param {boolean} meant else it is taken once it has been seen for a while
+   */
+  begin(meant) {
     this.showPerception();
     this.showInterface();
     this.onlookers.look();
     const free = this.question.status === 'pending' || this.mine; // by a page of before: keep it
-    if (this.app.mayAnswer && free) this.claim('claim');
+    if (this.app.mayAnswer && free) {
+      if (meant) this.claim('claim');
+      else setTimeout(() => this.claimSeen(), SETTLING_MS);
+    }
     this.show();
+  }
+
+  /** Nothing was sent as it was opened: it might have been another one. Now it has been seen. */
+  claimSeen() {
+    if (this.ended || this.held || this.settled) return;
+    if (this.free || this.mine) this.claim('claim');
   }
 
   /** The connection is back: so is the claim, if nobody has taken it meanwhile. */

@@ -1,5 +1,6 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
+import { wasMeant } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
@@ -93,8 +94,8 @@ class QuestionPanel {
     const { key, status, state, robot, path, rate } = question;
     const silent = this.app.liveness.whoIsSilent(question) ? ' silent' : '';
     return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
-      'data-deliberate': 'choose ' + key, 'aria-current': this.isChosen(key),
-      onclick: () => this.choose(key) },
+      'data-deliberate': 'open ' + key, 'aria-current': this.isChosen(key),
+      onclick: (/** @type {Event} */ event) => this.choose(key, wasMeant(event)) },
     h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
       h('span', { class: 'spacer' }), this.statusChip(question)),
     h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
@@ -125,17 +126,21 @@ class QuestionPanel {
         duration(left) + ' left'));
   }
 
-  /** @param {string} key */
-  choose(key) {
+  /**
+   * Open a question.
+   * @param {string} key
+   * @param {boolean} meant else it is claimed once it has been seen
+   */
+  choose(key, meant) {
     const question = this.open.find((each) => each.key === key);
     if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
     this.close();
     this.detail = new QuestionDetail(this.app, question,
-      { leave: () => this.leave(), choose: (next) => this.choose(next) });
+      { leave: () => this.leave(), choose: (...next) => this.choose(...next) });
     this.showStage();
     this.showQueue();
     moveFocus(this.detail.title);
-    this.detail.begin(); // may ask for a name, which takes the focus
+    this.detail.begin(meant); // may ask for a name, which takes the focus
   }
 
   /** Back to the list, as a person wants it: the focus goes to its first question. */
@@ -176,7 +181,7 @@ class QuestionPanel {
     if (!this.takesKeys || modified(event) || typing(event.target) || event.repeat
       || turnedOff(event)) return;
     if (event.key === 'n') {
-      if (this.next && this.nextKey.pressed) this.choose(this.next.key);
+      if (this.next) this.choose(this.next.key, this.nextKey.meant);
     } else if (event.key === 'Escape') {
       if (this.detail && !this.detail.cancel()) this.leave();
     } else if (this.detail) {
