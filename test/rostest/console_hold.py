@@ -117,7 +117,7 @@ class Hold(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: not self.told[-1].machines[0].breakpoints))
         browser.click(RESUME)
         self.assertTrue(browser.says('still to be confirmed: FOURTH', '.hand-reply'))
-        self.assertFalse(self.told[-1].machines[0].paused)
+        self.assertTrue(wait_for(lambda: not self.told[-1].machines[0].paused), 'it says so')
         self.assertTrue(browser.says('Confirm: FOURTH in {}/INNER will run'.format(MACHINE),
                                      CONFIRM))
         browser.click(CONFIRM)

@@ -5,9 +5,9 @@
 // is a key that presses what has the focus, where the page has just put the focus there.
 //
 // The attribute's value says what a click would do: where it changes, the element is another one.
-// What is held begins with `hold`, and is refused as it is pressed. What only shows something begins
-// with `open`. It is never refused: `wasMeant` says whether something may be sent with it at once.
-// What stops or lets go never has the attribute.
+// What is held begins with `hold`, and is refused as it is pressed. What only shows something
+// begins with `open`. It is never refused: `wasMeant` says whether something may be sent with it at
+// once. What stops or lets go never has the attribute.
 import { toast } from './dom.js';
 import { justGiven } from './focus.js';
 
