@@ -85,7 +85,8 @@ class Container(State):
 
     def is_opened(self) -> bool:
         """Whether this is the innermost open container: the one construction methods add to."""
-        return self in Container._construction_stack[-1:]
+        stack = Container._construction_stack
+        return bool(stack) and stack[-1] is self
 
     def assert_opened(self, msg: str = '') -> None:
         """Raise InvalidConstructionError(msg) if this is not the innermost open container."""

@@ -1,25 +1,27 @@
 #!/usr/bin/env python3
 """Programs that use OracleContainer themselves, configured by the parameters of their node."""
 import sys
+import tempfile
 import unittest
-from typing import Any
+from typing import Any, List
 
 import actionlib
 import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
-from oracle_support import EventLog, FrontEnd, Process, oracle_run, script
+from oracle_support import EventLog, FrontEnd, Process, oracle_run, recorded_events, script
 from waiting import wait_for
 
 from smach_msgs.msg import SmachContainerStructure
 from smach_oracle.msg import (
+    ControlStatus,
     ExpertDecision,
     MoveArmsAsideAction,
     MoveArmsAsideGoal,
     OracleEvent,
     OracleRates,
 )
-from smach_oracle.srv import AnswerQueryRequest
+from smach_oracle.srv import AnswerQueryRequest, CommandMachine
 
 PRELUDE = '''
 import sys, rospy, smach, smach_ros
@@ -115,6 +117,48 @@ for sm in machines:
 print('PATHS', [sm.path for sm in machines], flush=True)
 sys.stdin.readline()
 viewer.stop()
+'''
+EQUAL_MACHINES = PRELUDE + '''
+import dataclasses
+from geometry_msgs.msg import PoseStamped
+class Hostile:
+    armed = False  # SMACH compares machines while they are built
+    def __eq__(self, other):
+        if Hostile.armed:
+            raise RuntimeError('compared')
+        return self is other
+    def __ne__(self, other):
+        return not self == other
+    def __hash__(self):
+        raise RuntimeError('hashed')
+    def __bool__(self):
+        raise RuntimeError('asked for its truth')
+class Goal(Hostile, PoseStamped): pass
+class State(Hostile, Turn): pass
+@dataclasses.dataclass
+class Task(smach.StateMachine):
+    robot: str
+    def __post_init__(self):
+        smach.StateMachine.__init__(self, OUTCOMES)
+class HostileTask(Hostile, smach.StateMachine): pass
+machines = [Task('r1'), Task('r1'), HostileTask(OUTCOMES), HostileTask(OUTCOMES)]
+rospy.init_node('task')
+for number, sm in enumerate(machines):
+    sm.userdata.goal = Goal()
+    with sm:
+        smach.StateMachine.add('PICK_%d' % number, State('aborted'))
+Hostile.armed = True
+if 'bare' not in sys.argv:
+    for number, sm in enumerate(machines):
+        OracleContainer.wrap(sm, settings={'max_recoveries': 0 if number % 2 else 3})
+for sm in machines:
+    print('OUTCOME', sm.execute(), flush=True)
+sys.stdin.readline()
+if 'bare' not in sys.argv:
+    from smach_oracle.oracle import unwrap
+    for sm in machines:
+        assert type(unwrap(sm)) in (Task, HostileTask)
+    print('UNWRAPPED', flush=True)
 '''
 ACTION_SERVER = PRELUDE + '''
 from smach_oracle.msg import MoveArmsAsideAction
@@ -249,6 +293,51 @@ class LibraryTest(unittest.TestCase):
         machines, threads = [int(word) for word in program.output().split('LEFT ')[1].split()[:2]]
         self.assertLessEqual(machines, 3)
         self.assertLess(threads, 40)
+
+    def folder(self) -> str:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        return folder.name
+
+    def check_four_machines(self, program: Process, folder: str) -> None:
+        wait_for(lambda: program.output().count('OUTCOME succeeded') == 4, 40.0)
+        self.assertEqual(program.output().count('OUTCOME succeeded'), 4, program.output())
+        told: List[ControlStatus] = []
+        subscriber = rospy.Subscriber('/task/oracle/control', ControlStatus, told.append)
+        self.addCleanup(subscriber.unregister)
+        names = ['task', 'task_2', 'task_3', 'task_4']
+        wait_for(lambda: told and len(told[-1].machines) == 4)
+        self.assertEqual([machine.path for machine in told[-1].machines], names)
+        pause = rospy.ServiceProxy('/task/oracle/pause', CommandMachine)
+        self.assertTrue(pause('task_3', 'Ann').ok)
+        self.assertTrue(wait_for(lambda: [each.path for each in told[-1].machines
+                                          if each.paused] == ['task_3']))
+        program.go_on()
+        self.assertEqual(program.wait(), 0, program.output())
+        trials = recorded_events(folder)
+        self.assertEqual(sorted(events[0].path for events in trials), names)
+        self.assertEqual(sorted({event.state for events in trials for event in events
+                                 if event.kind == OracleEvent.FAILURE}),
+                         ['PICK_0', 'PICK_1', 'PICK_2', 'PICK_3'])
+
+    def test_machines_that_compare_equal_or_raise_when_compared_are_told_apart(self) -> None:
+        folder = self.folder()
+        self.set_param('record', folder)
+        program = self.start(EQUAL_MACHINES)
+        expert = FrontEnd(self, '/task/expert_query')
+        answered = ''
+        for state in ('PICK_1', 'PICK_3'):  # those with a setting of their own ask
+            question = expert.question(state=state, other_than=answered)
+            self.assertIsNotNone(question, program.output())
+            self.answer(expert, question)
+            answered = question.query.query_id
+        self.check_four_machines(program, folder)
+        self.assertIn('UNWRAPPED', program.output())
+
+    def test_machines_that_compare_equal_run_unmodified_under_oracle_run(self) -> None:
+        folder = self.folder()
+        self.check_four_machines(
+            oracle_run(self, '--record', folder, script(self, EQUAL_MACHINES), 'bare'), folder)
 
     def test_a_machine_behind_an_action_server_recovers(self) -> None:
         task = oracle_run(self, script(self, ACTION_SERVER))

@@ -346,7 +346,7 @@ class OracleContainer(smach.StateMachine):
                     edge = record.fast[outcome]
                     target = edge.target
                     plain = transitions[outcome] is target and not self._preempt_requested
-                except (KeyError, TypeError):
+                except Exception:
                     # seen for the first time, no plain success, or no outcome at all
                     plain = False
                 if not plain:

@@ -14,7 +14,7 @@ from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.sending import Prospect, prospect_of, way_for
 from .machine.nesting import nodes_of
-from .machine.tree_node import TreeNode
+from .machine.tree_node import TreeNode, node_of
 from .places.place import Place
 from .records.events import EventKind
 from .settings.settings import AUTONOMY_LEVELS
@@ -55,8 +55,8 @@ class OperatorHand:
 
         :raises TrialError: for a machine that is not under an oracle.
         """
-        node = getattr(machine, '_oracle', None)
-        if not isinstance(node, TreeNode):
+        node = node_of(machine)
+        if node is None:
             raise TrialError('{!r} is not under an oracle'.format(machine))
         self._node = node
 

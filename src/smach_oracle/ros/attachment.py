@@ -9,16 +9,15 @@ import functools
 import os
 import threading
 import time
+import types
 import weakref
 from contextlib import contextmanager, nullcontext
 from typing import (
-    Any,
     Callable,
     ContextManager,
     Dict,
     Iterator,
     List,
-    MutableSet,
     NamedTuple,
     Optional,
     Tuple,
@@ -30,6 +29,7 @@ import smach
 from smach_oracle.forking import in_child
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.identity import WeakIdentityMap, own_mark, remove_identical
 from smach_oracle.oracle.settings.paths import path_of
 
 from .diagnostics.diagnostics_publisher import DiagnosticsPublisher
@@ -78,10 +78,11 @@ class Attachments:
         # a top-level machine executes within it: what becomes of an error that it begins with
         self.refusing: Callable[[], ContextManager[object]] = nullcontext
         self._lock = threading.RLock()
-        self._machines: MutableSet[OracleContainer] = weakref.WeakSet()  # all that ever ran
+        # all that ever ran
+        self._machines: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
         self._trials: List[OracleContainer] = []  # within execute, their last events included
         # those of them that are attached to the node
-        self._on_ros: MutableSet[OracleContainer] = weakref.WeakSet()
+        self._on_ros: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
         # our servers, by path. Each holds its machine
         self._introspection: Dict[str, IntrospectionServer] = {}
         self._shown: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by the same paths
@@ -127,7 +128,7 @@ class Attachments:
         try:
             yield
         finally:
-            self._trials.remove(machine)
+            remove_identical(self._trials, machine)
             if not self._trials:
                 self.trials_ended()
 
@@ -149,7 +150,7 @@ class Attachments:
         if self.has(machine):
             return
         with self._lock:
-            self._machines.add(machine)
+            self._machines[machine] = True
             node = rospy.core.is_initialized() and not rospy.core.is_shutdown_requested()
             plan = self._plan_recording(node)  # first, since it may raise
             if oracle_of(machine).settings.checkpoint:
@@ -157,7 +158,7 @@ class Attachments:
             if node:
                 self._start_node()
                 self._attach_to_node(machine)
-                self._on_ros.add(machine)
+                self._on_ros[machine] = True
             # last: topics that are there already are recorded from the first trial on
             self._record(machine, plan)
 
@@ -167,7 +168,7 @@ class Attachments:
         Where it is wrapped again, its first execute attaches it again.
         """
         with self._lock:
-            self._on_ros.discard(machine)
+            self._on_ros.forget(machine)
             if self._rates is not None:
                 self._rates.forget(machine)
             if self._hand is not None:
@@ -197,7 +198,7 @@ class Attachments:
             recorder.close(timeout_s)
 
     def _running(self) -> List[OracleContainer]:
-        return [machine for machine in list(self._machines) if machine.is_running()]
+        return [machine for machine in self._machines if machine.is_running()]
 
     def _start_node(self) -> None:
         if self._node_started:
@@ -346,15 +347,17 @@ def has_introspection(machine: OracleContainer) -> bool:
 
     Told by its callbacks: the server of a script that was made before the machine first ran.
     """
-    callbacks = [each[0] for name in CALLBACK_LISTS for each in getattr(machine, name, ())]
-    return is_watched(machine) or any(
-        _is_running_proxy(getattr(callback, '__self__', None)) for callback in callbacks)
+    callbacks = [each[0] for name in CALLBACK_LISTS for each in own_mark(machine, name) or ()]
+    return is_watched(machine) or any(_is_running_proxy(callback) for callback in callbacks)
 
 
-def _is_running_proxy(owner: Any) -> bool:
-    """Whether this is upstream's proxy of a container, and its server was not stopped."""
+def _is_running_proxy(callback: object) -> bool:
+    """Whether this is a method of upstream's proxy of a container, and its server still runs."""
+    if not isinstance(callback, types.MethodType):
+        return False
+    owner = callback.__self__
     return (type(owner).__module__ == 'smach_ros.introspection'
-            and getattr(owner, '_keep_running', True))
+            and own_mark(owner, '_keep_running') is not False)
 
 
 def start_introspection(machine: OracleContainer) -> IntrospectionServer:

@@ -7,8 +7,7 @@ expert (action server `~expert_query`, or the one that `~expert_query_server` na
 recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves as the bare one.
 """
 import functools
-import weakref
-from typing import Any, List, Mapping, MutableMapping, NamedTuple, Optional, Sequence, Set
+from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Set
 
 import rospy
 
@@ -18,6 +17,7 @@ from smach_oracle.oracle.asking.question import Expert
 from smach_oracle.oracle.container import OracleContainer as BareContainer
 from smach_oracle.oracle.container import SettingsLike
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.patterns import Nested
 from smach_oracle.oracle.settings.settings import Settings
@@ -48,7 +48,7 @@ class _GivenSettings(NamedTuple):
 
 
 _told: Set[str] = set()  # a script may build a machine for each trial
-_given: MutableMapping[BareContainer, _GivenSettings] = weakref.WeakKeyDictionary()
+_given: WeakIdentityMap[BareContainer, _GivenSettings] = WeakIdentityMap()
 
 
 class OracleContainer(BareContainer):
@@ -138,7 +138,7 @@ def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> 
 def _remember(machine: BareContainer, settings: SettingsLike, preconditions: PreconditionLists,
               nested: Optional[Nested]) -> None:
     if isinstance(settings, Settings):
-        _given.pop(machine, None)
+        _given.forget(machine)
     else:
         _given[machine] = _GivenSettings(settings, preconditions, nested)
 
@@ -152,9 +152,9 @@ def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
     :raises SettingsError: naming key, value and what is allowed.
     :raises rospy.ROSInterruptException: where the node shuts down meanwhile.
     """
-    if machine not in _given or not rospy.core.is_initialized():
+    given = _given.get(machine)
+    if given is None or not rospy.core.is_initialized():
         return
-    given = _given[machine]
     # Python objects that they name are looked up in this thread: a module may be imported for it
     parameters = outside_main_thread(functools.partial(read_param, DEFAULT_PARAM))
     checkpoint, checkpoint_name = outside_main_thread(read_checkpoint)
@@ -172,7 +172,7 @@ def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
         BareContainer.wrap(machine, settings=checked(settings, given.preconditions),
                            nested=given.nested, strict=complain,
                            recover=oracle_of(machine).recovers)
-    del _given[machine]  # only now: a program that tries again after an error gets it again
+    _given.forget(machine)  # only now: a program that tries again after an error gets it again
 
 
 def _tell_once(text: str) -> None:

@@ -10,6 +10,7 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 import rospy
 
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.identity import is_same
 from smach_oracle.oracle.settings.close_names import did_you_mean
 from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.oracle.settings.written import plain
@@ -52,7 +53,7 @@ class LoadedSettings(Dict[str, Any]):
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
         mine, theirs = dict(_leaves(plain(self))), dict(_leaves(plain(values)))
         return ['{}: {!r}, now {!r}'.format(key, mine[key], value)
-                for key, value in theirs.items() if key in mine and mine[key] != value]
+                for key, value in theirs.items() if key in mine and not is_same(mine[key], value)]
 
     def origin(self, key: str) -> str:
         """Return where a dotted key, or the mapping it should be in, was set, '' for nowhere."""

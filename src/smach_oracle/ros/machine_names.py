@@ -14,6 +14,7 @@ import rospy
 import smach
 from smach_oracle.forking import in_child
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.identity import remove_identical
 
 # what every script is called that oracle_run.launch runs and nobody has named
 LAUNCHED_NAME = 'oracle_run'
@@ -77,7 +78,7 @@ class MachineNames:
             yield
         finally:
             with self._lock:
-                self._running.remove(machine)
+                remove_identical(self._running, machine)
 
     def _find(self, labels: Tuple[str, ...], machine: smach.StateMachine) -> str:
         stem = self._stem()

@@ -8,13 +8,13 @@ import os
 import threading
 import time
 from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Set, Tuple, Union
-from weakref import WeakSet
 
 import genpy
 import rospy
 
 from smach_oracle.foreign import error_text, repr_of
 from smach_oracle.forking import in_child
+from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -95,7 +95,7 @@ class TrialRecorder(OwnObserver):
         self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch,
                                LATE_S if listens else 0.0)
         self._bags.recover()
-        self._attached: 'WeakSet[EventSource]' = WeakSet()
+        self._attached: WeakIdentityMap[EventSource, bool] = WeakIdentityMap()
         self._hung = False
         self._not_recorded: Set[Tuple[type, str]] = set()  # kinds of items, and why: said once
         self._closed = False
@@ -119,7 +119,7 @@ class TrialRecorder(OwnObserver):
         source = machine if isinstance(machine, EventSource) else machine.events
         if source in self._attached:
             return
-        self._attached.add(source)
+        self._attached[source] = True
         source.observers.append(
             _MachineObserver(self._observe, self._put_snapshot, self._put_end, self._reporter.warn,
                         {resolve(topic): take

@@ -12,6 +12,7 @@ from smach_oracle.oracle import OracleContainer, oracle_of, unwrap
 from smach_oracle.oracle.asking.question import Answer, Expert, Progress, Question
 from smach_oracle.oracle.background import BackgroundCall
 from smach_oracle.oracle.errors import TrialError
+from smach_oracle.oracle.identity import remove_identical
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
@@ -168,11 +169,12 @@ class Bench:
         oracle = oracle_of(self.machine)
         if self._expert is not None:
             oracle.expert = _NotingExpert(self._expert, notes.questions)
-        oracle.events.observers.append(notes.note_event)
+        observer = notes.note_event
+        oracle.events.observers.append(observer)
         try:
             yield
         finally:
-            oracle.events.observers.remove(notes.note_event)
+            remove_identical(oracle.events.observers, observer)
             if self._expert is not None:
                 oracle.expert = self._expert_before
 

@@ -11,7 +11,8 @@ ARROWS: Dict[str, Set[str]] = {
     'oracle': {'foreign', 'forking', 'store'},
     'store': {'foreign', 'forking'},  # no ROS, no SMACH
     'ros': {'oracle.asking', 'oracle.background', 'oracle.container', 'oracle.decision',
-            'oracle.errors', 'oracle.number_checks', 'oracle.prospects', 'oracle.records',
+            'oracle.errors', 'oracle.identity', 'oracle.number_checks',
+            'oracle.prospects', 'oracle.records',
             'oracle.settings', 'oracle.operator_hand', 'oracle.OracleContainer',
             'oracle.oracle_of', 'oracle.waiting', 'foreign', 'forking', 'packages', 'store'},
     'geometry': set(),
@@ -30,7 +31,8 @@ ARROWS: Dict[str, Set[str]] = {
     'inspection_robot': set(),  # a robot as any ROS user writes it
     # the public face of the executive; ros is imported where a test asks for it
     'testing': {'oracle.OracleContainer', 'oracle.asking', 'oracle.background', 'oracle.errors',
-                'oracle.oracle_of', 'oracle.records', 'oracle.settings', 'oracle.unwrap', 'ros'},
+                'oracle.identity', 'oracle.oracle_of', 'oracle.records', 'oracle.settings',
+                'oracle.unwrap', 'ros'},
     '__init__': {'oracle.OracleContainer', 'ros.container'},
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
@@ -51,7 +53,7 @@ LAYERS: Dict[str, List[Layer]] = {
     'oracle': [
         'prospects', 'operator_hand', 'container', 'question', 'execution', 'checkpoint',
         'branches', 'recovery', 'places', 'machine', 'control', 'asking', 'records', 'settings',
-        'decision', 'number_checks', 'background', 'waiting', 'errors'
+        'decision', 'number_checks', 'background', 'waiting', 'identity', 'errors'
     ],
     'ros': [
         'oracle_run', 'container', 'attachment', {'recorder', 'expert', 'publishers', 'health',

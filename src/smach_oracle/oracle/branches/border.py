@@ -18,8 +18,9 @@ from typing import (
 import smach
 from smach_oracle.foreign import error_text
 
-from ..machine.nesting import machines_below
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..identity import own_mark
+from ..machine.nesting import BORDER, machines_below
+from ..machine.tree_node import TreeNode, WrappedMachine, node_of
 from ..records.events import NO_OUTCOME, EventKind
 from ..records.facts import BRANCHES
 from ..settings.failing_outcomes import is_preempted
@@ -366,7 +367,7 @@ class IteratorBorder(Border):
 
 def border_of(state: object) -> Optional[Border]:
     """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
-    border = getattr(state, '_oracle_border', None)
+    border = own_mark(state, BORDER)
     return border if isinstance(border, Border) else None
 
 
@@ -380,7 +381,7 @@ def _children_of(container: Any) -> Mapping[str, Any]:
 def _forget_given_up(container: smach.Container) -> None:
     """Forget whether the oracles of the machines in a container have given up."""
     for _, machine in machines_below(container):
-        node = getattr(machine, '_oracle', None)
+        node = node_of(machine)
         if node is not None:
             node.gave_up = False
 

@@ -3,11 +3,12 @@ from typing import Any, Dict, Optional, Tuple
 
 import smach
 
+from ..identity import own_attributes, set_class
+from ..machine.nesting import BORDER
 from .border import Border, ConcurrenceBorder, IteratorBorder
 from .stand_in import real
 
-_MADE: Dict[type, type] = {}
-_BORDER = '_oracle_border'
+_MADE: Dict[int, type] = {}  # by id of the class that it is made of, and keeps
 
 
 class _Bordered:
@@ -81,31 +82,30 @@ def put_border(container: smach.Container) -> None:
     :raises TypeError: where its class cannot be extended.
     """
     cls = bordered_class(type(container))
-    changed: Any = container
-    changed.__class__ = cls
+    set_class(container, cls)
     is_iterator = isinstance(container, smach.Iterator)
-    changed._oracle_border = (IteratorBorder if is_iterator else ConcurrenceBorder)(container)
+    own_attributes(container)[BORDER] = (
+        IteratorBorder if is_iterator else ConcurrenceBorder)(container)
 
 
 def take_border_away(container: smach.Container) -> None:
     """Give a Concurrence or an Iterator back as it was before `put_border`."""
     made_of = type(container).__dict__.get('_bordered_of')
     if made_of is not None:
-        changed: Any = container
-        changed.__class__ = made_of
-        del changed.__dict__[_BORDER]
+        set_class(container, made_of)
+        del own_attributes(container)[BORDER]
 
 
 def bordered_class(base: type) -> type:
     """Return the class of bordered containers of class `base`, the same one each time."""
-    made = _MADE.get(base)
+    made = _MADE.get(id(base))
     if made is None:
         mixin = _BorderedIterator if issubclass(base, smach.Iterator) else _Bordered
         metaclass: Any = type(base)
         made = metaclass(base.__name__, (mixin, base), {
             '__module__': base.__module__, '__qualname__': base.__qualname__,
             '__doc__': base.__doc__, '_bordered_of': base})
-        made = _MADE.setdefault(base, made)
+        made = _MADE.setdefault(id(base), made)
     return made
 
 

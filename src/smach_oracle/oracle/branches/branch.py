@@ -1,9 +1,10 @@
 """One branch: where its outcomes lead, by its author's word."""
 from dataclasses import replace
-from typing import Any, Optional, Tuple
+from typing import Any, Tuple
 
 import smach
 
+from ..identity import attribute_of
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..recovery.failure import failure_kind, route_of
@@ -108,5 +109,5 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
 
 def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:
     """Return the entries of an outcome map, or of the conditions in it. None of what is no map."""
-    items: Optional[Any] = getattr(given, 'items', None)
+    items = attribute_of(given, 'items')
     return tuple(items()) if callable(items) else ()

@@ -3,6 +3,8 @@ from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, ca
 
 from smach_oracle.foreign import repr_of
 
+from ..identity import has_attribute, own_mark
+
 Tell = Callable[[str], None]
 Items = Union[Iterable[object], Callable[[], Iterable[object]]]
 
@@ -158,9 +160,9 @@ class TrackedItems:
 
 def can_be_indexed(iterator: Any) -> bool:
     """Whether what an Iterator goes through has the same items in the same order each time."""
-    items = getattr(iterator, '_items', None)
+    items = own_mark(iterator, '_items')
     items = items.given if isinstance(items, TrackedItems) else items
     if callable(items):
         return True  # whoever makes them again says what they are
-    return (hasattr(items, '__len__') and hasattr(items, '__getitem__')
-            and not hasattr(items, 'keys'))
+    return (has_attribute(items, '__len__') and has_attribute(items, '__getitem__')
+            and not has_attribute(items, 'keys'))

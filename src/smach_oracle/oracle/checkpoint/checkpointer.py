@@ -9,7 +9,7 @@ from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
 from ..branches.around import borders_around, borders_in
-from ..branches.border import Border
+from ..branches.border import Border, IteratorBorder
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..places.place import Place
@@ -228,7 +228,7 @@ class Checkpointer:
         for path, border in self._borders_around(node):
             if event.kind is EventKind.CONTAINER_START and event.path == path:
                 continue  # it has not begun with any
-            number = getattr(border, 'item_number', 0)
+            number = border.item_number if isinstance(border, IteratorBorder) else 0
             if number and self._items.get(path) != number:
                 self._items[path] = number
                 yield fact_of(path, ITEMS, number)

@@ -11,7 +11,7 @@ from ..branches.border import border_of
 from ..branches.items import can_be_indexed
 from ..errors import SettingsError
 from ..machine.nesting import borders_below, nodes_of
-from ..machine.tree_node import TreeNode
+from ..machine.tree_node import TreeNode, node_of
 from ..places.place import Place, place_named, places_of
 from ..places.way import way_to
 from ..records.asked_once import NOT_BEGUN, AskedOnce
@@ -370,7 +370,7 @@ def _up_from(node: TreeNode) -> Iterator[TreeNode]:
 def _is_wrapped_through(state: object) -> bool:
     """Whether each plain state in it has an oracle of its own, so that each is told of."""
     if isinstance(state, smach.StateMachine):
-        return hasattr(state, '_oracle')
+        return node_of(state) is not None
     border = border_of(state)
     return border is not None and all(
         label in border.machines or _is_wrapped_through(inner)

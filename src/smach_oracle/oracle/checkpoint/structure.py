@@ -5,6 +5,7 @@ from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Tuple
 
 import smach
 
+from ..identity import own_mark
 from ..machine.tree_node import TreeNode
 
 DIGITS = 16  # of the id
@@ -102,7 +103,7 @@ def _container(container: Any, meta: str) -> Dict[str, Any]:
         'outcomes': sorted(map(str, container.get_registered_outcomes())),
         'input_keys': sorted(map(str, container.get_registered_input_keys())),
         'output_keys': sorted(map(str, container.get_registered_output_keys())),
-        'initial': str(getattr(container, '_initial_state_label', '') or ''),
+        'initial': str(own_mark(container, '_initial_state_label') or ''),
         'states': {label: _state(container, label, state)
                    for label, state in _states(container, meta).items()},
         'rules': _rules(container),
@@ -127,8 +128,8 @@ def _rules(container: Any) -> List[str]:
 
 
 def _state(container: Any, label: str, state: Any) -> Dict[str, Any]:
-    transitions = getattr(container, '_transitions', {}).get(label) or {}
-    remapping = getattr(container, '_remappings', {}).get(label) or {}
+    transitions = (own_mark(container, '_transitions') or {}).get(label) or {}
+    remapping = (own_mark(container, '_remappings') or {}).get(label) or {}
     is_state = isinstance(state, smach.State)
     return {
         'class': _class_of(state),

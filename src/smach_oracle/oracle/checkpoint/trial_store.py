@@ -15,6 +15,7 @@ from smach_oracle.store.store_writer import Ending, StoreWriter
 
 from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, SettingsError
+from ..identity import remove_identical
 from ..machine.nesting import borders_below, nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
@@ -179,8 +180,7 @@ class TrialStore:
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
-        if self._observer in self._top.events.observers:
-            self._top.events.observers.remove(self._observer)
+        remove_identical(self._top.events.observers, self._observer)
         GOALS.observers.remove(self._observer.goal_begins)
         self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
         self._writer.close(None if why in _CAN_GO_ON else Ending(at, outcome))

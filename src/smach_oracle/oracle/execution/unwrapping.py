@@ -1,13 +1,14 @@
 """Takes a machine out of its oracle again: the opposite of wrapping."""
-from typing import Any, Optional, cast
+from typing import Optional, cast
 
 import smach
 
 from ..branches.adopting import release_branches
 from ..errors import TrialError
+from ..identity import own_attributes, set_class
 from ..machine.nesting import machines_below, nodes_of
 from ..machine.tree import Tree
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, WrappedMachine, node_of
 from ..settings.settings import Settings
 from .item_gates import remove_gates
 from .wrapped_classes import two_classes
@@ -22,8 +23,8 @@ def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
     :raises TrialError: for a machine that was not wrapped, that runs, or that was wrapped together
         with a machine around it.
     """
-    node = getattr(machine, '_oracle', None)
-    if not isinstance(node, TreeNode) or two_classes(type(machine)) is None:
+    node = node_of(machine)
+    if node is None or two_classes(type(machine)) is None:
         raise TrialError('{!r} was not wrapped: there is nothing to undo'.format(machine))
     if machine.is_running():
         raise TrialError('{} runs; it can be unwrapped when it has ended'.format(node.path))
@@ -51,11 +52,10 @@ def _strip_alone(machine: WrappedMachine) -> None:
     release_branches(machine)
     machine._remove_oracle()
     remove_gates(cast(smach.StateMachine, machine))
-    stripped: Any = machine
     made_of = two_classes(type(machine))
     if made_of is not None:
-        stripped.__class__ = made_of[1]
-        del stripped.__dict__['_oracle']
+        set_class(machine, made_of[1])
+        del own_attributes(machine)['_oracle']
 
 
 def _stand_alone(machine: WrappedMachine) -> None:

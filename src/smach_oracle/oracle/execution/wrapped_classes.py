@@ -4,15 +4,17 @@ from typing import Any, Dict, Optional, Tuple
 import smach
 
 from ..errors import SettingsError
+from ..identity import own_attributes, set_class
 
-_MADE: Dict[Tuple[type, type], type] = {}
+_MADE: Dict[Tuple[int, int], type] = {}  # by ids of both classes, which it keeps
 # static in StateMachine, so that the order of bases alone does not find the user's
 _STATIC = ('add', 'add_auto')
 
 
 def wrapped_class(oracle_class: type, base: type) -> type:
     """Return the class of machines of class `base` under `oracle_class`, the same one each time."""
-    made = _MADE.get((oracle_class, base))
+    key = id(oracle_class), id(base)
+    made = _MADE.get(key)
     if made is None:
         namespace: Dict[str, Any] = {
             '__module__': base.__module__, '__qualname__': base.__qualname__,
@@ -24,7 +26,7 @@ def wrapped_class(oracle_class: type, base: type) -> type:
                 namespace[name] = own
         metaclass: Any = type(base)
         made = metaclass(base.__name__, (oracle_class, base), namespace)
-        made = _MADE.setdefault((oracle_class, base), made)
+        made = _MADE.setdefault(key, made)
     return made
 
 
@@ -59,7 +61,7 @@ def change_class(machine: smach.StateMachine, oracle_class: type) -> None:
     :raises SettingsError: where its class cannot be extended.
     """
     try:
-        machine.__class__ = wrapped_class(oracle_class, type(machine))
+        set_class(machine, wrapped_class(oracle_class, type(machine)))
     except TypeError as err:
         raise SettingsError('machine', machine, 'a machine whose class can be extended ({})'.format(
             err)) from err
@@ -72,4 +74,4 @@ def renew_attributes(machine: object) -> None:
     CPython reads from it much faster than from one that was looked at, or whose object has changed
     its class.
     """
-    machine.__dict__ = dict(machine.__dict__)
+    object.__setattr__(machine, '__dict__', dict(own_attributes(machine)))

@@ -1,10 +1,11 @@
 """Whole trees: puts a machine, and the machines nested in it, under one oracle each."""
-from typing import Any, cast
+from typing import cast
 
 import smach
 
 from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError
+from ..identity import own_attributes, set_class
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.protocols import Labels
@@ -44,8 +45,8 @@ def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, sett
                name: str) -> WrappedMachine:
     change_class(machine, oracle_class)
     wrapped = cast(WrappedMachine, machine)
-    wrapped._oracle = TreeNode(wrapped, tree, settings, name)
-    return wrapped
+    node = own_attributes(machine)['_oracle'] = TreeNode(wrapped, tree, settings, name)
+    return node.machine
 
 
 def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
@@ -113,10 +114,9 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
         if made_of is not None and (container is machine or container._oracle.inherits):
             container._remove_oracle()
             remove_gates(cast(smach.StateMachine, container))
-            unwrapped: Any = container
             release_branches(container)
-            unwrapped.__class__ = made_of[1]
-            del unwrapped.__dict__['_oracle']
+            set_class(container, made_of[1])
+            del own_attributes(container)['_oracle']
 
 
 def adopt(machine: WrappedMachine) -> None:

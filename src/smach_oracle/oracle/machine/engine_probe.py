@@ -1,9 +1,10 @@
 """Finds out how the engine works that executes a machine."""
-import functools
-
 import smach
 
+from ..identity import WeakIdentityMap
 from .protocols import Machine
+
+_STEP_AS_DRAWN: WeakIdentityMap[type, bool] = WeakIdentityMap()
 
 
 class EngineProbe:
@@ -56,7 +57,10 @@ def _has_own_loop(machine: Machine) -> bool:
             and _steps_as_drawn(type(machine)))
 
 
-@functools.lru_cache(maxsize=256)
 def _steps_as_drawn(cls: type) -> bool:
-    return all(each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
-               for each in cls.__mro__ if 'execute' in vars(each) or '_update_once' in vars(each))
+    known = _STEP_AS_DRAWN.get(cls)
+    if known is None:
+        known = _STEP_AS_DRAWN[cls] = all(
+            each.__module__.partition('.')[0] in ('smach', 'smach_oracle') for each in cls.__mro__
+            if 'execute' in vars(each) or '_update_once' in vars(each))
+    return known

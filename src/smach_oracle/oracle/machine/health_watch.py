@@ -6,6 +6,7 @@ from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
 
 import smach
 
+from ..identity import is_same, name_of
 from ..records.events import EventKind
 from ..settings.health import (
     HealthCondition,
@@ -84,14 +85,13 @@ class HealthWatch:
         """
         self._settle_s = settle_s
         made_of = (conditions, self.given, self.listen)
-        if made_of == self._made_of:
+        if is_same(made_of, self._made_of):
             return
         self._made_of = made_of
         functions = [HealthFunctionPort(each.name, each.function) for each in conditions
                      if each.function is not None]
         if self.given is not None:
-            functions.append(HealthFunctionPort(
-                str(getattr(self.given, '__name__', type(self.given).__name__)), self.given))
+            functions.append(HealthFunctionPort(name_of(self.given), self.given))
         self._functions = functions
         self._listening = self._listen_to(conditions)
 

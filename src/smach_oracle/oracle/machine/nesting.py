@@ -3,8 +3,11 @@ from typing import Any, Iterator, List, Mapping, Tuple, cast
 
 import smach
 
+from ..identity import own_mark
 from .protocols import Labels
 from .tree_node import TreeNode, WrappedMachine
+
+BORDER = '_oracle_border'  # the mark of a Concurrence or an Iterator of a wrapped tree
 
 
 def machines_below(
@@ -15,7 +18,7 @@ def machines_below(
     plain state of those it yields the hidden machine, if it has one, with the labels of the
     Concurrence or Iterator.
     """
-    border = getattr(container, '_oracle_border', None)
+    border = own_mark(container, BORDER)
     if border is not None:
         yield from ((below, machine) for machine in list(border.machines.values()))
     for label, state in list(_children(container).items()):
@@ -67,7 +70,7 @@ def items_under_way(node: TreeNode) -> str:
         state: Any = node.parent.machine._states.get(node.below[0])
         around: List[str] = []
         for label in node.below[1:] + ('',):
-            border = getattr(state, '_oracle_border', None)
+            border = own_mark(state, BORDER)
             words = border.in_words() if border is not None else ''
             if words:
                 around.append(words)

@@ -12,7 +12,7 @@ from ..settings.settings import Settings
 from ..waiting import Waiting
 from .health_watch import ListenToHealth
 from .nesting import nodes_of
-from .tree_node import TreeNode, WrappedMachine
+from .tree_node import TreeNode, WrappedMachine, node_of
 
 
 def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:
@@ -165,8 +165,8 @@ def oracle_of(machine: object) -> Oracle:
 
     :raises TrialError: for a machine that is not under an oracle.
     """
-    node = getattr(machine, '_oracle', None)
-    if not isinstance(node, TreeNode):
+    node = node_of(machine)
+    if node is None:
         raise TrialError('{!r} is not under an oracle; OracleContainer.wrap puts it there'.format(
             machine))
     return Oracle(node)

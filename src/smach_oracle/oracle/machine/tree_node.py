@@ -5,6 +5,7 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 
 import smach
 
+from ..identity import own_mark
 from ..records.asked_once import AskedOnce
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
@@ -44,6 +45,12 @@ class WrappedMachine(Machine, Protocol):
 
     def set_initial_state(self, initial_states: Sequence[str]) -> None:
         """Begin at this label (one, in a list) from now on."""
+
+
+def node_of(machine: object) -> Optional['TreeNode']:
+    """Return the node of a wrapped machine, None for anything else."""
+    node = own_mark(machine, '_oracle')
+    return node if isinstance(node, TreeNode) else None
 
 
 def entered_by_failures_alone(label: str) -> smach.InvalidStateError:

@@ -3,6 +3,7 @@ from typing import Any, Collection, Iterable, Mapping, Tuple, cast
 
 import smach
 
+from ..identity import own_mark
 from .protocols import Machine
 from .tree_node import TreeNode
 from .userdata_gate import UserdataGate, behind
@@ -28,7 +29,7 @@ def view_of(machine: Machine, label: str, state: smach.State,
 
     `label` is '' for a state that is not in the machine.
     """
-    if label and getattr(machine, 'hands_on_userdata', False):
+    if label and own_mark(machine, 'hands_on_userdata'):
         return cast(smach.Remapper, userdata)  # as an Iterator does
     remapping = machine._remappings.get(label) or {} if label else {}
     return smach.Remapper(userdata, state.get_registered_input_keys(),
@@ -69,7 +70,7 @@ class StateView:
         self.userdata = machine.userdata
         self.state = None  # what no state is: made for one visit
         if (_KEEPS_KEY_SETS and _has_plain_keys(state)
-                and not getattr(machine, 'hands_on_userdata', False)):
+                and not own_mark(machine, 'hands_on_userdata')):
             self.state = state
             self.input_keys, self.output_keys = state._input_keys, state._output_keys
             self.remapper = smach.Remapper(machine.userdata, self.input_keys, self.output_keys,

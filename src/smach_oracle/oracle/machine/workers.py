@@ -14,6 +14,7 @@ import smach
 from smach_oracle.foreign import repr_of
 
 from ..background import BackgroundCall
+from ..identity import attribute_of, own_mark
 from .limited_run import LimitedRun, enter
 from .userdata_gate import UserdataGate
 
@@ -189,7 +190,7 @@ def wait(event: threading.Event, seconds: float) -> bool:
 def _stop_bare_machines(state: smach.State) -> None:
     """Let machines without an oracle end at their next state boundary, as both engines do then."""
     try:
-        if isinstance(state, smach.StateMachine) and not hasattr(state, '_oracle'):
+        if isinstance(state, smach.StateMachine) and own_mark(state, '_oracle') is None:
             state._is_running = False
         for child in _children(state):
             _stop_bare_machines(child)
@@ -198,7 +199,7 @@ def _stop_bare_machines(state: smach.State) -> None:
 
 
 def _children(state: smach.State) -> List[smach.State]:
-    get_children = getattr(state, 'get_children', None)
+    get_children = attribute_of(state, 'get_children')
     return list(get_children().values()) if callable(get_children) else []
 
 

@@ -1,6 +1,7 @@
 """Finds the keys of a container's userdata that were written, and takes writes back."""
 from typing import Any, Dict, Iterable, NamedTuple, Optional, Set
 
+from ..identity import own_mark
 from .protocols import Machine
 from .snapshots import copied, fingerprint
 from .userdata_gate import UserdataGate
@@ -52,7 +53,7 @@ class WriteWatch:
         Objects that were changed inside stay changed, except the deep-copied keys.
         """
         data = self._machine.userdata._data
-        if getattr(self._machine, 'shares_userdata', False):
+        if own_mark(self._machine, 'shares_userdata'):
             self.take_back_own(begun)
             return
         for key, value in begun.data.items():

@@ -3,6 +3,7 @@ from typing import Any, Iterator, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import smach
 
+from ..identity import own_mark
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of
 
@@ -17,7 +18,7 @@ class Link(NamedTuple):
     @property
     def remapping(self) -> Mapping[str, str]:
         """Key of the container above by key of the one below, where they differ."""
-        remappings = getattr(self.above, '_remappings', None) or {}
+        remappings = own_mark(self.above, '_remappings') or {}
         return remappings.get(self.label) or {}
 
 

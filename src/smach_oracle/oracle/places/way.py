@@ -1,6 +1,7 @@
 """The way from a failure to a place, and what is told of it before the machine goes there."""
 from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
+from ..identity import own_mark
 from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
@@ -97,7 +98,7 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
         keys = set(child.userdata._data).union(
             key for key in child.get_registered_input_keys()
             if link.remapping.get(key, key) in keys)
-        item = getattr(child, '_items_label', None)
+        item = own_mark(child, '_items_label')
         if item is not None:  # an Iterator: its state works on its own userdata
             keys.add(item)
     return keys

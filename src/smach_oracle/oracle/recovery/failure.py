@@ -56,6 +56,14 @@ class ContainerEnding(NamedTuple):
     obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
 
 
+def is_registered(state: smach.State, outcome: object) -> bool:
+    """Whether a state has registered what it has returned, which may be anything."""
+    try:
+        return bool(outcome in state.get_registered_outcomes())
+    except Exception:  # an array, or an object that compares in its own way
+        return False
+
+
 def route_of(machine: Machine, label: str, outcome: str) -> Route:
     """Follow an outcome of a state.
 

@@ -13,6 +13,7 @@ from .failure import (
     Failure,
     Route,
     failure_kind,
+    is_registered,
     raised_error,
     route_of,
     traceback_of,
@@ -57,7 +58,7 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
         return _failure_before(node, label, outcome)
     if isinstance(outcome, HeldBack):
         return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
-    if outcome not in state.get_registered_outcomes():
+    if not is_registered(state, outcome):
         text = unregistered_text(label, state, outcome)
         if node.branch is not None and isinstance(outcome, str):
             # Concurrences and Iterators go on with such an outcome

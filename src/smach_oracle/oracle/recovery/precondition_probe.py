@@ -9,6 +9,7 @@ from typing import List, NamedTuple, Optional
 from smach_oracle.foreign import repr_of
 
 from ..asking.question import PreconditionProbe, PreconditionStatus
+from ..identity import truth_of
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
 from ..places.place import place_named
@@ -72,7 +73,7 @@ class LivePreconditionProbe(PreconditionProbe):
             return PreconditionStatus(None, '{} raised {}'.format(spec.name, repr_of(err)))
         if result is None:
             return PreconditionStatus(None, '{} returned None; True is met'.format(spec.name))
-        return PreconditionStatus(bool(result), shortened(
+        return PreconditionStatus(truth_of(result), shortened(
             '{} returned {}'.format(spec.name, repr_of(result)), 300))
 
     def _last(self, name: str) -> str:

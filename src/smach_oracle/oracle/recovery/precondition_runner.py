@@ -10,6 +10,7 @@ import smach
 from smach_oracle.foreign import repr_of
 
 from ..control.hold import HeldPlace
+from ..identity import truth_of
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate, behind
@@ -21,7 +22,7 @@ from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import RUN, StateSettings
-from .failure import failure_kind, route_of
+from .failure import failure_kind, is_registered, route_of
 from .operator_wait import wait_for_operator
 from .precondition_elsewhere import NotMet, RunElsewhere
 
@@ -115,7 +116,7 @@ class PreconditionRunner:
         result = ended.outcome
         if result is None:
             raise NotMet('{} returned None; True is met'.format(spec.name))
-        if not result:
+        if not truth_of(result):
             raise NotMet('{} returned {}'.format(spec.name, repr_of(result)))
 
     def _stopped(self) -> bool:
@@ -222,7 +223,7 @@ class PreconditionRunner:
     def _judge(self, site: _Site, state: smach.State, label: str, outcome: Any) -> None:
         if self._cancelled:
             raise NotMet('preempted')
-        if outcome not in state.get_registered_outcomes():
+        if not is_registered(state, outcome):
             raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
         failing = site.node.in_force.failing
         if label:

@@ -6,6 +6,7 @@ import math
 from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 
 from ..errors import SettingsError
+from ..identity import attribute_of
 from ..number_checks import is_number, is_whole
 from .paths import path_of
 from .written import as_text, as_value, read_otherwise
@@ -15,8 +16,15 @@ Check = Callable[[str, object], Any]
 
 def is_state(value: object) -> bool:
     """Whether `value` is a state in smach's sense, told without importing smach."""
-    return callable(getattr(value, 'execute', None)) and callable(
-        getattr(value, 'get_registered_outcomes', None))
+    names = ('execute', 'get_registered_outcomes')
+    if all(callable(attribute_of(value, name)) for name in names):
+        return True
+    if callable(value):
+        return False  # a function, also one that answers to every name
+    try:  # what stands for a state that is elsewhere
+        return all(callable(getattr(value, name)) for name in names)
+    except Exception:
+        return False
 
 
 def number(low: float, high: float, allowed: str) -> Check:

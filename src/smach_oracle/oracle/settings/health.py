@@ -9,6 +9,7 @@ from enum import Enum
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from ..errors import SettingsError
+from ..identity import name_of
 from . import checks as values
 from .python_names import PYTHON, Resolver, named_object
 from .written import as_text, as_value
@@ -147,7 +148,7 @@ def _function(prefix: str, entry: Mapping[str, Any],
         raise SettingsError(prefix + 'function', given,
                             "'python:module:attribute' of a function without arguments, "
                             'or such a function')
-    name = name or str(getattr(found, '__name__', type(found).__name__))
+    name = name or name_of(found)
     return HealthCondition(HealthKind.FUNCTION, name, function=found)
 
 

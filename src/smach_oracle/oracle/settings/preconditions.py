@@ -10,6 +10,7 @@ from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
+from ..identity import name_of
 from .checks import is_state, no_name
 from .python_names import PYTHON, Resolver, named_object
 from .written import as_text
@@ -88,9 +89,7 @@ def parse_precondition(key: str, given: object,
     if isinstance(given, (tuple, list)) and len(given) == 2:
         return _parse_pair(key, list(given), resolver)
     if callable(given) and not (isinstance(given, type) and is_state(given)):
-        return PreconditionSpec(PreconditionKind.CALLABLE,
-                                getattr(given, '__name__',
-                                        type(given).__name__), given)
+        return PreconditionSpec(PreconditionKind.CALLABLE, name_of(given), given)
     raise no_name(key, given, _ALLOWED)
 
 

@@ -1,14 +1,14 @@
 """Publishes on /diagnostics how the oracle of this node fares, once a second."""
 import threading
 import time
-import weakref
-from typing import List, MutableSet, Optional
+from typing import List, Optional
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from smach_oracle.msg import OpenQueries, OpenQuery, RecorderStatus
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.store.store_writer import running_writers
 
 from ..connections import quiet_at_shutdown
@@ -24,7 +24,7 @@ class DiagnosticsPublisher:
 
     def __init__(self, server: str, period_s: float = PERIOD_S) -> None:
         """`server`: the expert query server that the node asks."""
-        self._machines: MutableSet[OracleContainer] = weakref.WeakSet()
+        self._machines: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
         self._queries: List[OpenQuery] = []
         self._recorder: Optional[RecorderStatus] = None
         self._listens = False  # to a recorder
@@ -41,16 +41,16 @@ class DiagnosticsPublisher:
 
     def watch(self, machine: OracleContainer) -> None:
         """Report the states of a machine from now on."""
-        self._machines.add(machine)
+        self._machines[machine] = True
 
     def forget(self, machine: OracleContainer) -> None:
         """Report it no longer."""
-        self._machines.discard(machine)
+        self._machines.forget(machine)
 
     def statuses(self) -> List[DiagnosticStatus]:
         """Return the statuses of this moment."""
         node = rospy.get_name()
-        rows = [row for machine in list(self._machines) for row in oracle_of(machine).rates()]
+        rows = [row for machine in self._machines for row in oracle_of(machine).rates()]
         writers = running_writers()
         behind = {writer.path: writer.error for writer in writers if writer.is_behind}
         return [questions_status(node, self._queries), states_status(node, rows),

@@ -1,5 +1,6 @@
 """Finds why an action failed: the status text of its goal, or a text in its result."""
 import smach
+from smach_oracle.oracle.identity import own_mark
 
 # commonly hold the reason
 RESULT_FIELDS = ('reason', 'text', 'error_string', 'message')
@@ -10,14 +11,14 @@ def describe_failure(state: smach.State) -> str:
 
     Knows our own SimpleActionState and upstream's.
     """
-    return _status_text(state) or _result_text(getattr(state, '_goal_result', None))
+    return _status_text(state) or _result_text(own_mark(state, '_goal_result'))
 
 
 def _status_text(state: smach.State) -> str:
-    own = getattr(state, '_goal_status_text', None)
+    own = own_mark(state, '_goal_status_text')
     if isinstance(own, str):
         return own
-    client = getattr(state, '_action_client', None)  # upstream: a SimpleActionClient
+    client = own_mark(state, '_action_client')  # upstream: a SimpleActionClient
     status_text = getattr(client, 'get_goal_status_text', None)
     if getattr(client, 'gh', None) is None or status_text is None:
         return ''

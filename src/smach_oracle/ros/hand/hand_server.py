@@ -10,6 +10,7 @@ import genpy
 import rospy
 
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.identity import remove_identical
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.events import Event, EventKind, OwnObserver
 from smach_oracle.srv import (
@@ -48,6 +49,7 @@ class HandServer(OwnObserver):
 
     def __init__(self) -> None:
         self._machines: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by path
+        self._observer = self._on_event  # the same object each time it is looked for
         self._status = ControlPublisher(self._hands)
         self._viewers = ViewerCommands()
         for name in TREE_COMMANDS + PLACE_COMMANDS:
@@ -65,15 +67,13 @@ class HandServer(OwnObserver):
         """Offer the hand on a top-level machine, in place of an earlier one of its path."""
         oracle = oracle_of(machine)
         self._machines[oracle.path] = weakref.ref(machine)
-        oracle.events.observers.append(self._on_event)
+        oracle.events.observers.append(self._observer)
         self._viewers.listen_for(machine)
         self._status.changed()
 
     def forget(self, machine: OracleContainer) -> None:
         """Take the hand off a machine that is about to come out of its oracle."""
-        observers = oracle_of(machine).events.observers
-        if self._on_event in observers:
-            observers.remove(self._on_event)
+        remove_identical(oracle_of(machine).events.observers, self._observer)
         for path, known in list(self._machines.items()):
             if known() is machine:
                 del self._machines[path]

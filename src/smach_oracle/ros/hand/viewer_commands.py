@@ -5,6 +5,7 @@ the initial state, which does nothing to a machine that runs: its topic is liste
 """
 import threading
 import time
+import types
 import weakref
 from typing import Any, Collection, Dict, Iterator, List, Optional, Tuple
 
@@ -13,6 +14,7 @@ import rospy
 import smach
 from smach_msgs.msg import SmachContainerInitialStatusCmd
 from smach_oracle.oracle.errors import TrialError
+from smach_oracle.oracle.identity import own_mark
 from smach_oracle.oracle.operator_hand import OperatorHand
 
 from ..introspection.plain_pickle import RefusedDataError, decode_userdata
@@ -97,7 +99,9 @@ def _containers_in(container: Any, above: List[object]) -> Iterator[smach.Contai
 
 def _shown_by_upstream(container: smach.Container) -> Iterator[_Shown]:
     """Topics and paths by which upstream's introspection listens for a container."""
-    for callback in getattr(container, '_transition_cbs', []):
-        proxy: Any = getattr(callback[0], '__self__', None)
+    for callback in own_mark(container, '_transition_cbs') or ():
+        if not isinstance(callback[0], types.MethodType):
+            continue
+        proxy: Any = callback[0].__self__
         if type(proxy).__module__ == 'smach_ros.introspection' and hasattr(proxy, '_init_cmd'):
             yield proxy._init_cmd.resolved_name, proxy._path

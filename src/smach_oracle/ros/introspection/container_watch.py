@@ -66,12 +66,11 @@ class ContainerWatch(object):
         """Report nothing any more, and take the callbacks out of the container."""
         self._report = None
         for name in CALLBACK_LISTS:
-            callbacks = getattr(self.container, name, None)
-            if callbacks:
+            attributes = vars(self.container)
+            if attributes.get(name):
                 # another list: the machine may be in the midst of this one
-                setattr(self.container, name,
-                        [each for each in callbacks
-                         if not any(each[0] is hook for hook in self._hooks)])
+                attributes[name] = [each for each in attributes[name]
+                                    if not any(each[0] is hook for hook in self._hooks)]
 
     def happened(self, info: str, userdata: Any, states: Sequence[str],
                  args: Sequence[Any]) -> None:
@@ -99,7 +98,7 @@ class ContainerWatch(object):
 def is_watched(container: Any) -> bool:
     """Whether a server of ours follows what this container does."""
     return any(isinstance(each[0], _Hook) and each[0].is_live()
-               for name in CALLBACK_LISTS for each in getattr(container, name, ()))
+               for name in CALLBACK_LISTS for each in vars(container).get(name, ()))
 
 
 def _children(container: Any) -> Dict[str, Any]:

@@ -7,11 +7,11 @@ an author's override runs once.
 import functools
 import os
 import threading
-import weakref
 from typing import Any, Callable, Iterator, List, Tuple, Type
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.identity import WeakIdentityMap, own_mark
 
 WrapFunction = Callable[[smach.StateMachine], None]
 MARK = '_asks_for_an_oracle'
@@ -31,7 +31,7 @@ class Interception:
     def __init__(self, wrap: WrapFunction) -> None:
         self._wrap = wrap
         self._process = os.getpid()  # in a child of it machines stay as they are
-        self._left_bare: 'weakref.WeakSet[smach.StateMachine]' = weakref.WeakSet()
+        self._left_bare: WeakIdentityMap[smach.StateMachine, bool] = WeakIdentityMap()
         self._lock = threading.RLock()  # machines may start in several threads at once
 
     def install(self) -> None:
@@ -51,13 +51,14 @@ class Interception:
             if machine in self._left_bare:
                 return False
             self._wrap(machine)
-            self._left_bare.update(child for child in machines_inside(machine)
-                                   if not isinstance(child, OracleContainer))
+            for child in machines_inside(machine):
+                if not isinstance(child, OracleContainer):
+                    self._left_bare[child] = True
         return isinstance(machine, OracleContainer)
 
     def _patch(self, cls: Type[smach.StateMachine]) -> None:
         original = cls.execute  # its own, or one that a mix-in brings
-        if hasattr(original, MARK) or issubclass(cls, OracleContainer):
+        if own_mark(original, MARK) or issubclass(cls, OracleContainer):
             return
         before_execute = self.before_execute
 

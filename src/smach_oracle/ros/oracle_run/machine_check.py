@@ -6,6 +6,7 @@ from typing import Any, Callable, Iterable, Iterator, List, Sequence, Tuple, Typ
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.identity import own_mark
 from smach_oracle.oracle.prospects import ContainerProspect, good_outcome, prospects_of
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.oracle.settings.unfit_names import Strictness
@@ -172,7 +173,7 @@ def intercept(instead: Callable[[smach.Container], Any]) -> None:
 
 def _patch(cls: Type[smach.Container], instead: Callable[[smach.Container], Any]) -> None:
     original = cls.execute  # its own, or one that a mix-in brings
-    if hasattr(original, MARK):
+    if own_mark(original, MARK):
         return
 
     @functools.wraps(original)
