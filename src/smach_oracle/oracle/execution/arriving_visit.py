@@ -33,13 +33,14 @@ class ArrivingVisit(OracleVisit):
         """
         meta = self._pass_to_meta(outcome, outcome or 'left')
         verdict = self._departure.verdict._replace(level=None)
-        why_not = self._departure.why_not()
-        if why_not:
-            verdict = self._recover(meta, ArrivalRecovery(
-                self._node, self._record, self._failure, context, why_not))
-        if verdict.kind is VerdictKind.SUPERSEDE:
-            self._note_superseded(verdict.outcome)
-        return self._leave(meta, verdict)
+        with self._back_where_it_raises():
+            why_not = self._departure.why_not()
+            if why_not:
+                verdict = self._recover(meta, ArrivalRecovery(
+                    self._node, self._record, self._failure, context, why_not))
+            if verdict.kind is VerdictKind.SUPERSEDE:
+                self._note_superseded(verdict.outcome)
+            return self._leave(meta, verdict)
 
     def _note_superseded(self, outcome: str) -> None:
         if self._departure.result_of(self._node) is VisitResult.FAILURE:

@@ -1,5 +1,6 @@
 """One visit of the meta state: entered by a failure, left by a verdict (paper, section IV-A)."""
-from typing import Any, Mapping, Optional, Sequence, cast
+import contextlib
+from typing import Any, Iterator, Mapping, Optional, Sequence, cast
 
 import smach
 
@@ -49,10 +50,11 @@ class OracleVisit:
         Where the oracle gives up, it raises what the machine would raise without one.
         """
         meta = self._enter()
-        verdict = self._recover(meta, self._recovery(context, continuous))
-        if verdict.kind is VerdictKind.SUPERSEDE:
-            self._note_superseded(verdict.outcome)
-        return self._leave(meta, verdict)
+        with self._back_where_it_raises():
+            verdict = self._recover(meta, self._recovery(context, continuous))
+            if verdict.kind is VerdictKind.SUPERSEDE:
+                self._note_superseded(verdict.outcome)
+            return self._leave(meta, verdict)
 
     def _recovery(self, context: FailureContext, continuous: bool) -> Recovery:
         return Recovery(self._node, self._record, self._failure, context, continuous)
@@ -63,11 +65,25 @@ class OracleVisit:
         `outcome`: with what it ended then. It returns, and raises, what `run` does.
         """
         meta = self._pass_to_meta(outcome, outcome or 'taken_out')
-        verdict = self._recover(meta, TakenOutRecovery(
-            self._node, self._record, self._failure, context, answer))
-        if verdict.kind is VerdictKind.SUPERSEDE:
-            self._node.records.history.count_superseded(self._record.label, verdict.outcome)
-        return self._leave(meta, verdict)
+        with self._back_where_it_raises():
+            verdict = self._recover(meta, TakenOutRecovery(
+                self._node, self._record, self._failure, context, answer))
+            if verdict.kind is VerdictKind.SUPERSEDE:
+                self._node.records.history.count_superseded(self._record.label, verdict.outcome)
+            return self._leave(meta, verdict)
+
+    @contextlib.contextmanager
+    def _back_where_it_raises(self) -> Iterator[None]:
+        """Have the failed state as the current one after an error, as without an oracle."""
+        try:
+            yield
+        except BaseException:
+            self._be_back()
+            raise
+
+    def _be_back(self) -> None:
+        if self._record.label in self._machine._states:
+            self._machine._set_current_state(self._record.label)
 
     def _enter(self) -> OracleState:
         self._tell_failure()
@@ -139,6 +155,7 @@ class OracleVisit:
 
     def _leave(self, meta: OracleState, verdict: Verdict) -> Optional[str]:
         if self._node.tree.early_end.why is not None:
+            self._be_back()
             stop_left_behind(self._node)
             return None
         if verdict.arrives_at not in (None, self._node):
