@@ -260,7 +260,7 @@ class OracleContainer(smach.StateMachine):
         """
         if self._oracle.tree.is_parents and not self.is_running():
             return execute_bare(self, *args, **kwargs)
-        return run_container(self, lambda: super(OracleContainer, self).execute(*args, **kwargs))
+        return run_container(self, super().execute, args, kwargs)
 
     def call_start_cbs(self) -> None:
         """Forget the execution before: the machine has its initial state now."""

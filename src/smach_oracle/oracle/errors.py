@@ -7,6 +7,7 @@
     +-- OperatorError (also a ValueError): an operator's command cannot be obeyed
     +-- CheckpointError: the store of a machine cannot be used
     +-- TrialError: the executive was used out of order
+    +-- TooDeepError (also a RecursionError): too many containers lie in each other
 """
 import warnings
 
@@ -59,6 +60,13 @@ class CheckpointError(OracleError):
 
 class TrialError(OracleError):
     """The executive was used out of order."""
+
+
+class TooDeepError(OracleError, RecursionError):
+    """Too many containers lie in each other for Python's stack. The text says what to do.
+
+    It is no failure of a state: no oracle recovers from it.
+    """
 
 
 def __getattr__(name: str) -> type:

@@ -5,6 +5,7 @@ import smach
 
 from ..identity import own_attributes, set_class
 from ..machine.nesting import BORDER
+from ..machine.stack_room import too_deep_below, too_deep_here
 from .border import Border, ConcurrenceBorder, IteratorBorder
 from .stand_in import real
 
@@ -31,6 +32,10 @@ class _Bordered:
         except BaseException as err:
             error = err
             border.tell_cause(err)
+            if border.top is not None and too_deep_below(err) is None:
+                too_deep = too_deep_here(border.top, err)
+                if too_deep is not None:
+                    raise too_deep from None
             raise
         finally:
             border.ended(outcome, error)

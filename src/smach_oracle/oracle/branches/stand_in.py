@@ -30,14 +30,13 @@ class StandIn:
         """Execute the state, and recover where it fails. Return its outcome."""
         if self._note_begin is not None:
             self._note_begin()
-        outcome = self._execute(userdata)
+        # at once where it can be: each of the Iterators that lie in each other takes these frames
+        outcome = (self._state.execute(userdata) if self._machine is None
+                   else self._execute(self._machine, userdata))
         self._note_outcome(outcome)
         return outcome
 
-    def _execute(self, userdata: smach.UserData) -> object:
-        machine = self._machine
-        if machine is None:
-            return self._state.execute(userdata)
+    def _execute(self, machine: WrappedMachine, userdata: smach.UserData) -> object:
         with self._lock:
             begins = not self._is_under_way
             if begins:

@@ -9,6 +9,7 @@ from ..asking.question import AnswerKind
 from ..branches.passed_over import tell_passed_over
 from ..decision.policy import FailureContext
 from ..machine.repeats import note_visit
+from ..machine.stack_room import too_deep_below, too_deep_here
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
@@ -177,8 +178,14 @@ class Step:
 
         :raises InvalidUserCodeError: as the machine would without an oracle.
         :raises InvalidTransitionError: likewise.
+        :raises TooDeepError: where too many containers lie in each other.
         """
         node, record = self._node, self._record
+        if error is not None:
+            too_deep = too_deep_below(error) or too_deep_here(node, error)
+            if too_deep is not None:
+                node.gave_up = True  # upstream's Concurrence drops what its states raise
+                raise too_deep.with_traceback(None) from None
         node.tree.early_end.note_end_of_state(smach.is_shutdown)
         if node.is_left_behind():
             stop_left_behind(node)

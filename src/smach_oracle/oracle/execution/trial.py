@@ -2,8 +2,10 @@
 
 Also what one execution of any container begins and ends.
 """
+import functools
 import time
-from typing import Any, Callable, Dict, List, Optional
+from types import TracebackType
+from typing import Any, Callable, Dict, List, Optional, Tuple, Type
 
 import smach
 from smach_oracle.foreign import error_text
@@ -28,17 +30,32 @@ from .wrapping import adopt, bring_up_to_date
 _running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
-def run_container(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
-    """Execute a container. Where no container above it runs, this is a trial."""
+def run_container(machine: WrappedMachine, execute: Callable[..., Optional[str]],
+                  args: Tuple[Any, ...], kwargs: Dict[str, Any]) -> Optional[str]:
+    """Execute a container. Where no container above it runs, this is a trial.
+
+    Containers that lie in each other take the frames of this function many times on the stack.
+
+    :param execute: the engine's own. It gets `args` and `kwargs`.
+    """
     node = machine._oracle
-    if not node.has_running_ancestor():
+    is_top = not node.has_running_ancestor()
+    if is_top:
         node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
     if not node.look_around():
         smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
         return outcome_of_early_end(node, None)
-    if node.has_running_ancestor():
-        outcome, node.ended_before = node.ended_before, None
-        return outcome_of_early_end(node, _run(node, execute)) if outcome is None else outcome
+    if is_top:
+        return _begin_trial(machine, functools.partial(execute, *args, **kwargs))
+    outcome, node.ended_before = node.ended_before, None
+    if outcome is None:
+        with _Execution(node) as run:
+            outcome = run.outcome = execute(*args, **kwargs)
+    return outcome_of_early_end(node, outcome)
+
+
+def _begin_trial(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
+    node = machine._oracle
     adopt(machine)
     for each in nodes_of(machine):
         bring_up_to_date(each)
@@ -74,7 +91,8 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
     try:
         _running.append(node)
         try:
-            outcome = _run(node, execute)
+            with _Execution(node) as run:
+                outcome = run.outcome = execute()
         finally:
             _running.remove(node)
         return outcome
@@ -134,27 +152,36 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
     return TrialEnd.SHUTDOWN if node.engine.stepped else TrialEnd.INCONSISTENT
 
 
-def _run(node: TreeNode, execute: Callable[[], Optional[str]]) -> Optional[str]:
-    machine = node.machine
-    node.begin_execution()
-    begins_in = (node.entry if node.resuming is None else node.resuming.label)
-    node.emit(EventKind.CONTAINER_START, state=begins_in or machine._initial_state_label or '')
-    outcome: Optional[str] = None
-    error: Optional[BaseException] = None
-    try:
-        outcome = execute()
-        return outcome
-    except BaseException as err:
-        machine._is_running = False  # also after what no engine cleans up after, such as Ctrl-C
-        error = err
-        if ends_program(err):
-            node.tree.early_end.of_program = err
-        raise
-    finally:
+class _Execution:
+    """One execution of a container. `outcome`: with which it has ended."""
+
+    __slots__ = ('_node', 'outcome')
+
+    def __init__(self, node: TreeNode) -> None:
+        self._node = node
+        self.outcome: Optional[str] = None
+
+    def __enter__(self) -> '_Execution':
+        node = self._node
+        node.begin_execution()
+        begins_in = (node.entry if node.resuming is None else node.resuming.label)
+        node.emit(EventKind.CONTAINER_START,
+                  state=begins_in or node.machine._initial_state_label or '')
+        return self
+
+    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
+                 trace: Optional[TracebackType]) -> None:
+        node = self._node
+        if error is not None:
+            # also after what no engine cleans up after, such as Ctrl-C
+            node.machine._is_running = False
+            if ends_program(error):
+                node.tree.early_end.of_program = error
         dropped = node.tree.control.leave(node.engine, node.key)
         if dropped is not None:
             tell_dropped(node, dropped)
-        node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=_why(outcome, error))
+        node.emit(EventKind.CONTAINER_END, outcome=self.outcome or '',
+                  text=_why(self.outcome, error))
         node.runs_around = ()
         node.records.drop_snapshots()
 

@@ -21,7 +21,7 @@ def machines_below(
     border = own_mark(container, BORDER)
     if border is not None:
         yield from ((below, machine) for machine in list(border.machines.values()))
-    for label, state in list(_children(container).items()):
+    for label, state in list(children_of(container).items()):
         path = below + (label,)
         if isinstance(state, smach.StateMachine):
             yield path, state
@@ -35,7 +35,7 @@ def borders_below(
 
     It looks through them, but not into machines.
     """
-    for label, state in list(_children(container).items()):
+    for label, state in list(children_of(container).items()):
         path = below + (label,)
         if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
@@ -43,7 +43,8 @@ def borders_below(
             yield from borders_below(state, path)
 
 
-def _children(container: object) -> Mapping[str, smach.State]:
+def children_of(container: object) -> Mapping[str, smach.State]:
+    """Return the states of a container by label, none of what is no container."""
     if isinstance(container, smach.StateMachine):
         return container._states
     return container.get_children() if isinstance(container, smach.Container) else {}
@@ -54,7 +55,7 @@ def paths_below(container: object, above: Labels = ()) -> Iterator[str]:
 
     These are the machines in a container, and the plain states of its Concurrences and Iterators.
     """
-    for label, state in list(_children(container).items()):
+    for label, state in list(children_of(container).items()):
         path = above + (label,)
         is_branch = not isinstance(container, smach.StateMachine) and isinstance(
             state, smach.State) and not isinstance(state, smach.Container)

@@ -159,9 +159,17 @@ class TreeNode:
     @property
     def path(self) -> str:
         """Return the path: the top machine's name and the labels below it, joined by '/'."""
-        if self.parent is None:
-            return self.name
-        return '/'.join((self.parent.path,) + self.below)
+        labels, top = self._labels_from_top()
+        return '/'.join((top.name,) + labels)
+
+    def _labels_from_top(self) -> Tuple[Labels, 'TreeNode']:
+        """Return the labels that lead here from the top machine, and its node."""
+        labels: Labels = ()
+        node = self
+        while node.parent is not None:
+            labels = node.below + labels
+            node = node.parent
+        return labels, node
 
     @property
     def key(self) -> str:
@@ -173,14 +181,11 @@ class TreeNode:
     @property
     def relative_path(self) -> str:
         """Return the path below the top machine, '' for itself."""
-        if self.parent is None:
-            return ''
-        above = self.parent.relative_path
-        return '/'.join(((above,) if above else ()) + self.below)
+        return '/'.join(self._labels_from_top()[0])
 
     def top(self) -> 'TreeNode':
         """Return the node of the top machine."""
-        return self if self.parent is None else self.parent.top()
+        return self._labels_from_top()[1]
 
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""
@@ -206,8 +211,12 @@ class TreeNode:
 
     def runs_beside_others(self) -> bool:
         """Whether a Concurrence or an Iterator is around it."""
-        return self.parent is not None and (
-            self.branch is not None or len(self.below) > 1 or self.parent.runs_beside_others())
+        node = self
+        while node.parent is not None:
+            if node.branch is not None or len(node.below) > 1:
+                return True
+            node = node.parent
+        return False
 
     def look_around(self) -> bool:
         """Find out inside which executions this one is about to begin.

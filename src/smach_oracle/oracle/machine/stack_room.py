@@ -1,0 +1,72 @@
+"""Room on Python's stack for machines that lie in each other.
+
+Each container takes a few frames while it executes. Where none are left, Python raises a
+RecursionError in the innermost one. That is no failure of any state: no oracle around it could do
+better, and each of them would try.
+"""
+import sys
+from typing import Iterator, Optional
+
+import smach
+
+from ..errors import TooDeepError
+from .nesting import children_of
+from .tree_node import TreeNode
+
+NEEDED_FRAMES = 150  # for a recovery, with whoever is asked, logs or records it
+_FRAMES_OF_CONTAINER = 10  # at most, what is in a state not counted
+
+
+def too_deep_below(error: BaseException) -> Optional[TooDeepError]:
+    """Return the error that says that the stack was full further below, None where it was not."""
+    return next((each for each in _chain(error) if isinstance(each, TooDeepError)), None)
+
+
+def too_deep_here(node: TreeNode, error: BaseException) -> Optional[TooDeepError]:
+    """Return what says that an error in a container comes from a full stack, None where not.
+
+    A state whose own functions call each other without end has failed as by any other error.
+    """
+    if sys.getrecursionlimit() - _frames_in_use() >= NEEDED_FRAMES:
+        return None
+    has_overrun = any(isinstance(each, RecursionError) for each in _chain(error))
+    return _too_deep(node) if has_overrun else None
+
+
+def _chain(error: BaseException) -> Iterator[BaseException]:
+    """Yield an error, and those that it was raised from."""
+    current: Optional[BaseException] = error
+    seen = set()
+    while current is not None and id(current) not in seen:
+        seen.add(id(current))
+        yield current
+        current = current.__cause__ or current.__context__
+
+
+def _frames_in_use() -> int:
+    frame = sys._getframe()
+    count = 0
+    while frame is not None:
+        count += 1
+        frame = frame.f_back  # type: ignore[assignment]
+    return count
+
+
+def _too_deep(node: TreeNode) -> TooDeepError:
+    top, limit = node.top(), sys.getrecursionlimit()
+    depth = _depth_of(top.machine)
+    wanted = limit + _FRAMES_OF_CONTAINER * depth
+    return TooDeepError(
+        '{}: {} containers lie in each other, and the stack of Python, which has {} frames, is '
+        'full. Call sys.setrecursionlimit({}) before the machine runs'.format(
+            top.path, depth, limit, -(-wanted // 1000) * 1000))
+
+
+def _depth_of(container: object) -> int:
+    """Return how many containers lie in each other, that one among them."""
+    depth, level = 0, [container]
+    while level:
+        depth += 1
+        level = [state for each in level for state in children_of(each).values()
+                 if isinstance(state, smach.Container)]
+    return depth
