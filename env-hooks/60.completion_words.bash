@@ -39,7 +39,7 @@ _smach_oracle_words() {
       echo '--delete --help --keep-days --keep-gb --version -h' ;;
     'oracle_run')
       echo '--check --checkpoint --config --from --help --name --no-nested --policy
---rates-file --record --record-topic --resume --resume-map --version
+--rates-file --record --record-topic --repeat --resume --resume-map --version
 --without-oracle -h' ;;
     'oracle_run --policy')
       echo 'algorithm1 always_ask ladder prose random restart retry step_back' ;;
@@ -50,7 +50,7 @@ _smach_oracle_words() {
     'oracle_state edit')
       echo '--container --help --trial -h' ;;
     'oracle_state goto')
-      echo '--help --trial -h' ;;
+      echo '--help --repeat --trial -h' ;;
     'oracle_state list')
       echo '--help -h' ;;
     'oracle_state log')

@@ -14,6 +14,7 @@ from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.sending import Prospect, prospect_of, way_for
 from .machine.nesting import nodes_of
+from .machine.repeats import note_initial
 from .machine.tree_node import TreeNode, node_of
 from .places.place import Place
 from .records.events import EventKind
@@ -174,6 +175,14 @@ class OperatorHand:
             node.warn('is not sent to {} as {} wants: {}'.format(state, by or 'a viewer', err))
             return False
         return True
+
+    def begins_in(self, state: str) -> None:
+        """Note that a viewer has this machine, which does not run, begin in a state.
+
+        A state that is not repeated by itself is then asked about.
+        """
+        if self._top.tree.control.in_trial:
+            note_initial(self._node, state)
 
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
         control = self._top.tree.control

@@ -5,7 +5,7 @@ What is stored stays as it is. A fact that is read is told under the new names.
 import json
 from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
-from .names import ASKED, AT, EDIT, ENDED, HISTORY, MOVED, STATE, VISIT
+from .names import ASKED, AT, BEFORE, EDIT, ENDED, HISTORY, MARK, MOVED, STATE, VISIT
 from .rows import StoredFact, StoredValue
 
 
@@ -36,8 +36,10 @@ class Renaming:
         fact = fact._replace(moment_path=self._whole(place.container), label=place.label)
         if not fact.path:
             return fact
-        if fact.name.startswith(STATE):
-            return self._state(fact)
+        for word in (STATE, MARK):
+            if fact.name.startswith(word):
+                path, label = self.state(fact.path, fact.name[len(word):])
+                return fact._replace(path=path, name=word + label)
         path = self._below(fact.path)
         fact = fact._replace(path=self._whole(self._path(path)))
         change = {AT: self._at, ASKED: self._asked, HISTORY: self._history}.get(fact.name)
@@ -48,17 +50,21 @@ class Renaming:
             return fact
         return fact._replace(value=StoredValue(json.dumps(change(path, plain)), None))
 
-    def _state(self, fact: StoredFact) -> StoredFact:
-        path, label = self._below(fact.path), fact.name[len(STATE):]
+    def state(self, path: str, label: str) -> Tuple[str, str]:
+        """Return the path of the container, or the branch, of a state now, and its label."""
+        path = self._below(path)
         place = self._place(path, label)
         container = self._path(path) if self._is_branch(path) else place.container
-        return fact._replace(path=self._whole(container), name=STATE + place.label)
+        return self._whole(container), place.label
 
     def _at(self, path: str, at: List[Any]) -> List[Any]:
         if at[1] == ENDED:  # with an outcome
             return at
         place = self._place(path, at[0])
-        at = [place.label, *at[1:2], *map(self._jumped_to, at[2:3]), *at[3:]]
+        more = at[3:]
+        if at[1] == BEFORE and more:  # the states that may be repeated
+            more = [[self._path(each) for each in more[0]]]
+        at = [place.label, *at[1:2], *map(self._jumped_to, at[2:3]), *more]
         if self._is_here(path, place):
             return at
         return [place.label, MOVED, self._whole('/'.join(filter(None, place))), at]

@@ -55,6 +55,9 @@ def _parser() -> argparse.ArgumentParser:
     go_to = _add(works, 'goto', _go_to, 'let it go on at another state')
     go_to.add_argument('label', metavar='LABEL', help='of a state, or its path below the top '
                        'machine')
+    go_to.add_argument('--repeat', metavar='STATE', action='append', default=[],
+                       help='let it repeat this state once, whatever its on_retry says '
+                       '(repeatable)')
     _add(works, 'drop', _drop, 'end the trial: it is never resumed')
     works.add_parser('accept', help='go on with what can be read of a store that has lost some '
                      'of it').set_defaults(work=_accept)
@@ -158,8 +161,10 @@ def _edit(given: argparse.Namespace) -> None:
 
 def _go_to(given: argparse.Namespace) -> None:
     with trial_to_change(given.path, given.trial) as stopped:
-        stopped.go_to(given.label, _user_name())
-    _say('it will go on at {}'.format(given.label))
+        stopped.go_to(given.label, _user_name(), given.repeat)
+        asked = [each for each in stopped.guarded() if each not in given.repeat]
+    _say('it will go on at {}{}'.format(given.label, '; a person is asked before it repeats ' +
+                                        ', '.join(asked) if asked else ''))
 
 
 def _drop(given: argparse.Namespace) -> None:

@@ -2,7 +2,7 @@
 import contextlib
 import json
 import time
-from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .codecs import Codecs, Encoded, NotStorable
 from .errors import StoreError
@@ -20,6 +20,7 @@ from .names import (
     KEPT,
     KEPT_OUT,
     KEY,
+    MARK,
     MOVED,
     STATE,
     STRUCTURE,
@@ -195,21 +196,45 @@ class StoppedTrial:
             facts.append(Fact(path, KEPT_OUT + key, None))
         self._commit(path, '', facts, who, '{}: {} = {}'.format(path, key, json_text))
 
-    def go_to(self, label: str, who: str) -> None:
+    def guarded(self) -> Dict[str, str]:
+        """Return the states that have begun and are not repeated by themselves, with on_retry.
+
+        By their paths below the top machine.
+        """
+        top, found = self.trial.machine, {}
+        for (path, name), value in sorted(self._facts.items()):
+            if name.startswith(MARK) and value.is_there:
+                done, _, on_retry = (*json.loads(value.text or '[]'), 'allow')[2:5]
+                if done and on_retry != 'allow':
+                    found[self._state_path(path, name[len(MARK):])[len(top) + 1:]] = on_retry
+        return found
+
+    def go_to(self, label: str, who: str, repeat: Sequence[str] = ()) -> None:
         """Let the machine go on at another state.
 
         :param label: of the top machine, or the path of a state below it.
-        :raises StoreError: as `edit`, and where there is no such state.
+        :param repeat: states that may be repeated once for that, whatever their on_retry says.
+        :raises StoreError: as `edit`, where there is no such state, and where it, or one on the way
+            down to it, is not repeated by itself.
         """
         top, states = self.trial.machine, self.states()
-        if label not in states:
-            raise StoreError('there is no state {!r}; there are {}'.format(
-                label, ', '.join(sorted(states))))
+        for each in (label, *repeat):
+            if each not in states:
+                raise StoreError('there is no state {!r}; there are {}'.format(
+                    each, ', '.join(sorted(states))))
+        for each, on_retry in self.guarded().items():
+            if (label + '/').startswith(each + '/') and each not in repeat:
+                raise StoreError(
+                    '{0} was done in this trial, and is not repeated by itself (on_retry: {1}). '
+                    '`oracle_state {2} goto {3} --repeat {0}` sends the machine there '
+                    'anyway'.format(each, on_retry, self._store.path, label))
         first, _, below = label.partition('/')
-        at: List[Optional[str]] = [first, BEFORE, '{}/{}'.format(top, label) if below else None]
+        at: List[Any] = [first, BEFORE, '{}/{}'.format(top, label) if below else None,
+                         list(repeat)]
         facts = [Fact(top, AT, Encoded(json.dumps(at), None, {}))]  # also a long path as text
         facts += (Fact(path, ASKED, None) for path, _ in self._named(ASKED))
-        self._commit(top, first, facts, who, 'go to ' + label)
+        self._commit(top, first, facts, who, 'go to {}{}'.format(label, ''.join(
+            ', and repeat ' + each for each in repeat)))
 
     def drop(self, who: str) -> None:
         """End the trial, so that it is never resumed.

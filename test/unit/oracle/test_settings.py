@@ -153,7 +153,8 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'escalate', 'step_back_across', 'still_running_s', 'still_running_factor',
         'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
         'interfaces', 'states', 'healthy', 'health_settle_s', 'checkpoint', 'checkpoint_wait_s',
-            'checkpoint_synchronous', 'on_resume', 'resume_from', 'resume_map'
+            'checkpoint_synchronous', 'on_resume', 'resume_from', 'resume_map',
+            'resume_repeat'
     }
 
 

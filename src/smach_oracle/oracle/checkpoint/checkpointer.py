@@ -118,8 +118,18 @@ class Checkpointer:
         facts = [fact for line in self._pending.values() for fact in line]
         facts += (fact for node in self._nodes.values()
                   for fact in self._facts_of(node).all_states())
+        facts += self._marks()
         self._pending = {}
         self._commit_by_hand(kind, (*facts, *self._ended_goals()))
+
+    def keep_marks(self) -> None:
+        """Store which states have begun, before one of them runs of which there is no event."""
+        self._commit_by_hand('MARKS', tuple(self._marks()))
+
+    def _marks(self) -> Iterator[Fact]:
+        if self._top.tree.numbers_visits:
+            for node in self._nodes.values():
+                yield from self._facts_of(node).marks()
 
     def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
         """Commit a moment that belongs to no event."""
@@ -239,6 +249,7 @@ class Checkpointer:
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
         facts += self._spent()
+        facts += self._marks()
         self._pending_of(node).clear()
         for each in self._entered.pop(_begins_line(node), ()):
             facts += self._keys_around(each)

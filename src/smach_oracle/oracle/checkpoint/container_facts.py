@@ -3,7 +3,7 @@ import json
 from typing import Any, Dict, Iterator, List, Optional, Union
 
 from smach_oracle.store.codecs import Encoded
-from smach_oracle.store.names import EXECUTION, HISTORY, STATE, VISIT
+from smach_oracle.store.names import EXECUTION, HISTORY, MARK, STATE, VISIT
 from smach_oracle.store.rows import Fact
 
 from ..machine.tree_node import TreeNode
@@ -29,6 +29,7 @@ class ContainerFacts:
         self._path = node.key
         self._execution = 0 if before is None else before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
+        self._marks: Dict[str, List[object]] = {}  # by label
         # stored ones of this execution
         self._visits = 0 if before is None else before.visits_of_execution
 
@@ -54,14 +55,21 @@ class ContainerFacts:
         yield from self.changed(list(self._node.records.by_label))
 
     def _of_state(self, record: StateRecord) -> Dict[str, Any]:
-        mark = self._node.records.marks.of(record.label)
         told = {'learned': record.learned(), 'counts': [
             record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
-                'longest_s': record.longest_s,
-                'mark': [mark.reached, mark.executed, mark.done, mark.spent]}
+                'longest_s': record.longest_s}
         if record.shared:
             told['shared'] = record.shared
         return told
+
+    def marks(self) -> Iterator[Fact]:
+        """Yield what is new of the states that have begun: a jump changes marks of many at once."""
+        for label, mark in self._node.records.marks.told():
+            if self._marks.get(label) != mark:
+                self._marks[label] = mark
+                if label in self._node.machine._states:
+                    yield fact_of(self._path, MARK + label,
+                                  [*mark, self._node.settings_of(label).on_retry])
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits = history.visits

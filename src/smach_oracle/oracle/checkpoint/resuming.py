@@ -11,9 +11,10 @@ from ..branches.border import border_of
 from ..branches.items import can_be_indexed
 from ..errors import SettingsError
 from ..machine.nesting import borders_below, nodes_of
+from ..machine.repeats import leave_unconfirmed, why_held_back
 from ..machine.tree_node import TreeNode, node_of
 from ..places.place import Place, place_named, places_of
-from ..places.way import way_to
+from ..places.way import Way, way_to
 from ..records.asked_once import NOT_BEGUN, AskedOnce
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
@@ -21,6 +22,7 @@ from ..records.running_goals import GOALS
 from ..records.state_record import StateRecord, Unfinished
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_container import StoredContainer
+from .stored_marks import Marks, let_repeat, take_over_marks
 from .stored_tree import StoredTree
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
@@ -37,6 +39,7 @@ class Resumption(NamedTuple):
     at: float  # s since the epoch, when that was
     asks: bool  # a person is asked before anything moves
     changes: List[str]  # how the script differs from the one that was stopped
+    marks: Marks = {}  # of the states that have begun
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
     is_earlier: bool = False  # whether later moments of the trial are stored
     renamed: Mapping[str, str] = {}  # paths of states by those that they had
@@ -159,46 +162,54 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     """
     _forget(top)  # of an execution before that has ended early
     nodes = list(nodes_of(top.machine))
-    latest = 0
     for node in nodes:
         stored = resumption.tree.container(node.key)
         for label, told in stored.states.items():
             if label in node.machine._states and not node.is_oracle(label):
-                latest = max(latest, _restore(node, node.record(label), told))
+                record = node.record(label)
+                record.restore(told['learned'])
+                record.shared = told.get('shared', record.shared)
+                record.go_on(told['counts'], told['longest_s'])
         if stored.history:
             node.records.history.take_over([], 0, _of_states(node, stored.history))
-    top.tree.go_on_counting(latest, resumption.tree.whole)
+    top.tree.go_on_counting(take_over_marks(nodes, resumption.marks), resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
-    if resumption.begins_at:
-        _begin_at(top, resumption)
+    stood = resumption.tree.container(top.key)
+    way = _way_named(top, resumption.begins_at) if resumption.begins_at else None
+    if way is not None:
+        stood.at = [way.first, BEFORE]
+    elif stood.label in top.machine._states and stood.sent is not None:
+        way = _way_named(top, stood.jumped_to[len(top.path) + 1:] or stood.label)
+    if way is not None:
+        leave_unconfirmed(top, way.first)
+    let_repeat(top, top.settings.resume_repeat, stood.sent)
+    if resumption.begins_at and way is not None:
+        top.resuming = EntryPoint(stood, way.down[1:])
+        _hold_back(way.down)
     else:
         _Setting(resumption, nodes).set_container(top)
 
 
-def _begin_at(top: TreeNode, resumption: Resumption) -> None:
-    """Let the machine begin at the state that the settings name, with what was stored.
+def _way_named(top: TreeNode, path: str) -> Way:
+    """Return the way to a state that the settings, or oracle_state, name.
 
     :raises SettingsError: where there is no such state.
     """
-    place = place_named(top, resumption.begins_at)
+    place = place_named(top, path)
     way = None if place is None else way_to(top, place)
     if way is None:
-        raise SettingsError('on_resume', 'state:' + resumption.begins_at,
-                            'the label of a state of {}, or the path of one below it'.format(
-                                top.path))
-    stored = resumption.tree.container(top.key)
-    stored.at = [way.first, BEFORE]
-    top.resuming = EntryPoint(stored, way.down[1:])
+        raise SettingsError('on_resume', 'state:' + path, 'the label of a state of {}, or the path '
+                            'of one below it'.format(top.path))
+    return way
 
 
-def _restore(node: TreeNode, record: StateRecord, told: Mapping[str, Any]) -> int:
-    """Have what was learned and counted of a state, and return the number of its latest visit."""
-    record.restore(told['learned'])
-    record.shared = told.get('shared', record.shared)
-    record.go_on(told['counts'], told['longest_s'])
-    mark = node.records.marks.of(record.label)
-    mark.reached, mark.executed, mark.done, mark.spent = told['mark']
-    return int(mark.reached)
+def _hold_back(places: Sequence[Place]) -> None:
+    """Have a person asked at states that are not to come again. Without an answer it is kept."""
+    for node, label in places:
+        record = node.record(label)
+        why = why_held_back(node, record)
+        if why and node.tree.numbers_visits:
+            record.resume(Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True))
 
 
 class _Setting:
@@ -232,6 +243,8 @@ class _Setting:
             self._go_on_in(node, stored, record)
         elif self._resumption.asks:
             self._ask_before(node, stored.label)
+        else:
+            _hold_back([Place(node, stored.label)])
         return True
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
@@ -350,6 +363,7 @@ class _Setting:
                 outcome = ''
             return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label),
                               self._resumption.asks)
+        node.records.marks.of(stored.label).spent = True  # it may have been done
         return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label),
                           self._resumption.asks)
 

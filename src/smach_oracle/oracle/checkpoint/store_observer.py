@@ -37,6 +37,10 @@ class StoreObserver:
         """Store a goal that is about to be sent."""
         self._do(partial(self._checkpointer.goal_begins, goal_id, server))
 
+    def keep_marks(self) -> None:
+        """Store which states have begun. See Checkpointer."""
+        self._do(self._checkpointer.keep_marks)
+
     def last_words(self, kind: str) -> None:
         """Store what has not been stored of the trial, which has ended, as a moment of a kind."""
         self._do(partial(self._checkpointer.last_words, kind))

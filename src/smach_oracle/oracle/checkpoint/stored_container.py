@@ -1,7 +1,7 @@
 """One container at one moment, as a store has it."""
-from typing import Any, Dict, List, Mapping
+from typing import Any, Dict, List, Mapping, Optional, Set
 
-from smach_oracle.store.names import BEFORE, IN, MOVED
+from smach_oracle.store.names import BEFORE, ENDED, IN, MOVED
 
 from ..records.visits import Visit
 
@@ -24,6 +24,10 @@ class StoredContainer:
         self.visits: List[Visit] = []
         self.visits_of_execution = 0
         self.states: Dict[str, Mapping[str, Any]] = {}
+        self.marks: Dict[str, List[Any]] = {}
+        self.begun: Set[str] = set()  # states at which it has stood, and which had begun
+        # sent elsewhere by oracle_state: the states that may be repeated. None: it was not
+        self.sent: Optional[List[str]] = None
         self.keys: Dict[str, Any] = {}
         self.missing: Dict[str, str] = {}
         self.snapshots: Dict[str, Dict[str, Any]] = {}
@@ -37,6 +41,15 @@ class StoredContainer:
             if key in data:
                 for snapshot in self.snapshots.values():
                     snapshot.setdefault(key, data[key])
+
+    def labels(self) -> Set[str]:
+        """Return the states of which anything is told."""
+        here = {self.label} if self.at and self.phase not in (ENDED, MOVED) else set()
+        return {*self.states, *self.marks, *self.begun, *here}
+
+    def visits_of(self, label: str) -> int:
+        """Return how many visits of a state have ended in the trial."""
+        return int(self.states.get(label, {}).get('counts', [0])[0])
 
     @property
     def phase(self) -> str:

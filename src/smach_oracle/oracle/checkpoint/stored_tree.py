@@ -1,6 +1,6 @@
 """Reads the containers of a tree at one moment from a store."""
 import json
-from typing import Any, Dict, Iterable, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Tuple
 
 from smach_oracle.store.codecs import Codecs, NotReadable
 from smach_oracle.store.errors import StoreDamaged
@@ -9,11 +9,15 @@ from smach_oracle.store.names import (
     AT,
     EDIT,
     EXECUTION,
+    FAILED,
     GOAL,
     HISTORY,
+    IN,
     ITEMS,
     KEPT_OUT,
     KEY,
+    MARK,
+    MOVED,
     STATE,
     VISIT,
 )
@@ -118,14 +122,27 @@ class _Reading:
             self._visits.setdefault(path, {})[execution, number] = Visit(
                 state, outcome, VisitResult(result))
         elif name.startswith(STATE):
-            container.states[name[len(STATE):]] = _plain(value)
+            told = container.states[name[len(STATE):]] = _plain(value)
+            if 'mark' in told:  # of an earlier version
+                container.marks[name[len(STATE):]] = told['mark']
+        elif name.startswith(MARK):
+            container.marks[name[len(MARK):]] = _plain(value)
+        elif name == AT:
+            container.at = _plain(value) or []
+            container.sent = [*container.at[3:4], []][0] if fact.kind == EDIT else None
+            self._note_begun(path, container.at)
         else:
             self._take_named(container, path, name, _plain(value))
 
+    def _note_begun(self, path: str, at: List[Any]) -> None:
+        """Keep which states have begun, also where the machine is sent elsewhere later."""
+        if at and at[1] == MOVED:
+            path, at = at[2].rpartition('/')[0], at[3]
+        if at and at[1] in (IN, FAILED):
+            self._tree.containers.setdefault(path, StoredContainer()).begun.add(at[0])
+
     def _take_named(self, container: StoredContainer, path: str, name: str, plain: Any) -> None:
-        if name == AT:
-            container.at = plain or []
-        elif name == HISTORY:
+        if name == HISTORY:
             container.history = plain
         elif name == ASKED:
             container.asked = plain or []

@@ -17,6 +17,7 @@ from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, SettingsError
 from ..identity import remove_identical
 from ..machine.nesting import borders_below, nodes_of
+from ..machine.tree import no_store
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import TrialEnd
@@ -29,6 +30,7 @@ from .damaged import understood
 from .resuming import Resumption, go_on
 from .storable import CODECS
 from .store_observer import StoreObserver
+from .stored_marks import marks_now, same_place
 from .stored_tree import StoredTree, read_tree
 from .structure import structure_of
 
@@ -123,6 +125,7 @@ class TrialStore:
         is_broken = moments[-1].kind == BROKEN and not earlier
         if is_broken:
             smach.logwarn(NOT_STORED.format(self._top.path, self._store.path))
+        latest = tree
         # what runs elsewhere, and what was asked, has not become undone
         kept = {name: value for name, value in tree.whole.items()
                 if name.startswith(GOAL) or name == 'questions'}
@@ -131,12 +134,15 @@ class TrialStore:
         changed = changed_script(self._top, self._store, trial, tree, self._structure)
         if changed.renaming is not None:
             tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
+        marks = marks_now(latest, tree, same_place if changed.renaming is None
+                          else changed.renaming.state)
         tree.whole.update(kept)
         return Resumption(trial, tree, earlier or moments[-1].number,
                           max(each.seq for each in moments), moments[-1].at,
                           asks or is_broken or bool(
                               changed.changes and changed.renaming is None),
-                          changed.changes, is_earlier=bool(earlier), renamed=changed.names,
+                          changed.changes, marks=marks,
+                          is_earlier=bool(earlier), renamed=changed.names,
                           structure=changed.before)
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
@@ -157,6 +163,7 @@ class TrialStore:
             resumed.moment if resumed and resumed.is_earlier else None,
             self._facts_of_new_names(resumed)))
         GOALS.observers.append(self._observer.goal_begins)
+        top.tree.keep_marks = self._observer.keep_marks
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
 
     def _facts_of_new_names(self, resumed: Optional[Resumption]) -> List[Fact]:
@@ -182,6 +189,7 @@ class TrialStore:
         """Store the last of the trial, and let go of the store."""
         remove_identical(self._top.events.observers, self._observer)
         GOALS.observers.remove(self._observer.goal_begins)
+        self._top.tree.keep_marks = no_store
         self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
         self._writer.close(None if why in _CAN_GO_ON else Ending(at, outcome))
         self._let_go()

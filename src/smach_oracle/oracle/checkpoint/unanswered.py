@@ -1,6 +1,7 @@
 """A question whether a stored trial may go on: where nobody answers, the trial is kept."""
 from ..asking.question import Question
 from ..recovery.arrival_recovery import ArrivalRecovery
+from ..recovery.recovery import Recovery
 from ..recovery.stop import preempt_beside
 from ..recovery.verdict import Verdict, VerdictKind
 
@@ -10,7 +11,7 @@ KEPT = ('nobody has said how the trial goes on ({}). The machine stops where it 
         'the trial')
 
 
-class KeepingRecovery(ArrivalRecovery):
+class _Keeping(Recovery):
     """Asks before anything moves, whatever `on_no_answer` says of other questions."""
 
     def say_that_it_waits(self, question: Question) -> None:
@@ -35,3 +36,11 @@ class KeepingRecovery(ArrivalRecovery):
         node.tree.early_end.keep()
         preempt_beside(node)
         return Verdict(VerdictKind.PREEMPTED)
+
+
+class KeepingRecovery(_Keeping, ArrivalRecovery):
+    """Asks whether the trial may go on."""
+
+
+class KeepingHeldBack(_Keeping):
+    """Asks about a state that is not to be repeated, at which the trial would go on."""

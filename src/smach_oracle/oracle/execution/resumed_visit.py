@@ -1,5 +1,5 @@
 """The way of a visit through the meta state that was begun before the program was stopped."""
-from ..checkpoint.unanswered import KeepingRecovery
+from ..checkpoint.unanswered import KeepingHeldBack, KeepingRecovery
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord, Unfinished
@@ -22,5 +22,7 @@ class ResumedVisit(OracleVisit):
         before = self._before
         if not before.asks:
             return super()._recovery(context, continuous)
+        if self._failure.is_held_back:
+            return KeepingHeldBack(self._node, self._record, self._failure, context, continuous)
         kind = KeepingRecovery if before.keeps else ArrivalRecovery
         return kind(self._node, self._record, self._failure, context, before.asks)

@@ -34,13 +34,20 @@ def note_visit(node: TreeNode, record: StateRecord) -> str:
     """Note that the machine has come to a state. Return why it is not executed, or ''."""
     mark = node.records.marks.of(record.label)
     mark.reached = node.tree.next_visit()
+    why_not = why_held_back(node, record)
+    if not why_not:
+        mark.executed = mark.reached
+        mark.done = True
+    return why_not
+
+
+def why_held_back(node: TreeNode, record: StateRecord) -> str:
+    """Return why a state is not executed when the machine comes to it, or '' where it is."""
     on_retry = record.settings.on_retry
-    if mark.spent and on_retry != ALLOW:
-        return 'was done in this trial and {}'.format(
-            'must not be repeated' if on_retry == NEVER else 'is not repeated by itself')
-    mark.executed = mark.reached
-    mark.done = True
-    return ''
+    if on_retry == ALLOW or not node.records.marks.of(record.label).spent:
+        return ''
+    return 'was done in this trial and {}'.format(
+        'must not be repeated' if on_retry == NEVER else 'is not repeated by itself')
 
 
 def has_visited(node: TreeNode, label: str) -> bool:
@@ -88,10 +95,32 @@ def leave_for(node: TreeNode, target: str, below: Iterable[Tuple[TreeNode, str]]
     """
     if not node.tree.numbers_visits:
         return
-    for done in _done_since(node, target):
-        done.mark.spent = True
+    leave_unconfirmed(node, target)
     for each, label in ((node, target), *below):
         each.records.marks.of(label).spent = False
+
+
+def leave_unconfirmed(node: TreeNode, target: str) -> None:
+    """Note that the machine goes to a state as it is told to, and not by its author's transitions.
+
+    What may come again now is spent, the state itself among it: nobody has confirmed anything.
+    """
+    for done in _done_since(node, target):
+        done.mark.spent = True
+
+
+def note_initial(node: TreeNode, label: str) -> None:
+    """Note that somebody has a container begin in a state, without a word on what that repeats."""
+    if node.tree.numbers_visits:
+        for done in _done_within(node, label):
+            done.mark.spent = True
+
+
+def begin_once_more(node: TreeNode, label: str) -> None:
+    """Let a state, and all in it, come again as if it had not begun: a person wants it so."""
+    node.records.marks.take_over(label, VisitMark())
+    for done in list(_done_within(node, label)):
+        done.mark.done = done.mark.spent = False
 
 
 def note_superseded(node: TreeNode, label: str) -> None:
@@ -135,6 +164,8 @@ def note_precondition(node: TreeNode, label: str) -> None:
     for done in _done_within(node, label):
         done.mark.spent = True
         done.mark.reached = done.mark.executed = 0
+    if node.settings_of(label).on_retry != ALLOW:
+        node.tree.keep_marks()
 
 
 def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:

@@ -34,6 +34,10 @@ def no_description(state: smach.State) -> str:
     return ''
 
 
+def no_store() -> None:
+    """Nothing is kept."""
+
+
 def new_id() -> str:
     """Return an id that nobody else uses."""
     return uuid.uuid4().hex[:12]
@@ -59,6 +63,8 @@ class Tree:
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
         self._visits = itertools.count(1)
+        # has a store keep which states have begun, at once, where there is no event of it
+        self.keep_marks: Callable[[], None] = no_store
         self.health = HealthWatch(health)
         self.clock = AlarmClock()
         self.control = Control()
@@ -134,6 +140,7 @@ class Tree:
         del state['_lock'], state['rates_lock'], state['departures_lock'], state['early_end']
         state['expert'] = None
         state['waiting'] = MonotonicWaiting()
+        state['keep_marks'] = no_store
         state['describe_failure'] = no_description
         return state
 

@@ -2,7 +2,7 @@
 
 Pure, and without smach.
 """
-from typing import Dict
+from typing import Dict, List, Tuple
 
 
 class VisitMark:
@@ -39,3 +39,12 @@ class VisitMarks:
         if mark is None:
             mark = self._by_label[label] = VisitMark()
         return mark
+
+    def take_over(self, label: str, mark: VisitMark) -> None:
+        """Go on with the mark of a state."""
+        self._by_label[label] = mark
+
+    def told(self) -> List[Tuple[str, List[object]]]:
+        """Return labels and marks as plain data."""
+        return [(label, [mark.reached, mark.executed, mark.done, mark.spent])
+                for label, mark in list(self._by_label.items())]

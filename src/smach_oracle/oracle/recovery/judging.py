@@ -89,7 +89,8 @@ def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     error = None
     if route is None or not route.target:
         route = None
-        if before.kind not in (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT):
+        if before.kind not in (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT,
+                               FailureKind.HELD_BACK):
             error = partial(smach.InvalidUserCodeError, '{}: {}'.format(label, before.text))
     return Failure(label, before.kind, before.outcome, before.text, route, error)
 

@@ -84,6 +84,7 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'on_resume': checked_on_resume,
     'resume_from': values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62),
     'resume_map': checked_resume_map,
+    'resume_repeat': values.words,
     'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
     'oracle_label': values.label,
     'nested': checked_nested,
@@ -139,6 +140,8 @@ class Settings:
     resume_map: Mapping[str, str] = field(default_factory=dict)
     # how long states behind a preempt may run after Ctrl-C or SIGTERM, under oracle_run
     after_preempt_s: float = 0.0
+    # paths of states that may be repeated as the trial goes on, whatever `on_retry` says
+    resume_repeat: Tuple[str, ...] = ()
 
     @classmethod
     def from_dict(cls, given: Optional[Mapping[str, Any]],

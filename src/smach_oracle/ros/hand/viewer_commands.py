@@ -66,13 +66,17 @@ class ViewerCommands:
 
         :param written: userdata keys that come with the command.
         :param by: who wants it.
-        :returns: None where the container is no such machine, False where it cannot go there.
+        :returns: None where the container is no such machine, or does not run and begins there,
+            False where it cannot go there.
         """
-        if not isinstance(container, smach.StateMachine) or not container.is_running():
+        if not isinstance(container, smach.StateMachine):
             return None
         try:
             hand = OperatorHand(container)
         except TrialError:
+            return None
+        if not container.is_running():
+            hand.begins_in(label)
             return None
         wish = (id(container), label)
         with self._sending:

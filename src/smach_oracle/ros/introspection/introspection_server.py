@@ -285,9 +285,9 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
         smach.logerr('Initial state %s not set: the container has only the states %s'
                      % (unknown, sorted(container.get_children())))
         return False
-    goes_there = len(labels) == 1 and isinstance(
-        container, smach.StateMachine) and container.is_running()
-    is_sent = send_running(container, labels[0], data, by) if goes_there else None
+    is_machine = len(labels) == 1 and isinstance(container, smach.StateMachine)
+    goes_there = is_machine and container.is_running()
+    is_sent = send_running(container, labels[0], data, by) if is_machine else None
     if is_sent is False:
         return False
     userdata = smach.UserData()

@@ -12,13 +12,15 @@ _senders: List[Sender] = []
 
 
 def add_sender(sender: Sender) -> None:
-    """Ask this one, too, for each container that runs and that a viewer wants elsewhere."""
+    """Ask this one, too, for each machine that a viewer wants elsewhere, or to begin elsewhere."""
     if sender not in _senders:
         _senders.append(sender)
 
 
 def send_running(container: Any, label: str, written: Collection[str], by: str) -> Optional[bool]:
-    """Have a container that runs sent to a state. Return None where nobody takes that on.
+    """Have a machine that runs sent to a state. Return None where nobody takes that on.
+
+    One that does not run will begin there. Whoever has a hand on it is asked about that, too.
 
     :param written: userdata keys that come with the command.
     :param by: who wants it.

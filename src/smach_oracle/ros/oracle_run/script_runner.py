@@ -41,7 +41,7 @@ from .refusal import USAGE_ERROR, Refusal
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--record',
-                      '--record-topic', '--checkpoint', '--from', '--resume-map')
+                      '--record-topic', '--checkpoint', '--from', '--resume-map', '--repeat')
 
 
 class CommandLine(NamedTuple):
@@ -112,6 +112,9 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument('--resume-map', metavar='OLD=NEW', action='append', default=[],
                         type=_renamed, help='where the script has changed: the state that was OLD '
                         'is NEW now, each a label or a path (repeatable)')
+    parser.add_argument('--repeat', metavar='STATE', action='append', default=[],
+                        help='let the trial that goes on repeat this state once, whatever its '
+                        'on_retry says: a label or a path (repeatable)')
     return parser
 
 
@@ -181,6 +184,8 @@ def _stored(given: argparse.Namespace) -> Dict[str, Any]:
         found['resume_from'] = given.moment
     if given.resume_map:
         found['resume_map'] = dict(given.resume_map)
+    if given.repeat:
+        found['resume_repeat'] = given.repeat
     return found
 
 

@@ -95,6 +95,34 @@ def test_what_is_refused_stays_refused_when_a_client_repeats_it(viewers):
     assert [event.kind for event in running.events].count(EventKind.WARNING) == 1
 
 
+def test_a_container_that_is_to_begin_in_a_guarded_state_asks_before_it_comes_again(viewers):
+    """The author enters KITCHEN twice: the second time POUR is not drawn, but a viewer's wish."""
+    poured, rounds = [], []
+    kitchen = smach.StateMachine(outcomes=['done', 'aborted'])
+    with kitchen:
+        smach.StateMachine.add('LOOK', smach.CBState(
+            lambda ud: 'ok' if len(rounds) == 0 else 'enough', outcomes=['ok', 'enough']),
+            {'ok': 'POUR', 'enough': 'done'})
+        smach.StateMachine.add('POUR', smach.CBState(
+            lambda ud: poured.append(1) or 'ok', outcomes=['ok']), {'ok': 'done'})
+
+    def wish(ud):
+        rounds.append(1)
+        if len(rounds) == 1:
+            watch = ContainerWatch(kitchen, lambda *args: None, lambda: False)
+            assert set_initial_states(watch, ['POUR'], {}, '/viewer')
+        return 'again' if len(rounds) == 1 else 'ok'
+
+    machine = smach.StateMachine(outcomes=['done', 'aborted'])
+    with machine:
+        smach.StateMachine.add('KITCHEN', kitchen, {'done': 'WISH'})
+        smach.StateMachine.add('WISH', smach.CBState(wish, outcomes=['again', 'ok']),
+                               {'again': 'KITCHEN', 'ok': 'done'})
+    OracleContainer.wrap(machine, settings={'states': {'POUR': {'on_retry': 'confirm'}}})
+    assert machine.execute() == 'aborted'  # nobody is there to be asked
+    assert poured == [1]
+
+
 def test_a_bare_machine_goes_there_as_ever(viewers):
     running = Running(wrap=False)
     watch = watch_of(running)
