@@ -105,7 +105,7 @@ def _take_out(database: sqlite3.Connection, trials: Iterable[int]) -> None:
                 for each in _structures(database, trial)}
         database.executemany('DELETE FROM structures WHERE id = ?',
                              [(each,) for each in structures - left])
-    used = _used_parts(database)
+    used = used_parts(database)
     for digest, in database.execute('SELECT digest FROM parts').fetchall():
         if bytes(digest) not in used:
             database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
@@ -124,7 +124,7 @@ def _structures(database: sqlite3.Connection, trial: int) -> Set[str]:
     return found
 
 
-def _used_parts(database: sqlite3.Connection) -> Set[bytes]:
+def used_parts(database: sqlite3.Connection) -> Set[bytes]:
     """Return the digests of the bytes that a fact refers to, by itself or within its value."""
     used: Set[bytes] = set()
     for text, in database.execute("SELECT text FROM facts WHERE text LIKE '%$part%'"):

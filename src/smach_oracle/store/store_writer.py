@@ -6,6 +6,7 @@ from typing import Callable, List, MutableSet, NamedTuple, Optional, Union
 
 from .rows import NewMoment
 from .store_file import NewTrial, StoreFile
+from .thinning import EVERY, LAST, thin
 
 Warn = Callable[[str], None]
 RETRY_S = 1.0  # between two tries at a disk that fails
@@ -52,6 +53,7 @@ class StoreWriter:
         self._is_behind = False
         self._error = ''
         self._is_closing = False
+        self._until_thinned = LAST + EVERY  # moments
         self._thread = threading.Thread(target=self._work, name='store', daemon=True)
         self._thread.start()
         _writers.add(self)
@@ -148,8 +150,20 @@ class StoreWriter:
                 caught_up = self._is_behind and not self._waiting
                 self._is_behind = self._is_behind and not caught_up
                 self._ready.notify_all()
+            self._until_thinned -= len(batch)
+            if self._until_thinned <= 0 and not self._is_closing:
+                self._thin()
             if caught_up:
                 self._warn('{}: all is stored again'.format(self._store.path))
+
+    def _thin(self) -> None:
+        """Take out old moments. Where that fails it is tried again later: nothing is lost."""
+        self._until_thinned = EVERY
+        try:
+            if isinstance(self._trial, int):
+                thin(self._store, self._trial)
+        except StoreError:
+            pass
 
     def _write(self, batch: List[NewMoment]) -> str:
         """Write moments, and the end once it has come. Return what went wrong, '' for nothing."""

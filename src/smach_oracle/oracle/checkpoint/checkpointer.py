@@ -74,6 +74,12 @@ class Checkpointer:
         """Take one event. See EventSource."""
         if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
             self._begin_trial()
+        if event.kind is EventKind.OPERATOR_COMMAND:
+            spent = tuple(self._spent())  # such as that it is paused, which must not be delayed
+            if spent:
+                self._writer.commit(NewMoment(event.wall_time, event.seq, event.kind.name,
+                                              self._top.key, '', spent), lambda: True)
+            return
         node = self._node_of(event)
         if node is None:
             return

@@ -77,8 +77,9 @@ class ContainerFacts:
         first = max(self._visits - 1, total - len(visits), 0)  # an expert may change the last one
         for number in range(first, total):
             state, outcome, result = visits[number - total]
-            yield from self._if_new('{}{}:{}'.format(VISIT, self._execution, number),
-                                    [state, outcome, int(result)])
+            # as many names as visits are kept, so that the store does not grow with each
+            yield from self._if_new('{}{}'.format(VISIT, number % (visits.maxlen or 1)),
+                                    [state, outcome, int(result), self._execution, number])
         self._visits = total
 
     def _if_new(self, name: str, plain: Plain) -> Iterator[Fact]:

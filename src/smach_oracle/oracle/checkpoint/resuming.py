@@ -60,6 +60,8 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
     for old, new in resumption.renamed.items():
         smach.logwarn('{}: goes on with {} as {}'.format(top.path, old, new))
+    if top.tree.control.paused:
+        smach.logwarn('{}: is paused, as before its program was stopped'.format(top.path))
     _end_goals(top, resumption)
     top.emit(EventKind.RESUMED, data={
         LAST_SEQ: resumption.seq, 'moment': resumption.moment,

@@ -117,8 +117,9 @@ class _Reading:
                 kind, why = _plain(value)
                 container.missing[name[len(KEPT_OUT):]] = '{} was not stored: {}'.format(kind, why)
         elif name.startswith(VISIT):
-            execution, number = map(int, name[len(VISIT):].split(':'))
-            state, outcome, result = _plain(value)
+            state, outcome, result, *when = _plain(value)
+            # of an earlier version the name says when
+            execution, number = when or map(int, name[len(VISIT):].split(':'))
             self._visits.setdefault(path, {})[execution, number] = Visit(
                 state, outcome, VisitResult(result))
         elif name.startswith(STATE):
@@ -154,10 +155,12 @@ class _Reading:
 
     def _put_together(self, path: str, container: StoredContainer) -> None:
         visits = self._visits.get(path, {})
-        present = sorted(number for execution, number in visits
-                         if execution == container.execution)
-        container.visits = [visits[container.execution, number] for number in present]
-        container.visits_of_execution = present[-1] + 1 if present else 0
+        latest = max((number for execution, number in visits
+                      if execution == container.execution), default=-1)
+        container.visits_of_execution = latest + 1
+        while (container.execution, latest) in visits:
+            container.visits.insert(0, visits[container.execution, latest])
+            latest -= 1
         for key, value in self._keys.get(path, {}).items():
             if not value.is_there:
                 container.gone.append(key)

@@ -128,7 +128,7 @@ class TrialStore:
         latest = tree
         # what runs elsewhere, and what was asked, has not become undone
         kept = {name: value for name, value in tree.whole.items()
-                if name.startswith(GOAL) or name == 'questions'}
+                if name.startswith(GOAL) or name in ('questions', 'paused')}
         if earlier:
             tree = read_tree(self._store, trial.number, CODECS, earlier)
         changed = changed_script(self._top, self._store, trial, tree, self._structure)

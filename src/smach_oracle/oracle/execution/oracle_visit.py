@@ -11,7 +11,7 @@ from ..machine.repeats import leave_for, note_superseded
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..places.way import Way
-from ..records.events import EventKind
+from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery.failure import (
@@ -102,7 +102,9 @@ class OracleVisit:
 
     def _tell_failure(self) -> None:
         failure = self._failure
+        # what was in doubt, or had not begun, has not failed
         told = (' ' + failure.text if failure.is_held_back
+                else ': ' + failure.text if failure.kind is FailureKind.INTERRUPTED
                 else ' failed: ' + (failure.details or in_words(failure)))
         smach.logwarn('{}/{}{}'.format(self._node.path, self._record.label, told))
 

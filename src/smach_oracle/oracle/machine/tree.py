@@ -108,15 +108,22 @@ class Tree:
             return is_new
 
     def go_on_counting(self, visits: int, whole: Mapping[str, Any]) -> None:
-        """Number visits behind `visits`, and go on with what the stored trial had spent."""
+        """Number visits behind `visits`, and go on with what the stored trial had spent.
+
+        A machine that was paused is paused again.
+        """
         self.is_resumed = True
         self._visits = itertools.count(visits + 1)
         self._questions = int(whole.get('questions', 0))
         self.budget.go_on(whole.get('budget'))
+        paused, by = whole.get('paused') or (False, '')
+        if paused:
+            self.control.pause(by)
 
     def spent(self) -> Dict[str, Any]:
-        """Return what a trial that goes on needs of what is spent, as plain data."""
-        return {'questions': self._questions, 'budget': self.budget.spent()}
+        """Return what a trial that goes on needs of what is spent or asked, as plain data."""
+        return {'questions': self._questions, 'budget': self.budget.spent(),
+                'paused': [self.control.paused, self.control.paused_by]}
 
     def next_visit(self) -> int:
         """Return the number of the next visit of a state, in whichever container."""

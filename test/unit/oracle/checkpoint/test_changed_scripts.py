@@ -219,8 +219,12 @@ def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
     before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=names)
     killed_while_it_runs(folder, before, 'LOOK')
     begun = before.diary.count('begins')
-    assert after.run()['ended_by'] == 'kept'
+    told = after.run()
+    assert told['ended_by'] == 'kept'
     assert before.diary.count('begins') == begun
+    # that has ended well, and the state at which it begins has not failed either
+    assert not [line for line in told['log'] if ' failed' in line]
+    assert [line for line in told['log'] if 'which is not there any more' in line]
 
 
 def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
