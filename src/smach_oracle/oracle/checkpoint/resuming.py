@@ -207,8 +207,7 @@ def _way_named(top: TreeNode, path: str) -> Way:
 
 def _hold_back(places: Sequence[Place]) -> None:
     """Have a person asked at states that are not to come again. Without an answer it is kept."""
-    for node, label in places:
-        record = node.record(label)
+    for record, node in ((each.node.record(each.label), each.node) for each in places):
         why = why_held_back(node, record)
         if why and node.tree.numbers_visits:
             record.resume(Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True))
