@@ -1,8 +1,8 @@
 """One store: an SQLite database for any number of machines and trials.
 
-Every moment of a trial can be resumed from. The older ones of a long trial are thinned (`thinning`).
-Where the trial has gone on from an earlier one, those between stay, too, and count for nothing that
-follows. A moment has the facts that changed with it. What is large is kept once, by its content.
+Every moment of a trial can be resumed from. The older ones of a long trial are thinned. Where the
+trial has gone on from an earlier one, those between stay, too, and count for nothing that follows.
+A moment has the facts that changed with it. What is large is kept once, by its content.
 """
 import contextlib
 import ctypes

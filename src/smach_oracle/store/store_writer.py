@@ -162,7 +162,7 @@ class StoreWriter:
         try:
             if isinstance(self._trial, int):
                 thin(self._store, self._trial)
-        except StoreError:
+        except Exception:  # this thread lives as long as the trial
             pass
 
     def _write(self, batch: List[NewMoment]) -> str:
