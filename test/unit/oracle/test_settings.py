@@ -154,7 +154,7 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
         'interfaces', 'states', 'healthy', 'health_settle_s', 'checkpoint', 'checkpoint_wait_s',
             'checkpoint_synchronous', 'on_resume', 'resume_from', 'resume_map',
-            'resume_repeat'
+            'resume_repeat', 'after_preempt_s'
     }
 
 
