@@ -4,6 +4,7 @@ from collections import OrderedDict
 from types import MappingProxyType
 from typing import Any, Callable, Dict, FrozenSet, List, Mapping, Optional, Sequence, Set, Tuple
 
+import rosgraph
 import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
@@ -125,7 +126,9 @@ class FollowedRobots:
 
     def _receiver(self, robot: FollowedRobot, method: str) -> Callable[[Any], None]:
         take_in = getattr(robot, method)
-        if method in ('on_rates', 'on_control'):  # latched: its stamp may be of long ago
+        if method == 'on_control':
+            return lambda message: self._take_control(robot, message)
+        if method == 'on_rates':  # latched: its stamp may be of long ago
             return take_in
 
         def take(message: Any) -> None:
@@ -138,6 +141,15 @@ class FollowedRobots:
             take(message)
             self._log.add(robot.name, event_of(message))
         return take_event
+
+    def _take_control(self, robot: FollowedRobot, message: ControlStatus) -> None:
+        """Its services are there by now. Only then can it be held."""
+        if robot.machines is None:
+            try:
+                self._look_up([robot.name])
+            except (OSError, rosgraph.MasterException) as err:
+                rospy.logdebug('%s: %s', robot.name, err)
+        robot.on_control(message)
 
     def _forget_gone(self) -> None:
         """Keep the latest of very many robots that are gone, such as anonymous nodes."""
