@@ -23,6 +23,8 @@ class QuietActionServer(actionlib.ActionServer):
     A goal counts only if its node listens for the result. The player of a bag does not.
     """
 
+    status_timer: Any  # a rospy.Timer, or None
+
     def initialize(self) -> None:
         """Begin, with a timer that goes on where simulated time is set back."""
         super().initialize()
