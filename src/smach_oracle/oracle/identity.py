@@ -43,6 +43,10 @@ class WeakIdentityMap(Generic[Key, Value]):
         if key in self:
             self._entries.pop(id(key), None)
 
+    def clear(self) -> None:
+        """Drop all entries."""
+        self._entries.clear()
+
     def __contains__(self, key: Key) -> bool:
         kept = self._entries.get(id(key))
         return kept is not None and kept[0]() is key
