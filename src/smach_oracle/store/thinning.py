@@ -21,7 +21,7 @@ _PART = re.compile(r'"\$part":"([0-9a-f]+)"')
 _Key = Tuple[str, str]
 
 
-class _Moment(NamedTuple):
+class _ListedMoment(NamedTuple):
     number: int
     kind: str
     path: str
@@ -35,7 +35,7 @@ def thin(store: StoreFile, trial: int) -> int:
     :raises StoreError: where that cannot be done. Nothing has changed then.
     """
     with transaction(store) as database:
-        moments = [_Moment(*row) for row in database.execute(
+        moments = [_ListedMoment(*row) for row in database.execute(
             'SELECT number, kind, path, label, after FROM moments WHERE trial = ? '
             'ORDER BY number', (trial,))]
         ends = {each.after for each in moments if each.after is not None}
@@ -56,7 +56,7 @@ def _renamed(database: sqlite3.Connection, trial: int) -> Set[int]:
         "facts.path = '' AND name IN (?, ?)", (trial, STRUCTURE, RENAMED))}
 
 
-def _kept(moments: List[_Moment], ends: Set[int], renamed: Set[int]) -> Set[int]:
+def _kept(moments: List[_ListedMoment], ends: Set[int], renamed: Set[int]) -> Set[int]:
     """Return which of the older moments stay. `ends`: those from which the trial has gone on.
 
     They are the first one, and those from which the trial has gone on, of changes by hand and of
