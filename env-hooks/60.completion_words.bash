@@ -44,7 +44,9 @@ _smach_oracle_words() {
     'oracle_run --policy')
       echo 'algorithm1 always_ask ladder prose random restart retry step_back' ;;
     'oracle_state')
-      echo '--help --version -h drop edit goto list log moments show' ;;
+      echo '--help --version -h accept drop edit goto list log moments show' ;;
+    'oracle_state accept')
+      echo '--help -h' ;;
     'oracle_state drop')
       echo '--help --trial -h' ;;
     'oracle_state edit')

@@ -63,7 +63,7 @@ with sm:
     smach.StateMachine.add('DRIVE', Drive())
 print('OUT', sm.execute(), flush=True)
 '''
-# how a child ends, and what its parent hears of that
+# how a child ends, and the status that its parent gets
 ENDS = {'exits': 'CHILD 768', 'terminated': 'CHILD 0', 'killed': 'CHILD -9'}
 
 

@@ -63,7 +63,7 @@ class Mark:
             pass
 
     def _salts(self) -> str:
-        """Return by what SQLite tells a log from the one before it."""
+        """Return the salts of the log, which SQLite changes with each new one."""
         if self._log is None:
             self._log = os.open(self._path + LOG, os.O_RDONLY | os.O_CLOEXEC)
         return os.pread(self._log, 8, 16).hex()

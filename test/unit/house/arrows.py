@@ -76,7 +76,8 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
-        'state_command', {'stopped_trial', 'retention'}, {'store_writer', 'holding'}, 'store_file',
+        'state_command', {'stopped_trial', 'store_writer'}, 'thinning', 'retention', 'holding',
+        'store_file',
         'opening', 'tables', 'soundness', 'renaming', 'rows', 'codecs',
         {'object_parts', 'errors', 'names'}
     ],

@@ -5,7 +5,7 @@ import smach
 
 from ..identity import own_attributes, set_class
 from ..machine.nesting import BORDER
-from ..machine.stack_room import too_deep_below, too_deep_here
+from ..recovery.stack_room import too_deep_below, too_deep_here
 from .border import Border, ConcurrenceBorder, IteratorBorder
 from .stand_in import real
 

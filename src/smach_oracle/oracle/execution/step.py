@@ -9,7 +9,6 @@ from ..asking.question import AnswerKind
 from ..branches.passed_over import tell_passed_over
 from ..decision.policy import FailureContext
 from ..machine.repeats import note_visit
-from ..machine.stack_room import too_deep_below, too_deep_here
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
@@ -31,6 +30,7 @@ from ..recovery.failure import (
     visit_result,
 )
 from ..recovery.judging import HeldBack, Overrun, judge
+from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import TakenOut, WatchedVisit
 from .arriving_visit import ArrivingVisit
 from .boundary import pass_boundary

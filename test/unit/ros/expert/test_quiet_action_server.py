@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from smach_oracle.msg import ExpertQueryAction
 from smach_oracle.ros.expert import quiet_action_server
 from smach_oracle.ros.expert.quiet_action_server import QuietActionServer
 
@@ -27,7 +28,7 @@ def test_the_timer_of_the_status_goes_on_where_time_is_set_back(has_timer, monke
 
     monkeypatch.setattr(quiet_action_server.actionlib.ActionServer, 'initialize', initialize)
     monkeypatch.setattr(quiet_action_server.rospy, 'Timer', FakeTimer)
-    server = QuietActionServer.__new__(QuietActionServer)
+    server = QuietActionServer('/ask', ExpertQueryAction, print, auto_start=False)
     server.initialize()
     if first is None:
         assert server.status_timer is None

@@ -72,7 +72,7 @@ def test_viewers_get_all_other_keys(value):
 def test_an_event_becomes_a_message_whatever_it_holds(value):
     event = Event(EventKind.WARNING, 't', 0, 0.0, 'TOP', text=value, outcome=value,
                   data={'odd': value})
-    serialise(to_msg(event, genpy.Time()))
+    assert serialise(to_msg(event, genpy.Time()))
 
 
 def test_events_behind_one_with_an_odd_value_are_in_the_bag(tmp_path):

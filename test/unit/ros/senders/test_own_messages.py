@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from smach_oracle.msg import ExpertQueryAction
 from smach_oracle.ros.expert import quiet_action_server
 from smach_oracle.ros.expert.quiet_action_server import QuietActionServer
 from smach_oracle.ros.senders import own_messages
@@ -75,8 +76,8 @@ def test_a_goal_counts_only_of_a_node_that_listens_for_its_result(message, count
                             lambda self, received: taken.append(received))
     monkeypatch.setattr(quiet_action_server, 'LISTENS_AFTER_S', 0.02)
     monkeypatch.setattr(quiet_action_server.rospy, 'resolve_name', str)
-    server = QuietActionServer.__new__(QuietActionServer)
-    server.ns, server.result_pub = '/ask', publisher_to('/asker')
+    server = QuietActionServer('/ask', ExpertQueryAction, print, auto_start=False)
+    server.result_pub = publisher_to('/asker')
     (server.internal_goal_callback if hasattr(message, 'goal')
      else server.internal_cancel_callback)(message)
     assert taken == [message] * counts and len(warnings) == (not counts)

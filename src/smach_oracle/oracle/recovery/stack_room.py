@@ -10,8 +10,8 @@ from typing import Iterator, Optional
 import smach
 
 from ..errors import TooDeepError
-from .nesting import children_of
-from .tree_node import TreeNode
+from ..machine.nesting import children_of
+from ..machine.tree_node import TreeNode
 
 NEEDED_FRAMES = 150  # for a recovery, with whoever is asked, logs or records it
 _FRAMES_OF_CONTAINER = 10  # at most, what is in a state not counted
@@ -44,11 +44,9 @@ def _chain(error: BaseException) -> Iterator[BaseException]:
 
 
 def _frames_in_use() -> int:
-    frame = sys._getframe()
-    count = 0
+    count, frame = 0, sys._getframe().f_back
     while frame is not None:
-        count += 1
-        frame = frame.f_back  # type: ignore[assignment]
+        count, frame = count + 1, frame.f_back
     return count
 
 
