@@ -9,6 +9,7 @@ from smach_oracle.store.rows import Fact
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.state_record import StateRecord
+from ..records.visits import Visit
 from .stored_container import StoredContainer
 
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
@@ -30,6 +31,7 @@ class ContainerFacts:
         self._execution = 0 if before is None else before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
         self._marks: Dict[str, List[object]] = {}  # by label
+        self._latest: Optional[Visit] = None  # that is stored
         # stored ones of this execution
         self._visits = 0 if before is None else before.visits_of_execution
 
@@ -74,13 +76,16 @@ class ContainerFacts:
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits = history.visits
         total = history.visits_of_execution
-        first = max(self._visits - 1, total - len(visits), 0)  # an expert may change the last one
+        first = max(self._visits - 1, total - len(visits), 0)
+        if first < min(self._visits, total) and visits[first - total] is self._latest:
+            first += 1  # else an expert has changed it
         for number in range(first, total):
             state, outcome, result = visits[number - total]
             # as many names as visits are kept, so that the store does not grow with each
             yield from self._if_new('{}{}'.format(VISIT, number % (visits.maxlen or 1)),
                                     [state, outcome, int(result), self._execution, number])
         self._visits = total
+        self._latest = visits[-1] if visits else None
 
     def _if_new(self, name: str, plain: Plain) -> Iterator[Fact]:
         text = _as_json(plain)
