@@ -57,7 +57,7 @@ def test_a_decision_is_told_in_a_sentence(given, sentence):
     assert decision_sentence(given) == sentence
 
 
-def test_a_failure_that_is_no_continuous_one_says_what_was_tried_before():
+def test_each_failure_after_the_first_says_what_was_tried_before():
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('DETECT', Scripted('ok', 'aborted'), {'ok': 'GRASP'})
@@ -66,7 +66,7 @@ def test_a_failure_that_is_no_continuous_one_says_what_was_tried_before():
     assert watched.run() == 'done'
     assert [event.text for event in watched.of(EventKind.DECISION)] == [
         'GRASP failed (its first result): trying it again',
-        'GRASP keeps failing (2 of its last 2): going back to DETECT',
+        'GRASP keeps failing after trying it again (2 of its last 2): going back to DETECT',
         'DETECT failed (1 of its last 2): trying it again',
         'GRASP failed again after going back to DETECT (3 of its last 3): trying it again']
     watched.machine._states['GRASP'].script.append('aborted')

@@ -57,8 +57,9 @@ def test_a_step_back_to_the_guarded_state_becomes_a_question(on_retry):
     machine, expert = guarded(pouring('aborted', 'aborted'), goto('PLACE'), on_retry=on_retry)
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'PLACE'), ('ask', '')]
-    assert sentences(machine)[1] == ('PLACE keeps failing (2 of its last 2); going back to POUR '
-                                     'would repeat POUR: asking an expert, 300 s')
+    assert sentences(machine)[1] == (
+        'PLACE keeps failing after trying it again (2 of its last 2); going back to POUR would '
+        'repeat POUR: asking an expert, 300 s')
     assert expert.questions[0].reason.endswith('going back to POUR would repeat POUR')
     assert deciders(machine) == [Decider.POLICY, Decider.ON_RETRY]
 

@@ -65,8 +65,9 @@ def test_when_the_recoveries_are_spent_the_expert_is_asked():
     machine, expert = failing(give_up(), budget={'recoveries': 2})
     assert machine.run() == 'aborted'
     assert [action for action, _ in machine.decisions()] == ['revisit', 'step_back', 'ask']
-    assert sentences(machine)[-1] == ("PICK keeps failing (3 of its last 3); the trial's 2 "
-                                      "recoveries are spent: asking an expert, 300 s")
+    assert sentences(machine)[-1] == (
+        "PICK keeps failing after going back to LOOK (3 of its last 3); the trial's 2 recoveries "
+        'are spent: asking an expert, 300 s')
     assert deciders(machine)[-1] == Decider.BUDGET
     assert expert.questions[0].reason.endswith("the trial's 2 recoveries are spent")
 
@@ -103,8 +104,9 @@ def test_it_is_one_for_all_containers():
     assert machine.run() == 'aborted'
     assert [(event.path, event.outcome) for event in machine.of(EventKind.DECISION)] == [
         ('SM_ROOT', 'revisit'), ('SM_ROOT/INNER', 'revisit'), ('SM_ROOT/INNER', 'ask')]
-    assert sentences(machine)[2] == ("REACH keeps failing (2 of its last 2); the trial's 2 "
-                                     'recoveries are spent: asking an expert, 300 s')
+    assert sentences(machine)[2] == (
+        "REACH keeps failing after trying it again (2 of its last 2); the trial's 2 recoveries "
+        'are spent: asking an expert, 300 s')
 
 
 def test_a_fallback_to_a_state_costs_a_recovery():
@@ -194,8 +196,8 @@ def test_when_the_minutes_are_over_it_ends_as_without_an_oracle(clock):
     assert machine.run() == 'aborted'
     assert machine.decisions() == [('revisit', 'PICK')] and clear.runs == 1
     assert machine.of(EventKind.GIVE_UP)[0].text == (
-        "PICK keeps failing (2 of its last 2); the trial's 30 minutes are over: the machine ends "
-        'as without an oracle')
+        "PICK keeps failing after trying it again (2 of its last 2); the trial's 30 minutes are "
+        'over: the machine ends as without an oracle')
     assert not expert.questions
     assert machine.run() == 'done', 'the next trial has minutes of its own'
 

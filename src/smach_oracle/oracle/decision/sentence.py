@@ -78,10 +78,9 @@ def _failed(facts: DecisionFacts) -> str:
     if facts.spent > 0:
         return '{} failed again after {} of this trial'.format(
             facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent))
-    if facts.continuous:
-        return '{} keeps failing ({})'.format(facts.state, _rate(facts))
-    return '{} failed{} ({})'.format(
-        facts.state, ' again after ' + facts.tried if facts.tried else '', _rate(facts))
+    failed = 'keeps failing' if facts.continuous else 'failed again' if facts.tried else 'failed'
+    return '{} {}{} ({})'.format(
+        facts.state, failed, ' after ' + facts.tried if facts.tried else '', _rate(facts))
 
 
 def _rate(facts: DecisionFacts) -> str:
