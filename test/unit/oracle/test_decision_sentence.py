@@ -37,7 +37,10 @@ def facts(action, **fields):
      'PICK failed again after 1 recovery of this trial: asking an expert'),
     (facts(Action.ASK, blocked='MOVE still runs'),
      'PICK failed (1 of its last 10); MOVE still runs: asking an expert'),
-    (facts(Action.ASK, held_back='was done in this trial and is not repeated by itself'),
+    (facts(Action.REVISIT, target='PICK',
+           not_failed='has no result, since the program was stopped while it ran'),
+     'PICK has no result, since the program was stopped while it ran: trying it again'),
+    (facts(Action.ASK, not_failed='was done in this trial and is not repeated by itself'),
      'PICK was done in this trial and is not repeated by itself: asking an expert'),
     (facts(Action.ASK, blocked=going_would_repeat('PICK', 'DETECT', ['POUR', 'ARM/CUT'])),
      'PICK failed (1 of its last 10); going back to DETECT would repeat POUR, ARM/CUT: asking an '

@@ -20,7 +20,7 @@ class DecisionFacts(NamedTuple):
     not_met: str = ''  # the one that could not
     spent: int = -1  # recoveries of this trial, where they are all spent, else -1
     blocked: str = ''  # why the policy's own choice is not possible
-    held_back: str = ''  # why the state was not executed, where it has not failed
+    not_failed: str = ''  # what is said of the state where it has not failed
     asked: str = ''  # who is asked, and how long: "an expert, 300 s"
     wait_s: float = 0.0  # waited before
     tried: str = ''  # what was done after its failure before, where it has not succeeded since
@@ -71,8 +71,8 @@ def _seconds(seconds: float) -> str:
 
 
 def _failed(facts: DecisionFacts) -> str:
-    if facts.held_back:
-        return '{} {}'.format(facts.state, facts.held_back)
+    if facts.not_failed:
+        return '{} {}'.format(facts.state, facts.not_failed)
     if facts.spent == 0:
         return '{} failed ({}), and no recovery of it is allowed'.format(facts.state, _rate(facts))
     if facts.spent > 0:

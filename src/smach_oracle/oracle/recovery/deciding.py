@@ -166,7 +166,7 @@ class Deciding:
         record = self._record
         return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
                              met=self._met, not_met=self._not_met, tried=record.tried,
-                             held_back=self.failure.text if self.failure.is_held_back else '',
+                             not_failed=self.failure.why_none,
                              **fields)
 
     # -- preconditions

@@ -46,6 +46,13 @@ class Failure(NamedTuple):
         """Whether it is in the rate and in the history, from which it may be taken back."""
         return self.kind not in (FailureKind.HELD_BACK, FailureKind.INTERRUPTED)
 
+    @property
+    def why_none(self) -> str:
+        """Return what is to be said of the state where it has not failed, '' where it has."""
+        if self.kind is FailureKind.INTERRUPTED:
+            return 'has no result, since ' + self.text.partition(':')[0]
+        return self.text if self.is_held_back else ''
+
 
 class ContainerEnding(NamedTuple):
     """The way a container would end, or go on, without an oracle: exactly one is set."""
