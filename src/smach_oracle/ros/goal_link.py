@@ -3,10 +3,11 @@
 actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and does not
 notice a server that has died. This goes by the connections themselves.
 """
+import math
 import queue
 import threading
 import time
-from typing import List, NamedTuple, Optional, Type
+from typing import Dict, List, NamedTuple, Optional, Type
 
 import actionlib
 import genpy
@@ -15,7 +16,7 @@ from actionlib_msgs.msg import GoalStatus
 
 from .connections import Connection, ConnectionGrace, live_connections
 from .introspection.viewer_jump import sender_of
-from .senders.own_messages import listens
+from .senders.own_messages import LISTENS_AFTER_S, listens
 
 # how often a waiting thread looks at things that cannot wake it: a cancel flag, a connection
 POLL_S = 0.02
@@ -92,6 +93,10 @@ class ServedClient(actionlib.ActionClient):
     The statuses of a bag do not have the goal, so it would take it for lost.
     """
 
+    def __init__(self, ns: str, action_spec: Type[genpy.Message]) -> None:
+        self._ignored_s: Dict[str, float] = {}  # since when, by node; inf: it was named
+        super().__init__(ns, action_spec)
+
     def _status_cb(self, msg: genpy.Message) -> None:
         if self._is_of_server(msg):
             super()._status_cb(msg)
@@ -105,7 +110,15 @@ class ServedClient(actionlib.ActionClient):
             super()._feedback_cb(msg)
 
     def _is_of_server(self, msg: genpy.Message) -> bool:
-        return listens(self.pub_goal, sender_of(msg))
+        node, now_s = sender_of(msg), time.monotonic()
+        if listens(self.pub_goal, node):
+            self._ignored_s.pop(node, None)
+            return True
+        if now_s - self._ignored_s.setdefault(node, now_s) > LISTENS_AFTER_S:
+            self._ignored_s[node] = math.inf
+            rospy.logwarn('%s: ignored what %s reports about goals, as it does not listen for '
+                          'them. A bag that is played does that', rospy.resolve_name(self.ns), node)
+        return False
 
 
 class GoalLink:

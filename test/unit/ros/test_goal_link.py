@@ -1,13 +1,15 @@
 """What of a goal on its way counts as lost; no master."""
 import time
+from types import SimpleNamespace
 
+import actionlib
 import pytest
 import rospy
 from actionlib import CommState
 
 from smach_oracle.msg import SharedAutonomyAction
 from smach_oracle.ros import connections, goal_link
-from smach_oracle.ros.goal_link import GoalLink, SentGoal, _reaches
+from smach_oracle.ros.goal_link import GoalLink, SentGoal, ServedClient, _reaches
 
 
 class FakeHandle:
@@ -134,3 +136,33 @@ def test_a_topic_without_the_server_is_waited_for(client, link, topic):
     assert not link.ready()
     connection.callerid_pub, connection.socket = '/server', None
     assert not link.ready(), 'a connection whose socket is gone'
+
+
+def test_a_node_that_reports_about_goals_and_takes_none_is_named_once(monkeypatch):
+    warnings = []
+    monkeypatch.setattr(goal_link.rospy, 'logwarn',
+                        lambda text, *args: warnings.append(text % args))
+    monkeypatch.setattr(goal_link.rospy, 'resolve_name', str)
+    monkeypatch.setattr(goal_link, 'LISTENS_AFTER_S', 0.02)
+    monkeypatch.setattr(actionlib.ActionClient, '__init__',
+                        lambda self, ns, _: setattr(self, 'ns', ns))
+    taken = []
+    monkeypatch.setattr(actionlib.ActionClient, '_status_cb', lambda _, told: taken.append(told))
+    client = ServedClient('/server', SharedAutonomyAction)
+
+    def hear(node, *listeners):
+        connections = [SimpleNamespace(endpoint_id=each) for each in listeners]
+        client.pub_goal = SimpleNamespace(impl=SimpleNamespace(connections=connections))
+        client._status_cb(SimpleNamespace(_connection_header={'callerid': node}))
+
+    hear('/server')
+    time.sleep(0.03)  # it listens only now
+    hear('/server', '/server')
+    hear('/server')
+    assert len(taken) == 1 and not warnings, 'its connections come and go one after the other'
+    for _ in range(3):
+        hear('/relay', '/server')
+        time.sleep(0.03)  # longer than any connection takes
+    assert len(taken) == 1
+    assert warnings == ['/server: ignored what /relay reports about goals, as it does not '
+                        'listen for them. A bag that is played does that']

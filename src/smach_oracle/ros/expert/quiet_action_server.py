@@ -8,9 +8,8 @@ import rospy
 
 from ..connections import quiet_at_shutdown
 from ..introspection.viewer_jump import sender_of
-from ..senders.own_messages import listens
+from ..senders.own_messages import LISTENS_AFTER_S, listens
 
-LISTENS_AFTER_S = 0.5  # a client may be connected a moment before this node knows it
 _LOOK_S = 0.01
 
 

@@ -12,6 +12,8 @@ from ..introspection.viewer_jump import sender_of
 
 Take = Callable[[Any], None]
 
+LISTENS_AFTER_S = 0.5  # a node may be connected a moment before this one knows it
+
 
 def owner_of(topic: str, nodes: Iterable[str]) -> str:
     """Return the node that a topic belongs to, '' where nobody publishes it.
