@@ -53,6 +53,7 @@ class StoreFile:
         where = os.path.realpath(path)
         self._mark = Mark(where, synchronous)
         self._has = Content()
+        self._version = 0  # changes as another program changes the store
         try:
             self._db = Opening(path, where, read_only, accept, self._begin).opened(synchronous)
         except sqlite3.Error as err:
@@ -74,13 +75,18 @@ class StoreFile:
                 self._db.execute('PRAGMA busy_timeout = 0')
                 mode, = self._db.execute('PRAGMA journal_mode = DELETE').fetchone()
                 if mode == 'delete':
-                    self._mark.write(self._has, log=CLOSED)
+                    self._note(log=CLOSED)
         self._mark.close()
         self._db.close()
 
-    def _note(self, **changed: int) -> None:
-        self._has = self._has._replace(**changed)
-        self._mark.write(self._has)
+    def _note(self, log: Optional[str] = None, **changed: int) -> None:
+        """Mark what it has. Where another program has changed it, trials may have gone."""
+        with contextlib.suppress(sqlite3.Error):  # what was committed is there all the same
+            version, = self._db.execute('PRAGMA data_version').fetchone()
+            self._has = (self._has._replace(**changed) if version == self._version
+                         else content_of(self._db))
+            self._version = version
+            self._mark.write(self._has, log)
 
     # -- writing
 
@@ -286,7 +292,7 @@ class StoreFile:
         :raises StoreError: where that cannot be done, as another program reads.
         """
         try:
-            self._note(**content_of(self._db)._asdict())  # trials may have gone
+            self._note(**content_of(self._db)._asdict())  # once more: others may have had more
             self._db.execute('VACUUM')
             self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')
         except sqlite3.Error as err:
@@ -318,6 +324,7 @@ def transaction(store: StoreFile, keep: bool = True) -> Iterator[sqlite3.Connect
             yield database
             if not keep:
                 raise _TakenBack
+            store._note(**content_of(database)._asdict())  # before trials are gone
     except _TakenBack:
         pass
     except sqlite3.Error as err:

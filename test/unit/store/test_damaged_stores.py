@@ -279,20 +279,73 @@ def test_a_store_of_an_earlier_program_is_read(tmp_path, left):
     assert seen(there) == [(4, 3)] * 2
 
 
-def test_trials_that_are_removed_are_not_missed(tmp_path):
-    from smach_oracle.store.retention import Retention
+PRUNES = (
+    'import os, sys\n'
+    'from smach_oracle.store.retention import Retention\n'
+    'from smach_oracle.store.store_file import StoreFile\n'
+    'store = StoreFile(sys.argv[1])\n'
+    'StoreFile.compact = StoreFile.compact if sys.argv[2] == "whole" else '
+    'lambda store: os.kill(os.getpid(), 9)\n'
+    'retention = Retention(store, days=1.0)\n'
+    'retention.plan(1e9)\n'
+    'assert len(retention.going) == 3\n'
+    'retention.drop()\n'
+    'store.close()\n')
+
+
+def ended(store, name, machine='TASK'):
+    trial = store.begin_trial(NewTrial(machine, name, ('id', '{}'), 5.0))
+    store.add(trial, [moment(0), moment(1)])
+    store.end_trial(trial, 6.0, 'succeeded')
+
+
+def prune(path, way):
+    code = [sys.executable, '-c', PRUNES, path, way]
+    assert subprocess.run(code, env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)),
+                          check=False).returncode == (0 if way == 'whole' else -signal.SIGKILL)
+
+
+@pytest.mark.parametrize('way', ['whole', 'killed'])
+def test_trials_that_are_removed_are_not_missed(tmp_path, way):
     there = str(tmp_path / 'robot.db')
     store = StoreFile(there)
-    for name in ('abc', 'def'):
-        trial = store.begin_trial(NewTrial('TASK', name, ('id', '{}'), 5.0))
-        store.add(trial, [moment(0), moment(1)])
-        store.end_trial(trial, 6.0, 'succeeded')
-    retention = Retention(store, days=1.0)
-    retention.plan(1e9)
-    retention.drop()
+    for name in 'abc':
+        ended(store, name)
     store.close()
+    prune(there, way)
     again = StoreFile(there)
     assert again.trials() == []
+    again.close()
+
+
+@pytest.mark.parametrize('then', ['', 'add', 'end', 'begin'])
+@pytest.mark.parametrize('is_killed', [True, False])
+def test_trials_that_another_program_removes_meanwhile_are_not_missed(tmp_path, then, is_killed):
+    """Also where the last moments and trials were among them."""
+    there = str(tmp_path / 'robot.db')
+    ended(StoreFile(there), 'first')
+    child = os.fork()
+    if not child:
+        store = StoreFile(there)
+        trial = store.begin_trial(NewTrial('OTHER', 'runs', ('id', '{}'), 5.0))
+        store.add(trial, [moment(0)])
+        second = StoreFile(there)
+        ended(second, 'second')
+        ended(second, 'third')
+        prune(there, 'whole')
+        if then == 'add':
+            store.add(trial, [moment(1)])
+        elif then == 'end':
+            store.end_trial(trial, 1e9, 'succeeded')
+        elif then == 'begin':
+            store.begin_trial(NewTrial('OTHER', 'next', ('id', '{}'), 5.0))
+        second.close()
+        if not is_killed:
+            store.close()
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    again = StoreFile(there)
+    assert [each.trial_id for each in again.trials()][:1] == ['runs']
     again.close()
 
 
@@ -312,5 +365,3 @@ def test_programs_that_open_and_close_one_store_at_once_find_no_damage(tmp_path)
     store = StoreFile(there)
     assert len(store.trials()) == 45
     store.close()
-
-
