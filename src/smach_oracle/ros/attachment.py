@@ -48,6 +48,7 @@ from .parameters import private_flag, private_names, private_number, private_tex
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
+from .shutdown import ShutdownGuard
 from .stored import prepare_store
 from .waiting.service_waiting import ServiceWaiting
 
@@ -70,6 +71,11 @@ class _RecordingPlan(NamedTuple):
     keep: Limits = NO_LIMITS
 
 
+class _BegunTrial(NamedTuple):
+    machine: OracleContainer
+    thread: int
+
+
 class Attachments:
     """The attachments of one process."""
 
@@ -78,10 +84,8 @@ class Attachments:
         # a top-level machine executes within it: what becomes of an error that it begins with
         self.refusing: Callable[[], ContextManager[object]] = nullcontext
         self._lock = threading.RLock()
-        # all that ever ran
-        self._machines: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
-        self._trials: List[OracleContainer] = []  # within execute, their last events included
-        # those of them that are attached to the node
+        self._trials: List[_BegunTrial] = []  # from before they begin to after their last events
+        # the machines that are attached to the node
         self._on_ros: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
         # our servers, by path. Each holds its machine
         self._introspection: Dict[str, IntrospectionServer] = {}
@@ -96,19 +100,17 @@ class Attachments:
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
         self._node_started = False
-        # called when the last trial that ran has ended
-        self.trials_ended: Callable[[], None] = _nothing
+        self.guard: Optional[ShutdownGuard] = None  # its signals wait for the trials
         self.has_parents_node = False  # a forked child cannot use it
         in_child(self._let_go)
 
     def _let_go(self) -> None:
         """Leave a child without what its parent has, and the node to its parent."""
         self.options, self._recorder, self._recorder_wanted = RecordingOptions(), None, True
-        self.refusing, self.trials_ended = nullcontext, _nothing
+        self.refusing, self.guard = nullcontext, None
         self._lock = threading.RLock()
         for server in self._introspection.values():
             server.leave_to_parent()
-        self._machines.clear()
         self._on_ros.clear()
         self._introspection.clear()
         self._shown.clear()
@@ -123,22 +125,36 @@ class Attachments:
 
     @contextmanager
     def trial(self, machine: OracleContainer) -> Iterator[None]:
-        """Keep the bags open until the trial has told its end."""
-        self._trials.append(machine)
+        """Keep the bags open until the trial has told its end.
+
+        While the handler of a signal waits, none begins, except within a state of one that runs.
+        """
+        trial = _BegunTrial(machine, threading.get_ident())
+        is_inner = any(each.thread == trial.thread for each in list(self._trials))
+        self._trials.append(trial)  # first: a signal from here on preempts it
         try:
+            if not is_inner and self.guard is not None and self.guard.holds():
+                self._leave(trial)
+                self.guard.wait_for_handler()
+                self._trials.append(trial)
             yield
         finally:
-            remove_identical(self._trials, machine)
-            if not self._trials:
-                self.trials_ended()
+            self._leave(trial)
+            if not is_inner and self.guard is not None and (
+                    threading.current_thread() is threading.main_thread()):
+                self.guard.wait_for_handler()  # others may still run
+
+    def _leave(self, trial: _BegunTrial) -> None:
+        if remove_identical(self._trials, trial) and not self._trials and self.guard is not None:
+            self.guard.trials_ended()
 
     def after_preempt_s(self) -> float:
         """Return for how long the machines that run may go on after they are preempted.
 
         It takes no lock: a signal's handler asks.
         """
-        return max((oracle_of(machine).settings.after_preempt_s for machine in list(self._trials)),
-                   default=0.0)
+        return max((oracle_of(each.machine).settings.after_preempt_s
+                    for each in list(self._trials)), default=0.0)
 
     def attach(self, machine: OracleContainer) -> None:
         """Attach a top-level machine. It does nothing the second time.
@@ -150,7 +166,6 @@ class Attachments:
         if self.has(machine):
             return
         with self._lock:
-            self._machines[machine] = True
             node = rospy.core.is_initialized() and not rospy.core.is_shutdown_requested()
             plan = self._plan_recording(node)  # first, since it may raise
             if oracle_of(machine).settings.checkpoint:
@@ -182,13 +197,14 @@ class Attachments:
                 self._introspection.pop(path).stop()
 
     def preempt(self) -> None:
-        """Ask every machine that runs to stop, as the process goes down.
+        """Ask every machine that runs, or is about to, to stop, as the process goes down.
 
         Its question, if any, is taken back with it. It is open again where the trial is stored.
         """
-        for machine in self._running():
+        machines = [each.machine for each in list(self._trials)]
+        for machine in machines:
             oracle_of(machine).note_shutdown()
-        for machine in self._running():
+        for machine in machines:
             machine.request_preempt()
 
     def close(self, timeout_s: float) -> None:
@@ -196,9 +212,6 @@ class Attachments:
         recorder = self._recorder
         if recorder is not None:
             recorder.close(timeout_s)
-
-    def _running(self) -> List[OracleContainer]:
-        return [machine for machine in self._machines if machine.is_running()]
 
     def _start_node(self) -> None:
         if self._node_started:
@@ -306,10 +319,6 @@ class Attachments:
         while self._trials and time.monotonic() < until:
             time.sleep(0.02)
         self.close(CLOSE_S)
-
-
-def _nothing() -> None:
-    """Nobody waits for the end of the trials."""
 
 
 def leave_node_to_parent() -> None:

@@ -110,6 +110,17 @@ class ShutdownGuard:
         if threading.current_thread() is not threading.main_thread():
             self._handled.wait(self._limit_s)
 
+    def holds(self) -> bool:
+        """Whether a signal has come whose handler waits for trials, or runs now."""
+        return bool(self._hold_s) and not self._handled.is_set()
+
+    def wait_for_handler(self) -> None:
+        """Wait until the handler has run, where it waits for trials. Others may still run."""
+        if self.holds():
+            self._no_hold.wait()
+            if self._held is not None:
+                self._handled.wait(self._limit_s)
+
     def _listen(self, ear: SignalEar) -> None:
         while True:
             for number in ear.wait():

@@ -38,6 +38,11 @@ class Stow(smach.State):
         if how == 'for_ever':
             while not self.preempt_requested():
                 time.sleep(0.01)
+        if how == 'by_a_machine':
+            arm = smach.StateMachine(outcomes=['done'])
+            with arm:
+                smach.StateMachine.add('BESIDE', Beside())
+            arm.execute()
         time.sleep(0.3)  # an arm takes a while
         say('stowed')
         return 'stowed'
@@ -50,6 +55,37 @@ def run():
             smach.StateMachine.add('STOW', Stow())
         smach.StateMachine.add('INNER', inner)
     say(str(top.execute()))
+class Beside(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['done'])
+    def execute(self, userdata):
+        say('beside')
+        # the longer one does not look at its preempt, and lasts longer than the arm takes
+        time.sleep(1.0 if how == 'beside_long' else 0.05)
+        return 'done'
+if how == 'resuming':
+    from smach_oracle.oracle.checkpoint import resuming
+    def end_goals(top, resumption):
+        say('resuming')
+        while not resuming.must_stop(top):
+            time.sleep(0.01)
+    resuming._end_goals = end_goals  # as with a server that is not there
+if how == 'beginning':
+    from smach_oracle.oracle.execution import trial
+    open_store = trial.open_store
+    def on_a_slow_disk(node):
+        say('beginning')
+        time.sleep(1.0)
+        return open_store(node)
+    trial.open_store = on_a_slow_disk
+if how.startswith('beside'):
+    def go_on():
+        while True:
+            top = smach.StateMachine(outcomes=['done'])
+            with top:
+                smach.StateMachine.add('BESIDE', Beside())
+            top.execute()
+    threading.Thread(target=go_on, daemon=True).start()
 if how == 'in_a_thread':
     thread = threading.Thread(target=run)
     thread.start()
@@ -72,7 +108,14 @@ class Program:
             [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', 'task.py', how],
             cwd=str(folder), env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             universal_newlines=True)
-        self.says('working')
+        self.reads(how if how in ('beginning', 'resuming') else 'working')
+
+    def reads(self, text):
+        """Wait until it says something. Machines of other threads may say something before."""
+        for line in self.process.stdout:
+            if line.strip() == text:
+                return
+        raise AssertionError('it has not said {}: {}'.format(text, self.process.stderr.read()))
 
     def says(self, text):
         assert self.process.stdout.readline().strip() == text
@@ -105,6 +148,47 @@ def test_what_is_behind_the_preempt_runs_before_the_signal_ends_the_script(progr
     assert (output, ended) == (['stowing', 'stowed'], code)
     assert ('KeyboardInterrupt' in errors) == (number == signal.SIGINT)
     assert 'shutdown.py' not in errors
+
+
+def test_a_signal_while_a_trial_begins_preempts_its_first_state(program):
+    running = program('beginning', 'after_preempt_s: 5')
+    running.process.send_signal(signal.SIGINT)
+    output, code, _, took_s = running.rest()
+    assert (output, code) == (['working', 'stowing', 'stowed'], -2)
+    assert took_s < 5
+
+
+def test_a_signal_while_a_trial_resumes_preempts_it(program):
+    stored = 'checkpoint: store, on_resume: recover, after_preempt_s: 5'
+    killed = program('', '{' + stored + '}')
+    killed.process.kill()
+    killed.process.wait()
+    running = program('resuming', '{' + stored + '}')
+    running.process.send_signal(signal.SIGINT)
+    output, _, _, took_s = running.rest()
+    assert 'working' not in output and took_s < 5
+
+
+def test_no_trial_of_another_thread_begins_meanwhile(program):
+    running = program('beside')
+    running.process.send_signal(signal.SIGINT)
+    output, code, errors, _ = running.rest()
+    behind = output[output.index('stowing'):output.index('stowed')]
+    assert behind.count('beside') <= 1, 'one may have begun before the signal'
+    assert output.count('stowed') == 1 and code == -2 and 'KeyboardInterrupt' in errors
+
+
+def test_the_script_goes_on_only_once_the_machines_of_all_threads_have_ended(program):
+    running = program('beside_long')
+    running.process.send_signal(signal.SIGINT)
+    output, code, errors, _ = running.rest()
+    assert output.count('stowed') == 1 and code == -2 and 'KeyboardInterrupt' in errors
+
+
+def test_a_state_behind_the_preempt_may_execute_a_machine_itself(program):
+    running = program('by_a_machine')
+    running.process.send_signal(signal.SIGINT)
+    assert running.rest()[:2] == (['stowing', 'beside', 'stowed'], -2)
 
 
 @pytest.mark.parametrize('settings', ['{}', 'after_preempt_s: 0'])

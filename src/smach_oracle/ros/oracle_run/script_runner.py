@@ -376,7 +376,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     guard.install()
     atexit.register(attachments.close, 1.0)
     refusal = Refusal(guard, tell)
-    attachments.refusing, attachments.trials_ended = refusal.of_errors, guard.trials_ended
+    attachments.refusing, attachments.guard = refusal.of_errors, guard
     Interception(MachineWrapper(invocation, refusal)).install()
     with refusal.decides_exit_code():
         run_script(invocation.script, invocation.script_args)
