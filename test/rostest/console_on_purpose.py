@@ -74,6 +74,42 @@ TAKEN = OF_A_QUESTION % '''
   await detail.claim("take_over");
   said("bob");
   return [said("ann"), said("carl")];'''
+# a press that was not meant opens another question than the one that is worked on: what was told
+# then, after the way back, and once the other one has been seen; which one the others are told that
+# it is; and what is still typed
+ANOTHER_BY_ACCIDENT = OF_A_QUESTION % '''
+  const { questions } = await import("/static/js/questions/question_panel.js");
+  const panel = questions.create(app);
+  document.body.append(panel.root);
+  let viewed = "";
+  app.connection.request = (name, about) => {
+    if (name === "view") viewed = about.question;
+    return request(name);
+  };
+  const list = ["a", "b"].map((key) => ({ ...question, key, holder: "", status: "pending" }));
+  store.receive({ now: 0, sections: { questions: list } });
+  panel.update(["questions"]);
+  const sent = () => told.filter((name) => name !== "view").join();
+  const press = (key) => panel.queue.querySelector(`[data-key=${key}]`).click();
+  const typed = () => panel.stage.querySelector(".why").value;
+  panel.choose("a", true);
+  for (let turn = 0; turn < 9; turn += 1) await null; // the replies are there, and no time is over
+  panel.stage.querySelector(".why").value = "the mug lies";
+  press("b");
+  const seen = [sent(), panel.detail.key];
+  press("a");
+  seen.push(sent(), panel.detail.key, typed());
+  await new Promise((done) => setTimeout(done, 1000)); // longer than 0.7 s
+  seen.push(sent());
+  press("b");
+  await new Promise((done) => setTimeout(done, 1500)); // others are told within 1 s
+  seen.push(sent(), panel.detail.key, viewed);
+  press("a");
+  seen.push(typed());
+  panel.close();
+  app.current = "";
+  panel.root.remove();
+  return seen;'''
 # "No, go back" from giving up a container above that may end as the failed one may
 GO_BACK = '''
 return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
@@ -278,6 +314,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(mine, 'It is yours. Leave it to others')
         self.assertIn('carl has taken this question over.', taken)
         self.assertEqual(browser.run(GO_BACK), 'TOP', 'the focus is where it was')
+        self.assertEqual(browser.run(ANOTHER_BY_ACCIDENT), [
+            'claim', 'b', 'claim', 'a', 'the mug lies', 'claim', 'claim,release,claim', 'b', 'b',
+            ''])
         waits = 'It waits until somebody lets it go on.'
         self.assertEqual(browser.run(HELD), [waits, 'gone', waits])
         ends = 'Paused by ann. Runs to its end: PICK in TOP.'

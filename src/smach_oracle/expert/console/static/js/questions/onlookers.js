@@ -24,7 +24,7 @@ export class Onlookers {
   /** Tell the others that this page shows the question. */
   look() { this.tell(this.key); }
 
-  leave() { this.tell(''); }
+  leave() { if (wanted === this.key) this.tell(''); }
 
   /** @param {string} question */
   tell(question) {

@@ -143,11 +143,16 @@ export class QuestionDetail {
     if (this.held && !this.settled) this.release();
     this.ended = true;
     this.onlookers.leave();
-    this.form.cancel();
+    this.pause();
     this.camera.stop();
     if (this.perceptionPanel) this.perceptionPanel.stop();
-    if (this.interfacePanel) this.interfacePanel.stop();
     if (this.followUp) this.followUp.stop();
+  }
+
+  /** Nothing is about to be sent, and no hand is driven, while nobody sees it. */
+  pause() {
+    this.form.cancel();
+    this.endInterface();
   }
 
   release() {

@@ -1,6 +1,6 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
-import { wasMeant } from '../page/deliberate.js';
+import { SETTLING_MS, wasMeant } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
@@ -27,6 +27,9 @@ class QuestionPanel {
     this.app = app;
     /** @type {QuestionDetail | null} */
     this.detail = null;
+    /** @type {QuestionDetail | null} */
+    this.aside = null; // still held: what took its place may have been opened by accident
+    this.asideTimer = 0;
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
@@ -134,13 +137,34 @@ class QuestionPanel {
   choose(key, meant) {
     const question = this.open.find((each) => each.key === key);
     if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
-    this.close();
-    this.detail = new QuestionDetail(this.app, question,
+    const back = this.aside?.key === key ? this.aside : null;
+    if (back) this.aside = null;
+    if (!meant && this.detail?.held && !this.detail.settled) this.putAside(this.detail);
+    else this.close();
+    this.detail = back || new QuestionDetail(this.app, question,
       { leave: () => this.leave(), choose: (...next) => this.choose(...next) });
     this.showStage();
     this.showQueue();
     moveFocus(this.detail.title);
     this.detail.begin(meant); // may ask for a name, which takes the focus
+    if (back) back.update(['questions', 'images']); // what it has missed
+  }
+
+  /**
+   * Let it go once the other one has been seen. Until then the person can go back to it.
+   * @param {QuestionDetail} detail
+   */
+  putAside(detail) {
+    this.endAside();
+    detail.pause();
+    this.aside = detail;
+    this.asideTimer = setTimeout(() => this.endAside(), SETTLING_MS);
+  }
+
+  endAside() {
+    clearTimeout(this.asideTimer);
+    if (this.aside) this.aside.end();
+    this.aside = null;
   }
 
   /** Back to the list, as a person wants it: the focus goes to its first question. */
