@@ -1,6 +1,7 @@
 """Machines that have one rates file, in one process and in several."""
 import json
 import os
+import signal
 import stat
 import subprocess
 import sys
@@ -105,6 +106,20 @@ def test_a_file_that_others_hold_stops_no_machine(tmp_path, monkeypatch, log):
     assert not path.exists()
     task.run()
     assert learned(path, 'TASK') == (2, 1)
+
+
+def test_a_child_that_is_forked_meanwhile_does_not_keep_the_lock(tmp_path, monkeypatch):
+    monkeypatch.setattr(lock_module, 'WAIT_S', 0.05)
+    with folder_lock(str(tmp_path)):
+        child = os.fork()
+        if not child:
+            signal.pause()
+    try:
+        with folder_lock(str(tmp_path)):
+            assert os.waitpid(child, os.WNOHANG) == (0, 0), 'it lives'
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
 
 
 def test_a_link_leads_to_one_file(tmp_path):

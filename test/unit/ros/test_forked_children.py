@@ -110,6 +110,24 @@ def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(s
         program.stdout.close()
 
 
+def test_the_log_says_once_that_a_child_begins_its_machines_without_an_oracle(script):
+    path = script("""
+        def work():
+            for _ in range(2):
+                top = smach.StateMachine(outcomes=['succeeded'])
+                with top:
+                    smach.StateMachine.add('ONE', smach.CBState(
+                        lambda userdata: 'succeeded', outcomes=['succeeded']))
+                said(top.execute())
+        child = multiprocessing.get_context('fork').Process(target=work)
+        child.start()
+        child.join()
+        """)
+    ended = run('-c', RUNNER, path)
+    assert said(ended) == (['SAID succeeded'] * 2, 0)
+    assert (ended.stdout + ended.stderr).count('without an oracle there') == 1
+
+
 def can_lock(file):
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -23,6 +23,8 @@ def folder_lock(folder: str) -> Iterator[None]:
         _lock(descriptor, folder, time.monotonic() + WAIT_S)
         yield
     finally:
+        with contextlib.suppress(OSError):  # there may be no locks
+            fcntl.flock(descriptor, fcntl.LOCK_UN)  # a child forked meanwhile has it open, too
         os.close(descriptor)
 
 

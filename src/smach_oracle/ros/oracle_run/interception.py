@@ -31,6 +31,7 @@ class Interception:
     def __init__(self, wrap: WrapFunction) -> None:
         self._wrap = wrap
         self._process = os.getpid()  # in a child of it machines stay as they are
+        self._told_in = self._process
         self._left_bare: WeakIdentityMap[smach.StateMachine, bool] = WeakIdentityMap()
         self._lock = threading.RLock()  # machines may start in several threads at once
 
@@ -45,7 +46,13 @@ class Interception:
 
         :returns: whether it was wrapped just now.
         """
-        if isinstance(machine, OracleContainer) or os.getpid() != self._process:
+        if isinstance(machine, OracleContainer):
+            return False
+        if os.getpid() != self._process:
+            if self._told_in != os.getpid():
+                self._told_in = os.getpid()
+                smach.logwarn('a machine runs in a child process of the program, and without an '
+                              'oracle there')
             return False
         with self._lock:
             if machine in self._left_bare:
