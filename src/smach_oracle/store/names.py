@@ -15,3 +15,4 @@ MOVED = 'moved'  # the state at which it stands is in another container now
 # kinds of moments that are no events: made by hand, and the last one of a part of a trial that is
 # kept, as nobody has said how it goes on, and the last one of a part that was not stored to its end
 EDIT, KEPT, BROKEN = 'EDIT', 'KEPT', 'BROKEN'
+ANSWERED = 'QUERY_ANSWERED'  # the kind of one that is an event: a person has decided

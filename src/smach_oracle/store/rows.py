@@ -1,7 +1,8 @@
 """The rows of a store, as plain tuples: those to write, and those that were read."""
-from typing import NamedTuple, Optional, Tuple
+from typing import Iterable, NamedTuple, Optional, Tuple
 
 from .codecs import Encoded
+from .names import ANSWERED, BROKEN
 
 
 class Fact(NamedTuple):
@@ -51,6 +52,12 @@ class StoredMoment(NamedTuple):
     path: str
     label: str
     after: Optional[int] = None  # the one that it follows, where that is not the one before it
+
+
+def is_in_doubt(moments: Iterable[StoredMoment]) -> bool:
+    """Whether states may have run in a trial that are not stored, and nobody has answered since."""
+    told = [each.kind for each in moments if each.kind in (BROKEN, ANSWERED)]
+    return told[-1:] == [BROKEN]
 
 
 class StoredValue(NamedTuple):

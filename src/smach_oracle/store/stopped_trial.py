@@ -11,7 +11,6 @@ from .names import (
     ASKED,
     AT,
     BEFORE,
-    BROKEN,
     EDIT,
     ENDED,
     FAILED,
@@ -26,7 +25,7 @@ from .names import (
     STRUCTURE,
 )
 from .renaming import containers_of, states_of
-from .rows import Fact, NewMoment, StoredTrial, StoredValue
+from .rows import Fact, NewMoment, StoredTrial, StoredValue, is_in_doubt
 from .store_file import StoreFile
 
 DROPPED = 'dropped'  # in place of the outcome of a trial that somebody has dropped
@@ -129,8 +128,8 @@ class StoppedTrial:
         return self._last_kind() == KEPT
 
     def is_broken(self) -> bool:
-        """Whether a fault of the store kept the program from storing the trial to its end."""
-        return self._last_kind() == BROKEN
+        """Whether states may have run that are not stored, and nobody has answered since."""
+        return is_in_doubt(self._store.moments(self.trial.number))
 
     def _last_kind(self) -> str:
         moments = self._store.moments(self.trial.number)

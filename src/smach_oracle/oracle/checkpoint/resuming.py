@@ -41,6 +41,7 @@ class Resumption(NamedTuple):
     changes: List[str]  # how the script differs from the one that was stopped
     marks: Marks = {}  # of the states that have begun
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
+    is_in_doubt: bool = False  # whether states may have run that are not stored
     is_earlier: bool = False  # whether later moments of the trial are stored
     renamed: Mapping[str, str] = {}  # paths of states by those that they had
     structure: str = ''  # id of that which was stopped
@@ -174,7 +175,8 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
                 record.go_on(told['counts'], told['longest_s'])
         if stored.history:
             node.records.history.take_over([], 0, _of_states(node, stored.history))
-    top.tree.go_on_counting(take_over_marks(nodes, resumption.marks), resumption.tree.whole)
+    latest = take_over_marks(nodes, resumption.marks, resumption.is_in_doubt)
+    top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
     stood = resumption.tree.container(top.key)
     way = _way_named(top, resumption.begins_at) if resumption.begins_at else None
@@ -187,7 +189,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     let_repeat(top, top.settings.resume_repeat, stood.sent)
     if resumption.begins_at and way is not None:
         top.resuming = EntryPoint(stood, way.down[1:])
-        _hold_back(way.down)
+        _Setting(resumption, nodes).ask_at(way.down)
     else:
         _Setting(resumption, nodes).set_container(top)
 
@@ -203,14 +205,6 @@ def _way_named(top: TreeNode, path: str) -> Way:
         raise SettingsError('on_resume', 'state:' + path, 'the label of a state of {}, or the path '
                             'of one below it'.format(top.path))
     return way
-
-
-def _hold_back(places: Sequence[Place]) -> None:
-    """Have a person asked at states that are not to come again. Without an answer it is kept."""
-    for record, node in ((each.node.record(each.label), each.node) for each in places):
-        why = why_held_back(node, record)
-        if why and node.tree.numbers_visits:
-            record.resume(Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True))
 
 
 class _Setting:
@@ -242,10 +236,8 @@ class _Setting:
             record.resume(self._unfinished(node, stored))
         elif stored.phase == IN:
             self._go_on_in(node, stored, record)
-        elif self._resumption.asks:
-            self._ask_before(node, stored.label)
         else:
-            _hold_back([Place(node, stored.label)])
+            self.ask_at([Place(node, stored.label)])
         return True
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
@@ -345,12 +337,20 @@ class _Setting:
         node.record(label).resume(Unfinished(
             FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption), keeps=True))
 
+    def ask_at(self, down: Sequence[Place]) -> None:
+        """Have a person asked at states that are not to come again, or where nothing is to move."""
+        for node, label in down:
+            why = why_held_back(node, node.record(label))
+            if why and node.tree.numbers_visits:
+                node.record(label).resume(
+                    Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True))
+        self._ask_before(*down[-1])
+
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
         if self._resumption.asks and label in node.machine._states:
-            node.record(label).resume(
-                Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption),
-                           keeps=True))
+            node.record(label).resume(Unfinished(
+                FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption), keeps=True))
 
     def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
         is_open = node.record(stored.label).open_question

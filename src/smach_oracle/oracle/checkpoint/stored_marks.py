@@ -10,8 +10,9 @@ import smach
 from ..errors import SettingsError
 from ..machine.repeats import begin_once_more
 from ..machine.tree_node import TreeNode
-from ..places.place import place_named
+from ..places.place import Place, place_named
 from ..records.visit_marks import VisitMark
+from ..settings.settings import ALLOW
 from .stored_container import StoredContainer
 from .stored_tree import StoredTree
 
@@ -69,14 +70,22 @@ def _joined(one: VisitMark, other: VisitMark) -> VisitMark:
     return one
 
 
-def take_over_marks(nodes: Sequence[TreeNode], marks: Marks) -> int:
-    """Have the marks of a stored trial, and return the number of the latest visit."""
+def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> int:
+    """Have the marks of a stored trial, and return the number of the latest visit.
+
+    `in_doubt`: any guarded state may have run that the store does not know of.
+    """
     by_key = {node.key: node for node in nodes}
     for (path, label), mark in marks.items():
         node = by_key.get(path)
         if node is not None and (mark.done or mark.reached) and label in node.labels():
             node.record(label)  # of a state that only a precondition has run, too
             node.records.marks.take_over(label, mark)
+    for place in (Place(node, label) for node in nodes if in_doubt for label in node.labels()):
+        if place.node.settings_of(place.label).on_retry != ALLOW:
+            place.node.record(place.label)
+            unknown = place.node.records.marks.of(place.label)
+            unknown.done = unknown.spent = True
     return max((max(mark.reached, mark.executed) for mark in marks.values()), default=0)
 
 

@@ -8,8 +8,8 @@ from typing import Callable, List, Optional, Set, Tuple, TypeVar
 import smach
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
-from smach_oracle.store.rows import Fact, StoredTrial
+from smach_oracle.store.names import ENDED, GOAL, KEPT, RENAMED, STRUCTURE
+from smach_oracle.store.rows import Fact, StoredMoment, StoredTrial, is_in_doubt
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
@@ -83,8 +83,10 @@ class TrialStore:
         top = tree.container(self._top.key)
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
+        moments = self._store.moments(last.number)
         # before its first state nothing had run, but nothing is to move without being asked either
-        is_over = top.phase == ENDED or word == RESTART or (not top.phase and word != ASK)
+        is_over = top.phase == ENDED or word == RESTART or not (
+            top.phase or word == ASK or is_in_doubt(moments))
         if not earlier and is_over:
             if top.phase != ENDED:
                 smach.logwarn(BEGINS_ANEW.format(
@@ -93,7 +95,7 @@ class TrialStore:
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
             return None
-        resumed = self._resumption(last, tree, word == ASK, earlier)
+        resumed = self._resumption(last, tree, moments, earlier)
         if resumed.renamed:
             self._store.keep_structure(self._structure)
         return resumed if earlier else resumed._replace(begins_at=path)
@@ -118,12 +120,11 @@ class TrialStore:
         _used.add(used)
         return number
 
-    def _resumption(self, trial: StoredTrial, tree: StoredTree, asks: bool,
+    def _resumption(self, trial: StoredTrial, tree: StoredTree, moments: List[StoredMoment],
                     earlier: int = 0) -> Resumption:
         """Return how a trial goes on. `tree`: what its last moment says."""
-        moments = self._store.moments(trial.number)
-        is_broken = moments[-1].kind == BROKEN and not earlier
-        if is_broken:
+        in_doubt = is_in_doubt(moments)
+        if in_doubt:
             smach.logwarn(NOT_STORED.format(self._top.path, self._store.path))
         latest = tree
         # what runs elsewhere, and what was asked, has not become undone
@@ -139,9 +140,9 @@ class TrialStore:
         tree.whole.update(kept)
         return Resumption(trial, tree, earlier or moments[-1].number,
                           max(each.seq for each in moments), moments[-1].at,
-                          asks or is_broken or bool(
+                          self._top.settings.on_resume[0] == ASK or in_doubt or bool(
                               changed.changes and changed.renaming is None),
-                          changed.changes, marks=marks,
+                          changed.changes, marks=marks, is_in_doubt=in_doubt,
                           is_earlier=bool(earlier), renamed=changed.names,
                           structure=changed.before)
 

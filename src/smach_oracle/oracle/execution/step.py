@@ -247,6 +247,9 @@ class Step:
         if stopping:
             recall_preempts(self._machine._states[record.label])  # it services none
             return self._end_unrecovered(self._preempted_ending(failure), failure)
+        if node.tree.is_resumed:  # nobody has said whether it was done before the program stopped
+            return ResumedVisit(node, record, failure, Unfinished(
+                failure.kind, '', failure.text, failure.text)).run(self._context(), False)
         return OracleVisit(node, record, failure).run(self._context(), False)
 
     def _unfinished(self, failure: Failure, before: Unfinished) -> Optional[str]:
