@@ -8,6 +8,8 @@ import sys
 import threading
 
 import pytest
+from killed_machines import KilledMachine
+from killed_trees import flat
 from machines import Scripted, Watched, chain_of
 
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
@@ -197,6 +199,17 @@ def test_threads_of_one_process_lose_nothing(tmp_path):
     for each in threads:
         each.join(60)
     assert learned(path, 'TASK') == (3, 6)
+
+
+def test_a_machine_that_goes_on_keeps_what_others_have_learned_meanwhile(tmp_path):
+    """The file did not know the state when the program that was killed began."""
+    path = tmp_path / 'rates.json'
+    killed = KilledMachine(tmp_path, flat, rates_file=str(path))
+    assert killed.run(kill_at=4) is None
+    machine(path, 'TOP', ['aborted']).run()
+    assert learned(path, 'TOP') == (1, 1)
+    assert killed.run()['outcome'] == 'succeeded'
+    assert learned(path, 'TOP')[0] >= 1 and learned(path, 'TOP')[1] == 1
 
 
 def estimator(kind, results, memory=5):

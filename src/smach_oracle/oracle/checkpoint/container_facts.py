@@ -57,12 +57,9 @@ class ContainerFacts:
         yield from self.changed(list(self._node.records.by_label))
 
     def _of_state(self, record: StateRecord) -> Dict[str, Any]:
-        told = {'learned': record.learned(), 'counts': [
+        return {'learned': record.learned(), 'counts': [
             record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
-                'longest_s': record.longest_s}
-        if record.shared:
-            told['shared'] = record.shared
-        return told
+                'longest_s': record.longest_s, 'shared': record.shared}
 
     def marks(self) -> Iterator[Fact]:
         """Yield what is new of the states that have begun: a jump changes marks of many at once."""
