@@ -38,6 +38,10 @@ class SettingsError(OracleError, ValueError):
         return SettingsError('{}: {}'.format(origin, self.key), self.value, self.allowed, text,
                              self._problem)
 
+    def allowing(self, more: str) -> 'SettingsError':
+        """Return the same error with more that is allowed."""
+        return SettingsError(self.key, self.value, self.allowed + more, self._text, self._problem)
+
 
 class AnswerError(OracleError, ValueError):
     """An expert's answer does not fit its question. The text says what would."""

@@ -100,6 +100,43 @@ def test_a_state_of_a_machine_in_a_module_beside_the_script_is_known(run, tmp_pa
     assert (code, out.count('STATE RUNS')) == (0, 2), errors
 
 
+LABELS = """import enum
+Step = enum.Enum('Step', 'POUR WIPE')
+class Place(enum.Enum):
+    TABLE = 1
+class Fetch: pass
+PLAIN = 'PICK'
+WORDS = 'LIFT-IT PUT-IT'.split()
+JOINED = '_'.join(['LOOK', 'LEFT'])
+TURNED = 'NEPO'[::-1]  # OPEN
+"""
+
+
+def test_a_label_is_known_that_stands_in_any_way_in_a_source(run, tmp_path):
+    (tmp_path / 'labels.py').write_text(LABELS)  # it does not name SMACH
+    settings = 'states: {%s}' % ', '.join(label + ': {on_retry: never}' for label in (
+        'POUR', 'TABLE', 'Fetch', 'PICK', 'PUT-IT', 'LOOK_LEFT', 'OPEN'))
+    text = """
+        import sys, labels
+        machine('HOME').execute()
+        if sys.argv[1:]:
+            machine(labels.Step.POUR.name).execute()
+    """
+    code, out, errors = run(settings, text)
+    assert (code, out.count('STATE RUNS')) == (0, 1), errors
+    code, report, errors = run(settings, text, '--check')
+    assert code == 0 and '7 warnings' in report, report + errors
+
+
+@pytest.mark.parametrize('option', [[], ['--check']])
+def test_the_error_says_what_to_do_for_a_label_that_no_source_can_show(run, option):
+    later = 'machine("HOME").execute()\nmachine("RUOP"[::-1]).execute()'
+    code, _, errors = run('states: {POUR: {on_retry: never}}', later.splitlines()[0], *option)
+    assert code == 2 and 'write the name somewhere in the script, for example in' in errors
+    comment = '  ' + errors.splitlines()[-1].rsplit(', ', 1)[-1]
+    assert run('states: {POUR: {on_retry: never}}', later + comment, *option)[0] == 0
+
+
 def test_a_name_that_no_reached_machine_has_but_a_source_mentions_is_a_warning(run):
     code, report, _ = run('states: {POUR: {on_retry: never}}', CHAIN + '\nNOT_MADE = "POUR"\n',
                           '--check')

@@ -5,7 +5,7 @@ import smach
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
 
-from ..reading.known_names import is_known, names_of_process
+from ..reading.known_names import is_known, names_of_process, with_way_out
 from ..reading.source_labels import is_in_sources
 
 
@@ -38,16 +38,16 @@ class CheckedNames:
 
     def mistakes(self) -> List[SettingsError]:
         """Return an error for each name that nothing has, each once."""
-        return self._errors(in_sources=False)
+        return [unfit.error if unfit.kind is UnfitKind.MISPLACED else with_way_out(unfit)
+                for unfit in self._unknown(in_sources=False)]
 
     def doubts(self) -> List[SettingsError]:
         """Return an error for each name that a source mentions, and no machine has."""
-        return self._errors(in_sources=True)
+        return [unfit.error for unfit in self._unknown(in_sources=True)]
 
-    def _errors(self, in_sources: bool) -> List[SettingsError]:
+    def _unknown(self, in_sources: bool) -> List[UnfitName]:
         found = {str(unfit.error): unfit for unfit in self._unfit if not self._is_known(unfit)}
-        return [unfit.error for unfit in found.values()
-                if in_sources is self._may_be_made(unfit)]
+        return [unfit for unfit in found.values() if in_sources is self._may_be_made(unfit)]
 
     def _is_known(self, unfit: UnfitName) -> bool:
         if unfit.kind is UnfitKind.MISPLACED:

@@ -60,7 +60,7 @@ class NameJudge:
         is_elsewhere = is_known(unfit.name, names_of_others(self._machine))
         if self._is_error(unfit, is_here) and not is_elsewhere and (
                 is_here or not is_in_sources(unfit.name)):
-            raise unfit.error
+            raise with_way_out(unfit)
         if is_here or not is_elsewhere or unfit.kind is UnfitKind.MISPLACED:
             smach.logwarn('A machine of the script: {}'.format(unfit.error))
 
@@ -69,6 +69,13 @@ class NameJudge:
             return False
         return unfit.kind is UnfitKind.MISPLACED or (
             unfit.kind is UnfitKind.PROTECTION and not is_here)
+
+
+def with_way_out(unfit: UnfitName) -> SettingsError:
+    """Return the error of a name, with what to do if a machine that is made later has it."""
+    return unfit.error.allowing(
+        ', or a name of a machine that the script makes later: then write the name somewhere in '
+        'the script, for example in a comment, # {}'.format(unfit.name))
 
 
 def is_known(name: str, names: Set[str]) -> bool:

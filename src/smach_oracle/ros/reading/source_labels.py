@@ -1,7 +1,7 @@
 """Labels in the sources of a program: those of machines that it makes later.
 
-A label of a machine that does not exist yet stands somewhere in the source, whole or as a text that
-is filled in: `'PICK'`, `f'PICK_{side}'`, `'PICK_%d' % number`, `'PICK_' + side`.
+A label of a machine that does not exist yet stands somewhere in the source, as a word or a text, or
+as a text that is filled in: `'PICK'`, `Step.PICK`, `f'PICK_{side}'`, `'PICK_' + side`.
 """
 import ast
 import os
@@ -12,6 +12,9 @@ from typing import Iterator, List, Set, Tuple
 from smach_oracle.oracle.settings.patterns import matches
 
 _OTHERS = ('smach', 'smach_ros', 'smach_oracle', 'rospy')  # no program's own machines
+# here a file that does not name SMACH has no labels
+_INSTALLED = ('/opt/ros/', '/usr/lib/python', '/usr/local/lib/python',
+              *(os.path.join(root, 'lib', 'python') for root in (sys.prefix, sys.base_prefix)))
 _FILLED = re.compile(r'\{[^{}]*\}|%[-+ #0-9.]*[a-zA-Z]')
 _ANY = '.*'
 
@@ -42,15 +45,19 @@ def _texts_of_program() -> Tuple[Set[str], Set[str]]:
         try:
             with open(path, 'rb') as stream:
                 source = stream.read()
-            tree = ast.parse(source) if b'smach' in source else None
+            if b'smach' not in source and path.startswith(_INSTALLED):
+                continue
+            texts.update(re.findall(r'\w+', source.decode('utf-8', 'replace')))
+            tree = ast.parse(source)
         except (OSError, SyntaxError, ValueError):
             continue
-        for node in ast.walk(tree) if tree is not None else ():
+        for node in ast.walk(tree):
             if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                texts.add(node.value)
+                texts.update((node.value, *node.value.split()))
             waiting += _imported_files(node, path)
             form = _form(node)
-            if re.search('[A-Za-z0-9]', form.replace(_ANY, '')) and _ANY in form:
+            if re.search('[A-Za-z0-9]', form.replace(_ANY, '')) and not isinstance(
+                    node, ast.Constant):
                 forms.add(form)
     return texts, forms
 
@@ -92,9 +99,12 @@ def _form(node: ast.AST) -> str:
     template: object = None
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
         template = getattr(node.left, 'value', None)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and (
-            node.func.attr == 'format'):
-        template = getattr(node.func.value, 'value', None)
+    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        text, verb = getattr(node.func.value, 'value', None), node.func.attr
+        if verb == 'join' and isinstance(text, str):
+            return re.escape(text).join(_form(part) for each in node.args
+                                        for part in getattr(each, 'elts', [each]))
+        template = text if verb == 'format' else None
     if not isinstance(template, str):
         return _ANY
     return _ANY.join(re.escape(part) for part in _FILLED.split(template))
