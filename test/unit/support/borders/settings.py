@@ -48,7 +48,7 @@ _MACHINE = {
     'history_length': counts, 'rates_file': texts, 'checkpoint': texts,
     'checkpoint_wait_s': seconds, 'on_resume': words('ask', 'recover', 'restart', 'state:A'),
     'resume_from': counts, 'resume_map': st.dictionaries(names, names, max_size=2),
-    'resume_repeat': lists,
+    'resume_repeat': lists, 'after_preempt_s': seconds,
     'checkpoint_synchronous': words('FULL', 'OFF'), 'oracle_label': names,
     'nested': st.one_of(flags, lists), 'health_settle_s': seconds}
 assert set(_EACH_STATE) == set(executive._STATE_CHECKS)
