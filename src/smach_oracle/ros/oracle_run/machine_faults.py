@@ -86,9 +86,11 @@ def _search(container: Any, path: str, seen: List[Any]) -> Iterator[MachineFault
         return
     seen.append(container)
     found = list(_of_kind(container, path))
-    found += [MachineFault(path, 'it has no states')
-              for _ in range(not _children(container) and not _executes_itself(container))]
-    yield from found or _own_complaints(container, path)
+    if not _children(container) and not _executes_itself(container):
+        # a state may fill another container while it runs
+        found.append(MachineFault(path, 'it has no states', is_certain=len(seen) == 1))
+    for fault in found or _own_complaints(container, path):
+        yield fault._replace(is_certain=fault.is_certain and not _executes_itself(container))
     for label, state in _children(container).items():
         if isinstance(state, smach.Container):
             yield from _search(state, '{}/{}'.format(path, label), seen)
@@ -112,7 +114,9 @@ def _of_machine(machine: Any, path: str) -> Iterator[MachineFault]:
         yield MachineFault(path, 'its initial state is {}, which is none of its states; they are '
                            '{}'.format(initial, _names(states)))
     for label, state in states.items():
-        drawn = machine._transitions[label]
+        drawn = machine._transitions.get(label)
+        if drawn is None:  # it is shown, and is no state
+            continue
         for outcome, target in drawn.items():
             why = _why_nowhere(outcome, target, path, states, outcomes)
             if why:
@@ -158,7 +162,7 @@ def _of_concurrence(concurrence: Any, path: str) -> Iterator[MachineFault]:
                 yield MachineFault(
                     '{}/{}'.format(path, label), 'the outcome map of {} waits for its outcome '
                     '{!r}, which it does not have{}; its outcomes are {}'.format(
-                        path, wanted, _close(wanted, registered), _names(registered)))
+                        path, wanted, _close(wanted, registered), _names(registered)), False)
 
 
 def _of_iterator(iterator: Any, path: str) -> Iterator[MachineFault]:
@@ -168,7 +172,7 @@ def _of_iterator(iterator: Any, path: str) -> Iterator[MachineFault]:
     for end in ends.values():
         if end not in outcomes:
             yield MachineFault(path, 'its final outcome map leads to ' + _is_none_of(
-                end, 'outcomes', outcomes))
+                end, 'outcomes', outcomes), False)
     for outcome in iterator._break_outcomes:
         if outcome not in ends and outcome not in outcomes:
             yield MachineFault(path, 'it would end in ' + _is_none_of(
