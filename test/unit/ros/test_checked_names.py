@@ -32,9 +32,9 @@ nested: [ARMM]
 on_no_answer: {goto: HOEM}
 on_resume: state:GRAPS
 resume_map: {OLD: HOEM}
-failure_outcomes: [abortde]
 states:
   GRAPS: {on_retry: confirm}
+  HOME: {failure_outcomes: [abortde]}
   ARM*/**: {memory: 3}
 interfaces:
   by_hand: {action: by_hand, states: [GRSAP]}
@@ -48,7 +48,7 @@ def test_a_check_names_every_unknown_name_in_any_setting_and_ends_with_2(run):
     for part in ("states.GRAPS: 'GRAPS' is no state (did you mean GRASP?)", "states.ARM*/**: ",
                  "nested", "on_no_answer", "on_resume", 'resume_map.OLD',
                  'interfaces.by_hand.states',
-                 "failure_outcomes: 'abortde' is no outcome (did you mean aborted?)"):
+                 "states.HOME.failure_outcomes: 'abortde' is no outcome (did you mean aborted?)"):
         assert any(part in line for line in told), (part, told)
 
 
@@ -135,6 +135,11 @@ def test_the_error_says_what_to_do_for_a_label_that_no_source_can_show(run, opti
     assert code == 2 and 'write the name somewhere in the script, for example in' in errors
     comment = '  ' + errors.splitlines()[-1].rsplit(', ', 1)[-1]
     assert run('states: {POUR: {on_retry: never}}', later + comment, *option)[0] == 0
+
+
+def test_a_general_list_of_failures_may_hold_more_than_a_machine_has(run):
+    code, report, errors = run('failure_outcomes: [aborted, timed_out]', CHAIN, '--check')
+    assert code == 0 and "failure_outcomes: 'timed_out' is no outcome" in report, errors
 
 
 def test_a_name_that_no_reached_machine_has_but_a_source_mentions_is_a_warning(run):

@@ -92,7 +92,7 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     named: List[Tuple[str, str, str, UnfitKind]] = []
     if verb == 'give_up':
         named.append(('on_no_answer', '**', target, UnfitKind.CHECKED))
-    named += [('failure_outcomes', '**', each, UnfitKind.CHECKED)
+    named += [('failure_outcomes', '**', each, UnfitKind.GENERAL)
               for each in settings.defaults.failure_outcomes]
     named += [('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
               for name, given in settings.states.items()
@@ -143,7 +143,7 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
 def _complain(node: TreeNode, unfit: UnfitName) -> None:
     if callable(node.strict):
         node.strict(unfit)
-    elif unfit.kind is UnfitKind.CHECKED:
+    elif unfit.kind in (UnfitKind.CHECKED, UnfitKind.GENERAL):
         return
     elif node.strict:
         raise unfit.error

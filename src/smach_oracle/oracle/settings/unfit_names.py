@@ -14,6 +14,8 @@ class UnfitKind(Enum):
     MISPLACED = 'a precondition is never met in the whole machine'
     # only a check of all settings reports it: it is reported when it is used, if it ever is
     CHECKED = 'a setting has no effect now'
+    # the same for a list that may serve many scripts: it is a warning there
+    GENERAL = 'an item of a list has no effect in this script'
 
 
 class UnfitName(NamedTuple):

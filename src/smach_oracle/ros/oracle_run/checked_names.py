@@ -42,7 +42,7 @@ class CheckedNames:
                 for unfit in self._unknown(in_sources=False)]
 
     def doubts(self) -> List[SettingsError]:
-        """Return an error for each name that a source mentions, and no machine has."""
+        """Return an error for each name that is no mistake, and that no machine has."""
         return [unfit.error for unfit in self._unknown(in_sources=True)]
 
     def _unknown(self, in_sources: bool) -> List[UnfitName]:
@@ -55,7 +55,8 @@ class CheckedNames:
         return is_known(unfit.name, self._known)
 
     def _may_be_made(self, unfit: UnfitName) -> bool:
-        return not is_known(unfit.name, self._known) and is_in_sources(unfit.name)
+        return not is_known(unfit.name, self._known) and (
+            unfit.kind is UnfitKind.GENERAL or is_in_sources(unfit.name))
 
 
 def _place_of(error: SettingsError) -> Tuple[str, str]:

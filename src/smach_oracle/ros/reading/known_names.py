@@ -51,7 +51,7 @@ class NameJudge:
 
         :raises SettingsError: where it is an error.
         """
-        if unfit.kind is UnfitKind.CHECKED:
+        if unfit.kind in (UnfitKind.CHECKED, UnfitKind.GENERAL):
             return
         if unfit.kind is UnfitKind.PRECONDITION:
             smach.logwarn(str(unfit.error))
