@@ -9,6 +9,9 @@ import actionlib
 import genpy
 import rospy
 
+from smach_oracle.interfaces import interface_goal
+from smach_oracle.ros.expert import server
+
 
 class Offered:
     """Handlers of services and subscribers by name, and action servers in the order of coming."""
@@ -143,5 +146,7 @@ def fake_ros() -> Iterator[Offered]:
             resolve_name=lambda name: name, get_name=lambda: '/node',
             is_shutdown=lambda: False, get_rostime=lambda: rospy.Time(7), **quiet), \
             mock.patch.object(rospy.Time, 'now', lambda: rospy.Time(7)), \
-            mock.patch.object(actionlib, 'ActionServer', action):
+            mock.patch.object(actionlib, 'ActionServer', action), \
+            mock.patch.object(interface_goal, 'QuietActionServer', action), \
+            mock.patch.object(server, 'QuietActionServer', action):
         yield offered

@@ -76,8 +76,7 @@ def _told(reply: Any) -> str:
 
 def _questions() -> Any:
     """A question server with the question q1 open."""
-    with mock.patch.object(server, 'QuietActionServer', server.actionlib.ActionServer):
-        made = server.ExpertQueryServer('~expert_query')
+    made = server.ExpertQueryServer('~expert_query')
     made._action.on_goal(FakeHandle(to_goal(make_question(), '/robot', genpy.Time(1))))
     return made
 
