@@ -82,7 +82,7 @@ def read_mark(path: str) -> Optional[Dict[str, Any]]:
         with open(path + MARK, 'rb') as stream:
             told = json.loads(stream.read(_LONGEST_MARK).decode('ascii'))
         Content(*(int(told[name]) for name in Content._fields))
-        return dict(told, log=str(told['log']), synchronous=str(told['synchronous']))
+        return dict(told, **{name: str(told[name]) for name in ('log', 'synchronous', 'boot')})
     except (OSError, ValueError, TypeError, LookupError):
         return None
 
@@ -127,13 +127,12 @@ def examined(path: str, shown: str) -> Files:
                            'it back from a copy, with the files next to it'.format(shown))
     mark = read_mark(path)
     follows = head[_MODE] == 2
-    if mark and follows and mark['log'] == CLOSED:
-        mark = None  # of a store that was there before
-    log = _stat(path + LOG)
-    size = 0 if log is None else log.st_size
-    if size >= _LOG_HEAD_BYTES:
+    has_log = _size(path + LOG) >= _LOG_HEAD_BYTES
+    if mark and follows and mark['log'] == CLOSED and (has_log or mark['boot'] == _boot()):
+        mark = None  # of a store that was there before, unless a power cut has cost the later ones
+    if has_log:
         _check_log(path, shown, follows, mark)
-    return Files(True, follows and size < _LOG_HEAD_BYTES, mark)
+    return Files(True, follows and not has_log, mark)
 
 
 def _check_nothing_is_left(path: str, shown: str, is_empty: bool) -> None:

@@ -226,6 +226,35 @@ def test_what_a_power_cut_may_cost_is_no_damage_where_the_setting_allows_it(tmp_
         assert all(isinstance(each, str) for each in seen(there)) == is_lost
 
 
+@pytest.mark.parametrize('synchronous', ['FULL', 'NORMAL'])
+@pytest.mark.parametrize('is_same_boot', [False, True])
+def test_a_log_that_never_came_to_the_disk_is_no_damage_after_a_power_cut(
+        tmp_path, synchronous, is_same_boot):
+    """The mark on the disk is still that of the program before, which had closed the store."""
+    there = str(tmp_path / 'robot.db')
+    store = StoreFile(there)
+    store.add(store.begin_trial(NewTrial('TASK', 'abc', ('id', '{}'), 5.0)), [moment(0), moment(1)])
+    store.close()
+    mark = bytes_of(there + '-mark').decode()
+    if not is_same_boot:
+        mark = mark.replace(mark.split('"boot":"')[1][:8], 'anothers')
+    child = os.fork()
+    if not child:
+        opened = StoreFile(there, synchronous)
+        if synchronous == 'NORMAL':
+            opened.add(1, [moment(2)])
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    if os.path.exists(there + '-wal'):
+        os.unlink(there + '-wal')
+    with open(there + '-mark', 'w') as stream:
+        stream.write(mark)
+    if is_same_boot:
+        refused(there, 'accept')
+    else:
+        assert seen(there) == [(2, 1)] * 2
+
+
 def test_what_can_be_read_is_accepted_by_hand(path, capsys):
     frame = 4096 + 24
     flip(path + '-wal', os.path.getsize(path + '-wal') - frame * 12)
