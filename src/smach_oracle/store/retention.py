@@ -124,12 +124,17 @@ def _structures(database: sqlite3.Connection, trial: int) -> Set[str]:
     return found
 
 
-def used_parts(database: sqlite3.Connection) -> Set[bytes]:
-    """Return the digests of the bytes that a fact refers to, by itself or within its value."""
+def used_parts(database: sqlite3.Connection, since: int = 0) -> Set[bytes]:
+    """Return the digests of the bytes that a fact refers to, by itself or within its value.
+
+    `since`: the first moment whose facts count.
+    """
     used: Set[bytes] = set()
-    for text, in database.execute("SELECT text FROM facts WHERE text LIKE '%$part%'"):
+    for text, in database.execute(
+            "SELECT text FROM facts WHERE moment >= ? AND text LIKE '%$part%'", (since,)):
         used.update(map(bytes.fromhex, _PART.findall(text)))
-    wholes = database.execute('SELECT DISTINCT whole FROM facts WHERE whole IS NOT NULL').fetchall()
+    wholes = database.execute('SELECT DISTINCT whole FROM facts WHERE moment >= ? AND '
+                              'whole IS NOT NULL', (since,)).fetchall()
     for digest, in wholes:
         used.add(bytes(digest))
         for data, in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):

@@ -53,6 +53,7 @@ class StoreFile:
         where = os.path.realpath(path)
         self._mark = Mark(where, synchronous)
         self._has = Content()
+        self.added_parts: Dict[bytes, int] = {}  # new in the store, with the moment of each
         self._version = 0  # changes as another program changes the store
         try:
             self._db = Opening(path, where, read_only, accept, self._begin).opened(synchronous)
@@ -139,9 +140,9 @@ class StoreFile:
                 rows.append((number, path, name, text, whole))
             if rows:
                 database.executemany('INSERT INTO facts VALUES (?, ?, ?, ?, ?)', rows)
-            if parts:
-                database.executemany('INSERT OR IGNORE INTO parts VALUES (?, ?)',
-                                     list(parts.items()))
+            for part in parts.items():
+                if database.execute('INSERT OR IGNORE INTO parts VALUES (?, ?)', part).rowcount:
+                    self.added_parts[part[0]] = number or 0
         return self._has.moment if number is None else number
 
     def end_trial(self, trial: int, at: float, outcome: str) -> None:

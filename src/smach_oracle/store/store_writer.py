@@ -151,7 +151,7 @@ class StoreWriter:
                 self._is_behind = self._is_behind and not caught_up
                 self._ready.notify_all()
             self._until_thinned -= len(batch)
-            if self._until_thinned <= 0 and not self._is_closing:
+            if self._until_thinned <= 0 and not self._is_closing and not self._waiting:
                 self._thin()
             if caught_up:
                 self._warn('{}: all is stored again'.format(self._store.path))

@@ -4,7 +4,6 @@ A moment that goes hands what it has to the next one that stays. So each moment 
 it has always said. Of the last ones that is all. An older one may not know any more with what
 userdata some states had begun by then.
 """
-import re
 import sqlite3
 from typing import Dict, List, NamedTuple, Optional, Set, Tuple
 
@@ -17,7 +16,6 @@ EVERY = 500  # moments more before it is done again
 BEGINS = 'STATE_START'  # with the userdata of then a state is entered again
 # moments of a state that has failed: the userdata of its entry have what they have, too
 AFTER_FAILURE = ('PRECONDITION_START', 'DECISION', 'QUERY_OPENED')
-_PART = re.compile(r'"\$part":"([0-9a-f]+)"')
 _Key = Tuple[str, str]
 
 
@@ -46,6 +44,8 @@ def thin(store: StoreFile, trial: int) -> int:
             _hand_on(database, trial, kept)
             database.executemany('DELETE FROM moments WHERE number = ?',
                                  [(number,) for number in going])
+            if store.added_parts:
+                _drop_parts(database, store.added_parts)
         return len(going)
 
 
@@ -121,25 +121,15 @@ def _hand_on(database: sqlite3.Connection, trial: int, kept: Set[int]) -> None:
         else:
             pending[path, name] = (row, bool(says_gone))
     hand_to(latest)
-    parts = _parts_of(database, gone)
     database.executemany('DELETE FROM facts WHERE rowid = ?', gone)
     database.executemany('UPDATE facts SET moment = ? WHERE rowid = ?', moved)
-    if parts:
-        database.executemany('DELETE FROM parts WHERE digest = ?', [
-            (digest,) for digest in parts.difference(used_parts(database))])
 
 
-def _parts_of(database: sqlite3.Connection, rows: List[Tuple[int]]) -> Set[bytes]:
-    """Return the digests of what is kept by its content, and rows refer to."""
-    found: Set[bytes] = set()
-    for row in rows:
-        for text, whole in database.execute(
-                "SELECT text, whole FROM facts WHERE rowid = ? AND (whole IS NOT NULL OR "
-                "text LIKE '%$part%')", row):
-            found.update(map(bytes.fromhex, _PART.findall(text or '')))
-            if whole is not None:
-                found.add(bytes(whole))
-                for data, in database.execute('SELECT data FROM parts WHERE digest = ?', (whole,)):
-                    found.update(map(bytes.fromhex, _PART.findall(
-                        bytes(data).decode('ascii', 'replace'))))
-    return found
+def _drop_parts(database: sqlite3.Connection, added: Dict[bytes, int]) -> None:
+    """Take out of `added` and of the store what no fact refers to any more.
+
+    Nothing older than a part that is new in the store refers to it, so no older fact is read.
+    """
+    for digest in set(added).difference(used_parts(database, min(added.values()))):
+        database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
+        del added[digest]

@@ -8,10 +8,10 @@ import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.checkpoint.storable import CODECS
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
-from smach_oracle.store.codecs import Encoded
+from smach_oracle.store.codecs import Codecs, Encoded
 from smach_oracle.store.names import EDIT
 from smach_oracle.store.rows import Fact, NewMoment
-from smach_oracle.store.store_file import NewTrial, StoreFile
+from smach_oracle.store.store_file import NewTrial, StoreFile, transaction
 from smach_oracle.store.thinning import LAST, thin
 
 KINDS = ['STATE_START'] * 6 + ['TRANSITION'] * 3 + ['DECISION', 'QUERY_OPENED', EDIT, 'JUMP']
@@ -71,6 +71,59 @@ def test_whatever_stays_says_what_it_said(tmp_path):
         assert len(store.moments(other)) == 400
         assert thin(store, trial) <= 100
         store.close()
+
+
+def trial_with(store, name, values):
+    """A trial with one moment for each value."""
+    trial = store.begin_trial(NewTrial('TOP', name, ('s', '{}'), 0.0))
+    for seq, value in enumerate(values):
+        store.add(trial, [NewMoment(0.0, seq, 'TRANSITION', 'TOP', 'A', (
+            Fact('TOP', 'key:x', Codecs().encode(value)),))])
+    return trial
+
+
+def test_bytes_that_another_trial_refers_to_stay(tmp_path):
+    path = str(tmp_path / 'robot.db')
+    images = [bytes([number]) * 5000 for number in range(150)]
+    texts = [[text.decode('latin-1') * 20, text] for text in images]
+    before = StoreFile(path, 'OFF')
+    old = trial_with(before, 'old', images[:9] + texts[:9])
+    before.close()
+    store, beside = StoreFile(path, 'OFF'), StoreFile(path, 'OFF')
+    trial = trial_with(store, 'new', texts + images)
+    other = trial_with(beside, 'beside', images[5:20] + texts[5:20])
+    thin(store, trial)
+    for number, wanted in ((old, images[:9] + texts[:9]), (other, images[5:20] + texts[5:20]),
+                           (trial, images[-LAST:])):
+        values = [Codecs().decode(*fact.value, store.part) for fact in store.facts(number)]
+        assert values[-len(wanted):] == wanted
+    with transaction(store) as database:
+        left, = database.execute('SELECT count(*) FROM parts').fetchone()
+    needed = {*range(20), *range(149 - LAST, 150)}  # and the texts of twenty
+    assert left == len(needed) + 20
+    beside.close()
+    store.close()
+
+
+def test_what_a_thinning_takes_does_not_grow_with_the_trials_before(tmp_path):
+    took = []
+    for moments in (0, 5000):
+        path = str(tmp_path / '{}.db'.format(moments))
+        with_old = StoreFile(path, 'OFF')
+        trial = with_old.begin_trial(NewTrial('TOP', 'old', ('s', '{}'), 0.0))
+        with_old.add(trial, [NewMoment(0.0, seq, 'TRANSITION', 'TOP', 'A', (
+            Fact('TOP', 'key:x', Codecs().encode([seq, b'x' * 2000])),)) for seq in range(moments)])
+        with_old.close()
+        store, steps = StoreFile(path, 'OFF'), [0]
+        trial = trial_with(store, 'new', [[seq, 'x' * 300, bytes([seq % 256, seq // 256]) * 2000]
+                                          for seq in range(300)])
+        with transaction(store) as database:
+            database.set_progress_handler(
+                lambda counted=steps: counted.__setitem__(0, counted[0] + 1), 100)
+        assert thin(store, trial) > 100
+        took.append(steps[0])
+        store.close()
+    assert 0 < took[1] < 1.3 * took[0], took
 
 
 def loops(path, rounds):
