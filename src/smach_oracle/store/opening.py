@@ -18,6 +18,10 @@ from .tables import (
     try_to_write,
 )
 
+# waits before a store that looks damaged is looked at again: a program that begins or ends changes
+# several files
+LOOKS_AGAIN_S = (0.05, 0.2)
+
 
 class Opening:
     """How one store is opened."""
@@ -48,10 +52,10 @@ class Opening:
         make_store(self._where)
 
     def _examined(self) -> Files:
-        for waits_s in (0.05, 0.2):
+        for waits_s in LOOKS_AGAIN_S:
             try:
                 return self._checked()
-            except StoreDamaged:  # a program that begins or ends changes several files
+            except StoreDamaged:
                 time.sleep(waits_s)
         return self._checked()
 

@@ -27,7 +27,7 @@ from smach_oracle.oracle.errors import CheckpointError
 from smach_oracle.oracle.records import rates_file
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording.bag_repair import recover_folder
-from smach_oracle.store import state_command
+from smach_oracle.store import opening, state_command
 from smach_oracle.store.codecs import Codecs, NotReadable, NotStorable
 
 from .border import REFUSED, TAKEN, Border, refused
@@ -214,6 +214,11 @@ def stored() -> bytes:
         return copies[0]
 
 
+def waiting_for_nobody() -> Any:
+    """No other program changes these stores, so none is waited for."""
+    return mock.patch.object(opening, 'LOOKS_AGAIN_S', ())
+
+
 def _take_store(damage: Damage) -> str:
     with folder() as where:
         return _resumed(written(os.path.join(where, 'robot.db'), damage.of(stored())))
@@ -224,7 +229,7 @@ def _resumed(path: str) -> str:
     ends = {_state_command([path] + words) for words in (
         ['list'], ['show'], ['edit', 'cups=3'], ['goto', 'A'])}
     said: List[str] = []
-    with mock.patch.multiple(smach, logwarn=said.append, logerr=said.append):
+    with mock.patch.multiple(smach, logwarn=said.append, logerr=said.append), waiting_for_nobody():
         made = machine(checkpoint=path, checkpoint_synchronous='OFF', on_resume='recover')
         try:
             assert made.execute() in ('done', 'aborted', 'preempted')
@@ -235,7 +240,7 @@ def _resumed(path: str) -> str:
 
 def _state_command(arguments: List[str]) -> int:
     out, err = io.StringIO(), io.StringIO()
-    with mock.patch('sys.stdout', out), mock.patch('sys.stderr', err):
+    with mock.patch('sys.stdout', out), mock.patch('sys.stderr', err), waiting_for_nobody():
         code = state_command.main(arguments)
     if code:
         refused(err.getvalue(), 'oracle_state: ')
