@@ -3,6 +3,7 @@ from typing import NamedTuple, Optional
 
 import smach
 
+from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..settings.failing_outcomes import PREEMPTED
@@ -27,14 +28,12 @@ def message_of(source: str, outcome: str, target: str) -> str:
     return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
 
 
-def obey_preempt(node: TreeNode, state: smach.State) -> None:
+def obey_preempt(machine: Machine, state: smach.State) -> None:
     """Have a preempt obeyed by the current state, as if it had run and serviced the request.
 
     The machine sees that before its next state.
     """
     recall_preempts(state)
-    node.has_obeyed = True
-    machine = node.machine
     machine._preempt_requested = True
     machine._preempted_state, machine._preempted_label = state, machine._current_label
 

@@ -128,7 +128,6 @@ class TreeNode:
         self.engine = EngineProbe()
         self.checked_states = -1  # number of states for which the settings were last checked
         self.preempt_told = False
-        self.has_obeyed = False  # a preempt, in the present or latest execution
         self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
         # where a verdict from below or here ends the present state
         self.departure: Optional[DeparturePort] = None
@@ -190,15 +189,12 @@ class TreeNode:
 
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""
-        return any(True for _ in self.running_around())
-
-    def running_around(self) -> Iterator['TreeNode']:
-        """Yield the wrapped containers above this one that are being executed."""
         above = self.parent
         while above is not None:
             if above.machine._is_running:
-                yield above
+                return True
             above = above.parent
+        return False
 
     def is_left_behind(self) -> bool:
         """Whether this container is to stop without an outcome, as nobody waits for one.
@@ -357,7 +353,7 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.preempt_told = self.has_obeyed = self.gave_up = False
+        self.preempt_told = self.gave_up = False
         self.departure = None
         self.engine.begin_execution()
         self.records.drop_snapshots()

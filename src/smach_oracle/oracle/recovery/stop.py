@@ -18,20 +18,6 @@ def why_stopped(node: TreeNode, preempted: bool) -> str:
     return 'left behind' if node.is_left_behind() else 'shutdown'
 
 
-def is_asked_around(node: TreeNode) -> bool:
-    """Whether a container around this one was asked to stop, though this one may have obeyed."""
-    return any(each.machine.preempt_requested() for each in node.running_around())
-
-
-def winds_down(node: TreeNode) -> bool:
-    """Whether this container, or one around it, was asked to stop or has obeyed already.
-
-    Such a container does not take up its work again, whatever its clean-up ends with.
-    """
-    return any(each.has_obeyed or each.machine.preempt_requested()
-               for each in (node, *node.running_around()))
-
-
 def preempt_beside(node: TreeNode) -> None:
     """Preempt the whole machine where others may run next to a container.
 
