@@ -3,9 +3,11 @@ import threading
 import time
 from typing import Any, Callable, List, Optional
 
-from machines import Watched
+from guarded_machines import OUTCOMES
+from machines import Scripted, Watched
 from waiting import wait_for
 
+import smach
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.events import EventKind
 
@@ -93,3 +95,37 @@ class Held(Watched):
     def told(self, kind: EventKind) -> List[str]:
         """Outcomes of the events of a kind."""
         return [event.outcome for event in self.of(kind)]
+
+
+class Trail:
+    """The labels of the states that have run, in order."""
+
+    def __init__(self):
+        self.ran = []
+
+    def state(self, label, *script, outcomes=('ok', 'aborted', 'preempted')):
+        """A state that does as told, and looks at no preempt unless its script does."""
+        def noted(step):
+            def run(state, ud):
+                self.ran.append(label)
+                return step(state, ud) if callable(step) else step
+            return run
+        return Scripted(*map(noted, script or ['ok'] * 9), outcomes=outcomes)
+
+    def cleaned(self, *work, clean=None, ends='preempted'):
+        """A machine of these states, A and B, each of which leads to CLEAN at a preempt.
+
+        `ends`: the machine's outcome after CLEAN.
+        """
+        a, b = work or (self.state('A'), self.state('B'))
+        machine = smach.StateMachine(OUTCOMES)
+        with machine:
+            smach.StateMachine.add('A', a, self._ways(a, 'B'))
+            smach.StateMachine.add('B', b, self._ways(b, 'done'))
+            smach.StateMachine.add('CLEAN', clean or self.state('CLEAN'), {'ok': ends})
+        return machine
+
+    def _ways(self, state, good):
+        outcomes = state.get_registered_outcomes()
+        return {**{each: good for each in ('ok', 'done') if each in outcomes},
+                **({'preempted': 'CLEAN'} if 'preempted' in outcomes else {})}

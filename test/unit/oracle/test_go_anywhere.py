@@ -220,8 +220,7 @@ def test_a_jump_that_a_preempt_has_ended_has_no_container_on_the_way_recover():
     assert obeys.entered.wait(20)
     watched.machine.request_preempt()
     assert ended.result() in ('preempted', 'aborted') and not jumps(watched)
-    assert [event.path for event in watched.of(EventKind.FAILURE)] == ['TOP/BOTH/LEFT/IN']
-    assert [question.failed_state for question in expert.questions] == ['A']
+    assert not watched.of(EventKind.FAILURE) and not expert.questions
     assert watched.run() == 'done', 'nothing is left over'
 
 

@@ -2,47 +2,15 @@
 import threading
 
 import pytest
-from guarded_machines import both, chain
-from held_machines import Gate, Held, eventually
-from machines import FakeExpert, FakeHealth, Scripted, goto, waits
+from guarded_machines import OUTCOMES, both, chain
+from held_machines import Gate, Held, Trail, eventually
+from machines import FakeExpert, FakeHealth, goto, waits
 from waiting import wait_for
 
 import smach
 from smach_oracle.oracle.records.events import EventKind
 
-OUTCOMES = ['done', 'aborted', 'preempted']
 CONFIRM = {'states': {'B': {'autonomy': 'confirm'}}}
-
-
-class Trail:
-    """The labels of the states that have run, in order."""
-
-    def __init__(self):
-        self.ran = []
-
-    def state(self, label, *script, outcomes=('ok', 'aborted', 'preempted')):
-        """A state that does as told, and looks at no preempt unless its script does."""
-        def noted(step):
-            def run(state, ud):
-                self.ran.append(label)
-                return step(state, ud) if callable(step) else step
-            return run
-        return Scripted(*map(noted, script or ['ok'] * 9), outcomes=outcomes)
-
-    def cleaned(self, *work, ends='preempted'):
-        """A machine of these states, A and B, each of which leads to CLEAN at a preempt."""
-        a, b = work or (self.state('A'), self.state('B'))
-        machine = smach.StateMachine(OUTCOMES)
-        with machine:
-            smach.StateMachine.add('A', a, self._ways(a, 'B'))
-            smach.StateMachine.add('B', b, self._ways(b, 'done'))
-            smach.StateMachine.add('CLEAN', self.state('CLEAN'), {'ok': ends})
-        return machine
-
-    def _ways(self, state, good):
-        outcomes = state.get_registered_outcomes()
-        return {**{each: good for each in ('ok', 'done') if each in outcomes},
-                **({'preempted': 'CLEAN'} if 'preempted' in outcomes else {})}
 
 
 def by_operator(held):

@@ -10,6 +10,7 @@ from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..recovery.operator_wait import clocks_stand_still
+from ..recovery.stop import is_asked_around
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
 from .passing_by import pass_by
@@ -43,7 +44,7 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
     asked = machine.preempt_requested()
     obeyed = was_preempted and not asked
-    stops = asked or _is_to_stop(node)
+    stops = asked or is_asked_around(node)
     if not (stops or was_preempted):
         control.stop_is_over()
     jump = None if stops else control.take_jump(node.key)
@@ -64,15 +65,6 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     if level == ANNOUNCE:
         _announce(node, place)
     return None if hold is None else _hold(node, hold)
-
-
-def _is_to_stop(node: TreeNode) -> bool:
-    """Whether a machine around this one was asked to stop, though this one has obeyed already."""
-    while node.parent is not None:
-        node = node.parent
-        if node.machine._is_running and node.machine.preempt_requested():
-            return True
-    return False
 
 
 def _announce(node: TreeNode, place: HeldPlace) -> None:

@@ -234,7 +234,7 @@ class OracleVisit:
             self._node.tell_preempt()
         if ending.state is not None:  # the author's own transition: the request goes on with it
             if ending.obeys:
-                obey_preempt(self._machine, meta)
+                obey_preempt(self._node, meta)
             self._go_on(ending.state)
             return None
         meta.service_preempt()

@@ -34,7 +34,7 @@ def pass_by(node: TreeNode) -> Optional[Stop]:
     forget_resumed(node)
     record = node.record(label)
     record.forget_entry()  # it may have been led to, and is not entered
-    obey_preempt(machine, state)
+    obey_preempt(node, state, bool(down))
     if not route.is_state:
         machine.service_preempt()
         return Stop(terminate(node, label, PREEMPTED, route.target))

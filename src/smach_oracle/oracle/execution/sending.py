@@ -68,6 +68,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
         return False
     node.record(label).forget_entry()  # it may have been led to, and is not entered
     entry = prepare_entry(way, jump.written, 'sent')
+    node.records.take_up_work()
     by = jump.by or 'an operator'
     data = {'missing_keys': list(entry.missing), 'userdata': entry.userdata}
     if jump.container:

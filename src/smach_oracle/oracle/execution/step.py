@@ -32,6 +32,8 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import TakenOut, WatchedVisit
+from ..recovery.stop import winds_down
+from ..settings.failing_outcomes import is_preempted
 from .arriving_visit import ArrivingVisit
 from .boundary import pass_boundary
 from .departure import Departure, is_settled, take_departure
@@ -206,9 +208,12 @@ class Step:
         if self._machine.preempt_requested():
             node.tell_preempt()
         if isinstance(judged, Route):
+            if stopping and is_preempted(outcome):
+                node.records.note_obeyed(record.label, False)
             result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
             node.records.visit_ended(record, outcome, result)
             return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)
+        stopping = stopping or winds_down(node)
         if judged.is_held_back:
             return self._held_back(judged, stopping)
         if stopping:
@@ -358,7 +363,7 @@ class Step:
             return self._natural_ending(failure)
         ending = preempted_ending(self._node, failure)
         if ending.obeys:
-            obey_preempt(self._machine, self._machine._states[failure.state])
+            obey_preempt(self._node, self._machine._states[failure.state])
         return ending
 
     def _end_unrecovered(self, ending: ContainerEnding, failure: Failure,

@@ -3,7 +3,6 @@ from typing import NamedTuple, Optional
 
 import smach
 
-from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..settings.failing_outcomes import PREEMPTED
@@ -28,12 +27,15 @@ def message_of(source: str, outcome: str, target: str) -> str:
     return "State machine transitioning '{}':'{}'-->'{}'".format(source, outcome, target)
 
 
-def obey_preempt(machine: Machine, state: smach.State) -> None:
+def obey_preempt(node: TreeNode, state: smach.State, cleans_within: bool = False) -> None:
     """Have a preempt obeyed by the current state, as if it had run and serviced the request.
 
-    The machine sees that before its next state.
+    The machine sees that before its next state. `cleans_within`: the state is entered next, a
+    machine with a clean-up of its own.
     """
     recall_preempts(state)
+    machine = node.machine
+    node.records.note_obeyed(str(machine._current_label), cleans_within)
     machine._preempt_requested = True
     machine._preempted_state, machine._preempted_label = state, machine._current_label
 

@@ -1,6 +1,6 @@
 """The memory of one container: its states' records, its history, the ways out of its oracle."""
 import copy
-from typing import Any, Dict, Mapping
+from typing import Any, Dict, Mapping, Optional, Tuple
 
 from ..decision.merged_rates import base_of
 from ..decision.policy import FailureContext
@@ -21,6 +21,8 @@ class ContainerRecords:
         self.by_label: Dict[str, StateRecord] = {}
         self.history = History(history_length)
         self.marks = VisitMarks()
+        # before a preempt that was obeyed, each with the snapshot of its latest entry
+        self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, Any]]], ...]] = None
         self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
         self.to_come: Dict[str, Dict[str, Any]] = {}
@@ -68,10 +70,37 @@ class ContainerRecords:
 
     def drop_snapshots(self) -> None:
         """Let go of the userdata that snapshots refer to, and of entries that never came."""
+        self.take_up_work()
         for record in self.by_label.values():
             record.snapshot = None
             if record.way_down or record.entered_by_oracle:
                 record.forget_entry()
+
+    # -- a preempt that was obeyed
+
+    def note_obeyed(self, label: str, cleans_within: bool) -> None:
+        """Note that the state of that label has obeyed a preempt.
+
+        What was executed before is work, what comes is not. So is the state, but where it is a
+        machine that is entered for the clean-up within it.
+        """
+        self._work = tuple((record, record.snapshot) for record in self.by_label.values()
+                           if (not cleans_within if record.label == label
+                               else record.snapshot is not None))
+
+    def winds_down(self) -> bool:
+        """Whether a preempt was obeyed, and no state of the work was entered since.
+
+        Each entry takes a snapshot of its own.
+        """
+        return self._work is not None and all(
+            record.snapshot is snapshot for record, snapshot in self._work)
+
+    def take_up_work(self) -> None:
+        """Note that an operator has sent the machine on: what comes is work."""
+        self._work = None
+
+    # -- visits
 
     def visit_ended(self, record: StateRecord, outcome: str, result: VisitResult) -> None:
         """Add a visit to the history, and a success to the rate.
@@ -108,6 +137,7 @@ class ContainerRecords:
         twin.by_label = copy.deepcopy(self.by_label)
         twin.history = copy.deepcopy(self.history)
         twin.marks = VisitMarks()
+        twin.take_up_work()
         twin.oracle_edges = dict(self.oracle_edges)
         twin.to_come = dict(self.to_come)
         return twin

@@ -189,12 +189,15 @@ class TreeNode:
 
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""
+        return any(True for _ in self.running_around())
+
+    def running_around(self) -> Iterator['TreeNode']:
+        """Yield the wrapped containers above this one that are being executed."""
         above = self.parent
         while above is not None:
             if above.machine._is_running:
-                return True
+                yield above
             above = above.parent
-        return False
 
     def is_left_behind(self) -> bool:
         """Whether this container is to stop without an outcome, as nobody waits for one.

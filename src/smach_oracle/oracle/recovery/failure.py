@@ -162,13 +162,15 @@ def route_at_preempt(machine: Machine, label: str) -> Route:
 def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     """Return how a container ends, or goes on, where a preempt or a shutdown ends a recovery.
 
-    After a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
-    unless the state still runs. Else its own outcome `preempted` ends it.
+    At a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
+    unless the state still runs. Else, and once a preempt was obeyed, its own outcome `preempted`
+    ends it.
     """
     machine = node.machine
     registered = machine.get_registered_outcomes()
     state = machine._states[failure.state]
-    if not (smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)):
+    if machine.preempt_requested() and not (
+            smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)):
         route = route_at_preempt(machine, failure.state)
         if route.target:
             return ContainerEnding(state=route.target, obeys=True) if route.is_state else (

@@ -18,6 +18,20 @@ def why_stopped(node: TreeNode, preempted: bool) -> str:
     return 'left behind' if node.is_left_behind() else 'shutdown'
 
 
+def is_asked_around(node: TreeNode) -> bool:
+    """Whether a container around this one was asked to stop, though this one may have obeyed."""
+    return any(each.machine.preempt_requested() for each in node.running_around())
+
+
+def winds_down(node: TreeNode) -> bool:
+    """Whether this container, or one around it, was asked to stop or has obeyed already.
+
+    The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
+    """
+    return any(each.records.winds_down() or each.machine.preempt_requested()
+               for each in (node, *node.running_around()))
+
+
 def preempt_beside(node: TreeNode) -> None:
     """Preempt the whole machine where others may run next to a container.
 

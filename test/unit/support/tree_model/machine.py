@@ -24,6 +24,7 @@ class MachinePart(Part, Recovering):
         self.memory = Remembered(run.plan, path, self.labels, self.labels[0])
         self.current: Optional[Part] = None
         self._preempted: Optional[Part] = None
+        self.work: Set[str] = set()  # before a preempt that was obeyed, while none of it runs again
         self.left_with = ''
         self._natural: Optional[Way] = None  # ending, of the failure that is being recovered from
         self.begins_in: Optional[str] = None  # its next execution
@@ -39,6 +40,7 @@ class MachinePart(Part, Recovering):
         self.settled = False
         self._natural = None
         self._preempted = None
+        self.work = set()
         self.snapshots.clear()
         self.memory.begin_execution()
         label = self.begins_in or self.labels[0]
@@ -84,6 +86,7 @@ class MachinePart(Part, Recovering):
         failed = Failed(label, 'HELD_BACK', '', None, failing and Way(failing, False))
         if self.flag:
             self._preempted.flag = False
+        if self._winds_down():
             return self._end_preempted(failed)
         self._natural = failed.ending
         way = yield from self.recover(failed, False)
@@ -95,6 +98,8 @@ class MachinePart(Part, Recovering):
         child = self.current = self.child(label)
         if self.flag:
             self._heed_preempt()
+        if label in self.work:
+            self.work = set()
         if self.run.repeats.come((self.path, label)):
             self.snapshots[label] = dict(self.userdata)
             return (yield from self._held_back(label))
@@ -117,10 +122,12 @@ class MachinePart(Part, Recovering):
         if failed is None:
             is_success = not self.flag and outcome != 'preempted'
             self.memory.ended(label, SUCCESS if is_success else PREEMPTED)
+            if self.flag and outcome == 'preempted':
+                self.work = set(self.snapshots)
             way = self.way_of(label, outcome)
             self.tell('TRANSITION', label, outcome, way.target)
             return way
-        if self.flag:
+        if self._winds_down():
             self.memory.ended(label, PREEMPTED)
             return self._end_preempted(failed)
         return (yield from self._fails(failed))
@@ -212,6 +219,13 @@ class MachinePart(Part, Recovering):
         was_asked = self._preempted is not None and self._preempted is self.current
         if self.current is not None and not (was_asked and self.run.is_upstream):
             self._pass_preempt_on()  # upstream's engine asks a state once in a visit
+
+    def _winds_down(self) -> bool:
+        """Whether a preempt of this machine, or of one around it, is under way or was obeyed."""
+        part: Any = self
+        while part is not None and not (part.flag or getattr(part, 'work', None)):
+            part = part.parent
+        return part is not None
 
     def _heed_preempt(self) -> None:
         """Before a state runs: it is preempted, unless the one before has serviced the request."""
