@@ -1,5 +1,7 @@
 """The hold on a machine of a store: a lock of the operating system, which ends with its process."""
+import contextlib
 import fcntl
+import glob
 import hashlib
 import os
 import time
@@ -9,6 +11,7 @@ from smach_oracle.forking import in_child, let_go_of
 
 from .errors import StoreError
 
+_LOCK = '-lock-'
 TAKE_S = 0.2  # who only looks whether it is held has it for less than this
 
 
@@ -24,7 +27,7 @@ class MachineLock:
         self._path, self._machine = path, machine
         digest = hashlib.blake2b(machine.encode('utf-8', 'replace'), digest_size=6).hexdigest()
         # a link leads to the store that it names, and to its lock
-        self._file = '{}-lock-{}'.format(os.path.realpath(path), digest)
+        self._file = os.path.realpath(path) + _LOCK + digest
         self._descriptor: Optional[int] = None
         in_child(self._let_go)
 
@@ -41,7 +44,7 @@ class MachineLock:
         except OSError as err:
             raise StoreError('{}: cannot be locked: {}'.format(self._path, err)) from err
         if not _locked(descriptor, fcntl.LOCK_EX, TAKE_S):
-            holder = os.read(descriptor, 100).decode('ascii', 'replace').strip() or 'unknown'
+            holder = _holder(descriptor)
             os.close(descriptor)
             raise Held('{}: machine {} is held by process {}'.format(
                 self._path, self._machine, holder))
@@ -55,7 +58,7 @@ class MachineLock:
     def release(self) -> None:
         """Let go of it."""
         if self._descriptor is not None:
-            os.close(self._descriptor)
+            _close(self._descriptor)
             self._descriptor = None
 
     def _let_go(self) -> None:
@@ -79,7 +82,39 @@ class MachineLock:
         try:
             return not _locked(descriptor, fcntl.LOCK_SH)
         finally:
-            os.close(descriptor)
+            _close(descriptor)
+
+
+def check_nobody_holds(where: str, path: str) -> None:
+    """Check that no process holds a machine of a store.
+
+    `where`: its own file, no link. `path`: as the user has named it.
+
+    :raises Held: where one does.
+    :raises StoreError: where a lock cannot be read.
+    """
+    for name in glob.glob(glob.escape(where) + _LOCK + '*'):
+        try:
+            descriptor = os.open(name, os.O_RDONLY | os.O_CLOEXEC)
+        except OSError as err:
+            raise StoreError('{}: its lock cannot be read: {}'.format(path, err)) from err
+        try:
+            if not _locked(descriptor, fcntl.LOCK_SH, TAKE_S):
+                raise Held('{}: a machine of it is held by process {}'.format(
+                    path, _holder(descriptor)))
+        finally:
+            _close(descriptor)
+
+
+def _holder(descriptor: int) -> str:
+    return os.read(descriptor, 100).decode('ascii', 'replace').strip() or 'unknown'
+
+
+def _close(descriptor: int) -> None:
+    """Close a file that may be locked. A child forked meanwhile has it open, too."""
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_UN)
+    os.close(descriptor)
 
 
 def _locked(descriptor: int, kind: int, wait_s: float = 0.0) -> bool:

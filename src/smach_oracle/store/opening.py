@@ -5,8 +5,9 @@ import time
 from typing import Callable
 from urllib.parse import quote
 
+from .accepting import prepare, put_in_doubt
 from .errors import StoreDamaged, StoreError
-from .soundness import ACCEPT, LOG, Content, Files, examined, missed, set_log_aside
+from .soundness import ACCEPT, LOG, Content, Files, examined, missed
 from .tables import (
     FORMAT,
     MAGIC,
@@ -26,14 +27,16 @@ LOOKS_AGAIN_S = (0.05, 0.2)
 class Opening:
     """How one store is opened."""
 
-    def __init__(self, path: str, where: str, read_only: bool, accepts: bool,
+    def __init__(self, path: str, where: str, read_only: bool, accepts: str,
                  begin: Callable[[Content], None]) -> None:
         """`path`: as the user has named it. `where`: of its own file.
 
+        `accepts`: who takes what is left of a store that has lost some of it, '' for nobody.
         `begin`: takes what it has before its log is begun.
         """
         self.path, self._where, self.read_only = path, where, read_only
         self._accepts, self._begin = accepts, begin
+        self.is_damaged = False  # and accepted
 
     def _look_at_files(self) -> None:
         """Make a new store where there is none. Refuse one that has lost some of it.
@@ -41,10 +44,14 @@ class Opening:
         :raises StoreError: for no store.
         :raises StoreDamaged: for one that has lost some of it.
         """
-        if self._accepts:
-            self._accept()
+        try:
+            files = self._examined()
+        except StoreDamaged:
+            if not self._accepts:
+                raise
+            prepare(self._where, self.path)
+            self.is_damaged = True
             return
-        files = self._examined()
         if files.is_there:
             return
         if self.read_only:
@@ -88,14 +95,6 @@ class Opening:
                     'its latest moments are missing: it or its log was damaged or replaced',
                     ACCEPT.format(self.path)))
 
-    def _accept(self) -> None:
-        try:
-            examined(self._where, self.path)
-        except StoreDamaged:
-            if not os.path.exists(self._where + LOG):
-                raise
-            set_log_aside(self._where)
-
     def opened(self, synchronous: str) -> sqlite3.Connection:
         """Return its database.
 
@@ -123,6 +122,8 @@ class Opening:
                 database.execute('PRAGMA query_only = ON')
             else:
                 make_tables(database)
+                if self.is_damaged:
+                    put_in_doubt(database, self._accepts)
                 self._begin(content_of(database))
                 database.execute('PRAGMA journal_mode = WAL')
                 database.execute('PRAGMA synchronous = ' + synchronous)

@@ -20,6 +20,8 @@ from .stopped_trial import (
 from .store_file import StoreFile
 
 WRONG = 2  # exit code
+IN_DOUBT = ('. The latest moments may be lost, and whole trials. So each machine asks a person '
+            'before it moves, and repeats no state by itself that has `on_retry`')
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
@@ -174,13 +176,14 @@ def _drop(given: argparse.Namespace) -> None:
 
 
 def _accept(given: argparse.Namespace) -> None:
-    store = StoreFile(given.path, accept=True)
+    store = StoreFile(given.path, accept_by=_user_name())
     try:
         trials = store.trials()
     finally:
         store.close()
-    _say('{} is accepted as it is, with {} trial{}'.format(
-        given.path, len(trials), '' if len(trials) == 1 else 's'))
+    _say('{} is accepted as it is, with {} trial{}{}'.format(
+        given.path, len(trials), '' if len(trials) == 1 else 's',
+        IN_DOUBT if store.was_damaged else ''))
 
 
 def _user_name() -> str:

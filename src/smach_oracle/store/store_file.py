@@ -37,12 +37,12 @@ class StoreFile:
     """An open store. To be used in one thread at a time."""
 
     def __init__(self, path: str, synchronous: str = 'FULL', read_only: bool = False,
-                 accept: bool = False) -> None:
+                 accept_by: str = '') -> None:
         """Open the store at `path`, made if there is nothing of one.
 
         `synchronous`: FULL survives a power cut, NORMAL may lose the last moments by one, OFF by a
-        crash of the operating system may be damaged. `accept`: take what can be read of a store
-        that has lost some of it.
+        crash of the operating system may be damaged. `accept_by`: who has what can be read
+        of a store taken that has lost some of it.
 
         :raises StoreError: where it cannot be opened or written, is no store, or of a later
             version.
@@ -56,9 +56,11 @@ class StoreFile:
         self.added_parts: Dict[bytes, int] = {}  # new in the store, with the moment of each
         self._version = 0  # changes as another program changes the store
         try:
-            self._db = Opening(path, where, read_only, accept, self._begin).opened(synchronous)
+            opening = Opening(path, where, read_only, accept_by, self._begin)
+            self._db = opening.opened(synchronous)
         except sqlite3.Error as err:
             raise told_error(path, err) from err
+        self.was_damaged = opening.is_damaged
         in_child(self._let_go)
 
     def _let_go(self) -> None:
@@ -99,8 +101,10 @@ class StoreFile:
         with _Transaction(self._db):
             self._db.execute('INSERT OR IGNORE INTO structures VALUES (?, ?)', trial.structure)
             row = self._db.execute(
-                'INSERT INTO trials (machine, trial_id, structure, begun) VALUES (?, ?, ?, ?)',
-                (trial.machine, trial.trial_id, trial.structure[0], trial.begun))
+                'INSERT INTO trials (number, machine, trial_id, structure, begun) VALUES '
+                '((SELECT max(coalesce(max(number), 0), ?) + 1 FROM trials), ?, ?, ?, ?)',
+                (self.lost_until() or 0, trial.machine, trial.trial_id, trial.structure[0],
+                 trial.begun))
         number = int(row.lastrowid or 0)
         self._note(trial=number)
         return number
@@ -199,6 +203,13 @@ class StoreFile:
             'SELECT number, machine, trial_id, structure, begun, ended, outcome, '
             '(SELECT count(*) FROM moments WHERE trial = trials.number) '
             'FROM trials {}ORDER BY number'.format(chosen), given)]
+
+    def lost_until(self) -> Optional[int]:
+        """Return the number of the trial behind which others may be lost. None: none is lost.
+
+        :raises StoreDamaged: where it cannot be read.
+        """
+        return next(since for since, in self._read('SELECT max(since) FROM marked', ()))
 
     def description(self, structure: str) -> str:
         """Return the description of a machine's structure, '' where it is not known."""

@@ -76,9 +76,8 @@ LAYERS: Dict[str, List[Layer]] = {
     ],
     'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
     'store': [
-        'state_command', {'stopped_trial', 'store_writer'}, 'thinning', 'retention', 'holding',
-        'store_file',
-        'opening', 'tables', 'soundness', 'renaming', 'rows', 'codecs',
+        'state_command', {'stopped_trial', 'store_writer'}, 'thinning', 'retention', 'store_file',
+        'opening', 'accepting', 'holding', 'tables', 'soundness', 'renaming', 'rows', 'codecs',
         {'object_parts', 'errors', 'names'}
     ],
     'pr2': [

@@ -8,8 +8,8 @@ from typing import Callable, List, Optional, Set, Tuple, TypeVar
 import smach
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import ENDED, GOAL, KEPT, RENAMED, STRUCTURE
-from smach_oracle.store.rows import Fact, StoredMoment, StoredTrial, is_in_doubt
+from smach_oracle.store.names import BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
+from smach_oracle.store.rows import Fact, NewMoment, StoredMoment, StoredTrial, is_in_doubt
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
@@ -17,7 +17,7 @@ from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, SettingsError
 from ..identity import remove_identical
 from ..machine.nesting import borders_below, nodes_of
-from ..machine.tree import no_store
+from ..machine.tree import new_id, no_store
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import TrialEnd
@@ -73,7 +73,7 @@ class TrialStore:
 
     def _to_resume(self) -> Optional[Resumption]:
         trials = self._store.trials(self._top.name)
-        last = trials[-1] if trials else None
+        last = self._instead_of_lost(trials[-1] if trials else None)
         if last is None or last.ended is not None or not last.moments:
             self._earlier_moment(None)
             smach.loginfo('{}: {} has no trial that was stopped: a new one begins'.format(
@@ -94,11 +94,23 @@ class TrialStore:
                     else 'the last trial was stopped before its first state'))
             self._store.end_trial(last.number, time.time(),
                                   top.label if top.phase == ENDED else RESTARTED)
-            return None
+            return self._to_resume() if top.phase == ENDED else None
         resumed = self._resumption(last, tree, moments, earlier)
         if resumed.renamed:
             self._store.keep_structure(self._structure)
         return resumed if earlier else resumed._replace(begins_at=path)
+
+    def _instead_of_lost(self, last: Optional[StoredTrial]) -> Optional[StoredTrial]:
+        """Return the last trial of the machine, a new one in doubt where it may be lost."""
+        lost = self._store.lost_until()
+        if (lost is None or self._top.settings.on_resume[0] == RESTART
+                or (last is not None and (last.ended is None or last.number > lost))):
+            return last
+        now = time.time()
+        number = self._store.begin_trial(NewTrial(self._top.name, new_id(), (*self._structure,),
+                                                  now))
+        self._store.add(number, [NewMoment(now, -1, BROKEN, self._top.key, '', ())])
+        return self._store.trials(self._top.name)[-1]
 
     def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
         """Return the number of the moment that the settings name, 0 for the last one.
