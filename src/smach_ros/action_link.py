@@ -3,6 +3,7 @@
 A link lives as long as the process: states come and go (and machines are executed hundreds of
 times) without opening topics or threads again.
 """
+import _thread
 import threading
 import time
 import weakref
@@ -51,11 +52,9 @@ def _cancel_all() -> None:
     """
     runs = [run for link in list(_links.values()) for run in list(link.active_runs)]
     if runs:
-        canceller = threading.Thread(target=lambda: [run.cancel() for run in runs],
-                                     name='cancel goals', daemon=True)
-        canceller.start()
-        canceller.join(SEND_CANCEL_S)
-        time.sleep(SEND_CANCEL_S)
+        # not a Thread: Ctrl-C may have interrupted threading, too
+        _thread.start_new_thread(lambda: [run.cancel() for run in runs], ())
+        time.sleep(2 * SEND_CANCEL_S)
 
 
 class ActionLink(object):

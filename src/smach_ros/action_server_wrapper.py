@@ -1,5 +1,5 @@
 """An action server whose goals are executions of a SMACH container."""
-import threading
+import _thread
 import traceback
 from typing import Any, Dict, Iterable, List, Optional
 
@@ -175,8 +175,8 @@ class ActionServerWrapper(object):
         """
         # Not in this thread: it holds the server's lock, which the executing one may want while it
         # holds the machine's.
-        threading.Thread(target=self._preempt_container, name='preempt %s' % self._server_name,
-                         daemon=True).start()
+        # Not a Thread either: at a shutdown Ctrl-C may have interrupted threading, too.
+        _thread.start_new_thread(self._preempt_container, ())
 
     def _preempt_container(self) -> None:
         server = self._action_server

@@ -1,4 +1,5 @@
 """Small helpers for scripts."""
+import _thread
 import inspect
 import signal
 import threading
@@ -31,16 +32,20 @@ def _is_running(container: Any) -> bool:
 
 
 def _preempt(container: Any) -> None:
+    asked = []
+
+    def ask() -> None:
+        try:
+            container.request_preempt()
+        finally:
+            asked.append(True)
     # The handler may have interrupted the executing thread while that held the machine's lock: ask
-    # from another one.
-    asker = threading.Thread(target=container.request_preempt, name='preempt_at_shutdown',
-                             daemon=True)
-    asker.start()
+    # from another one. Where it has interrupted threading, a Thread could not be started.
+    _thread.start_new_thread(ask, ())
     if _executes_beneath_us(container):
         return
-    asker.join(STOP_WITHIN_S)
     give_up_at = time.monotonic() + STOP_WITHIN_S
-    while _is_running(container) and time.monotonic() < give_up_at:
+    while (not asked or _is_running(container)) and time.monotonic() < give_up_at:
         time.sleep(0.02)
     if _is_running(container):
         smach.logwarn(
@@ -60,5 +65,5 @@ def set_preempt_handler(sc: Any) -> None:
     if rospy_has_signals or not rospy.core.is_initialized():
         return
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, lambda number, frame: threading.Thread(
-            target=sc.request_preempt, name='preempt_at_sigint', daemon=True).start())
+        signal.signal(signal.SIGINT, lambda number, frame: _thread.start_new_thread(
+            sc.request_preempt, ()))

@@ -49,6 +49,7 @@ from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
 from .shutdown import ShutdownGuard
+from .signals.latch import start_thread
 from .stored import prepare_store
 from .waiting.service_waiting import ServiceWaiting
 
@@ -308,10 +309,8 @@ class Attachments:
         So it must not wait for a lock that this thread may hold: others do the work, and it waits
         for them only a little, so that the preempt comes before rospy goes down.
         """
-        preempting = threading.Thread(target=self.preempt, name='shutdown_preempt', daemon=True)
-        preempting.start()
-        preempting.join(0.1)
-        threading.Thread(target=self._close_when_ended, name='shutdown_close', daemon=True).start()
+        start_thread(self.preempt).wait(0.1)
+        start_thread(self._close_when_ended)
 
     def _close_when_ended(self) -> None:
         """Close the bags once the trials have told their end, or do not end at all."""

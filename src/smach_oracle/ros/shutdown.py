@@ -18,11 +18,12 @@ from typing import Any, Callable, Dict, Optional, TextIO, TypeVar
 
 from smach_oracle.forking import in_child
 
+from .signals.child_processes import end_children
+from .signals.latch import Latch, start_thread
 from .signals.signal_ear import SignalEar
 
 LIMIT_S = 1.5  # from the signal to the end by force
 CLOSING_S = 0.3  # of which for closing, where a machine did not end by itself
-CHILDREN_S = 0.2  # for child processes to end by SIGTERM
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 Argument = TypeVar('Argument')
@@ -51,8 +52,8 @@ class ShutdownGuard:
         self._armed = False
         self._hold_s: Optional[float] = None  # how long a handler may wait, once that is known
         self._held: Optional[int] = None  # the signal whose handler waits
-        self._no_hold = threading.Event()  # no handler is to wait any longer
-        self._handled = threading.Event()
+        self._no_hold = Latch()  # no handler is to wait any longer
+        self._handled = Latch()
         self._handlers: Dict[int, Any] = {}  # by signal, as the script has set them
 
     def install(self) -> None:
@@ -82,9 +83,8 @@ class ShutdownGuard:
             is_first, self._armed = not self._armed, True
         if is_first:
             started = time.monotonic()
-            threading.Thread(target=self._preempt, name='shutdown_preempt', daemon=True).start()
-            threading.Thread(target=self._end_in_time, args=(started, hold_s, exit_code),
-                             name='shutdown_limit', daemon=True).start()
+            start_thread(self._preempt)
+            start_thread(lambda: self._end_in_time(started, hold_s, exit_code))
 
     def _hold(self) -> float:
         """Return for how many seconds a handler may wait. The first signal decides."""
@@ -101,9 +101,10 @@ class ShutdownGuard:
         It returns when that is done, so that the script begins no other trial before.
         """
         with self._lock:
-            waits = self._held is not None and not self._no_hold.is_set()
-            if self._hold_s is not None:  # a signal has come
-                self._no_hold.set()
+            if self._hold_s is None or self._no_hold.is_set():
+                return
+            self._no_hold.set()  # first: from here on a handler does not wait
+            waits = self._held is not None
         if not waits:
             return
         self._deliver()
@@ -140,7 +141,7 @@ class ShutdownGuard:
         _within(CLOSING_S, self._close, CLOSING_S)
         for stream in (sys.stdout, sys.stderr):
             _within(0.1, _flush, stream)
-        _end_children()
+        end_children()
         self._end(exit_code)
 
     # -- handlers
@@ -220,29 +221,12 @@ def _means_the_end(number: int, handler: Any) -> bool:
         function, '__module__', '') in ('rospy.core', 'asyncio.runners')
 
 
-def _end_children() -> None:
-    """End the processes that `multiprocessing` ends or awaits where a program ends by itself."""
-    multiprocessing = sys.modules.get('multiprocessing')
-    if multiprocessing is None:
-        return
-    children = multiprocessing.active_children()
-    for child in children:
-        child.terminate()
-    until = time.monotonic() + CHILDREN_S
-    while time.monotonic() < until and multiprocessing.active_children():
-        time.sleep(0.01)
-    for child in children:
-        child.kill()
-
-
 def _within(limit_s: float, function: Callable[[Argument], object], argument: Argument) -> None:
     """Call it, but wait no longer than the limit.
 
     A full disk or a pipe that nobody reads must not hold the end up.
     """
-    thread = threading.Thread(target=function, args=(argument,), daemon=True)
-    thread.start()
-    thread.join(limit_s)
+    start_thread(lambda: function(argument)).wait(limit_s)
 
 
 def _flush(stream: TextIO) -> None:

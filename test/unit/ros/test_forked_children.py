@@ -216,21 +216,29 @@ def test_a_program_that_is_ended_by_force_leaves_no_child(script):
         top.execute()
         ''')
     program = subprocess.Popen([sys.executable, '-c', RUNNER, path], stdout=subprocess.PIPE,
-                               env=ENVIRONMENT)
-    children = json.loads(first_said(program))
+                               env=ENVIRONMENT, start_new_session=True)
     try:
+        first = json.loads(first_said(program))
+        assert set(first) < living(program.pid)
         program.send_signal(signal.SIGTERM)
         assert program.wait(30) == 128 + signal.SIGTERM
-        assert wait_for(lambda: not any(map(lives, children)))
+        # a Pool begins new workers in place of those that end: they are to be gone, too
+        assert wait_for(lambda: not living(program.pid)), (first, living(program.pid))
     finally:
         program.stdout.close()
-        for each in filter(lives, children):
+        for each in living(program.pid):
             os.kill(each, signal.SIGKILL)
+        program.wait(30)
 
 
-def lives(pid):
-    try:
-        with open('/proc/{}/stat'.format(pid)) as stat:
-            return stat.read().rsplit(')', 1)[1].split()[0] != 'Z'
-    except FileNotFoundError:
-        return False
+def living(session):
+    """The processes of a session that have not ended."""
+    found = set()
+    for stat in Path('/proc').glob('[0-9]*/stat'):
+        try:
+            state, _, _, its_session = stat.read_text().rsplit(')', 1)[1].split()[:4]
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if int(its_session) == session and state != 'Z':
+            found.add(int(stat.parent.name))
+    return found

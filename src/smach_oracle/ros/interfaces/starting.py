@@ -23,6 +23,7 @@ from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 
 from ..connections import quiet_at_shutdown
+from ..signals.latch import start_thread
 
 OUTPUT_TOPIC = '~interface_output'
 MOST_LINES = 200
@@ -163,7 +164,7 @@ class InterfaceStarter:
         self._publisher = rospy.Publisher(OUTPUT_TOPIC, InterfaceOutput, latch=True, queue_size=5)
         self._last: Dict[str, StartedInterface] = {}
         self._lock = threading.Lock()
-        rospy.on_shutdown(self.stop)
+        rospy.on_shutdown(lambda: start_thread(self.stop))  # often in a signal's handler
 
     def start(self, offer: InterfaceOffer, query_id: str) -> StartedInterface:
         """Start it, once what was started under its name before has ended.
