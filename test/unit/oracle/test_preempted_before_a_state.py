@@ -102,14 +102,18 @@ def test_a_state_leads_by_preempted_to_what_the_author_calls_it():
 
 
 @pytest.mark.parametrize('preempt', [by_operator, by_script])
-def test_a_state_to_confirm_is_passed_by_where_the_one_before_ignores_the_request(preempt):
+@pytest.mark.parametrize('hold', [waiting_for_a_confirmation, at_a_breakpoint])
+def test_a_state_that_would_be_held_is_passed_by_where_the_one_before_ignores_the_request(
+        hold, preempt):
     trail, gate = Trail(), Gate(heeds=False)
     machine = trail.cleaned(trail.state('A', gate), trail.state('B'))
-    with Held(machine, settings=CONFIRM).begin() as held:
+    with Held(machine).begin() as held:
+        hold(held)
         eventually(gate.entered.is_set)
         preempt(held)
         gate.opened.set()
         assert (held.end(), trail.ran) == ('preempted', ['A', 'CLEAN'])
+        assert not held.hand.status().paused, 'the next trial is not paused'
 
 
 def test_a_stop_that_lifts_a_pause_lets_no_state_run_that_it_held():

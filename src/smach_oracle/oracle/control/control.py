@@ -115,13 +115,13 @@ class Control:
 
         :param confirms: whether the state is entered only once somebody has confirmed it.
         :param breaks: whether breakpoints count.
-        :param asked: whether a preempt of its container stands.
+        :param asked: whether a preempt of its container stands. Then a breakpoint pauses nothing.
         :param obeyed: whether the state before has serviced one.
         """
         with self._changed:
             if self._pauses(asked, obeyed):
                 return Hold(place, HeldBy.PAUSE, confirms)
-            if breaks and self._breaks_before(place):
+            if breaks and self._breaks_before(place, not asked):
                 return Hold(place, HeldBy.BREAKPOINT, confirms)
             return Hold(place, HeldBy.CONFIRM, confirms) if confirms else None
 
@@ -132,10 +132,12 @@ class Control:
             return self.paused
         return (stop.lifts_pause and asked) or (self.paused and not obeyed)
 
-    def _breaks_before(self, place: HeldPlace) -> bool:
-        """Pause the tree where a breakpoint is meant."""
+    def _breaks_before(self, place: HeldPlace, pauses: bool) -> bool:
+        """Return whether there is a breakpoint. It pauses the tree where it is meant to."""
         for pattern in self._breakpoints.values():
             if pattern.matches(*place):
+                if not pauses:
+                    return True
                 self.paused, self.paused_by = True, 'breakpoint ' + pattern.text
                 self._note_change()
                 return True

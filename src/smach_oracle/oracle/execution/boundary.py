@@ -55,7 +55,7 @@ def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
     level = control.level_of(place, autonomy)
     # what an author does at a preempt waits for no confirmation, and at no breakpoint
     hold = control.hold_before(place, level == CONFIRM_FIRST and not obeyed,
-                               not (stops or was_preempted), asked, obeyed)
+                               asked or not (stops or was_preempted), asked, obeyed)
     if hold is not None:
         hold.autonomy, hold.key, hold.asks = autonomy, node.key, not obeyed
     else:
