@@ -4,6 +4,8 @@ A part that a process has once says here what becomes of it in a forked child: a
 descriptor, an open bag, a store, the trial that runs. The child then neither uses it nor reports to
 it. SIGINT and SIGTERM wait in a thread that forks until the child has let go of everything.
 """
+import contextlib
+import fcntl
 import os
 import signal
 import sys
@@ -59,6 +61,16 @@ def let_go_of(descriptor: int) -> None:
         os.dup2(nothing, descriptor, inheritable=False)
     finally:
         os.close(nothing)
+
+
+def unlock(descriptor: int) -> None:
+    """Release the lock of a file that is about to be closed.
+
+    Closing alone keeps the lock as long as a child lives that was forked meanwhile. A file without
+    a lock, or on a file system without locks, stays as it is.
+    """
+    with contextlib.suppress(OSError):
+        fcntl.flock(descriptor, fcntl.LOCK_UN)
 
 
 def _before() -> None:

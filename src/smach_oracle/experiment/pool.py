@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence
 
+from smach_oracle.forking import unlock
+
 from .estimate import seconds_missing
 from .job import ExperimentJob
 from .plan import ExperimentError, ExperimentPlan, enter_folder
@@ -168,4 +170,7 @@ def alone_in(folder: Path) -> Iterator[None]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as err:
             raise ExperimentError('{}: another run_trials is at work there'.format(folder)) from err
-        yield
+        try:
+            yield
+        finally:
+            unlock(lock.fileno())

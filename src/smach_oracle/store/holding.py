@@ -1,5 +1,4 @@
 """The hold on a machine of a store: a lock of the operating system, which ends with its process."""
-import contextlib
 import fcntl
 import glob
 import hashlib
@@ -7,7 +6,7 @@ import os
 import time
 from typing import Optional
 
-from smach_oracle.forking import in_child, let_go_of
+from smach_oracle.forking import in_child, let_go_of, unlock
 
 from .errors import StoreError
 
@@ -111,9 +110,7 @@ def _holder(descriptor: int) -> str:
 
 
 def _close(descriptor: int) -> None:
-    """Close a file that may be locked. A child forked meanwhile has it open, too."""
-    with contextlib.suppress(OSError):
-        fcntl.flock(descriptor, fcntl.LOCK_UN)
+    unlock(descriptor)
     os.close(descriptor)
 
 

@@ -20,13 +20,13 @@ ARROWS: Dict[str, Set[str]] = {
                  'packages'},
     'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
     'expert': {'oracle.asking', 'oracle.errors', 'oracle.records', 'oracle.settings', 'ros',
-               'geometry', 'analysis', 'interfaces', 'packages', 'store'},
+               'geometry', 'analysis', 'interfaces', 'forking', 'packages', 'store'},
     'pr2': {'oracle.errors', 'oracle.number_checks', 'oracle.settings', 'ros', 'geometry'},
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'expert',
                           'interfaces'},
     'experiment': {'oracle.decision', 'oracle.errors', 'oracle.records', 'oracle.settings',
-                   'analysis', 'packages'},
+                   'analysis', 'forking', 'packages'},
     'tasks': set(),
     'inspection_robot': set(),  # a robot as any ROS user writes it
     # the public face of the executive; ros is imported where a test asks for it

@@ -6,6 +6,8 @@ import os
 import time
 from typing import Iterator
 
+from smach_oracle.forking import unlock
+
 WAIT_S = 2.0  # who holds it writes one small file
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.EBADF, errno.EINVAL)  # such as on some networks
 
@@ -23,8 +25,7 @@ def folder_lock(folder: str) -> Iterator[None]:
         _lock(descriptor, folder, time.monotonic() + WAIT_S)
         yield
     finally:
-        with contextlib.suppress(OSError):  # there may be no locks
-            fcntl.flock(descriptor, fcntl.LOCK_UN)  # a child forked meanwhile has it open, too
+        unlock(descriptor)
         os.close(descriptor)
 
 

@@ -4,6 +4,7 @@ import glob
 import os
 from typing import Callable, Dict, List, NamedTuple, Set, Tuple
 
+from smach_oracle.forking import unlock
 from smach_oracle.msg import OracleEvent
 
 from .limits import KnownBag, Plan, Removal
@@ -116,6 +117,7 @@ def _why_locked(path: str) -> str:
     try:
         with open(path, 'rb') as bag:
             fcntl.flock(bag.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
+            unlock(bag.fileno())
     except BlockingIOError:
         return 'a program holds it by a lock'
     except OSError as err:

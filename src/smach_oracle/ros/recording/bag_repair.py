@@ -14,6 +14,8 @@ import re
 import time
 from typing import BinaryIO, Callable, List, NamedTuple, Optional
 
+from smach_oracle.forking import unlock
+
 from . import bag_format
 from .bag_format import BagFormatError
 from .bag_mending import Saved, contents, mend, read_back
@@ -65,11 +67,14 @@ def _recover(path: str, tools: _Tools) -> Optional[str]:
             fcntl.flock(bag.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             return None  # it is being written
-        if not _is_still_at(bag, path) or not _is_ours(bag):
-            return None
-        if not path.endswith(DAMAGED_SUFFIX):
-            return _mend(bag, path, tools)
-        return _go_on(bag, path, tools)
+        try:
+            if not _is_still_at(bag, path) or not _is_ours(bag):
+                return None
+            if not path.endswith(DAMAGED_SUFFIX):
+                return _mend(bag, path, tools)
+            return _go_on(bag, path, tools)
+        finally:
+            unlock(bag.fileno())
 
 
 def _mend(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:

@@ -12,7 +12,7 @@ import fcntl
 import os
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
-from smach_oracle.forking import in_child, let_go_of
+from smach_oracle.forking import in_child, let_go_of, unlock
 
 from . import bag_format
 from .bag_format import ChunkInfo, Stamp
@@ -67,6 +67,7 @@ class BagWriter:
             _lock(self._fd)
             _write_at(self._fd, bag_format.MAGIC + bag_format.pack_bag_header(0, 0, 0), 0)
         except OSError:
+            unlock(self._fd)
             os.close(self._fd)
             os.unlink(path)  # holds nothing
             raise
@@ -162,6 +163,7 @@ class BagWriter:
         """Close the file as it is, without an index. The chunk in memory is lost."""
         if self._fd >= 0:
             fd, self._fd = self._fd, -1
+            unlock(fd)
             os.close(fd)
 
     def _reset_chunk(self) -> None:

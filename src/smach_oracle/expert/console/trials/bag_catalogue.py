@@ -17,6 +17,7 @@ from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
 from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
 from smach_oracle.analysis.trials import TrialSummary
 from smach_oracle.analysis.variants import Count, count_variant, find_variants
+from smach_oracle.forking import unlock
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.packages import lacking
 
@@ -205,6 +206,7 @@ class BagCatalogue:
         except OSError:
             return True
         finally:
+            unlock(descriptor)
             os.close(descriptor)
         return False
 
