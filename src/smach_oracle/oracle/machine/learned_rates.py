@@ -1,4 +1,5 @@
 """The rates file of a tree: written and read where the settings name one."""
+from ..records.name_claims import claim
 from ..records.rates_file import read_rates, share_rates, write_rates
 from .nesting import nodes_of
 from .tree_node import TreeNode
@@ -13,6 +14,7 @@ def save_rates(node: TreeNode) -> None:
     path = top.settings.rates_file
     if not path:
         return
+    claim(path, _name(top), top.tree)
     try:
         with node.tree.rates_lock:
             share_rates(path, _name(top), nodes_of(top.machine))
@@ -25,6 +27,8 @@ def load_rates(node: TreeNode) -> None:
     path = node.settings.rates_file
     if node.parent is None and node.tree.rates_loaded != path:
         node.tree.rates_loaded = path
+        if path:
+            claim(path, _name(node), node.tree)
         read_rates(path, _name(node), nodes_of(node.machine), is_shared=True)
 
 
@@ -33,6 +37,7 @@ def write_by_hand(node: TreeNode, path: str) -> None:
 
     :raises OSError: where it cannot be written.
     """
+    claim(path, _name(node.top()), node.tree)
     write_rates(path, _name(node.top()), nodes_of(node.machine))
 
 

@@ -8,22 +8,47 @@ Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STA
 snapshot}}, "machines": {NAME: containers}}, with PATH relative to the top machine ('' itself).
 "machines" is there once a machine with a name has written. "containers" has all states of all
 machines then, for programs that do not know "machines". A machine without a name goes by ''.
+"renamed": {NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
 """
+import gc
 import json
 import os
 import tempfile
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence
+from typing import (
+    Any,
+    Dict,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Protocol,
+    Sequence,
+    Set,
+    Tuple,
+)
 
 import smach
 
 from .folder_lock import folder_lock
+from .name_claims import is_claimed
 
 FORMAT = 'smach_oracle rates'
 VERSION = 1
 DAMAGED = '.damaged'
+INHERITS = ('Rates file {}: {!r} is new there, and begins with what {} has learned. It has the '
+            'same states, and no running program uses that name')
 States = Dict[str, Any]  # what was learned, by label
 Containers = Dict[str, States]  # by path below the top machine
-Machines = Dict[str, Containers]  # by name, '' for one that has none
+
+
+class Machines(Dict[str, Containers]):
+    """What a file has, by the names of machines, '' for one that has none."""
+
+    def __init__(self, content: Mapping[str, Containers], renamed: Any = None) -> None:
+        """`renamed`: new names, by those whose rates have gone there, too."""
+        super().__init__(content)
+        self.renamed: Dict[str, str] = renamed if isinstance(renamed, dict) else {}
 
 
 class Learner(Protocol):
@@ -130,17 +155,20 @@ def write_learned(path: str, containers: Mapping[str, Any]) -> None:
     """
     path = os.path.realpath(path)
     with folder_lock(os.path.dirname(path)):
-        _write(path, {'': dict(containers)}, '')
+        _write(path, Machines({'': dict(containers)}), '')
 
 
 def _write(path: str, machines: Machines, name: str) -> None:
     """Write all. In "containers" the machine of this name wins, as the latest."""
+    machines.renamed.pop(name, None)  # it is there again
     content: Dict[str, Any] = {'format': FORMAT, 'version': VERSION, 'containers': {}}
     for each in [each for each in machines if each != name] + [name]:
         for place, states in machines[each].items():
             content['containers'].setdefault(place, {}).update(states)
     if set(machines) != {''}:
         content['machines'] = machines
+    if machines.renamed:
+        content['renamed'] = machines.renamed
     text = json.dumps(content, indent=1, sort_keys=True)
     folder = os.path.dirname(path)
     descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp',
@@ -183,9 +211,9 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
     """Take over the rates in `path`. `is_shared`: the machine adds to this file later.
 
     A machine that the file does not know takes over what a machine with the same states has
-    learned: it was renamed. A file that is not there is no matter. One that cannot be read is
-    warned of. A damaged one is set aside as PATH.damaged and warned of, and the states start from
-    their priors.
+    learned, once, if no running program uses that name: it was renamed. A file that is not there
+    is no matter. One that cannot be read is warned of. A damaged one is set aside as PATH.damaged
+    and warned of, and the states start from their priors.
     """
     learners = list(learners)
     if is_shared:
@@ -194,7 +222,8 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
     machines = _machines(path)
     if machines is None:
         return
-    containers = machines[name] if name in machines else _of_the_same_states(machines, learners)
+    containers = (machines[name] if name in machines
+                  else _inherited(os.path.realpath(path), name, learners, is_shared))
     for learner in learners:
         for label, learned in containers.get(learner.relative_path, {}).items():
             try:
@@ -203,12 +232,56 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
                 _tell_unusable(path, label, learner, err)
 
 
-def _of_the_same_states(machines: Machines, learners: Sequence[Learner]) -> Containers:
-    """Return what a machine under another name has learned, and else one without a name."""
-    own = {(learner.relative_path, label) for learner in learners for label in learner.labels()}
-    found = [containers for name, containers in machines.items() if name and own.issuperset(
-        (place, label) for place, states in containers.items() for label in states)]
-    return max(found, key=_size, default=machines.get('', {}))
+def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: bool) -> Containers:
+    """Return what a machine had learned under its name before, nothing where there is none.
+
+    The file then has it under the new name, too. Where all states are the same, no other machine
+    takes it over.
+    """
+    containers: Containers = {}
+    try:
+        with folder_lock(os.path.dirname(path)):
+            machines = _machines_or_none(path)
+            if name in machines:  # by now
+                return machines[name]
+            before = _name_before(path, machines, learners)
+            if before is None:
+                return {}
+            containers = machines[before]
+            smach.logwarn(INHERITS.format(path, name, before or 'a machine without a name'))
+            if is_shared and before:
+                machines[name] = containers
+                if _places(containers) == _own_places(learners):
+                    machines.renamed[before] = name
+                _write(path, machines, name)
+    except OSError as err:
+        smach.logwarn('Rates file {}: that {!r} is new cannot be noted there: {}'.format(
+            path, name, err))
+    return containers
+
+
+def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> Optional[str]:
+    """Return the name of a machine with the same states that no running program has.
+
+    Else '' for machines without a name.
+    """
+    own = _own_places(learners)
+    found = [name for name, containers in machines.items()
+             if name and name not in machines.renamed and own.issuperset(_places(containers))]
+    if any(is_claimed(path, name) for name in [*found, '']):
+        gc.collect()  # machines of this process that are gone may still claim their names
+    free = [name for name in found if not is_claimed(path, name)]
+    if free:
+        return max(free, key=lambda each: _size(machines[each]))
+    return '' if '' in machines and not is_claimed(path, '', if_unknown=False) else None
+
+
+def _places(containers: Containers) -> Set[Tuple[str, str]]:
+    return {(place, label) for place, states in containers.items() for label in states}
+
+
+def _own_places(learners: Sequence[Learner]) -> Set[Tuple[str, str]]:
+    return {(learner.relative_path, label) for learner in learners for label in learner.labels()}
 
 
 def _size(containers: Containers) -> int:
@@ -229,11 +302,11 @@ def _machines_or_none(path: str) -> Machines:
         with open(path, encoding='utf-8') as stream:
             return _checked(json.load(stream))
     except FileNotFoundError:
-        return {}
+        return Machines({})
     except (ValueError, RecursionError) as err:
         smach.logwarn('Rates file {} is damaged ({}), {}; a new one is written'.format(
             path, err, _set_aside(path)))
-        return {}
+        return Machines({})
 
 
 def _machines(path: str) -> Any:
@@ -264,7 +337,7 @@ def _checked(content: Any) -> Machines:
                 isinstance(states, dict) for states in containers.values())
             for containers in machines.values()):
         raise ValueError('it has no states')
-    return machines
+    return Machines(machines, content.get('renamed'))
 
 
 def _set_aside(path: str) -> str:

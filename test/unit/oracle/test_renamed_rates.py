@@ -1,0 +1,131 @@
+"""A machine that was renamed goes on with its rates; one that lives keeps its own to itself."""
+import contextlib
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from machines import Scripted, Watched, chain_of
+
+from smach_oracle.oracle.records import name_claims
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+PROGRAM = '''
+import os, sys
+sys.path[:0] = {path!r}
+import smach
+smach.set_loggers(*[lambda text: None] * 4)
+said = []
+smach.set_loggers(said.append, said.append, said.append, said.append)
+from machines import Scripted, Watched, chain_of
+path, name, runs = sys.argv[1], sys.argv[2], int(sys.argv[3])
+state = Scripted()
+machine = Watched(chain_of(state), name=name, settings={{'rates_file': path}})
+rate = machine.rate('A')
+print(rate.successes, rate.failures, sum('is new there' in text for text in said), flush=True)
+for _ in range(runs):
+    state.script = ['aborted']
+    machine.run()
+if 'fork' in sys.argv and not os.fork():
+    os.close(1)
+    sys.stdin.readline()  # it outlives its parent
+    os._exit(0)
+if 'fork' not in sys.argv:
+    print('has run', flush=True)
+    sys.stdin.readline()
+'''
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Start a program of one machine with one state, that lives until its context ends."""
+    @contextlib.contextmanager
+    def started(name, runs=0, *words):
+        code = PROGRAM.format(path=[HERE] + sys.path)
+        process = subprocess.Popen(
+            [sys.executable, '-c', code, str(tmp_path / 'rates.json'), name, str(runs), *words],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        try:
+            told = tuple(map(int, process.stdout.readline().split()))
+            process.stdout.readline()  # it has run, or it has ended
+            yield told
+        finally:
+            process.stdin.close()
+            process.stdout.close()
+            assert process.wait(60) == 0
+    return started
+
+
+def file_of(tmp_path):
+    return json.loads((tmp_path / 'rates.json').read_text())
+
+
+def counts(tmp_path, name):
+    told = file_of(tmp_path)['machines'][name]['']['A']
+    return told['successes'], told['failures']
+
+
+def test_a_machine_that_lives_in_another_program_keeps_its_counts(tmp_path, program):
+    with program('PICK', 3), program('PLACE', 1) as told:
+        assert told == (0, 0, 0)
+        assert (counts(tmp_path, 'PICK'), counts(tmp_path, 'PLACE')) == ((3, 3), (1, 1))
+
+
+def test_machines_that_live_in_one_program_keep_their_counts(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    pick = Watched(chain_of(Scripted('aborted')), name='PICK', settings=settings)
+    pick.run()
+    place = Watched(chain_of(Scripted('aborted')), name='PLACE', settings=settings)
+    assert place.rate('A').failures == 0
+    place.run()
+    assert counts(tmp_path, 'PICK') == counts(tmp_path, 'PLACE') == (1, 1)
+
+
+def test_a_machine_without_a_name_that_lives_keeps_its_counts(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    plain = Watched(chain_of(Scripted('aborted')), settings=settings)
+    plain.run()
+    assert Watched(chain_of(Scripted()), name='PLACE', settings=settings).rate('A').failures == 0
+
+
+def test_one_that_was_renamed_inherits_once_and_the_log_says_it(tmp_path, program):
+    with program('OLD', 3):
+        pass
+    with program('NEW', 1) as told, program('OTHER') as other:
+        assert (told, other) == ((3, 3, 1), (0, 0, 0))
+    assert (counts(tmp_path, 'OLD'), counts(tmp_path, 'NEW')) == ((3, 3), (4, 4))
+    with program('NEW') as told:
+        assert told == (4, 4, 0)
+    with program('THIRD') as told:
+        assert told == (4, 4, 1), 'NEW was renamed again'
+
+
+def test_one_that_has_its_name_back_goes_on_and_may_be_renamed_again(tmp_path, program):
+    for name, wanted in (('OLD', (0, 0, 0)), ('NEW', (1, 1, 1)), ('OLD', (1, 1, 0))):
+        with program(name, 1) as told:
+            assert told == wanted
+    assert file_of(tmp_path).get('renamed', {}) == {}
+
+
+def test_programs_that_begin_at_once_inherit_once(tmp_path, program):
+    with program('OLD', 3):
+        pass
+    with contextlib.ExitStack() as stack:
+        told = [stack.enter_context(program('NEW{}'.format(number))) for number in range(3)]
+    assert sorted(told) == [(0, 0, 0), (0, 0, 0), (3, 3, 1)]
+
+
+def test_a_child_that_outlives_its_program_keeps_no_name(program):
+    with program('OLD', 2, 'fork'):
+        with program('NEW') as told:
+            assert told == (2, 2, 1)
+
+
+def test_where_nobody_can_say_who_lives_nothing_is_inherited(tmp_path, program, monkeypatch):
+    with program('OLD', 1):
+        pass
+    monkeypatch.setattr(name_claims, '_ask', lambda *_: (_ for _ in ()).throw(OSError(38, 'none')))
+    new = Watched(chain_of(Scripted()), name='NEW',
+                  settings={'rates_file': str(tmp_path / 'rates.json')})
+    assert new.rate('A').failures == 0
