@@ -16,7 +16,7 @@ from smach_oracle.forking import in_child, let_go_of
 
 # of Linux: locks of an open file, which the process does not lose as it closes the folder elsewhere
 _F_OFD_GETLK, _F_OFD_SETLK = 36, 37
-_LOCK = struct.Struct('hhqqi4x')  # struct flock: kind, whence, start, length, pid
+_LOCK = struct.Struct('hhqqi4x')  # struct flock: kind, origin, start, length, process
 Key = Tuple[str, str]  # path of the file, name
 
 _guard = threading.RLock()  # a machine may go at any time
