@@ -1,9 +1,16 @@
 """A machine that SMACH refuses to run is found before it runs, with state, outcome and name."""
+import os
+import re
+
 import pytest
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.ros.oracle_run.machine_faults import faults_of, refused_while_built
+from smach_oracle.ros.oracle_run.machine_faults import (
+    MachineFaultError,
+    faults_of,
+    refused_while_built,
+)
 
 ENDS = ['done', 'failed']
 
@@ -168,6 +175,29 @@ def test_the_complaints_of_an_authors_own_check_are_passed_on():
         smach.StateMachine.add('A', state('ok'), {'ok': 'done'})
     assert [str(each) for each in faults_of(sm, 'TOP')] == [
         'TOP: SMACH refuses it: InvalidStateError: no gripper']
+
+
+class Outcomes(smach.State):
+    def get_registered_outcomes(self):
+        raise KeyError('gripper')
+
+
+def added_late(state):
+    sm = machine(A=(smach.State(outcomes=['ok']), {'ok': 'done'}))
+    sm._states['A'] = state
+    return sm
+
+
+@pytest.mark.parametrize('make', [
+    lambda: added_late(Outcomes(outcomes=['ok'])),
+    lambda: around(added_late(Outcomes(outcomes=['ok']))),
+    lambda: around(concurrence({'done': {'A': 'ok'}}, A=Outcomes(outcomes=['ok'])))])
+def test_a_state_that_raises_as_it_is_looked_at_is_named_with_its_line(make):
+    with pytest.raises(MachineFaultError) as raised:
+        faults_of(make(), 'TOP')
+    text, path = str(raised.value), os.path.abspath(__file__)
+    assert re.match(r'TOP/(INNER/)?A: it cannot be checked', text), text
+    assert "KeyError: 'gripper' ({} line ".format(path) in text and len(text.splitlines()) == 1
 
 
 def error_of(build):

@@ -1,5 +1,6 @@
 """`oracle_run --check` executes no machine, reaches no master but its own, and reports."""
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -176,6 +177,32 @@ def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why
     code, _, errors = check('machine("HOME", "PICK").execute()', settings)
     assert code == 2
     assert why in errors.splitlines()[-1] and errors.splitlines()[-1].startswith('oracle_run: ')
+
+
+@pytest.mark.parametrize('kind', ['StateMachine', 'Concurrence'])
+@pytest.mark.parametrize('method', ['get_children', 'get_registered_outcomes', '__getattribute__'])
+def test_a_machine_that_raises_as_it_is_looked_at_is_refused_in_one_line(check, kind, method):
+    code, report, errors = check('''
+armed = False
+class Odd(smach.{0}):
+    def {1}(self, *given):
+        if armed and (not given or given[0] in ('_states', '_outcome_map', 'get_children')):
+            raise OSError('no disk')
+        return getattr(smach.{0}, '{1}')(self, *given)
+ends = ['succeeded', 'aborted', 'preempted']
+odd = Odd(ends, *['aborted'] * ('{0}' == 'Concurrence'))
+with odd:
+    smach.{0}.add('A', Runs())
+top = smach.StateMachine(ends)
+with top:
+    smach.StateMachine.add('ODD', odd)
+armed = True
+top.execute()
+'''.format(kind, method))
+    said = errors.splitlines()
+    assert code == 2 and 'All is well' not in report, report + errors
+    assert 'Traceback' not in errors
+    assert re.match(r'oracle_run: .*: OSError: no disk \(.*task.py line \d+\)$', said[-1]), said
 
 
 def test_a_name_that_is_no_outcome_or_state_is_told(check):

@@ -16,7 +16,7 @@ from ..machine_names import machine_names
 from .check_report import lines_of, wrapped
 from .checked_names import CheckedNames
 from .interception import MARK, family, machines_inside
-from .machine_faults import MachineFaultError, faults_of
+from .machine_faults import MachineFaultError, faults_of, looking_at
 from .precondition_labels import sorted_preconditions
 
 # new machines of one structure after which a script is taken for one that builds them forever
@@ -49,17 +49,19 @@ class MachineCheck:
 
         :raises StopIteration: where the script begins again.
         :raises SettingsError: where the settings do not fit.
-        :raises MachineFaultError: where SMACH would refuse the container.
+        :raises MachineFaultError: where SMACH would refuse the container, or where it raises as it
+            is looked at.
         """
         with self._lock:
             if any(container is each for each in self._seen):
                 raise StopIteration('it executes a machine for the second time')
             self._seen.append(container)
-            _refuse_faults(container)
-            with ExitStack() as running:  # machines of a Concurrence run at the same time
-                for machine in list(_top_machines(container)):
-                    self._check(machine, running)
-            outcome = good_outcome(container, self._settings())
+            with looking_at(type(container).__name__):
+                _refuse_faults(container)
+                with ExitStack() as running:  # machines of a Concurrence run at the same time
+                    for machine in list(_top_machines(container)):
+                        self._check(machine, running)
+                outcome = good_outcome(container, self._settings())
             self._tell(wrapped('It is not executed; the script goes on with {}.'.format(
                 'no outcome: all of them are failures' if outcome is None
                 else 'the outcome {}'.format(outcome)), 0) + [''])
@@ -95,7 +97,11 @@ def _refuse_faults(container: smach.Container) -> None:
 
     :raises MachineFaultError: with a line for each fault.
     """
-    if any(fault.is_certain for fault in faults_of(container, '')):
+    try:
+        is_refused = any(fault.is_certain for fault in faults_of(container, ''))
+    except MachineFaultError:  # it says so again, by its name
+        is_refused = True
+    if is_refused:
         raise MachineFaultError('\n'.join(
             str(fault) for fault in faults_of(container, _name_of(container)) if fault.is_certain))
 

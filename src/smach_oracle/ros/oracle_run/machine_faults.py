@@ -4,6 +4,7 @@ SMACH says it late: a StateMachine when it is executed, a Concurrence when its o
 an Iterator at its first item.
 """
 import inspect
+from contextlib import contextmanager
 from traceback import walk_tb
 from types import TracebackType
 from typing import (
@@ -20,6 +21,7 @@ from typing import (
 )
 
 import smach
+from smach_oracle.foreign import error_text
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.close_names import did_you_mean
@@ -40,26 +42,51 @@ def refused_while_built(kind: Optional[Type[BaseException]], error: Optional[Bas
 
     It is None for all other errors.
     """
-    if isinstance(error, SettingsError):
+    if isinstance(error, (SettingsError, MachineFaultError)):
         return error
     frames = list(walk_tb(trace))
     of_engine = [(frame.f_code.co_name, number) for frame, number in frames
                  if _package_of(frame.f_globals.get('__name__')) == 'smach']
     is_last = bool(frames) and _package_of(frames[-1][0].f_globals.get('__name__')) == 'smach'
-    if not (is_last and any(name in _BUILDING for name, _ in of_engine)):
+    if error is None or not (is_last and any(name in _BUILDING for name, _ in of_engine)):
         return None
-    of_script = [(frame.f_code.co_filename, number) for frame, number in frames
-                 if _package_of(frame.f_globals.get('__name__')) not in _ENGINE]
-    place = '{} line {}'.format(*of_script[-1]) if of_script else 'the script'
+    place = _place_in_script(trace) or 'the script'
     # SMACH checks what is complete. Its KeyError does not say what is wrong
     built = [frame.f_locals.get('self') for frame, _ in frames
              if frame.f_code.co_name == 'check_consistency']
-    faults = [str(fault) for each in built if isinstance(each, smach.Container)
-              for fault in faults_of(each, type(each).__name__) if fault.is_certain]
-    why = faults or ['SMACH refuses the machine: {}: {}'.format(
-        type(error).__name__, ' '.join(str(error).split()))]
+    try:
+        faults = [str(fault) for each in built if isinstance(each, smach.Container)
+                  for fault in faults_of(each, type(each).__name__) if fault.is_certain]
+    except MachineFaultError as fault:
+        faults = [str(fault)]
+    why = faults or ['SMACH refuses the machine: {}'.format(' '.join(error_text(error).split()))]
     return MachineFaultError('\n'.join('{}: {}'.format(place, each)
                                        for each in dict.fromkeys(why)))
+
+
+@contextmanager
+def looking_at(path: str) -> Iterator[None]:
+    """Say which container or state has raised as it was looked at, what, and where.
+
+    :raises MachineFaultError: in place of any error of an author's own methods.
+    """
+    try:
+        yield
+    except (SettingsError, MachineFaultError, StopIteration):
+        raise
+    except Exception as err:
+        place = _place_in_script(err.__traceback__)
+        raise MachineFaultError('{}: it cannot be checked, as it raises as it is looked at: {}{}'
+                                .format(path, ' '.join(error_text(err).split()),
+                                        ' ({})'.format(place) if place else '')) from err
+
+
+def _place_in_script(trace: Optional[TracebackType]) -> str:
+    """Return where the script was last, or '' where it was in none of the frames."""
+    of_script = ['{} line {}'.format(frame.f_code.co_filename, number)
+                 for frame, number in walk_tb(trace)
+                 if _package_of(frame.f_globals.get('__name__')) not in _ENGINE]
+    return of_script[-1] if of_script else ''
 
 
 class MachineFault(NamedTuple):
@@ -77,6 +104,7 @@ def faults_of(container: smach.Container, path: str) -> List[MachineFault]:
     """Return what is wrong with a container and with all containers in it.
 
     :param path: what the container is called.
+    :raises MachineFaultError: where a container or a state raises as it is looked at.
     """
     return list(_search(container, path, []))
 
@@ -85,15 +113,18 @@ def _search(container: Any, path: str, seen: List[Any]) -> Iterator[MachineFault
     if any(container is each for each in seen):
         return
     seen.append(container)
-    found = list(_of_kind(container, path))
-    if not _children(container) and not _executes_itself(container):
-        # a state may fill another container while it runs
-        found.append(MachineFault(path, 'it has no states', is_certain=len(seen) == 1))
-    for fault in found or _own_complaints(container, path):
-        yield fault._replace(is_certain=fault.is_certain and not _executes_itself(container))
-    for label, state in _children(container).items():
-        if isinstance(state, smach.Container):
-            yield from _search(state, '{}/{}'.format(path, label), seen)
+    with looking_at(path):
+        children, executes_itself = _children(container), _executes_itself(container)
+        found = list(_of_kind(container, path))
+        if not children and not executes_itself:
+            # a state may fill another container while it runs
+            found.append(MachineFault(path, 'it has no states', is_certain=len(seen) == 1))
+        for fault in found or _own_complaints(container, path):
+            yield fault._replace(is_certain=fault.is_certain and not executes_itself)
+        inside = [('{}/{}'.format(path, label), state) for label, state in children.items()
+                  if isinstance(state, smach.Container)]
+    for its_path, state in inside:
+        yield from _search(state, its_path, seen)
 
 
 def _of_kind(container: Any, path: str) -> Iterator[MachineFault]:
@@ -122,7 +153,7 @@ def _of_machine(machine: Any, path: str) -> Iterator[MachineFault]:
             if why:
                 yield MachineFault('{}/{}'.format(path, label), 'its outcome {!r} {}'.format(
                     outcome, why))
-        for outcome in state.get_registered_outcomes():
+        for outcome in _outcomes_of(state, '{}/{}'.format(path, label)):
             if outcome not in drawn:
                 yield MachineFault('{}/{}'.format(path, label), 'its outcome {!r} was registered '
                                    'after it was added, and has no transition'.format(outcome),
@@ -157,7 +188,7 @@ def _of_concurrence(concurrence: Any, path: str) -> Iterator[MachineFault]:
                 yield MachineFault(path, 'its outcome map waits for the state ' + _is_none_of(
                     label, 'states', states))
                 continue
-            registered = states[label].get_registered_outcomes()
+            registered = _outcomes_of(states[label], '{}/{}'.format(path, label))
             if wanted not in registered:
                 yield MachineFault(
                     '{}/{}'.format(path, label), 'the outcome map of {} waits for its outcome '
@@ -193,8 +224,7 @@ def _own_complaints(container: Any, path: str) -> Iterator[MachineFault]:
     except NotImplementedError:
         pass
     except Exception as err:  # an author's own check may raise anything
-        yield MachineFault(path, 'SMACH refuses it: {}: {}'.format(
-            type(err).__name__, ' '.join(str(err).split())))
+        yield MachineFault(path, 'SMACH refuses it: {}'.format(' '.join(error_text(err).split())))
 
 
 def _children(container: Any) -> Mapping[Any, Any]:
@@ -207,6 +237,11 @@ def _children(container: Any) -> Mapping[Any, Any]:
         container, OracleContainer) and oracle_of(container).recovers else None
     return {label: state for label, state in children.items()
             if state is not None and label != meta}
+
+
+def _outcomes_of(state: Any, path: str) -> Collection[Any]:
+    with looking_at(path):
+        return tuple(state.get_registered_outcomes())
 
 
 def _executes_itself(container: Any) -> bool:
