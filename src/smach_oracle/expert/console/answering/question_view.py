@@ -3,6 +3,7 @@ import math
 from typing import Any, Callable, Dict, List
 
 from smach_oracle.msg import ExpertQueryGoal, OpenQuery, UserdataItem
+from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
 from ...followed_server import ListedQuestion
@@ -29,7 +30,8 @@ def question_view(listed: ListedQuestion, epoch_s: float,
         'key': listed.key, 'server': listed.server, 'id': goal.query_id, 'trial': goal.trial_id,
         'robot': goal.robot, 'path': goal.container_path, 'state': goal.failed_state,
         'stands': standing_words(goal), 'running': still_runs(goal),
-        'what': failure_words(goal), 'outcome': goal.outcome, 'text': _end(goal.text),
+        'what': failure_words(goal), 'outcome': goal.outcome,
+        'text': shortened(goal.text, LONGEST_TEXT),
         'class': goal.failure_class, 'rate': number(goal.rate), 'continuous': goal.continuous,
         'recoveries': goal.recoveries, 'reason': goal.reason, 'tried': list(goal.tried),
         'status': _STATUS.get(listed.status, 'pending'), 'holder': listed.holder,
@@ -88,8 +90,3 @@ def _item(item: UserdataItem) -> Dict[str, str]:
             'key': item.key, 'type': item.type, 'value': '',
             'note': 'cannot be shown: {}'.format(err)
         }
-
-
-def _end(text: str) -> str:
-    """Return the end of a long text. In a traceback the end names the error."""
-    return text if len(text) <= LONGEST_TEXT else '…' + text[-LONGEST_TEXT:]

@@ -9,10 +9,11 @@ from typing import Any, Dict, Optional
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_words
+from smach_oracle.oracle.records.short_text import shortened
 
 from ...wording import event_words
 
-LONGEST_TEXT = 8000
+LONGEST_LINE = 300
 LATEST_S = 1e11  # s since the epoch: a later time is not valid
 _KINDS = {int(kind): kind for kind in EventKind}
 
@@ -48,8 +49,13 @@ def event_view(event: Event) -> Dict[str, Any]:
         't': event.wall_time, 'path': event.path, 'state': event.state, 'outcome': event.outcome,
         'target': event.target, 'class': event.failure_class, 'rate': number(event.rate),
         'continuous': event.continuous, 'counted': is_counted(event), 'query': event.query_id,
-        'by': event.by, 'text': event.text[:LONGEST_TEXT], 'words': event_words(event)
+        'by': event.by, 'text': last_line(event.text), 'words': event_words(event)
     }
+
+
+def last_line(text: str) -> str:
+    """Return the line that says what happened, of a traceback."""
+    return shortened(text.strip().rpartition('\n')[2], LONGEST_LINE)
 
 
 def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:

@@ -19,6 +19,13 @@ def test_every_kind_of_event_has_words(kind):
     json.dumps(shown, allow_nan=False)
 
 
+def test_of_a_traceback_an_event_has_the_last_line_with_its_head_and_tail():
+    text = 'Traceback:\n  a\nValueError: {} no cup\n'.format('.' * 900)
+    shown = event_view(event_of(OracleEvent(kind=OracleEvent.FAILURE, text=text)))
+    assert len(shown['text']) == 300
+    assert shown['text'].startswith('ValueError: ...') and shown['text'].endswith('. no cup')
+
+
 def test_a_kind_of_a_later_release_does_no_harm():
     assert event_view(event_of(OracleEvent(kind=99, rate=math.inf)))['kind'] == '99'
 

@@ -63,22 +63,11 @@ export function breakable(name, sign) {
 }
 
 /**
- * Of a traceback that is the line that says what happened.
- * @param {string} text
- */
-function lastLine(text) {
-  const lines = text.trim().split('\n');
-  const line = lines[lines.length - 1];
-  return line.length <= 300 ? line : `${line.slice(0, 149)} … ${line.slice(-148)}`;
-}
-
-/**
  * What the text of an event adds to its words.
  * @param {Pick<TrialEvent, 'text' | 'words'>} event
  */
 export function added(event) {
-  const text = lastLine(event.text);
-  return text && !event.words.includes(text) ? ' ' + text : '';
+  return event.text && !event.words.includes(event.text) ? ' ' + event.text : '';
 }
 
 /**
