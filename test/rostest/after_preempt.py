@@ -13,13 +13,12 @@ import rospy
 from actionlib.msg import TestAction, TestGoal, TestResult
 from oracle_support import SIGNALS, Process, oracle_run, recorded_events, script
 from std_msgs.msg import String
-from waiting import wait_for
+from waiting import END_LIMIT_S, wait_for
 
 from smach_oracle.msg import OracleEvent
 
 # the limit of what the states behind a preempt may take, far more than they need
 LIMIT_S = 8.0
-END_LIMIT_S = 2.0 + 1.0  # two seconds are promised; the third is for ending a process at all
 TASK = '''
 import sys, time, actionlib, rospy, smach, smach_ros
 from actionlib.msg import TestAction, TestGoal

@@ -3,7 +3,6 @@
 stopped or killed. A master and nodes of its own.
 """
 import os
-import subprocess
 import sys
 import unittest
 
@@ -11,8 +10,7 @@ import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import OF_A_QUESTION, WITH_BROWSER, ConsolePage
-from expert_fixtures import Process
-from own_master import wait_for_master
+from expert_fixtures import start_master
 from waiting import wait_for
 
 from smach_oracle.experiment.launching import free_port
@@ -84,19 +82,13 @@ class Live(ConsolePage, unittest.TestCase):
     def setUpClass(cls):
         cls.master_port = free_port()
         os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(cls.master_port)
-        cls.start_master()
+        cls.master = start_master(cls.master_port)
         cls.begin('console_robot.py', 'PICK', '0.1', '0', '9')
 
     @classmethod
     def tearDownClass(cls):
         super().tearDownClass()
         cls.master.kill()
-
-    @classmethod
-    def start_master(cls):
-        cls.master = Process('rosmaster', '--core', '-p', str(cls.master_port),
-                             stdout=subprocess.DEVNULL, env=dict(os.environ))
-        wait_for_master(os.environ['ROS_MASTER_URI'])
 
     def setUp(self):
         if not self.browser.text('.detail-head'):
@@ -164,7 +156,7 @@ class Live(ConsolePage, unittest.TestCase):
             self.assertEqual(self.browser.text('.detail .machine-hand .problem'), '')
             self.assertFalse(self.browser.find('.detail [data-action=resume-machine]').is_enabled())
         finally:
-            self.start_master()
+            type(self).master = start_master(self.master_port)
         self.browser.click('.detail [data-action=resume-machine]')
         self.assertTrue(self.browser.says('goes on', '.detail .hand-reply'))
         self.assertTrue(self.answerable())

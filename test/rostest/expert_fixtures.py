@@ -8,6 +8,7 @@ import time
 
 import roslib.packages
 import rospy
+from own_master import wait_for_master
 
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question
 from smach_oracle.oracle.asking.question import OutcomeChoice, Question, StateChoice
@@ -70,6 +71,13 @@ class Asked(threading.Thread):
         """Whether ask() has returned within the time."""
         self.join(timeout_s)
         return not self.is_alive()
+
+
+def start_master(port, **options):
+    """A ROS master on a port, once it answers."""
+    master = Process('rosmaster', '--core', '-p', str(port), stdout=subprocess.DEVNULL, **options)
+    wait_for_master('http://localhost:{}'.format(port))
+    return master
 
 
 class Process:

@@ -12,7 +12,7 @@ import xmlrpc.client
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Process
+from expert_fixtures import Process, start_master
 from waiting import wait_for
 
 from smach_oracle.experiment.launching import free_port
@@ -36,9 +36,8 @@ class TestMasterRestart(unittest.TestCase):
         return process
 
     def start_master(self):
-        self.master = self.start(Process, 'rosmaster', '--core', '-p', str(self.port),
-                                 stdout=subprocess.DEVNULL)
-        self.assertTrue(wait_for(self.master_answers, 30.0))
+        self.master = start_master(self.port, env=self.environment)
+        self.addCleanup(self.master.kill)
 
     def restart_master(self):
         before = self.call('getPid')
@@ -51,12 +50,6 @@ class TestMasterRestart(unittest.TestCase):
     def start_expert(self, delay_s):
         self.start(Process.installed, 'scripted_expert',
                    '_rules:={{PICK: {{kind: goto, state: DETECT, delay_s: {}}}}}'.format(delay_s))
-
-    def master_answers(self):
-        try:
-            return bool(self.call('getPid'))
-        except OSError:
-            return False
 
     def subscribed(self, node, topic):
         """Whether the node listens to the server; what it has to do then takes milliseconds."""

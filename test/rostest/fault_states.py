@@ -42,6 +42,7 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('PICK', Odd(first), {'succeeded': 'PLACE'})
     smach.StateMachine.add('PLACE', Odd(lambda: 'succeeded'))
+print('WAITS', flush=True)
 sys.stdin.readline()
 print('OUTCOME', sm.execute(), flush=True)
 if sys.argv[2:] == ['stay']:
@@ -64,6 +65,7 @@ with sm:
 while not ready():
     # a state's limit counts from its entry: it is for the goal, not for the connections
     time.sleep(0.02)
+print('WAITS', flush=True)
 sys.stdin.readline()
 print('OUTCOME', sm.execute(), flush=True)
 '''
@@ -84,6 +86,9 @@ rospy.spin()
 '''
 
 
+START_S = 60.0
+
+
 class FaultyStatesTest(unittest.TestCase):
     def start(self, text: str, *args: str, **settings: Any) -> Process:
         """Start a script that waits for a line before it runs its machine."""
@@ -92,8 +97,12 @@ class FaultyStatesTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
         self.expert = FrontEnd(self, '/task/expert_query')
-        return oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
+        task = oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
                           *args)
+        # the first program of a machine that has just begun reads all from the disk: no test is
+        # about that time
+        self.assertTrue(task.says('WAITS', START_S), task.output())
+        return task
 
     def check_recovered(self, task: Process, kind: int) -> None:
         """One failure of this kind, then success."""

@@ -5,7 +5,6 @@ and from the terminal. A master and nodes of its own. No browser.
 import json
 import os
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -19,8 +18,7 @@ import tornado.ioloop
 import tornado.websocket
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Process
-from own_master import wait_for_master
+from expert_fixtures import Process, start_master
 from waiting import stays, wait_for
 
 from smach_oracle.experiment.launching import free_port
@@ -44,7 +42,7 @@ class StopWithoutMaster(unittest.TestCase):
     def setUpClass(cls):
         cls.master_port, cls.port = free_port(), free_port()
         os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(cls.master_port)
-        cls.start_master()
+        cls.master = start_master(cls.master_port)
         cls.console = Process.installed('expert_console', '_port:={}'.format(cls.port),
                                         '__name:=expert_console')
         cls.robot = Process(sys.executable, os.path.join(HERE, 'console_robot.py'), 'PICK', '0.1',
@@ -62,12 +60,6 @@ class StopWithoutMaster(unittest.TestCase):
     def tearDownClass(cls):
         for process in (cls.robot, cls.console, cls.master):
             process.kill()
-
-    @classmethod
-    def start_master(cls):
-        cls.master = Process('rosmaster', '--core', '-p', str(cls.master_port),
-                             stdout=subprocess.DEVNULL, env=dict(os.environ))
-        wait_for_master(os.environ['ROS_MASTER_URI'])
 
     def setUp(self):
         """All know each other, and the machine runs."""
@@ -132,7 +124,7 @@ class StopWithoutMaster(unittest.TestCase):
             self.assertEqual((style, text.startswith('resume: the master does not answer')),
                              ('red', True), 'what lets go is refused')
         finally:
-            self.start_master()
+            type(self).master = start_master(self.master_port)
         # the robot may not be known there yet
         self.assertEqual(self.terminal.carry_out('pause')[0][1], 'green')
         self.assertTrue(self.console_says('pause_machine')['ok'])

@@ -8,6 +8,9 @@ from typing import Any, Callable, List, Optional, Tuple
 
 # with it, a joystick whose release is lost is not in time: it stops after 0.3 s of silence
 _BELIEVED_S = 0.15
+# for a program that meets SIGINT or SIGTERM: two seconds are promised, the third is for ending a
+# process at all
+END_LIMIT_S = 2.0 + 1.0
 
 
 def wait_for(condition: Callable[[], Any], limit_s: float = 40.0) -> Any:

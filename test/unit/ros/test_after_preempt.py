@@ -8,6 +8,7 @@ import sys
 import time
 
 import pytest
+from waiting import END_LIMIT_S
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.settings import Settings
@@ -94,7 +95,6 @@ else:
     run()
     run()
 '''
-END_LIMIT_S = 2.0 + 1.0  # two seconds are promised; the third is for ending a process at all
 
 
 class Program:

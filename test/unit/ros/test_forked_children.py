@@ -156,6 +156,26 @@ said(heard)
 said(signal.getsignal(signal.SIGTERM))
 said(signal.set_wakeup_fd(-1))
 '''
+# says what `begin` returns, and then heeds nothing
+NEVER_ENDS = '''
+class Deaf(smach.State):
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['succeeded'])
+    def execute(self, userdata):
+        has_begun = False
+        while True:
+            try:
+                if not has_begun:
+                    has_begun = True
+                    said(begin())
+                time.sleep(0.1)
+            except BaseException:
+                pass
+top = smach.StateMachine(outcomes=['succeeded'])
+with top:
+    smach.StateMachine.add('DEAF', Deaf())
+top.execute()
+'''
 
 
 def test_a_loop_of_asyncio_hears_its_signals(under_oracle, script):
@@ -166,23 +186,7 @@ def test_a_loop_of_asyncio_hears_its_signals(under_oracle, script):
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signals_are_heard_after_a_loop_of_asyncio(script, number, tmp_path):
-    path = script(ASYNCIO + '''
-class Deaf(smach.State):
-    def __init__(self):
-        smach.State.__init__(self, outcomes=['succeeded'])
-    def execute(self, userdata):
-        while True:
-            try:
-                said('ready')
-                while True:
-                    time.sleep(0.1)
-            except BaseException:
-                pass
-top = smach.StateMachine(outcomes=['succeeded'])
-with top:
-    smach.StateMachine.add('DEAF', Deaf())
-top.execute()
-''')
+    path = script(ASYNCIO + "begin = lambda: 'ready'" + NEVER_ENDS)
     program = subprocess.Popen([sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'),
                                 path], stdout=subprocess.PIPE, env=ENVIRONMENT)
     try:
@@ -199,22 +203,11 @@ top.execute()
 
 def test_a_program_that_is_ended_by_force_leaves_no_child(script):
     path = script('''
-        class Deaf(smach.State):
-            def __init__(self):
-                smach.State.__init__(self, outcomes=['succeeded'])
-            def execute(self, userdata):
-                workers = multiprocessing.get_context('fork').Pool(2)
-                said([each.pid for each in workers._pool])
-                while True:
-                    try:
-                        time.sleep(1)
-                    except BaseException:
-                        pass
-        top = smach.StateMachine(outcomes=['succeeded'])
-        with top:
-            smach.StateMachine.add('DEAF', Deaf())
-        top.execute()
-        ''')
+def begin():
+    global workers
+    workers = multiprocessing.get_context('fork').Pool(2)
+    return [each.pid for each in workers._pool]
+''' + NEVER_ENDS)
     program = subprocess.Popen([sys.executable, '-c', RUNNER, path], stdout=subprocess.PIPE,
                                env=ENVIRONMENT, start_new_session=True)
     try:
