@@ -6,6 +6,8 @@ import rospy
 
 from smach_oracle.oracle.settings import checks
 
+from .log.said_once import warn_once
+
 
 def number_of(key: str, default: float, low: float, high: float) -> float:
     """Return a parameter that is a number from `low` to `high`.
@@ -72,7 +74,7 @@ def read_or_default(param: str, default: object) -> object:
     try:
         value: object = rospy.get_param(param, default)
     except (OSError, rospy.ROSException) as err:
-        rospy.logwarn('Parameter %s could not be read: %s', rospy.resolve_name(param), err)
+        warn_once('Parameter {} could not be read: {}'.format(rospy.resolve_name(param), err))
         return default
     return value
 

@@ -11,6 +11,7 @@ from typing import Dict, Optional, Protocol, Sequence, Union
 
 import rospy
 
+from smach_oracle.foreign import error_text
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
@@ -18,6 +19,7 @@ from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
 from .connections import TOPIC_ERRORS, quiet_at_shutdown
 from .event_messages import rates_to_msg, to_msg
+from .log.said_once import warn_once
 
 QUEUE_SIZE = 1000  # events waiting for one slow subscriber, about 0.3 MB
 RATES_PERIOD_S = 0.2  # at most 5 Hz
@@ -170,7 +172,8 @@ class RatesPublisher:
             # a table grew while it was read: the machine goes on, the next round gets it
             self.request(machine)
         except Exception as err:  # this thread serves every machine of the process
-            rospy.logerr('~oracle/rates: %r', err)
+            warn_once('~oracle/rates of {} are not published: {}. This is said once'.format(
+                oracle_of(machine).path, error_text(err)))
 
 
 class _RatesObserver(OwnObserver):

@@ -7,7 +7,7 @@ import logging
 import os
 import threading
 import time
-from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Set, Tuple, Union
+from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Tuple, Union
 
 import genpy
 import rospy
@@ -21,6 +21,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from .connections import quiet_at_shutdown
 from .disk.limits import NO_LIMITS, Limits
 from .disk.pruner import Pruner
+from .log.said_once import SaidOnce
 from .recording.recorder_queue import (
     EndItem,
     EventItem,
@@ -85,6 +86,7 @@ class TrialRecorder(OwnObserver):
         self._on_status = on_status
         self._publisher = StatusPublisher() if has_node() else None
         self._reporter = Reporter(say or default_info, warn or default_warn, self._report)
+        self._warn_once = SaidOnce(self._reporter.warn)
         self._pruner = Pruner(self.folder, keep, self._reporter.info, self._reporter.warn)
         self.losses = LossCounter()
         self._watch = DiskWatch(hung_after_s)
@@ -97,7 +99,6 @@ class TrialRecorder(OwnObserver):
         self._bags.recover()
         self._attached: WeakIdentityMap[EventSource, bool] = WeakIdentityMap()
         self._hung = False
-        self._not_recorded: Set[Tuple[type, str]] = set()  # kinds of items, and why: said once
         self._closed = False
         self._is_parents = False
         self._thread = threading.Thread(target=self._write_all, name='trial recorder', daemon=True)
@@ -121,7 +122,7 @@ class TrialRecorder(OwnObserver):
             return
         self._attached[source] = True
         source.observers.append(
-            _MachineObserver(self._observe, self._put_snapshot, self._put_end, self._reporter.warn,
+            _MachineObserver(self._observe, self._put_snapshot, self._put_end, self._warn_once,
                         {resolve(topic): take
                          for topic, take in (snapshots or {}).items()}))
 
@@ -194,12 +195,9 @@ class TrialRecorder(OwnObserver):
             self._tell_not_recorded(item, error_text(err))
 
     def _tell_not_recorded(self, item: QueueItem, why: str) -> None:
-        told = (type(item), why)
-        if told not in self._not_recorded:
-            self._not_recorded.add(told)
-            self._reporter.warn('Not recorded: {}: {}. The recorder goes on, and counts what it '
-                                'loses. This is said once'.format(
-                                    repr_of(item)[:LONGEST_ITEM], why))
+        self._warn_once('Not recorded: {}: {}. The recorder goes on, and counts what it '
+                        'loses. This is said once'.format(repr_of(item)[:LONGEST_ITEM], why),
+                        type(item), why)
 
     def _report(self, status: RecordingStatus) -> None:
         if status.state is RecorderState.IDLE and not self._closed:
@@ -209,7 +207,8 @@ class TrialRecorder(OwnObserver):
                 try:
                     publish(status)
                 except Exception as err:  # a listener must not stop the writer
-                    self._reporter.warn('Recorder status not passed on: {!r}'.format(err))
+                    self._warn_once('Recorder status not passed on: {}. This is said once'.format(
+                        error_text(err)))
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Write what waits, close all bags, also of trials that have not ended, and stop.
@@ -257,11 +256,11 @@ class _MachineObserver(OwnObserver):
 
     def __init__(self, observe: Callable[[Event], None],
                  put_snapshot: Callable[[str, str, genpy.Message], None],
-                 put_end: Callable[[str], None], warn: Log, snapshots: Snapshots) -> None:
+                 put_end: Callable[[str], None], warn_once: SaidOnce, snapshots: Snapshots) -> None:
         self._observe = observe
         self._put_snapshot = put_snapshot
         self._put_end = put_end
-        self._warn = warn
+        self._warn_once = warn_once
         self._snapshots = snapshots
         self._trial_id: Optional[str] = None
 
@@ -280,7 +279,9 @@ class _MachineObserver(OwnObserver):
             try:
                 message = take()
             except Exception as err:  # the rates must not cost the events
-                self._warn('No {} in the bag of {}: {!r}'.format(topic, event.trial_id, err))
+                why = error_text(err)
+                self._warn_once('No {} in the bag of {}: {}. This is said once'.format(
+                    topic, event.trial_id, why), topic, why)
                 continue
             if message is not None:
                 self._put_snapshot(event.trial_id, topic, message)

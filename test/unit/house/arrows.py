@@ -63,7 +63,7 @@ LAYERS: Dict[str, List[Layer]] = {
         {'event_messages', 'userdata_codec', 'images', 'connections', 'shutdown',
          'parameters', 'command_line', 'service_calls', 'introspection', 'main_thread',
          'machine_names', 'goal_tracking'},
-        {'sendable_text', 'strict_json', 'master_watch', 'reading', 'signals'}
+        {'sendable_text', 'strict_json', 'master_watch', 'reading', 'signals', 'log'}
     ],
     'expert': [
         {'console', 'terminal', 'scripted_expert'}, 'front_end', 'claims',

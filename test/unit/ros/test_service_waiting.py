@@ -69,6 +69,15 @@ def test_without_the_service_all_of_it_is_waited_for(monkeypatch):
     assert (len(world.asked), world.waited) == (1, [5.0])
 
 
+def test_a_service_that_is_not_there_is_named_once(monkeypatch):
+    warnings = []
+    world = World(monkeypatch, error=ServerGoneError('/world/pass_time: gone for good'))
+    monkeypatch.setattr(rospy, 'logwarn', lambda *args: warnings.append(args[0] % args[1:]))
+    for _ in range(3):
+        world.waiting.wait(5.0, '', never, lambda s: None)
+    assert len(warnings) == 1 and 'gone for good; the oracle waits without it' in warnings[0]
+
+
 def test_a_preempt_between_two_pieces_ends_the_wait(monkeypatch):
     stop = threading.Event()
     world = World(monkeypatch, then=stop.set)

@@ -3,6 +3,7 @@ import threading
 import time
 from typing import Optional
 
+from ..log.said_once import SaidOnce
 from .bag_folder import BagFolder, Say, remove
 from .limits import DAY_S, GB, Limits, planned
 
@@ -13,7 +14,7 @@ class Pruner:
     def __init__(self, folder: str, limits: Limits, say: Say, warn: Say) -> None:
         self._folder, self._limits = folder, limits
         self._bags = BagFolder(folder)
-        self._say, self._warn = say, warn
+        self._say, self._warn = say, SaidOnce(warn)
         self._due = threading.Event()
         self._thread: Optional[threading.Thread] = None
 

@@ -16,6 +16,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
 
 from ..connections import quiet_at_shutdown
+from ..log.said_once import warn_once
 
 TOPIC = '~failure_frames'
 PARAMETER = '~failure_cameras'
@@ -94,7 +95,8 @@ class FailureCameras:
                 message.images.append(compressed(image))
                 message.topics.append(topic)
             except ValueError as err:
-                rospy.logwarn('The image of %s at the failure cannot be published: %s', topic, err)
+                warn_once('The images of {} at failures cannot be published: {}. This is said once'
+                          .format(topic, err))
         message.header.stamp = rospy.get_rostime()
         if message.images and not rospy.is_shutdown():
             with quiet_at_shutdown():

@@ -8,6 +8,7 @@ import rospy
 
 from ..connections import quiet_at_shutdown
 from ..introspection.viewer_jump import sender_of
+from ..log.said_once import warn_once
 from ..senders.own_messages import LISTENS_AFTER_S, listens
 
 _LOOK_S = 0.01
@@ -48,9 +49,10 @@ class QuietActionServer(actionlib.ActionServer):
         until_s = time.monotonic() + LISTENS_AFTER_S
         while node and not listens(self.result_pub, node):
             if time.monotonic() > until_s or rospy.is_shutdown():
-                rospy.logwarn('%s: ignored a %s of %s, which does not listen for the result. A bag '
-                              'that is played does that', rospy.resolve_name(self.ns),
-                              'request to cancel' if hasattr(message, 'id') else 'goal', node)
+                warn_once('{}: ignores each {} of {}, which does not listen for the result. A bag '
+                          'that is played does that'.format(
+                              rospy.resolve_name(self.ns),
+                              'request to cancel' if hasattr(message, 'id') else 'goal', node))
                 return False
             time.sleep(_LOOK_S)
         return True

@@ -11,6 +11,7 @@ import rospy
 from smach_oracle.oracle.waiting import MonotonicWaiting, Pause, Stopped
 from smach_oracle.srv import PassTime, PassTimeRequest
 
+from ..log.said_once import warn_once
 from ..service_calls import ServerGoneError, ServiceCall
 
 _PIECE_S = 1.0  # a preempt is heeded between pieces
@@ -51,5 +52,5 @@ class ServiceWaiting:
         try:
             return max(0.0, float(call.result(0.0).stamp.to_sec()) - begun_s)
         except ServerGoneError as err:
-            rospy.logwarn('%s; the oracle waits without it', err)
+            warn_once('{}; the oracle waits without it. This is said once'.format(err))
             return None

@@ -8,7 +8,7 @@ import pytest
 import rosgraph
 import rospy
 from expert_fixtures import make_question
-from sensor_msgs.msg import CompressedImage
+from sensor_msgs.msg import CompressedImage, Image
 from waiting import wait_for
 
 from smach_oracle.oracle.errors import SettingsError
@@ -73,6 +73,16 @@ def test_where_no_camera_is_heard_nothing_is_told(clock):
     cameras.publish_for(make_question())
     assert wait_for(lambda: not set(threading.enumerate()) - set(before))
     assert clock.sent == []
+
+
+def test_a_camera_whose_images_cannot_be_published_is_named_once(clock, monkeypatch):
+    warnings = []
+    monkeypatch.setattr(rospy, 'logwarn', lambda *args: warnings.append(args[0] % args[1:]))
+    cameras = FailureCameras([])
+    odd = Image(encoding='odd', width=1, height=1)
+    for _ in range(3):
+        cameras._publish(make_question(), [('/depth', odd)])
+    assert len(warnings) == 1 and 'The images of /depth at failures cannot' in warnings[0]
 
 
 @pytest.mark.parametrize('topics', [['/a', ''], ['/a', 3], ['/a', '/b', '/c', '/d', '/e']])

@@ -2,6 +2,7 @@
 from types import SimpleNamespace
 
 import pytest
+from actionlib_msgs.msg import GoalID
 
 from smach_oracle.msg import ExpertQueryAction
 from smach_oracle.ros.expert import quiet_action_server
@@ -35,3 +36,18 @@ def test_the_timer_of_the_status_goes_on_where_time_is_set_back(has_timer, monke
     else:
         assert first.is_shut_down
         assert server.status_timer.made_with == (0.2, server.publish_status_async, True)
+
+
+def test_a_bag_that_is_played_is_named_once(monkeypatch):
+    warnings = []
+    monkeypatch.setattr(quiet_action_server, 'LISTENS_AFTER_S', 0.0)
+    monkeypatch.setattr(quiet_action_server, 'listens', lambda publisher, node: False)
+    monkeypatch.setattr(quiet_action_server, 'sender_of', lambda message: '/player')
+    monkeypatch.setattr(quiet_action_server.rospy, 'logwarn',
+                        lambda *args: warnings.append(args[0] % args[1:]))
+    server = QuietActionServer('/ask', ExpertQueryAction, pytest.fail, auto_start=False)
+    server.result_pub = None
+    for _ in range(3):
+        server.internal_goal_callback(ExpertQueryAction().action_goal)
+        server.internal_cancel_callback(GoalID())
+    assert sorted('goal' in text for text in warnings) == [False, True]

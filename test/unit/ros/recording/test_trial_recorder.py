@@ -193,6 +193,19 @@ def test_rates_that_cannot_be_had_cost_no_event(tmp_path, source):
     assert 'ZeroDivisionError' in warnings[0]
 
 
+def test_what_keeps_failing_in_each_trial_is_said_once(tmp_path, source):
+    warnings = []
+
+    def full(status):
+        raise OSError('no room')
+    recorder = TrialRecorder(str(tmp_path), warn=warnings.append, on_status=full)
+    recorder.attach(source, {'~oracle/rates': lambda: 1 / 0})
+    for number in range(3):
+        trial(source, 't{}'.format(number), steps=0)
+    recorder.close(10.0)
+    assert sorted(text[:12] for text in warnings) == ['No /oracle/r', 'Recorder sta']
+
+
 def test_the_last_words_of_a_bag_tell_what_was_lost(recorder, source, tmp_path):
     trial(source, 't')
     recorder.close(10.0)

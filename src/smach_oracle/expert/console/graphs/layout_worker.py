@@ -8,6 +8,8 @@ from typing import Callable, Dict, List, Optional
 
 import rospy
 
+from smach_oracle.ros.log.said_once import warn_once
+
 from .container_graph import GraphLayout, read_layout
 
 DOT_LIMIT_S = 20.0
@@ -83,5 +85,5 @@ class LayoutWorker:
                                     timeout=self._limit_s, check=True)
             return read_layout(result.stdout.decode('utf-8', 'replace'))
         except (OSError, ValueError, subprocess.SubprocessError) as err:
-            rospy.logwarn('dot could not lay a state graph out; it is shown as a list: %s', err)
+            warn_once('dot could not lay a state graph out; it is shown as a list: {}'.format(err))
             return None

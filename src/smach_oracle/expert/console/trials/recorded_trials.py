@@ -5,11 +5,11 @@ import time
 from collections import OrderedDict
 from typing import Any, Counter, Dict, List, Sequence, Set, Tuple
 
-import rospy
 from sensor_msgs.msg import CompressedImage
 
 from smach_oracle.analysis.bag_machines import FailureImage, RecordedMachines
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.ros.log.said_once import warn_once
 
 from ..feeds.views import event_view
 from ..graphs.container_graph import (
@@ -62,7 +62,7 @@ class RecordedTrials:
     def _content(self, trial: BagTrial) -> Dict[str, Any]:
         read = self._catalogue.replayed(trial, MOST_EVENTS)
         if read.problem:
-            rospy.logwarn('Machines in %s cannot be read: %s', trial.summary.bags, read.problem)
+            warn_once('Machines in {} cannot be read: {}'.format(trial.summary.bags, read.problem))
         containers, events = _structures(read.machines), read.events
         structures = {path: containers.get(path) or graph_from_events(path, events)
                       for path in sorted({event.path for event in events if event.path})[:200]}

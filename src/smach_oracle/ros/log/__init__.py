@@ -1,0 +1,1 @@
+"""What a node logs, and how often."""
