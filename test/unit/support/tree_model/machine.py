@@ -223,9 +223,11 @@ class MachinePart(Part, Recovering):
     def _winds_down(self) -> bool:
         """Whether a preempt of this machine, or of one around it, is under way or was obeyed."""
         part: Any = self
-        while part is not None and not (part.flag or getattr(part, 'work', None)):
+        while part is not None:
+            if isinstance(part, MachinePart) and (part.flag or part.work):
+                return True
             part = part.parent
-        return part is not None
+        return False
 
     def _heed_preempt(self) -> None:
         """Before a state runs: it is preempted, unless the one before has serviced the request."""
