@@ -107,7 +107,8 @@ class LeafPart(Part):
         plan = self.plan
         if plan.overruns:
             self.run.enter(self.path, self.label, self._seen(view))
-            return OVERRUN
+            was_asked, self.flag = self.flag, False
+            return 'preempted' if was_asked else OVERRUN
         yield Turn('{}/{}'.format(self.path, self.label))
         self.run.enter(self.path, self.label, self._seen(view))
         number = self._executions
