@@ -248,7 +248,8 @@ def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: boo
             if before is None:
                 return {}
             containers = machines[before]
-            smach.logwarn(INHERITS.format(path, name, before or 'a machine without a name'))
+            tell = smach.logwarn if before else smach.loginfo  # of before names
+            tell(INHERITS.format(path, name, before or 'a machine without a name'))
             if is_shared and before:
                 machines[name] = containers
                 if _places(containers) == _own_places(learners):
