@@ -1,46 +1,74 @@
 """The names that machines of running programs use in a rates file.
 
 A machine claims its name by a lock on one byte of the file's folder. It leaves no file behind, and
-ends with the machine or its process.
+ends with the machine or its process. Programs on other computers do not see it: a network file
+system keeps the locks of folders to each computer.
 """
 import contextlib
 import fcntl
 import hashlib
 import os
 import struct
-import threading
 import weakref
-from typing import Dict, Set, Tuple
+from typing import Dict, MutableMapping, Tuple
 
 from smach_oracle.forking import in_child, let_go_of
+
+from ..identity import WeakIdentityMap
 
 # of Linux: locks of an open file, which the process does not lose as it closes the folder elsewhere
 _F_OFD_GETLK, _F_OFD_SETLK = 36, 37
 _LOCK = struct.Struct('hhqqi4x')  # struct flock: kind, origin, start, length, process
 Key = Tuple[str, str]  # path of the file, name
 
-_guard = threading.RLock()  # a machine may go at any time
-_descriptors: Dict[Key, int] = {}
-_owners: Dict[Key, Set[int]] = {}
+
+class _Claim:
+    """The lock of one name. It lasts as long as this object, which its owners share."""
+
+    def __init__(self, key: Key) -> None:
+        """Lock it.
+
+        :raises OSError: where there is no such folder, or no such lock.
+        """
+        descriptor = os.open(os.path.dirname(key[0]), os.O_RDONLY | os.O_CLOEXEC)
+        self._end = weakref.finalize(self, _unlock, descriptor, key)
+        self._end.atexit = False
+        self._descriptor, self._folder = descriptor, os.fstat(descriptor)
+        in_child(self._leave_to_parent)
+        _ask(descriptor, _F_OFD_SETLK, fcntl.F_RDLCK, key)
+
+    def is_on(self, folder: str) -> bool:
+        """Whether it locks the folder that is at a path now.
+
+        :raises OSError: where none is there.
+        """
+        return self._end.alive and os.path.samestat(self._folder, os.stat(folder))
+
+    def _leave_to_parent(self) -> None:
+        if self._end.detach():
+            let_go_of(self._descriptor)
+
+
+# No lock guards these: an owner may go at any point, and two claims of one name do no harm.
+_by_key: 'MutableMapping[Key, _Claim]' = weakref.WeakValueDictionary()
+_by_owner: 'WeakIdentityMap[object, Dict[Key, _Claim]]' = WeakIdentityMap()
 
 
 def claim(path: str, name: str, owner: object) -> None:
     """Claim a name in a rates file, as long as its owner lives.
 
-    On a file system without such locks nothing is claimed.
+    Where there is no such folder, or no such lock, nothing is claimed, and the next call tries
+    again.
     """
     key = os.path.realpath(path), name
-    with _guard:
-        owners = _owners.setdefault(key, set())
-        if id(owner) in owners:
-            return
-        owners.add(id(owner))
-        weakref.finalize(owner, _forget, key, id(owner)).atexit = False
-        with contextlib.suppress(OSError):
-            if key not in _descriptors:
-                descriptor = os.open(os.path.dirname(key[0]), os.O_RDONLY | os.O_CLOEXEC)
-                _descriptors[key] = descriptor
-                _ask(descriptor, _F_OFD_SETLK, fcntl.F_RDLCK, key)
+    claims = _by_owner.get(owner)
+    if claims is None:
+        claims = _by_owner[owner] = {}
+    with contextlib.suppress(OSError):
+        found = _by_key.get(key)
+        if found is None or not found.is_on(os.path.dirname(key[0])):
+            found = _by_key[key] = _Claim(key)
+        claims[key] = found
 
 
 def is_claimed(path: str, name: str, if_unknown: bool = True) -> bool:
@@ -64,26 +92,7 @@ def _ask(descriptor: int, command: int, kind: int, key: Key) -> int:
     return int(_LOCK.unpack(told)[0])
 
 
-def _forget(key: Key, owner: int) -> None:
-    with _guard:
-        owners = _owners.get(key, set())
-        owners.discard(owner)
-        if not owners:
-            _owners.pop(key, None)
-            descriptor = _descriptors.pop(key, None)
-            if descriptor is not None:
-                with contextlib.suppress(OSError):  # a child may have the folder open, too
-                    _ask(descriptor, _F_OFD_SETLK, fcntl.F_UNLCK, key)
-                os.close(descriptor)
-
-
-def _leave_to_parent() -> None:
-    global _guard
-    _guard = threading.RLock()  # another thread may have had it
-    for descriptor in _descriptors.values():
-        let_go_of(descriptor)
-    _descriptors.clear()
-    _owners.clear()
-
-
-in_child(_leave_to_parent)
+def _unlock(descriptor: int, key: Key) -> None:
+    with contextlib.suppress(OSError):  # a child may have the folder open, too
+        _ask(descriptor, _F_OFD_SETLK, fcntl.F_UNLCK, key)
+    os.close(descriptor)
