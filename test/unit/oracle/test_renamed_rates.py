@@ -1,5 +1,6 @@
 """A machine that was renamed goes on with its rates; one that lives keeps its own to itself."""
 import contextlib
+import gc
 import json
 import os
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import pytest
 from machines import Scripted, Watched, chain_of
 
+import smach
 from smach_oracle.oracle.records import name_claims
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -99,6 +101,53 @@ def test_one_that_was_renamed_inherits_once_and_the_log_says_it(tmp_path, progra
         assert told == (4, 4, 0)
     with program('THIRD') as told:
         assert told == (4, 4, 1), 'NEW was renamed again'
+
+
+def test_one_that_never_came_to_its_last_states_hands_its_rates_on_once(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json'), 'max_recoveries': 2}
+
+    def machine(name):
+        states = Scripted('aborted', 'aborted'), Scripted(*['aborted'] * 40), Scripted()
+        return Watched(chain_of(*states), name=name, settings=settings)
+    machine('OLD').run()
+    gc.collect()
+    assert 'C' not in file_of(tmp_path)['machines']['OLD']['']
+    alive = [machine('NEW{}'.format(number)) for number in range(3)]
+    assert [each.rate('A').failures for each in alive] == [2, 0, 0]
+    assert file_of(tmp_path)['renamed'] == {'OLD': 'NEW0'}
+
+
+def test_one_that_has_another_state_beside_takes_nothing_over(tmp_path, program):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    with program('OLD', 3):
+        pass
+    more, same = (Watched(chain_of(*states), name=name, settings=settings) for name, states in (
+        ('MORE', (Scripted(), Scripted())), ('SAME', (Scripted(),))))
+    assert (more.rate('A').failures, same.rate('A').failures) == (0, 3)
+
+
+def test_one_that_lost_a_state_before_it_was_renamed_hands_on_all_that_it_learned(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    for name, states in (('OLD', 3), ('OLD', 2)):
+        Watched(chain_of(*[Scripted('aborted')] * states), name=name, settings=settings).run()
+    gc.collect()
+    new = Watched(chain_of(Scripted(), Scripted()), name='NEW', settings=settings)
+    assert new.rate('A').failures > 0
+    assert 'C' in file_of(tmp_path)['machines']['NEW'][''], 'a state that comes back has its rate'
+
+
+def test_a_machine_without_a_name_hands_its_rates_to_each_that_has_a_state_of_it(tmp_path, log):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    Watched(chain_of(Scripted('aborted')), settings=settings).run()
+    gc.collect()
+    inside = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with inside:
+        smach.StateMachine.add('INNER', chain_of(Scripted()))
+    alive = [Watched(machine, name=name, settings=settings) for name, machine in (
+        ('NEW', chain_of(Scripted())), ('OTHER', chain_of(Scripted(), Scripted())),
+        ('ELSE', inside))]
+    assert [each.rate('A').failures for each in alive] == [1, 1, 0]
+    assert sum('is new there' in text for _, text in log) == 2
 
 
 def test_one_that_has_its_name_back_goes_on_and_may_be_renamed_again(tmp_path, program):

@@ -8,7 +8,8 @@ Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STA
 snapshot}}, "machines": {NAME: containers}}, with PATH relative to the top machine ('' itself).
 "machines" is there once a machine with a name has written. "containers" has all states of all
 machines then, for programs that do not know "machines". A machine without a name goes by ''.
-"renamed": {NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
+"states": {NAME: {PATH: [STATE]}} has the states of each, also those without a result. "renamed":
+{NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
 """
 import gc
 import json
@@ -25,7 +26,6 @@ from typing import (
     Protocol,
     Sequence,
     Set,
-    Tuple,
 )
 
 import smach
@@ -38,16 +38,21 @@ VERSION = 1
 DAMAGED = '.damaged'
 INHERITS = ('Rates file {}: {!r} is new there, and begins with what {} has learned. It has the '
             'same states, and no running program uses that name')
+FROM_NAMELESS = ('Rates file {}: {!r} is new there, and begins with what machines without a name '
+                 'have learned of its states')
 States = Dict[str, Any]  # what was learned, by label
 Containers = Dict[str, States]  # by path below the top machine
+Labels = Dict[str, List[str]]  # by path, too
 
 
 class Machines(Dict[str, Containers]):
     """What a file has, by the names of machines, '' for one that has none."""
 
-    def __init__(self, content: Mapping[str, Containers], renamed: Any = None) -> None:
-        """`renamed`: new names, by those whose rates have gone there, too."""
+    def __init__(self, content: Mapping[str, Containers], states: Any = None,
+                 renamed: Any = None) -> None:
+        """`states`: of each. `renamed`: new names, by those whose rates have gone there, too."""
         super().__init__(content)
+        self.states: Dict[str, Labels] = states if isinstance(states, dict) else {}
         self.renamed: Dict[str, str] = renamed if isinstance(renamed, dict) else {}
 
 
@@ -107,6 +112,7 @@ def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
     with folder_lock(os.path.dirname(path)):
         machines = _machines_or_none(path)
         done = _merge(path, machines.setdefault(name, {}), learners)
+        machines.states[name] = _labels(learners)
         _write(path, machines, name)
     for each in done:
         each.record.share(each.before, each.written)
@@ -141,10 +147,12 @@ def write_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
 
     :raises OSError: where it cannot be written. The old file is then untouched.
     """
+    learners = list(learners)
     path = os.path.realpath(path)
     with folder_lock(os.path.dirname(path)):
         machines = _machines_or_none(path)
         machines[name] = learned_by(learners)
+        machines.states[name] = _labels(learners)
         _write(path, machines, name)
 
 
@@ -166,7 +174,7 @@ def _write(path: str, machines: Machines, name: str) -> None:
         for place, states in machines[each].items():
             content['containers'].setdefault(place, {}).update(states)
     if set(machines) != {''}:
-        content['machines'] = machines
+        content['machines'], content['states'] = machines, machines.states
     if machines.renamed:
         content['renamed'] = machines.renamed
     text = json.dumps(content, indent=1, sort_keys=True)
@@ -235,8 +243,9 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
 def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: bool) -> Containers:
     """Return what a machine had learned under its name before, nothing where there is none.
 
-    The file then has it under the new name, too. Where all states are the same, no other machine
-    takes it over.
+    The file then has it under the new name, too, and no other machine takes it over. What machines
+    without a name have learned stays for the others: in a file of an earlier version it may be of
+    several.
     """
     containers: Containers = {}
     try:
@@ -249,11 +258,11 @@ def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: boo
                 return {}
             containers = machines[before]
             tell = smach.logwarn if before else smach.loginfo  # of before names
-            tell(INHERITS.format(path, name, before or 'a machine without a name'))
+            tell((INHERITS if before else FROM_NAMELESS).format(path, name, before))
             if is_shared and before:
                 machines[name] = containers
-                if _places(containers) == _own_places(learners):
-                    machines.renamed[before] = name
+                machines.states[name] = _labels(learners)
+                machines.renamed[before] = name
                 _write(path, machines, name)
     except OSError as err:
         smach.logwarn('Rates file {}: that {!r} is new cannot be noted there: {}'.format(
@@ -264,25 +273,24 @@ def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: boo
 def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> Optional[str]:
     """Return the name of a machine with the same states that no running program has.
 
-    Else '' for machines without a name.
+    Else '' for machines without a name, where they have learned of any of its states.
     """
-    own = _own_places(learners)
-    found = [name for name, containers in machines.items()
-             if name and name not in machines.renamed and own.issuperset(_places(containers))]
-    if any(is_claimed(path, name) for name in [*found, '']):
+    own = _labels(learners)
+    found = [name for name in machines
+             if name and name not in machines.renamed and machines.states.get(name) == own]
+    if any(label in machines.get('', {}).get(place, {}) for place in own for label in own[place]):
+        found.append('')
+    if any(is_claimed(path, name) for name in found):
         gc.collect()  # machines of this process that are gone may still claim their names
-    free = [name for name in found if not is_claimed(path, name)]
-    if free:
-        return max(free, key=lambda each: _size(machines[each]))
-    return '' if '' in machines and not is_claimed(path, '', if_unknown=False) else None
+    free = [name for name in found if not is_claimed(path, name, if_unknown=bool(name))]
+    return max(free, key=lambda each: (bool(each), _size(machines[each])), default=None)
 
 
-def _places(containers: Containers) -> Set[Tuple[str, str]]:
-    return {(place, label) for place, states in containers.items() for label in states}
-
-
-def _own_places(learners: Sequence[Learner]) -> Set[Tuple[str, str]]:
-    return {(learner.relative_path, label) for learner in learners for label in learner.labels()}
+def _labels(learners: Sequence[Learner]) -> Labels:
+    found: Dict[str, Set[str]] = {}
+    for learner in learners:  # the branches of a Concurrence have one path
+        found.setdefault(learner.relative_path, set()).update(map(str, learner.labels()))
+    return {place: sorted(labels) for place, labels in found.items()}
 
 
 def _size(containers: Containers) -> int:
@@ -338,7 +346,7 @@ def _checked(content: Any) -> Machines:
                 isinstance(states, dict) for states in containers.values())
             for containers in machines.values()):
         raise ValueError('it has no states')
-    return Machines(machines, content.get('renamed'))
+    return Machines(machines, content.get('states'), content.get('renamed'))
 
 
 def _set_aside(path: str) -> str:
