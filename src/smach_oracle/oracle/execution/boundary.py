@@ -18,13 +18,14 @@ from .sending import make_jump
 from .transitions import Stop, terminate
 
 
-def pass_boundary(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
+def pass_boundary(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]:
     """Do before a state what an operator has asked for. None: the state is executed now.
 
     :param was_preempted: whether there was a preempt request, which the last state may have obeyed.
+    :param is_drawn: whether its author drew the state after the last one's `preempted`.
     """
     with _locked(node):
-        return _pass(node, was_preempted)
+        return _pass(node, was_preempted, is_drawn)
 
 
 @contextlib.contextmanager
@@ -40,10 +41,10 @@ def _locked(node: TreeNode) -> Iterator[None]:
             lock.release()
 
 
-def _pass(node: TreeNode, was_preempted: bool) -> Optional[Stop]:
+def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
-    asked = machine.preempt_requested()
-    obeyed = was_preempted and not asked
+    obeyed = was_preempted and (is_drawn or not machine.preempt_requested())
+    asked = machine.preempt_requested() and not obeyed
     stops = asked or is_asked_around(node)
     if not (stops or was_preempted):
         control.stop_is_over()

@@ -32,8 +32,7 @@ from ..recovery.failure import (
 from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import TakenOut, WatchedVisit
-from ..recovery.stop import winds_down
-from ..settings.failing_outcomes import is_preempted
+from ..recovery.stop import note_end_under_preempt, winds_down
 from .arriving_visit import ArrivingVisit
 from .boundary import pass_boundary
 from .departure import Departure, is_settled, take_departure
@@ -66,7 +65,8 @@ def before_step(node: TreeNode) -> Optional[Stop]:
     was_preempted = node.machine.preempt_requested()
     if was_preempted:
         _heed_preempt(node)
-    return pass_boundary(node, was_preempted) if node.engine.attentive else None
+    is_drawn = node.records.take_drawn()
+    return pass_boundary(node, was_preempted, is_drawn) if node.engine.attentive else None
 
 
 def _heed_preempt(node: TreeNode) -> None:
@@ -207,9 +207,9 @@ class Step:
                     or ends_program(error))
         if self._machine.preempt_requested():
             node.tell_preempt()
+            note_end_under_preempt(
+                node, record.label, outcome if isinstance(judged, Route) else None)
         if isinstance(judged, Route):
-            if stopping and is_preempted(outcome):
-                node.records.note_obeyed(record.label, False)
             result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
             node.records.visit_ended(record, outcome, result)
             return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)

@@ -5,6 +5,7 @@ import smach
 
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
+from ..recovery.stop import note_obeyed
 from ..settings.failing_outcomes import PREEMPTED
 
 
@@ -35,8 +36,9 @@ def obey_preempt(node: TreeNode, state: smach.State, cleans_within: bool = False
     """
     recall_preempts(state)
     machine = node.machine
-    node.records.note_obeyed(str(machine._current_label), cleans_within)
     machine._preempt_requested = True
+    note_obeyed(node, str(machine._current_label), cleans_within)
+    node.records.note_drawn()
     machine._preempted_state, machine._preempted_label = state, machine._current_label
 
 

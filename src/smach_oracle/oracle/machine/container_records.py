@@ -21,8 +21,9 @@ class ContainerRecords:
         self.by_label: Dict[str, StateRecord] = {}
         self.history = History(history_length)
         self.marks = VisitMarks()
-        # before a preempt that was obeyed, each with the snapshot of its latest entry
+        # before a stop that was obeyed, each with the snapshot of its latest entry
         self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, Any]]], ...]] = None
+        self._is_drawn = False  # the next state is what the author drew after `preempted`
         self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
         self.to_come: Dict[str, Dict[str, Any]] = {}
@@ -76,29 +77,46 @@ class ContainerRecords:
             if record.way_down or record.entered_by_oracle:
                 record.forget_entry()
 
-    # -- a preempt that was obeyed
+    # -- a stop that was obeyed
 
     def note_obeyed(self, label: str, cleans_within: bool) -> None:
-        """Note that the state of that label has obeyed a preempt.
+        """Note that the state of that label has ended by a stop of the whole machine.
 
-        What was executed before is work, what comes is not. So is the state, but where it is a
-        machine that is entered for the clean-up within it.
+        What was executed before is work, what comes is not, until some of the work is. So is the
+        state, but where it is a machine that is entered for the clean-up within it.
         """
-        self._work = tuple((record, record.snapshot) for record in self.by_label.values()
-                           if (not cleans_within if record.label == label
-                               else record.snapshot is not None))
+        if not self.winds_down():
+            self._work = tuple((record, record.snapshot)
+                               for record in list(self.by_label.values())
+                               if (not cleans_within if record.label == label
+                                   else record.snapshot is not None))
+
+    @property
+    def has_obeyed(self) -> bool:
+        """Whether a stop was obeyed in this execution."""
+        return self._work is not None
 
     def winds_down(self) -> bool:
-        """Whether a preempt was obeyed, and no state of the work was entered since.
+        """Whether a stop was obeyed, and no state of the work was entered since.
 
         Each entry takes a snapshot of its own.
         """
         return self._work is not None and all(
             record.snapshot is snapshot for record, snapshot in self._work)
 
+    def note_drawn(self) -> None:
+        """Note that the next state is what the author drew after `preempted`."""
+        self._is_drawn = True
+
+    def take_drawn(self) -> bool:
+        """Return whether it is, once."""
+        is_drawn, self._is_drawn = self._is_drawn, False
+        return is_drawn
+
     def take_up_work(self) -> None:
         """Note that an operator has sent the machine on: what comes is work."""
         self._work = None
+        self._is_drawn = False
 
     # -- visits
 

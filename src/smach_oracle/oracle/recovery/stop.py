@@ -1,11 +1,13 @@
 """Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
 import threading
+from typing import Optional
 
 import smach
 
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
+from ..settings.failing_outcomes import is_preempted
 
 
 def why_stopped(node: TreeNode, preempted: bool) -> str:
@@ -18,18 +20,54 @@ def why_stopped(node: TreeNode, preempted: bool) -> str:
     return 'left behind' if node.is_left_behind() else 'shutdown'
 
 
+def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None:
+    """Note that a state has ended by a preempt, where that is a stop of the whole machine.
+
+    Who preempts only a part of it wants the rest to go on, as a Concurrence does with its branches.
+
+    :param cleans_within: the state is entered again, a machine with a clean-up of its own.
+    """
+    outermost = [node, *node.running_around()][-1]
+    if outermost.machine.preempt_requested():
+        node.records.note_obeyed(label, cleans_within)
+
+
+def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -> None:
+    """Note that a state has ended under a preempt, if it has obeyed.
+
+    It has not where it goes on as if nobody had asked: then the next state is asked.
+
+    :param outcome: the outcome as its author drew it, None for a failure.
+    """
+    is_drawn = outcome is not None and is_preempted(outcome)
+    if is_drawn:
+        node.records.note_drawn()
+    if outcome is None or is_drawn or not node.machine._states[label].preempt_requested():
+        note_obeyed(node, label)
+
+
 def is_asked_around(node: TreeNode) -> bool:
-    """Whether a container around this one was asked to stop, though this one may have obeyed."""
-    return any(each.machine.preempt_requested() for each in node.running_around())
+    """Whether a container around this one was asked to stop, and none below it has obeyed."""
+    for each in node.running_around():
+        if node.records.has_obeyed:
+            return False
+        if each.machine.preempt_requested():
+            return True
+        node = each
+    return False
 
 
 def winds_down(node: TreeNode) -> bool:
-    """Whether this container, or one around it, was asked to stop or has obeyed already.
+    """Whether this container is to do no more work: the innermost one that has obeyed decides.
 
     The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
     """
-    return any(each.records.winds_down() or each.machine.preempt_requested()
-               for each in (node, *node.running_around()))
+    for each in (node, *node.running_around()):
+        if each.machine.preempt_requested():
+            return True
+        if each.records.has_obeyed:
+            return each.records.winds_down()
+    return False
 
 
 def preempt_beside(node: TreeNode) -> None:

@@ -24,7 +24,8 @@ class MachinePart(Part, Recovering):
         self.memory = Remembered(run.plan, path, self.labels, self.labels[0])
         self.current: Optional[Part] = None
         self._preempted: Optional[Part] = None
-        self.work: Set[str] = set()  # before a preempt that was obeyed, while none of it runs again
+        # what ran before a stop of the whole tree was obeyed. Empty once some of it runs again
+        self.work: Optional[Set[str]] = None
         self.left_with = ''
         self._natural: Optional[Way] = None  # ending, of the failure that is being recovered from
         self.begins_in: Optional[str] = None  # its next execution
@@ -40,7 +41,7 @@ class MachinePart(Part, Recovering):
         self.settled = False
         self._natural = None
         self._preempted = None
-        self.work = set()
+        self.work = None
         self.snapshots.clear()
         self.memory.begin_execution()
         label = self.begins_in or self.labels[0]
@@ -98,7 +99,7 @@ class MachinePart(Part, Recovering):
         child = self.current = self.child(label)
         if self.flag:
             self._heed_preempt()
-        if label in self.work:
+        if label in (self.work or ()):
             self.work = set()
         if self.run.repeats.come((self.path, label)):
             self.snapshots[label] = dict(self.userdata)
@@ -119,11 +120,12 @@ class MachinePart(Part, Recovering):
 
     def _ended(self, label: str, outcome: Any, raised: bool) -> Course:
         failed = self.failure_of(label, outcome, raised)
+        if self.flag and self.run.top.flag and not self.work and (
+                failed or outcome == 'preempted' or not self.child(label).flag):
+            self.work = set(self.snapshots)
         if failed is None:
             is_success = not self.flag and outcome != 'preempted'
             self.memory.ended(label, SUCCESS if is_success else PREEMPTED)
-            if self.flag and outcome == 'preempted':
-                self.work = set(self.snapshots)
             way = self.way_of(label, outcome)
             self.tell('TRANSITION', label, outcome, way.target)
             return way
@@ -221,11 +223,14 @@ class MachinePart(Part, Recovering):
             self._pass_preempt_on()  # upstream's engine asks a state once in a visit
 
     def _winds_down(self) -> bool:
-        """Whether a preempt of this machine, or of one around it, is under way or was obeyed."""
+        """Whether a preempt is under way, or who has obeyed one, the innermost, is to end."""
         part: Any = self
         while part is not None:
-            if isinstance(part, MachinePart) and (part.flag or part.work):
-                return True
+            if isinstance(part, MachinePart):
+                if part.flag:
+                    return True
+                if part.work is not None:
+                    return bool(part.work)
             part = part.parent
         return False
 

@@ -1,0 +1,192 @@
+"""When a container has obeyed a stop, in which of them, and what of its clean-up is held then."""
+import threading
+import time
+
+import pytest
+from guarded_machines import OUTCOMES
+from held_machines import LIMIT_S, Gate, Held, Trail, eventually
+
+import smach
+
+FROM_B = ('ok', 'aborted', 'preempted', 'stopped')
+
+
+class Ends:
+    """What a scripted state does: once it is preempted, it ends so."""
+
+    def __init__(self, outcome='preempted', services=True):
+        self.outcome = outcome
+        self.services = services
+        self.entered = threading.Event()
+
+    def __call__(self, state, ud):
+        self.entered.set()
+        until_s = time.monotonic() + LIMIT_S
+        while not state.preempt_requested():
+            assert time.monotonic() < until_s, 'nobody has preempted it'
+            time.sleep(0.002)
+        if self.services:
+            state.service_preempt()
+        return self.outcome
+
+
+def machine_of(outcomes=OUTCOMES, **states):
+    """Of states with their transitions."""
+    machine = smach.StateMachine(list(outcomes))
+    with machine:
+        for label, (state, transitions) in states.items():
+            smach.StateMachine.add(label, state, transitions)
+    return machine
+
+
+def working(trail, ends, after_b='CLEAN', **clean_up):
+    """A, then B, which `ends`, then what is in `clean_up`: labels with their transitions."""
+    return machine_of(
+        A=(trail.state('A'), {'ok': 'B'}),
+        B=(trail.state('B', ends, 'ok', outcomes=FROM_B),
+           {'ok': 'done', 'preempted': after_b, 'aborted': after_b, 'stopped': after_b}),
+        **{label: (trail.state(label), transitions) for label, transitions in clean_up.items()})
+
+
+def run_and_stop(machine, ends, before=lambda held: None, then=lambda held: None):
+    """Execute a machine, preempt it in B, and return it when it has ended."""
+    held = Held(machine, settings={'max_recoveries': 9})
+    with held:
+        before(held)
+        held.begin()
+        assert ends.entered.wait(LIMIT_S)
+        held.hand.preempt()
+        then(held)
+        eventually(lambda: not held.running())
+    return held
+
+
+@pytest.mark.parametrize('ends', [
+    Ends('preempted'), Ends('preempted', services=False), Ends('aborted'), Ends('stopped')],
+    ids=lambda ends: '{}{}'.format(ends.outcome, '' if ends.services else ', not serviced'))
+def test_a_state_that_was_stopped_ends_the_work_by_whatever_outcome(ends):
+    trail = Trail()
+    held = run_and_stop(working(trail, ends, CLEAN={'ok': 'aborted'}), ends)
+    assert (held.end(), trail.ran) == ('aborted', ['A', 'B', 'CLEAN'])
+
+
+def test_clean_ups_on_two_levels_end_the_work():
+    trail, ends = Trail(), Ends()
+    inner = working(trail, ends, CLEAN={'ok': 'aborted'})
+    outer = machine_of(N=(inner, {'aborted': 'HOME', 'preempted': 'HOME'}),
+                       HOME=(trail.state('HOME'), {'ok': 'aborted'}))
+    held = run_and_stop(outer, ends)
+    assert (held.end(), trail.ran) == ('aborted', ['A', 'B', 'CLEAN', 'HOME'])
+
+
+def test_a_concurrence_that_ends_by_its_default_has_obeyed_too():
+    trail, ends = Trail(), Ends()
+    beside = smach.Concurrence(['ok', 'aborted', 'preempted'], 'aborted',
+                               outcome_map={'ok': {'LEFT': 'ok', 'RIGHT': 'ok'}})
+    with beside:
+        smach.Concurrence.add('LEFT', Trail().state('LEFT', ends, 'ok'))
+        smach.Concurrence.add('RIGHT', Trail().state('RIGHT', Gate()))
+    outer = machine_of(A=(trail.state('A'), {'ok': 'C'}),
+                       C=(beside, {'ok': 'done', 'aborted': 'CLEAN', 'preempted': 'CLEAN'}),
+                       CLEAN=(trail.state('CLEAN'), {'ok': 'aborted'}))
+    held = run_and_stop(outer, ends)
+    assert (held.end(), trail.ran) == ('aborted', ['A', 'CLEAN'])
+
+
+def test_a_clean_up_that_is_stopped_again_and_repeats_itself_is_no_work():
+    trail, ends, again = Trail(), Ends(), Ends()
+    machine = working(trail, ends, CLEAN={'ok': 'aborted', 'preempted': 'CLEAN'})
+    machine._states['CLEAN'] = trail.state('CLEAN', again, 'ok')
+
+    def stop_again(held):
+        assert again.entered.wait(LIMIT_S)
+        held.hand.preempt()
+
+    held = run_and_stop(machine, ends, then=stop_again)
+    assert (held.end(), trail.ran) == ('aborted', ['A', 'B', 'CLEAN', 'CLEAN'])
+
+
+@pytest.mark.parametrize('fails', ['aborted', 'raises'])
+def test_a_branch_that_its_concurrence_ends_is_recovered_as_ever(fails):
+    trail, gate = Trail(), Gate()
+
+    def slips(state, ud):
+        raise ValueError('slipped')
+
+    left = machine_of(WATCH=(trail.state('WATCH', gate), {'ok': 'done', 'preempted': 'UNDOCK'}),
+                      UNDOCK=(trail.state('UNDOCK', slips if fails == 'raises' else fails, 'ok'),
+                              {'ok': 'done'}))
+    right = trail.state('CARRY', lambda state, ud: gate.entered.wait(LIMIT_S) and 'ok')
+    beside = smach.Concurrence(['done', 'aborted'], 'aborted',
+                               outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'ok'}},
+                               child_termination_cb=lambda outcomes: True)
+    with beside:
+        smach.Concurrence.add('LEFT', left)
+        smach.Concurrence.add('RIGHT', right)
+    held = Held(machine_of(C=(beside, {'done': 'done'})), settings={'max_recoveries': 9})
+    with held.begin():
+        eventually(lambda: not held.running())
+    assert (held.end(), sorted(trail.ran)) == ('done', ['CARRY', 'UNDOCK', 'UNDOCK', 'WATCH'])
+
+
+@pytest.mark.parametrize('services', [True, False])
+@pytest.mark.parametrize('hold', ['breakpoint', 'confirm', 'pause'])
+def test_the_first_state_of_a_clean_up_is_never_held(services, hold):
+    trail, ends = Trail(), Ends(services=services)
+    holds = {'breakpoint': lambda held: held.hand.set_breakpoint('CLEAN'),
+             'confirm': lambda held: held.hand.set_autonomy('CLEAN', 'confirm'),
+             'pause': lambda held: None}
+    machine = working(trail, ends, CLEAN={'ok': 'preempted'})
+    held = Held(machine)
+    with held:
+        holds[hold](held)
+        held.begin()
+        assert ends.entered.wait(LIMIT_S)
+        if hold == 'pause':
+            held.hand.pause()
+        held.hand.preempt()
+        eventually(lambda: not held.running())
+    assert (held.end(), trail.ran) == ('preempted', ['A', 'B', 'CLEAN'])
+
+
+def in_another(machine):
+    return machine_of(N=(machine, {}))
+
+
+@pytest.mark.parametrize('around', [lambda machine: machine, in_another], ids=['flat', 'nested'])
+def test_the_states_behind_it_are_held_again_on_each_level(around):
+    trail, ends = Trail(), Ends()
+    machine = around(working(trail, ends, CLEAN={'ok': 'WASH'}, WASH={'ok': 'preempted'}))
+
+    def confirm(held):
+        eventually(lambda: [each for each in held.held() if each.endswith('/WASH')])
+        held.hand.confirm()
+
+    held = run_and_stop(machine, ends, lambda held: held.hand.set_autonomy('WASH', 'confirm'),
+                        confirm)
+    assert (held.end(), trail.ran) == ('preempted', ['A', 'B', 'CLEAN', 'WASH'])
+
+
+@pytest.mark.parametrize('around', [lambda machine: machine, in_another], ids=['flat', 'nested'])
+def test_a_machine_on_any_level_that_is_led_back_to_its_work_recovers_again(around):
+    trail, ends = Trail(), Ends()
+    machine = working(trail, ends, CLEAN={'ok': 'A'})
+    machine._states['B'] = trail.state('B', ends, 'aborted', 'ok')
+    machine._transitions['B']['aborted'] = 'aborted'
+    held = run_and_stop(around(machine), ends)
+    assert (held.end(), trail.ran) == ('done', ['A', 'B', 'CLEAN', 'A', 'B', 'B'])
+
+
+def test_an_operator_sends_a_nested_machine_on_after_a_stop():
+    trail, ends, gate = Trail(), Ends(), Gate(heeds=False)
+    machine = working(trail, ends, CLEAN={'ok': 'WASH'}, WASH={'ok': 'preempted'},
+                      C={'ok': 'done'})
+    machine._states['CLEAN'] = trail.state('CLEAN', gate)
+
+    def send(held):
+        assert gate.entered.wait(LIMIT_S)
+        held.hand.go_to('SM_ROOT/N', 'C')
+        gate.opened.set()
+
+    held = run_and_stop(in_another(machine), ends, then=send)
+    assert (held.end(), trail.ran) == ('done', ['A', 'B', 'CLEAN', 'C'])
