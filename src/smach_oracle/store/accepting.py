@@ -2,6 +2,7 @@
 
 Each of its trials that has not ended gets a moment BROKEN. A trial may be lost as a whole, too. So
 the store keeps the number behind which new ones begin: a machine without a later trial is in doubt.
+The trials that go on get numbers behind it. A machine is then asked about its trial alone.
 """
 import os
 import sqlite3
@@ -51,6 +52,11 @@ def put_in_doubt(database: sqlite3.Connection, who: str) -> None:
     database.execute('INSERT INTO moments (trial, at, seq, kind, path, label) SELECT number, ?, '
                      '(SELECT coalesce(max(seq), -1) FROM moments WHERE trial = trials.number), '
                      "?, machine, '' FROM trials WHERE ended IS NULL", (now, BROKEN))
-    database.execute('INSERT INTO marked SELECT coalesce(max(number), 0) FROM trials')
+    since, = database.execute('SELECT coalesce(max(number), 0) FROM trials').fetchone()
+    database.execute('INSERT INTO marked VALUES (?)', (since,))
+    going_on = ('(SELECT number FROM trials WHERE ended IS NULL AND number IN '
+                '(SELECT max(number) FROM trials GROUP BY machine))')
+    database.execute('UPDATE moments SET trial = trial + ? WHERE trial IN ' + going_on, (since,))
+    database.execute('UPDATE trials SET number = number + ? WHERE number IN ' + going_on, (since,))
     database.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)', (now, who, WHAT))
     database.execute('COMMIT')

@@ -2,7 +2,7 @@
 import json
 import re
 import sqlite3
-from typing import Iterable, List, NamedTuple, Set
+from typing import Dict, Iterable, List, NamedTuple, Set
 
 from .errors import StoreError
 from .holding import MachineLock
@@ -11,6 +11,7 @@ from .renaming import told_renaming
 from .rows import StoredTrial, StoredValue
 from .store_file import StoreFile, transaction
 
+TELLS_IT = 'it tells that a person was asked after `oracle_state accept`'
 _PART = re.compile(r'"\$part":"([0-9a-f]+)"')
 
 
@@ -36,15 +37,28 @@ class Retention:
         :raises StoreError: where the store cannot be read, or another program writes all the time.
         """
         trials = sorted(self._store.trials(), key=lambda trial: trial.ended or trial.begun)
+        asked = self._asked(trials)
         with transaction(self._store, keep=False) as database:
             for trial in trials:
                 why = self._why(database, trial, now)
                 if not why:
                     continue
-                stays = self._why_kept(trial)
+                stays = TELLS_IT if trial.number in asked else self._why_kept(trial)
                 (self.kept if stays else self.going).append(Dropped(trial, stays or why))
                 if not stays and self._size:
                     _take_out(database, [trial.number])
+
+    def _asked(self, trials: Iterable[StoredTrial]) -> Set[int]:
+        """Return the latest trial of each machine since trials may have been lost.
+
+        Without it the machine would ask a person once more.
+        """
+        lost = self._store.lost_until()
+        latest: Dict[str, int] = {}
+        for trial in trials:
+            if lost is not None and trial.number > lost:
+                latest[trial.machine] = max(trial.number, latest.get(trial.machine, 0))
+        return set(latest.values())
 
     def _why(self, database: sqlite3.Connection, trial: StoredTrial, now: float) -> str:
         age = (now - (trial.ended or trial.begun)) / 86400.0

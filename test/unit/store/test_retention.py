@@ -5,6 +5,7 @@ import time
 import pytest
 
 from smach_oracle.ros.disk.disk_command import main
+from smach_oracle.store.accepting import put_in_doubt
 from smach_oracle.store.codecs import Codecs
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import Held, MachineLock
@@ -101,6 +102,21 @@ def test_never_one_that_has_not_ended(store):
     add(store, 'stopped')
     retention = dropped(store, days=30, size=10)
     assert names(store) == ['stopped'] and retention.kept[0].why == 'it has not ended'
+
+
+def test_never_the_latest_one_of_a_machine_since_the_store_was_accepted(store):
+    add(store, 'before', 60)
+    put_in_doubt(store._db, 'somebody')
+    for machine in ('TASK', 'OTHER'):
+        for days in (50, 40):
+            add(store, '{} {}'.format(machine, days), days, machine=machine)
+    retention = dropped(store, days=30)
+    assert names(store) == ['TASK 40', 'OTHER 40']
+    assert {each.why for each in retention.kept} == {
+        'it tells that a person was asked after `oracle_state accept`'}
+    add(store, 'new', 1)
+    dropped(store, days=30)
+    assert names(store) == ['OTHER 40', 'new']
 
 
 def test_never_one_of_a_machine_that_a_program_holds(store):

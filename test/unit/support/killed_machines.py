@@ -98,6 +98,8 @@ def in_a_process(work):
 class KilledMachine:
     """A machine with a store; `build(diary, points)` makes it again for each process."""
 
+    name = 'TOP'
+
     def __init__(self, folder, build, **settings):
         self.store = str(folder / 'robot.db')
         self.diary = Diary(str(folder / 'diary'))
@@ -113,7 +115,7 @@ class KilledMachine:
             points, log = Points(kill_at), []
             for level in ('info', 'warn'):
                 setattr(smach, 'log' + level, log.append)
-            machine = OracleContainer.wrap(self._build(self.diary, points), name='TOP',
+            machine = OracleContainer.wrap(self._build(self.diary, points), name=self.name,
                                            settings=dict(self._settings, **settings),
                                            expert=expert)
             kinds, events = [], machine._oracle.events.observers

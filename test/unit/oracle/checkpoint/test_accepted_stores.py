@@ -2,6 +2,7 @@
 import os
 import shutil
 import signal
+import time
 
 import pytest
 from killed_machines import KilledMachine, in_a_process
@@ -10,6 +11,7 @@ from test_never_twice import ByHand, chain, killed_in, oracle_state
 
 from smach_oracle.store import opening
 from smach_oracle.store.holding import MachineLock
+from smach_oracle.store.retention import Retention
 from smach_oracle.store.store_file import StoreFile
 
 CHAIN = chain('LOOK', 'POUR', 'CARRY')
@@ -82,6 +84,15 @@ def never_poured_again(killed, **settings):
     assert killed.diary.count('begins')['POUR'] == 1
 
 
+def prune(killed):
+    """Have all trials removed that may go."""
+    store = StoreFile(killed.store)
+    retention = Retention(store, days=1e-9)
+    retention.plan(time.time() + 1)
+    retention.drop()
+    store.close()
+
+
 @pytest.fixture(scope='module')
 def once(tmp_path_factory):
     folder = tmp_path_factory.mktemp('once') / 'killed'
@@ -144,6 +155,39 @@ def test_a_trial_behind_one_that_had_ended_is_asked_about(killed):
     begun = killed.diary.count('begins')
     assert killed.run()['ended_by'] == 'kept'
     assert killed.diary.count('begins') == begun
+
+
+@pytest.mark.parametrize('damage', ['log gone', 'cut 3/4'])  # its trial is lost, and is left
+@pytest.mark.parametrize('between', [lambda _: None, prune])
+def test_a_machine_that_was_asked_is_not_asked_again(killed, damage, between):
+    DAMAGES[damage](killed)
+    accept(killed)
+    assert killed.run(expert=ByHand())['outcome'] == 'succeeded'
+    for _ in range(2):
+        between(killed)
+        told = killed.run()
+        assert told['outcome'] == 'succeeded', told
+
+
+def test_each_accept_puts_the_machine_in_doubt_again(killed):
+    DAMAGES['cut 3/4'](killed)
+    accept(killed)
+    assert killed.run(expert=ByHand())['outcome'] == 'succeeded'
+    shutil.copy(killed.store, killed.store + '.copy')
+    assert killed.run()['outcome'] == 'succeeded'
+    shutil.copy(killed.store + '.copy', killed.store)
+    assert 'accept' in oracle_state(killed), 'it is refused'
+    accept(killed)
+    assert killed.run()['ended_by'] == 'kept'
+
+
+def test_a_machine_that_is_new_to_the_store_is_asked_until_one_has_answered(killed):
+    log_gone(killed)
+    accept(killed)
+    killed.name = 'NEW'
+    assert killed.run()['ended_by'] == 'kept', 'its trial may be lost'
+    assert killed.run(expert=ByHand())['outcome'] == 'succeeded'
+    assert killed.run()['outcome'] == 'succeeded'
 
 
 @pytest.mark.parametrize('damage', sorted(DAMAGES))
