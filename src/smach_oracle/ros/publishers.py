@@ -19,7 +19,7 @@ from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
 
 from .connections import TOPIC_ERRORS, quiet_at_shutdown
 from .event_messages import rates_to_msg, to_msg
-from .log.said_once import warn_once
+from .log.said_once import SaidOnce
 
 QUEUE_SIZE = 1000  # events waiting for one slow subscriber, about 0.3 MB
 RATES_PERIOD_S = 0.2  # at most 5 Hz
@@ -96,6 +96,7 @@ class RatesPublisher:
 
     def __init__(self, topic: str = '~oracle/rates', period_s: float = RATES_PERIOD_S) -> None:
         self._publisher = rospy.Publisher(topic, OracleRates, queue_size=10, latch=True)
+        self._error_once = SaidOnce(lambda text: rospy.logerr('%s', text))
         self._period_s = period_s
         self._wake = threading.Condition()
         # Of two threads the one that looked last publishes last: its message stays latched.
@@ -172,8 +173,8 @@ class RatesPublisher:
             # a table grew while it was read: the machine goes on, the next round gets it
             self.request(machine)
         except Exception as err:  # this thread serves every machine of the process
-            warn_once('~oracle/rates of {} are not published: {}. This is said once'.format(
-                oracle_of(machine).path, error_text(err)))
+            self._error_once('~oracle/rates are not published: {}. This is said once'.format(
+                error_text(err)))
 
 
 class _RatesObserver(OwnObserver):

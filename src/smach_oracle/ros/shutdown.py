@@ -18,7 +18,7 @@ from typing import Any, Callable, Dict, Optional, TextIO, TypeVar
 
 from smach_oracle.forking import in_child
 
-from .signals.child_processes import end_children
+from .signals.child_processes import end_program
 from .signals.latch import Latch, start_thread
 from .signals.signal_ear import SignalEar
 
@@ -41,7 +41,7 @@ class ShutdownGuard:
     """
 
     def __init__(self, preempt: Callable[[], None], close: Callable[[float], None],
-                 end: Callable[[int], None] = os._exit, limit_s: float = LIMIT_S,
+                 end: Callable[[int], None] = end_program, limit_s: float = LIMIT_S,
                  after_preempt_s: Callable[[], float] = lambda: 0.0) -> None:
         self._preempt = preempt
         self._close = close
@@ -141,7 +141,6 @@ class ShutdownGuard:
         _within(CLOSING_S, self._close, CLOSING_S)
         for stream in (sys.stdout, sys.stderr):
             _within(0.1, _flush, stream)
-        end_children()
         self._end(exit_code)
 
     # -- handlers

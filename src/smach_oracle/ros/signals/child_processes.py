@@ -1,4 +1,5 @@
-"""Ends the child processes of a program that ends by force."""
+"""Ends a program by force, and its child processes before."""
+import os
 import sys
 import time
 from typing import Any, List
@@ -7,7 +8,13 @@ CHILDREN_S = 0.2  # for child processes to end by SIGTERM
 _LOOK_S = 0.01
 
 
-def end_children() -> None:
+def end_program(exit_code: int) -> None:
+    """End this process on the spot, once its children have ended."""
+    _end_children()
+    os._exit(exit_code)
+
+
+def _end_children() -> None:
     """End the processes that `multiprocessing` ends or awaits where a program ends by itself.
 
     None begins from here on: a Pool would put new workers in the place of those that end.
