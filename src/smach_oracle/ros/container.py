@@ -7,7 +7,7 @@ expert (action server `~expert_query`, or the one that `~expert_query_server` na
 recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves as the bare one.
 """
 import functools
-from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Set
+from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
 
 import rospy
 
@@ -32,6 +32,7 @@ from .loaded_settings import (
     read_param,
     resolve_python,
 )
+from .log.said_once import SaidOnce
 from .machine_names import machine_names
 from .main_thread import outside_main_thread
 from .reading.known_names import Complaint
@@ -47,7 +48,8 @@ class _GivenSettings(NamedTuple):
     nested: Optional[Nested]
 
 
-_told: Set[str] = set()  # a script may build a machine for each trial
+# a script may build a machine for each trial
+_tell_once = SaidOnce(lambda text: rospy.loginfo('%s', text))
 _given: WeakIdentityMap[BareContainer, _GivenSettings] = WeakIdentityMap()
 
 
@@ -173,9 +175,3 @@ def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
                            nested=given.nested, strict=complain,
                            recover=oracle_of(machine).recovers)
     _given.forget(machine)  # only now: a program that tries again after an error gets it again
-
-
-def _tell_once(text: str) -> None:
-    if text not in _told:
-        _told.add(text)
-        rospy.loginfo(text)

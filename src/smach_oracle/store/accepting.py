@@ -8,10 +8,10 @@ import os
 import sqlite3
 import time
 
-from .errors import StoreDamaged
+from .errors import StoreDamaged, StoreError
 from .holding import check_nobody_holds
 from .names import BROKEN
-from .soundness import CLOSED, LOG, Content, Mark, examined, read_mark, set_log_aside
+from .soundness import CLOSED, LOG, SET_ASIDE, Content, Mark, examined, read_mark, set_log_aside
 
 WHAT = 'accepted although it had lost some of it: what has run since then is in doubt'
 _NO_STORE_HAS = 1 << 62  # moments
@@ -23,7 +23,7 @@ def prepare(where: str, path: str) -> None:
     `where`: its own file. `path`: as the user has named it.
 
     :raises StoreDamaged: where no store can be read.
-    :raises StoreError: where a program holds a machine of it.
+    :raises StoreError: where a program holds a machine of it, or its log cannot be set aside.
     """
     check_nobody_holds(where, path)
     mark, is_log_bad = read_mark(where), False
@@ -39,7 +39,12 @@ def prepare(where: str, path: str) -> None:
                      log='' if known['log'] == CLOSED else known['log'])
     unfinished.close()
     if is_log_bad:
-        set_log_aside(where)
+        try:
+            set_log_aside(where)
+        except OSError as err:
+            raise StoreError('{0}: its log cannot be kept as {0}{1}{2}: {3}. Mend that, and accept '
+                             'the store again'.format(
+                                 path, LOG, SET_ASIDE, err.strerror)) from err
 
 
 def put_in_doubt(database: sqlite3.Connection, who: str) -> None:

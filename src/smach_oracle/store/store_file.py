@@ -12,7 +12,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tu
 
 from smach_oracle.forking import in_child
 
-from .errors import StoreDamaged, told_error
+from .errors import StoreDamaged, StoreError, told_error
 from .names import RENAMED
 from .opening import Opening
 from .renaming import Renaming, containers_of, told_renaming
@@ -60,6 +60,8 @@ class StoreFile:
             self._db = opening.opened(synchronous)
         except sqlite3.Error as err:
             raise told_error(path, err) from err
+        except OSError as err:
+            raise StoreError('{}: cannot be used: {}'.format(path, err)) from err
         self.was_damaged = opening.is_damaged
         in_child(self._let_go)
 

@@ -169,6 +169,26 @@ def test_a_machine_that_was_asked_is_not_asked_again(killed, damage, between):
         assert told['outcome'] == 'succeeded', told
 
 
+def test_a_log_that_cannot_be_set_aside_is_one_line(killed):
+    head_wrong(killed)
+    os.mkdir(log_of(killed) + '.damaged')
+    told = oracle_state(killed, 'accept')
+    assert '{0}: its log cannot be kept as {0}-wal.damaged'.format(killed.store) in told
+    assert len(told.splitlines()) == 1
+    os.rmdir(log_of(killed) + '.damaged')
+    accept(killed)
+    never_poured_again(killed)
+
+
+@pytest.mark.parametrize('command', ['list', 'accept', 'drop'])
+def test_a_log_that_cannot_be_read_is_one_line(killed, command):
+    os.unlink(log_of(killed))
+    os.mkdir(log_of(killed))
+    told = oracle_state(killed, command)
+    assert told.startswith('oracle_state: {}: '.format(killed.store)), told
+    assert len(told.splitlines()) == 1
+
+
 def test_each_accept_puts_the_machine_in_doubt_again(killed):
     DAMAGES['cut 3/4'](killed)
     accept(killed)
