@@ -283,7 +283,9 @@ def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> 
     if any(is_claimed(path, name) for name in found):
         gc.collect()  # machines of this process that are gone may still claim their names
     free = [name for name in found if not is_claimed(path, name, if_unknown=bool(name))]
-    return max(free, key=lambda each: (bool(each), _size(machines[each])), default=None)
+    if not free:
+        return None
+    return max(free, key=lambda each: (bool(each), _size(machines[each])))
 
 
 def _labels(learners: Sequence[Learner]) -> Labels:
