@@ -22,7 +22,7 @@ _LOCK = struct.Struct('hhqqi4x')  # struct flock: kind, origin, start, length, p
 Key = Tuple[str, str]  # path of the file, name
 
 
-class _Claim:
+class _NameLock:
     """The lock of one name. It lasts as long as this object, which its owners share."""
 
     def __init__(self, key: Key) -> None:
@@ -50,8 +50,8 @@ class _Claim:
 
 
 # No lock guards these: an owner may go at any point, and two claims of one name do no harm.
-_by_key: 'MutableMapping[Key, _Claim]' = weakref.WeakValueDictionary()
-_by_owner: 'WeakIdentityMap[object, Dict[Key, _Claim]]' = WeakIdentityMap()
+_by_key: 'MutableMapping[Key, _NameLock]' = weakref.WeakValueDictionary()
+_by_owner: 'WeakIdentityMap[object, Dict[Key, _NameLock]]' = WeakIdentityMap()
 
 
 def claim(path: str, name: str, owner: object) -> None:
@@ -67,7 +67,7 @@ def claim(path: str, name: str, owner: object) -> None:
     with contextlib.suppress(OSError):
         found = _by_key.get(key)
         if found is None or not found.is_on(os.path.dirname(key[0])):
-            found = _by_key[key] = _Claim(key)
+            found = _by_key[key] = _NameLock(key)
         claims[key] = found
 
 
