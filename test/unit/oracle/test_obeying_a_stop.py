@@ -1,10 +1,10 @@
 """When a container has obeyed a stop, in which of them, and what of its clean-up is held then."""
 import threading
-import time
 
 import pytest
 from guarded_machines import OUTCOMES
 from held_machines import LIMIT_S, Gate, Held, Trail, eventually
+from waiting import wait_for
 
 import smach
 
@@ -21,10 +21,7 @@ class Ends:
 
     def __call__(self, state, ud):
         self.entered.set()
-        until_s = time.monotonic() + LIMIT_S
-        while not state.preempt_requested():
-            assert time.monotonic() < until_s, 'nobody has preempted it'
-            time.sleep(0.002)
+        assert wait_for(state.preempt_requested, LIMIT_S), 'nobody has preempted it'
         if self.services:
             state.service_preempt()
         return self.outcome

@@ -6,9 +6,9 @@ from ..recovery.stop import preempt_beside
 from ..recovery.verdict import Verdict, VerdictKind
 
 KEPT = ('nobody has said how the trial goes on ({}). The machine stops where it stands, and the '
-        'trial is kept. The next start asks again, `oracle_run --resume` asks before a state in '
-        'doubt alone (with --resume-map where states of the script are gone), and '
-        '`oracle_state {} drop` ends the trial')
+        'trial is kept. The next start asks again. `oracle_run --resume` asks only before a state '
+        'that on_retry protects, if the script has changed (unless --resume-map says how), and if '
+        'the store may have lost something. `oracle_state {} drop` ends the trial')
 
 
 class _Keeping(Recovery):
