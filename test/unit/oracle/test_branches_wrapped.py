@@ -192,6 +192,19 @@ def test_copied_while_it_runs_it_is_as_at_rest():
     assert type(taken[0]._items) is list
 
 
+def test_a_concurrence_that_is_copied_while_it_runs_is_as_at_rest():
+    taken = []
+
+    def take(state, ud):
+        taken.append(copy.copy(concurrence))
+        return 'ok'
+    left, right = Scripted(take), Scripted()
+    concurrence = both(left, right)
+    assert Watched(inside(concurrence)).run() == 'done'
+    assert taken[0]._states['LEFT'] is left and taken[0]._states['RIGHT'] is right
+    assert type(taken[0]._states['RIGHT']) is Scripted
+
+
 def test_rates_of_the_branches_of_one_concurrence_are_kept_in_one_file(tmp_path):
     file = str(tmp_path / 'rates.json')
     machine = Watched(inside(both(Scripted('aborted'), Scripted('aborted', 'aborted'))),
