@@ -7,7 +7,8 @@ from house import ROOT
 # what only those need who change this package
 OF_DEVELOPERS = {'mypy', 'ruff', 'vermin', 'catkin-lint', 'catkin_lint', 'chromium',
                  'chromium-driver', 'python3-selenium', 'axe-playwright-python', 'node-typescript',
-                 'python3-sphinx', 'furo', 'python3-proselint', 'hypothesis', 'python3-hypothesis'}
+                 'python3-sphinx', 'furo', 'python3-proselint', 'hypothesis', 'python3-hypothesis',
+                 'python3-coverage'}
 PAIRS = [('debian-packages.txt', 'debian-packages-dev.txt'),
          ('requirements.txt', 'requirements-dev.txt'),
          ('requirements-noetic.txt', 'requirements-noetic-dev.txt')]
