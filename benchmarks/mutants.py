@@ -39,10 +39,11 @@ EXECUTIVE = Project(ROOT, 'src/smach_oracle/oracle', 'test/unit/oracle')
 
 
 class Change(NamedTuple):
-    """A mutant, whatever its line is now."""
+    """A mutant, whatever the number of its line is now."""
 
     module: str
     place: str
+    code: str  # the line on which it begins
     before: str
     after: str
 
@@ -128,7 +129,7 @@ def show(trial: Trial, number: str, is_known: bool) -> None:
 
 def change_of(mutant: Mutant) -> Change:
     """Return the change that a mutant is."""
-    return Change(mutant.module, mutant.place, mutant.before, mutant.after)
+    return Change(mutant.module, mutant.place, mutant.code, mutant.before, mutant.after)
 
 
 def equivalents() -> Set[Change]:

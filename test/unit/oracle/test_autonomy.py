@@ -27,6 +27,7 @@ def test_a_state_that_is_to_be_confirmed_waits_for_that_alone() -> None:
         assert held.hand.confirm('SM_ROOT', 'eva') == 'runs now: B in SM_ROOT'
         assert held.end() == 'done'
     assert held.told(EventKind.HOLD_END) == ['confirmed']
+    assert 0 <= held.of(EventKind.HOLD_END)[0].data['waited_s'] < 20
 
 
 def test_a_level_is_given_with_a_state() -> None:
@@ -103,6 +104,28 @@ def test_a_preempt_ends_a_wait_for_a_confirmation() -> None:
         held.waits_before('SM_ROOT/A')
         held.machine.request_preempt()
         assert (held.end(), first.runs) == ('preempted', 0)
+
+
+@pytest.mark.parametrize('states, more', [(9, ''), (10, ''), (11, ', ...')])
+def test_at_most_ten_states_are_named(states: int, more: str) -> None:
+    held = Held(chain_of(*[Scripted() for _ in range(states)]))
+    told = held.hand.set_autonomy('*', 'announce')
+    named = ', '.join('SM_ROOT/' + label for label in 'ABCDEFGHIJ'[:states])
+    assert told == 'autonomy announce for ' + named + more
+
+
+def test_a_state_to_be_confirmed_is_confirmed_as_a_precondition_too() -> None:
+    look, failing = Scripted(), Scripted('aborted')
+    held = Held(chain_of(look, failing), settings={'states': {
+        'A': {'autonomy': 'confirm'}, 'B': {'preconditions': ['A']}}})
+    with held.begin():
+        for runs in (0, 1):
+            eventually(lambda runs=runs: failing.runs == runs)
+            held.waits_before('SM_ROOT/A')
+            assert look.runs == runs
+            held.hand.confirm()
+        assert held.end() == 'done'
+    assert (look.runs, failing.runs) == (2, 2)
 
 
 def test_a_preempt_while_nothing_runs_leaves_the_next_trial_to_be_confirmed() -> None:

@@ -71,6 +71,22 @@ def test_the_handles_of_an_iterator_stay_too():
     assert iterator._items is items and iterator._state is each
 
 
+class Undeclared(smach.State):
+    """Uses keys that it has not registered, as an Iterator lets it."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['ok'])
+
+    def execute(self, ud):
+        ud.done = ud.done + [ud.item]
+        return 'ok'
+
+
+def test_the_state_of_an_iterator_has_the_userdata_itself():
+    machine = Watched(inside(iterator_over(Undeclared(), items=[1, 2])))
+    assert machine.run() == 'done' and machine.machine.userdata.done == [1, 2]
+
+
 def test_a_class_of_the_users_keeps_its_methods():
     concurrence = MyConcurrence(outcomes=['done', 'aborted'], default_outcome='done')
     left = Scripted('aborted')

@@ -65,7 +65,9 @@ def test_an_interface_that_gives_something_else_than_an_answer_has_failed(wrong)
         settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}})
     assert machine.run() == 'done'
     assert len(expert.questions) == 2
-    assert expert.questions[1].tried[0].startswith('interface hand: ')
+    tried, = expert.questions[1].tried
+    assert tried.startswith('interface hand: ')
+    assert [event.text for event in machine.of(EventKind.WARNING)] == [tried]
 
 
 class Deaf:

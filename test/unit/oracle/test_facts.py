@@ -4,7 +4,13 @@ from machines import Scripted, watched
 
 import smach
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind
-from smach_oracle.oracle.records.facts import Decider, TrialEnd, decided_by, ended_by
+from smach_oracle.oracle.records.facts import (
+    Decider,
+    TrialEnd,
+    branches_of,
+    decided_by,
+    ended_by,
+)
 
 
 def end_of(machine):
@@ -64,3 +70,11 @@ def test_what_is_stated_counts_more_than_words():
     event = Event(EventKind.TRIAL_END, 'trial', 9, 0.0, 'TOP', text='KeyboardInterrupt: ',
                   data={'ended_by': 'error'})
     assert ended_by(event, True) is TrialEnd.ERROR
+
+
+@pytest.mark.parametrize('data, branches', [
+    ({'branches': ['LEFT', 'RIGHT']}, ('LEFT', 'RIGHT')), ({'branches': ()}, ()),
+    ({'branches': 'LEFT'}, ()), ({}, ()), (None, ())])
+def test_the_start_of_a_container_names_its_branches(data, branches):
+    event = Event(EventKind.CONTAINER_START, 'trial', 9, 0.0, 'TOP/BOTH', data=data)
+    assert branches_of(event) == branches

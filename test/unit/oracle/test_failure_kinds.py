@@ -33,6 +33,16 @@ def test_an_exception_is_recovered_from():
     assert machine.of(EventKind.FAILURE)[0].text == 'ValueError: no grasp'
 
 
+def test_where_nothing_more_can_be_said_of_a_failure_the_log_says_why(log):
+    machine = watched(Scripted('aborted'))
+
+    def describe(state):
+        raise OSError('no link')
+    oracle_of(machine.machine).describe_failure = describe
+    assert machine.run() == 'done' and machine.of(EventKind.FAILURE)[0].text == ''
+    assert ('warn', "SM_ROOT/A: cannot say more of its failure: OSError('no link')") in log
+
+
 @pytest.mark.parametrize('nonsense', [None, 'no such outcome', 7, ['ok'], {}])
 def test_an_unregistered_outcome_is_recovered_from(nonsense):
     machine = watched(Scripted(nonsense), Scripted())

@@ -78,7 +78,7 @@ def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
                     'to, and its condition holds']
 
 
-def test_a_port_for_topics_is_made_once(health):
+def test_a_port_for_topics_is_made_once(health, log):
     heard = []
 
     class Port:
@@ -95,6 +95,7 @@ def test_a_port_for_topics_is_made_once(health):
     assert machine.run() == 'done'
     assert machine.run() == 'done'
     assert heard == [['/motors_on', 'Power']]
+    assert not any('is not listened to' in text for _, text in log)
     assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'motors: off'
 
 

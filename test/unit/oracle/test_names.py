@@ -53,6 +53,11 @@ def recovered(machine, **settings):
     return [event.kind for event in events]
 
 
+def test_a_list_of_names_says_where_it_is_empty():
+    assert question.names([]) == '(none)'
+    assert question.names(['b', 3, 'a']) == '3, a, b'
+
+
 def test_what_a_script_keeps_on_its_machine_stays_its_own(tmp_path):
     machine = chain_of(Scripted('aborted'), machine_class=SetsThem)
     kinds = recovered(machine, rates_file=str(tmp_path / 'rates.json'))

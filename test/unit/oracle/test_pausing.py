@@ -7,6 +7,7 @@ from machines import FakeExpert, Scripted, chain_of
 
 import smach
 from smach_oracle.oracle.errors import OperatorError
+from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
 
 
@@ -100,6 +101,14 @@ def test_a_preempt_ends_a_paused_machine_at_once() -> None:
         assert (held.end(), first.runs) == ('done', 1)
 
 
+def test_a_preempt_of_a_paused_machine_that_does_not_run_lifts_the_pause() -> None:
+    held = Held(chain_of(Scripted()))
+    held.hand.pause()
+    assert held.hand.preempt() == 'SM_ROOT does not run; its pause is lifted'
+    with held.begin():
+        assert held.end() == 'done'
+
+
 def test_a_preempt_by_somebody_else_leaves_the_pause_to_the_next_trial() -> None:
     first = Scripted()
     held = Held(chain_of(first))
@@ -118,6 +127,7 @@ def test_a_preempt_of_a_state_that_runs_is_passed_on_though_paused() -> None:
     gate = Gate()
     with Held(chain_of(Scripted(gate), Scripted())).begin() as held:
         assert gate.entered.wait(20)
+        assert held.hand.status().active == (ActiveState('SM_ROOT', 'A', '', False),)
         held.hand.pause()
         held.hand.preempt()
         assert held.end() == 'preempted'

@@ -163,6 +163,15 @@ def test_a_preempt_in_a_query_of_a_nested_machine_ends_all():
     assert run.result() == 'preempted'
 
 
+def test_a_preempt_that_the_last_state_has_not_serviced_stays():
+    def ends_unserviced(state, ud):
+        machine.machine.request_preempt()
+        return 'preempted'
+    machine = watched(Scripted(ends_unserviced))
+    assert machine.run() == 'preempted'
+    assert machine.machine.preempt_requested()
+
+
 def test_the_next_run_after_a_preempted_one_is_as_any_other():
     machine = watched(Scripted('aborted'), Scripted(), expert=FakeExpert(waits, supersede('ok')),
                       settings={'max_recoveries': 0, 'deadline_s': 0})

@@ -77,6 +77,7 @@ def test_the_exponential_estimator_agrees_on_the_first_result_and_forgets_gradua
     for rate in (window, mean):
         rate.add(True)
     assert window.rate == pytest.approx(mean.rate)
+    assert (window.recent, mean.recent) == ((1, 1), (0, 0)), 'a mean knows no single results'
     mean.add_successes(1000)
     assert 0 < mean.rate < 1e-9
     one_by_one = ExponentialFailureRate(10, 0.1)
@@ -221,6 +222,8 @@ def test_one_state_that_makes_no_sense_costs_only_itself(tmp_path, log):
                                 'containers': {'': {'A': 5, 'B': good, 'GONE': good}}}))
     machine = watched(Scripted(), Scripted(), settings={'rates_file': str(path)})
     assert (machine.rate('A').successes, machine.rate('B').successes) == (0, 1)
+    warned, = [text for level, text in log if level == 'warn']
+    assert warned.startswith("Rates file {}: 'A' of SM_ROOT cannot be used: ".format(path))
     machine.run()
     assert 'GONE' in json.loads(
         path.read_text())['containers'][''], 'a state that comes back has its rate back'

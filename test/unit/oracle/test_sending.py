@@ -1,5 +1,6 @@
 """A running machine that an operator sends to a state, with the checks of an expert's jump."""
 import threading
+from typing import Any
 
 import pytest
 from guarded_machines import chain
@@ -154,6 +155,30 @@ def test_userdata_are_as_the_state_had_them_unless_settings_keep_them() -> None:
         assert values == seen
         assert held.of(EventKind.SENT)[0].data['userdata'] == userdata
         assert contents(held.machine.userdata)['x'] == seen[-1] + 1
+
+
+def test_a_state_that_was_not_entered_after_all_is_the_authors_the_next_time() -> None:
+    """The oracle would have entered A, and a person would be asked why it still runs."""
+    gate, expert = Gate(), FakeExpert()
+
+    def pauses(state: Any, ud: Any) -> str:
+        held.hand.pause()
+        return 'aborted'
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(pauses, gate), {'ok': 'done'})
+        smach.StateMachine.add('B', Scripted(), {'ok': 'A'})
+    held = Held(machine, expert=expert, settings={'still_running_s': 0.05,
+                                                  'still_running_factor': 1})
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        held.hand.go_to('', 'B')
+        held.hand.resume()
+        eventually(gate.entered.is_set)
+        assert not gate.opened.wait(0.3)  # six times as long as it takes to ask
+        gate.opened.set()
+        assert held.end() == 'done'
+    assert expert.questions == []
 
 
 def test_a_container_that_ends_before_says_so() -> None:

@@ -1,9 +1,27 @@
 """Settings: what is allowed, and errors that name the key, the value and what is allowed."""
+import dataclasses
+
 import pytest
 
 from smach_oracle.oracle.errors import OracleError, SettingsError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
+from smach_oracle.oracle.settings.preconditions import parse_preconditions
 from smach_oracle.oracle.settings.settings import Settings
+
+
+def test_nobody_changes_settings_in_place():
+    settings = Settings.from_dict({})
+    for each in (settings, settings.for_state('', 'ANY')):
+        for field in dataclasses.fields(each):
+            with pytest.raises(dataclasses.FrozenInstanceError):
+                setattr(each, field.name, None)
+
+
+def test_preconditions_that_were_checked_before_are_taken_and_no_other_tuple():
+    checked = parse_preconditions('preconditions', ['LOOK'])
+    assert parse_preconditions('preconditions', checked) is checked
+    with pytest.raises(SettingsError, match='a list of preconditions'):
+        parse_preconditions('preconditions', ('LOOK',))
 
 
 def test_the_defaults_are_those_of_the_design():

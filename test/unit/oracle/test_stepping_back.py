@@ -133,6 +133,14 @@ def test_a_policy_that_names_no_place_asks():
             in machine.of(EventKind.DECISION)[0].text)
 
 
+def test_a_policy_of_a_level_above_may_name_a_place_of_any_container():
+    machine = watched(chain(SEE=chain(AIM=Scripted(), LOOK=Scripted()), PICK=chain(
+        ARM=chain(GRASP=Scripted('aborted', 'aborted')))))
+    machine.machine.get_children()['PICK']._oracle.in_force.policy = Elsewhere('SEE/LOOK')
+    assert machine.run() == 'done'
+    assert decided(machine)[-1] == ('TOP/PICK/ARM', 'step_back', 'TOP/SEE/LOOK')
+
+
 def test_a_level_above_that_decides_may_step_back_further_still():
     machine = watched(chain(FIND=Scripted(), PICK=chain(ARM=chain(
         GRASP=Scripted('aborted', 'aborted')))), escalate=True, states={

@@ -21,7 +21,7 @@ from waiting import wait_for
 
 import smach
 import smach_oracle.oracle.machine.workers as workers
-from smach_oracle.oracle.asking.question import Expert
+from smach_oracle.oracle.asking.question import AnswerKind, Expert
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 SOON = {'still_running_s': 0.05, 'still_running_factor': 1}
@@ -106,10 +106,21 @@ def test_the_state_is_preempted_and_the_machine_goes_as_answered(answer, outcome
     assert machine.run() == outcome
     assert machine.visits() == visits
     assert failures(machine) == ['A'] and machine.rate('A').failures == before + 1
+    results = [visit.result.name for visit in machine.machine._oracle.records.history.latest()]
+    assert results[:2] == ['FAILURE', 'SUPERSEDED' if answer.kind is AnswerKind.SUPERSEDE
+                           else 'PREEMPTED']
     assert not machine.of(EventKind.PREEMPT)
     assert (machine.of(EventKind.TRANSITION)[1].state,
             machine.of(EventKind.TRANSITION)[1].target) == ('A', 'ORACLE')
     assert told(machine) == [('QUERY_OPENED', 'A'), ('QUERY_ANSWERED', 'A')]
+
+
+@pytest.mark.parametrize('by, who', [('eva', 'eva'), ('', 'the expert')])
+def test_the_log_says_by_whose_answer_the_state_is_preempted(by, who, log):
+    answer = goto('B')._replace(by=by)
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(answer))
+    assert machine.run() == 'done'
+    assert ('warn', 'SM_ROOT/A: is preempted, as {} answered goto B'.format(who)) in log
 
 
 def test_the_preempt_is_taken_back_for_the_next_visit():
@@ -236,14 +247,36 @@ def test_a_preempt_or_a_shutdown_takes_the_question_back(stop, monkeypatch):
     assert [kind for kind, _ in told(machine)] == ['QUERY_OPENED', 'QUERY_CANCELLED']
 
 
-def test_a_preempt_of_the_machine_goes_before_an_answer():
+@pytest.mark.parametrize('stop, why', [('preempt', 'preempted'), ('shutdown', 'shutdown')])
+def test_a_question_that_is_taken_back_while_the_state_runs_says_why(stop, why, monkeypatch):
+    def stays(state, ud):
+        assert wait_for(lambda: machine.of(EventKind.QUERY_CANCELLED))
+        return 'preempted'
+
+    def ask(question, cancelled, progress):
+        if stop == 'preempt':
+            machine.machine.request_preempt()
+        else:
+            monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
+        assert cancelled.wait(10)
+    machine = asked(Scripted('aborted', stays), expert=FakeExpert(ask))
+    machine.run()
+    assert [event.text for event in machine.of(EventKind.QUERY_CANCELLED)] == [why]
+
+
+@pytest.mark.parametrize('stop', ['preempt', 'shutdown'])
+def test_a_preempt_or_a_shutdown_goes_before_an_answer(stop, monkeypatch):
     def ends(state, ud):
         assert wait_for(state.preempt_requested)
-        machine.machine.request_preempt()
+        if stop == 'preempt':
+            machine.machine.request_preempt()
+        else:
+            monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         state.service_preempt()
         return 'preempted'
     machine = asked(Scripted('aborted', ends), Scripted(), expert=FakeExpert(goto('B')))
     assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
+    assert [event.target for event in machine.of(EventKind.JUMP)] == ['A']
 
 
 def both_branches(*scripts):
@@ -326,8 +359,15 @@ def test_a_nested_machine_that_hangs_is_preempted_as_a_whole():
 
 
 def test_the_clocks_thread_lives_only_while_a_state_runs():
-    machine = asked(Scripted('aborted', 'ok'))
+    clocks = []
+
+    def looks(state, ud):
+        clocks.extend(thread for thread in threading.enumerate()
+                      if 'smach_oracle alarm clock' in thread.name)
+        return 'ok'
+    machine = asked(Scripted('aborted', looks))
     assert machine.run() == 'done'
+    assert [clock.daemon for clock in clocks] == [True], 'it keeps no program from its end'
     assert wait_for(lambda: not any('smach_oracle alarm clock' in thread.name
                                     for thread in threading.enumerate()))
 

@@ -184,6 +184,8 @@ def test_the_log_says_in_which_state_it_goes_on(tmp_path):
                                  (tree, 'I1', ['PLAIN'])):
         killed = killed_in(make(tmp_path / 'killed'), build, name)
         log = killed.run()['log']
+        assert any(re.match('TOP: trial .* goes on; its program was stopped [0-9]+ s ago', text)
+                   for text in log)
         said = [re.match("State machine going on in state '(.*)' with userdata: ", text)
                 for text in log]
         assert [each.group(1) for each in said if each] == goes_on
@@ -219,7 +221,7 @@ def test_a_changed_script_is_not_guessed_about(tmp_path):
     assert killed.diary.count('begins') == begun
 
 
-@pytest.mark.parametrize('value', ['now', 'state:', 3, 'ask:A'])
+@pytest.mark.parametrize('value', ['now', 'state:', 'state: ', 3, 'ask:A'])
 def test_what_on_resume_may_be_is_said(tmp_path, value):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     assert 'ask, recover, restart or state:LABEL' in killed.run(on_resume=value)['error']
@@ -238,6 +240,8 @@ def test_it_goes_on_from_an_earlier_moment(tmp_path):
     first = next(each for each in before if each.label == 'B' and each.kind == 'STATE_START')
     told = killed.run(resume_from=first.number)
     assert told['done'] == ['A', 'B', 'C']
+    assert any(' goes on from moment {}; its program was'.format(first.number) in line
+               for line in told['log'])
     assert killed.diary.count('begins')['A'] == 1
     after = moments_of(killed)
     assert after[:len(before)] == before  # those behind it stay

@@ -65,6 +65,7 @@ def check_begins_anew(tmp_path, build):
     assert (told['outcome'], told['failures']) == ('succeeded', [])
     # the userdata are those with which FIRST began
     assert told['done'] == ['FIRST', 'I0', 'I1', 'I2']
+    assert killed.diary.count('ends')['I0'] == 2, 'it does not go on behind it'
 
 
 def test_an_iterator_begins_with_its_first_item(tmp_path):

@@ -22,8 +22,10 @@ import coverage
 measured, leave = coverage.process_startup(), os._exit
 
 def save_and_leave(status):
-    measured.save()
-    leave(status)
+    try:
+        measured.save()
+    finally:  # also where a test has taken away the right to write
+        leave(status)
 
 if measured is not None:
     os._exit = save_and_leave

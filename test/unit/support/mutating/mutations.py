@@ -27,6 +27,7 @@ class Mutant(NamedTuple):
     last_line: int
     last_column: int
     number: int  # of the changes that begin there
+    code: str  # the line on which it begins
     statement: Tuple[int, int]  # first and last line of the statement around it, without its block
     text: str  # in its place
     before: str  # the change, in one line each
@@ -86,14 +87,16 @@ def _end_of(node: Part) -> Tuple[int, int]:
 
 def mutants_of(text: str, module: str) -> List[Mutant]:
     """Return every mutant of a module."""
-    source = Source(text)
+    source, lines = Source(text), text.splitlines()
     found: List[Mutant] = []
     seen: List[Tuple[int, int]] = []
     for node, place, statement in _parts(source.tree, '', (1, 1)):
         for part, new in _changes_of(node, source):
             where = (part.lineno, part.col_offset)
-            found.append(Mutant(module, place, *where, *_end_of(part), seen.count(where), statement,
-                                new, ' '.join(source.text(part).split()), ' '.join(new.split())))
+            found.append(Mutant(
+                module, place, *where, *_end_of(part), seen.count(where),
+                lines[part.lineno - 1].strip(), statement, new,
+                ' '.join(source.text(part).split()), ' '.join(new.split())))
             seen.append(where)
     return found
 
