@@ -3,6 +3,7 @@ import os
 import threading
 
 from branch_machines import Item, iterator_over
+from held_machines import Held
 from machines import (
     FakeExpert,
     FakeHealth,
@@ -11,6 +12,7 @@ from machines import (
     Watched,
     give_up,
     goto,
+    interface,
     supersede,
     waits,
 )
@@ -42,6 +44,15 @@ def both(left, right):
         smach.Concurrence.add('LEFT', left)
         smach.Concurrence.add('RIGHT', right)
     return concurrence
+
+
+def each(state, *loop):
+    """An Iterator of two items. Its state is EACH."""
+    iterator = smach.Iterator(outcomes=OUTCOMES, input_keys=[], output_keys=[], it=[1, 2],
+                              it_label='item', exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=list(loop))
+    return iterator
 
 
 def run(machine, concurrence='', **wrap):
@@ -95,6 +106,16 @@ def iterator_gone_on_with():
                settings=ASKS)
 
 
+def iterator_in_concurrence():
+    return run(chain(BOTH=both(each(Scripted('aborted'), 'ok'), Scripted())),
+               concurrence='TOP/BOTH')
+
+
+def concurrence_in_iterator():
+    return run(chain(ALL=each(both(Scripted('ok', 'aborted'), Scripted()), 'done')),
+               concurrence='TOP/ALL/EACH')
+
+
 # -- why the oracle is entered
 
 def failed():
@@ -124,6 +145,25 @@ def failed_by_policy():
 
 def given_up_by_itself():
     return run(chain(A=Scripted(*['aborted'] * 3)), settings={'max_recoveries': 1})
+
+
+def escalated():
+    """The oracle of GRASP is unsure, and that of the machine above decides."""
+    return run(chain(FIND=Scripted(), PICK=chain(GRASP=Scripted('aborted', 'aborted'))), settings={
+        'memory': 1000, 'escalate': True, 'states': {'GRASP': {'prior': 0.5}}})
+
+
+def nobody_answers():
+    return run(chain(A=Scripted(), B=Scripted('aborted')), expert=FakeExpert(), settings={
+        'max_recoveries': 0, 'on_no_answer': {'goto': 'A'}})
+
+
+def done_by_an_interface():
+    """The first time it is of no help."""
+    helps = iter([None, supersede('ok')])
+    return run(chain(A=Scripted('aborted')), expert=FakeExpert(
+        interface('hand'), interface('hand'), interface=lambda *given: next(helps)), settings={
+            'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}})
 
 
 def overran():
@@ -208,24 +248,46 @@ def often_unwell():
     return unwell(times=2, max_recoveries=1)
 
 
-def preempted():
+def preempted(machine=None):
     """While an expert is asked."""
     asked = threading.Event()
 
     def ask(question, cancelled, progress):
         asked.set()
         return waits(question, cancelled, progress)
-    machine = Watched(chain(A=Scripted('aborted')), name='TOP', expert=FakeExpert(ask),
+    watched = Watched(machine or chain(A=Scripted('aborted')), name='TOP', expert=FakeExpert(ask),
                       settings=ASKS)
 
     def preempt():
         assert asked.wait(20)
-        machine.machine.request_preempt()
+        watched.machine.request_preempt()
     thread = threading.Thread(target=preempt)
     thread.start()
-    outcome = machine.run()
+    outcome = watched.run()
     thread.join()
-    return told(machine.events) + ['= {}'.format(outcome)]
+    return told(watched.events) + ['= {}'.format(outcome)]
+
+
+def preempted_as_drawn():
+    """Its author has drawn what comes after a preempt."""
+    machine = smach.StateMachine(outcomes=OUTCOMES)
+    with machine:
+        smach.StateMachine.add('A', Scripted('aborted'), {'ok': 'done', 'preempted': 'STOW'})
+        smach.StateMachine.add('STOW', Scripted(), {'ok': 'preempted'})
+    return preempted(machine)
+
+
+def sent():
+    """An operator sends it elsewhere while it waits to be confirmed."""
+    held = Held(chain(A=Scripted(), B=Scripted(), C=Scripted()), name='TOP',
+                settings={'states': {'B': {'autonomy': 'confirm'}}})
+    with held.begin():
+        held.waits_before('TOP/B')
+        held.hand.go_to('', 'C', by='ann')
+        outcome = held.end()
+    # another thread tells the command
+    return told([event for event in held.events if event.kind.name != 'OPERATOR_COMMAND']) + [
+        '= {}'.format(outcome)]
 
 
 def interrupted(folder):
@@ -245,6 +307,7 @@ def interrupted(folder):
 
 SCENES = (
     nested_machines, handed_up, concurrence, branch_given_up, iterator, item_passed_over,
-    iterator_gone_on_with, failed, failed_as_drawn, failed_by_policy, given_up_by_itself, overran,
-    held_back, taken_out, arrived, arrived_down, arrived_where_it_is_closed, unwell, often_unwell,
-    preempted)
+    iterator_gone_on_with, iterator_in_concurrence, concurrence_in_iterator, failed,
+    failed_as_drawn, failed_by_policy, given_up_by_itself, escalated, nobody_answers,
+    done_by_an_interface, overran, held_back, taken_out, arrived, arrived_down,
+    arrived_where_it_is_closed, unwell, often_unwell, preempted, preempted_as_drawn, sent)
