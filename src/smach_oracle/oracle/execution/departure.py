@@ -18,7 +18,8 @@ from ..places.way import repeated_on, why_closed_on
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
-from ..recovery.verdict import Verdict
+from ..recovery.occasions import FromBelow
+from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
 
 
 class Departure:
@@ -29,16 +30,23 @@ class Departure:
         self.verdict = verdict
         self.arrives_at = arrives_at
         self.failed = failed
-        self._repeated = set(repeated_on(verdict.way)) if verdict.way is not None else set()
+        self._repeated = set(repeated_on(verdict.way)) if isinstance(verdict, JumpTo) else set()
+
+    def from_below(self) -> FromBelow:
+        """Return what it is to the level that follows it."""
+        verdict = self.verdict
+        if isinstance(verdict, GiveUp):
+            verdict = verdict._replace(level=None)  # it is the one that ends
+        return FromBelow(verdict, self.failed, self.why_not)
 
     def why_not(self) -> str:
         """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
 
         What was preempted may have gone on for a while.
         """
-        way = self.verdict.way
-        if way is None:
+        if not isinstance(self.verdict, JumpTo):
             return ''
+        way = self.verdict.way
         closed = why_closed_on(way)
         repeated = sorted(set(repeated_on(way)).difference(self._repeated))
         if not (closed or repeated):
@@ -50,8 +58,11 @@ class Departure:
 
     def result_of(self, node: TreeNode) -> VisitResult:
         """Return how the visit counts that a container was in when it was left."""
-        decided_there = self.verdict.decided_by is node
-        return VisitResult.FAILURE if decided_there else VisitResult.PREEMPTED
+        return VisitResult.FAILURE if self.is_own(node) else VisitResult.PREEMPTED
+
+    def is_own(self, node: TreeNode) -> bool:
+        """Whether a container's own oracle has decided, as if its state had failed."""
+        return isinstance(self.verdict, JumpTo) and self.verdict.decided_by is node
 
 
 def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
@@ -65,24 +76,28 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     To be called in the thread of the failed state's container, its lock not held: what runs in the
     containers is preempted.
     """
-    arrives_at = verdict.arrives_at
-    left = [] if arrives_at is None else _left_for(node, arrives_at)
-    if arrives_at is None or not left:
+    level = arrives_at(verdict)
+    left = [] if level is None else _left_for(node, level)
+    if level is None or not left:
         return False
-    departure = Departure(verdict, arrives_at, '{}/{}'.format(node.path, label))
-    nodes = [*left, arrives_at]
+    departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
+    nodes = [*left, level]
     others = _claim(nodes, departure)
     if others:
         _preempt(_container_apart(nodes, others))
         _leave_way(nodes[:-len(others)])
         return False
-    where = (verdict.way.down[-1].path if verdict.way is not None
-             else 'its end with {}'.format(verdict.ending.outcome))
-    smach.loginfo('{}/{} is left for {}'.format(arrives_at.path, arrives_at.machine._current_label,
-                                                where))
-    _preempt(arrives_at.machine._current_state)
+    smach.loginfo('{}/{} is left for {}'.format(level.path, level.machine._current_label,
+                                                _in_words(verdict)))
+    _preempt(level.machine._current_state)
     _leave_way(left)
     return True
+
+
+def _in_words(verdict: Verdict) -> str:
+    if isinstance(verdict, JumpTo):
+        return verdict.way.down[-1].path
+    return 'its end with {}'.format(verdict.ending.outcome if isinstance(verdict, GiveUp) else '')
 
 
 def _preempt(state: Optional[smach.State]) -> None:

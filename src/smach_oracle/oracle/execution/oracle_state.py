@@ -8,8 +8,9 @@ from typing import Any, Dict, Optional, Tuple
 import smach
 
 from ..errors import TrialError
-from ..recovery.recovery import Recovery
-from ..recovery.verdict import Verdict
+from ..recovery.phases import recover
+from ..recovery.recovering import Recovering
+from ..recovery.verdict import Verdict, leads_to
 
 
 class OracleState(smach.State):
@@ -21,7 +22,7 @@ class OracleState(smach.State):
     def __init__(self) -> None:
         smach.State.__init__(self, outcomes=[])
         self._lock = threading.Lock()
-        self._recovery: Optional[Recovery] = None
+        self._recovering: Optional[Recovering] = None
         self._verdict: Optional[Verdict] = None
 
     def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
@@ -29,14 +30,14 @@ class OracleState(smach.State):
         self._outcomes = set(labels)
         return {label: label for label in labels}
 
-    def begin(self, recovery: Recovery) -> None:
+    def begin(self, recovering: Recovering) -> None:
         """Be ready to recover from a failure.
 
         From now on a preempt request reaches the recovery.
         """
         with self._lock:
             self._preempt_requested = False
-            self._recovery = recovery
+            self._recovering = recovering
             self._verdict = None
 
     def execute(self, ud: smach.UserData) -> str:
@@ -45,15 +46,15 @@ class OracleState(smach.State):
         :returns: where the machine goes, '' where it raises. It follows the verdict itself.
         :raises TrialError: where no failure was handed over.
         """
-        recovery = self._recovery
-        if recovery is None:
+        recovering = self._recovering
+        if recovering is None:
             raise TrialError('the meta state is entered by failures alone')
         try:
-            self._verdict = recovery.run()
-            return self._verdict.leads_to()
+            self._verdict = recover(recovering)
+            return leads_to(self._verdict)
         finally:
             with self._lock:
-                self._recovery = None
+                self._recovering = None
 
     def take_verdict(self) -> Verdict:
         """Return what the recovery that `execute` ran has come to, once.
@@ -69,14 +70,14 @@ class OracleState(smach.State):
         """End the recovery: a precondition that runs is preempted, an open question taken back."""
         smach.State.request_preempt(self)
         with self._lock:
-            recovery = self._recovery
-        if recovery is not None:
-            recovery.cancel()
+            recovering = self._recovering
+        if recovering is not None:
+            recovering.cancel()
 
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
-        state.update(_lock=None, _recovery=None, _verdict=None)
+        state.update(_lock=None, _recovering=None, _verdict=None)
         return state
 
     def __setstate__(self, state: Dict[str, Any]) -> None:

@@ -18,6 +18,7 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
 from ..records.state_record import StateRecord, Unfinished
 from ..records.visits import VisitResult
+from ..recovery import occasions
 from ..recovery.failure import (
     ContainerEnding,
     Failure,
@@ -33,14 +34,12 @@ from ..recovery.judging import HeldBack, Overrun, judge
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import TakenOut, WatchedVisit
 from ..recovery.stop import note_end_under_preempt, winds_down
-from .arriving_visit import ArrivingVisit
 from .boundary import pass_boundary
 from .departure import Departure, is_settled, take_departure
-from .oracle_visit import OracleVisit
-from .resumed_visit import ResumedVisit
+from .oracle_visit import visit_oracle
 from .starting_over import keep_start
 from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
-from .unwell_failure import OftenUnwellVisit, UnwellVisit, why_unwell_after
+from .unwell_failure import why_unwell_after
 
 NO_FACTS: Mapping[str, Any] = {}
 
@@ -244,7 +243,8 @@ class Step:
             recall_preempts(self._machine._states[record.label])
         failure = Failure(record.label, FailureKind.TIME_LIMIT, told,
                           'was left, as {} failed'.format(departure.failed), None)
-        return ArrivingVisit(node, record, failure, departure).arrive(told, self._context())
+        return self._recover(occasions.arrived(failure, self._context(), departure.from_below(),
+                                               told, departure.is_own(node)))
 
     def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
         """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""
@@ -253,9 +253,9 @@ class Step:
             recall_preempts(self._machine._states[record.label])  # it services none
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         if node.tree.is_resumed:  # nobody has said whether it was done before the program stopped
-            return ResumedVisit(node, record, failure, Unfinished(
-                failure.kind, '', failure.text, failure.text)).run(self._context(), False)
-        return OracleVisit(node, record, failure).run(self._context(), False)
+            return self._recover(occasions.interrupted(failure, self._context(), Unfinished(
+                failure.kind, '', failure.text, failure.text)))
+        return self._recover(occasions.failed(failure, self._context()))
 
     def _unfinished(self, failure: Failure, before: Unfinished) -> Optional[str]:
         """Go on with a visit that was begun before the program was stopped.
@@ -272,7 +272,7 @@ class Step:
             node.emit(EventKind.FAILURE, state=failure.state, failure_kind=int(failure.kind),
                       failure_class=int(record.failure_class), rate=record.rate,
                       text=failure.text)
-        return ResumedVisit(node, record, failure, before).run(self._context(), False)
+        return self._recover(occasions.interrupted(failure, self._context(), before))
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
         """Go on after a failure while the robot was not well. `why`: see `why_unwell_after`."""
@@ -287,7 +287,10 @@ class Step:
                                          UNCOUNTED if why else NO_FACTS)
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
-        return UnwellVisit(node, record, failure, why).run(self._context(), False)
+        state = self._machine._states[record.label]
+        if not why and state.preempt_requested():
+            recall_preempts(state)  # it came after the state's end: the meta state services it
+        return self._recover(occasions.unwell(failure, self._context(), why))
 
     def _context(self) -> FailureContext:
         """Return what the visits so far say about a failure of the state."""
@@ -317,10 +320,13 @@ class Step:
             return self._end_settled(failure)
         asked = None if node.asked_next is None else node.asked_next.take(record)
         if asked is not None:
-            return ResumedVisit(node, record, failure, asked).run(context, continuous)
-        visit = (OftenUnwellVisit(node, record, failure, why_unwell) if why_unwell
-                 else OracleVisit(node, record, failure))
-        return visit.run(context, continuous)
+            return self._recover(occasions.interrupted(failure, context, asked, continuous))
+        if why_unwell:
+            return self._recover(occasions.often_unwell(failure, context, continuous, why_unwell))
+        return self._recover(occasions.failed(failure, context, continuous))
+
+    def _recover(self, occasion: occasions.Occasion) -> Optional[str]:
+        return visit_oracle(self._node, self._record, occasion)
 
     def _end_settled(self, failure: Failure) -> Optional[str]:
         """End the container by a failure that has had its account further below."""
@@ -338,7 +344,7 @@ class Step:
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
         node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
                                  AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
-        return OracleVisit(node, record, taken.failure).follow(answer, outcome, self._context())
+        return self._recover(occasions.taken_out(taken.failure, self._context(), answer, outcome))
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings

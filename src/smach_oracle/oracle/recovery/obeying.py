@@ -10,7 +10,7 @@ from ..places.levels import levels_above
 from ..places.place import place_at
 from ..places.way import Way, way_to
 from .failure import ContainerEnding
-from .verdict import Verdict, VerdictKind
+from .verdict import GiveUp, JumpTo, Supersede, Verdict
 
 
 def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
@@ -24,14 +24,11 @@ def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
         watch.gate[remapping.get(key, key)] = value
     if answer.kind is AnswerKind.GOTO:
         way = way_of(answer, node)
-        return Verdict(VerdictKind.JUMP, way=way, by=answer.by, text=answer.why,
-                       written=way.kept(watch))
+        return JumpTo(way, answer.by, answer.why, way.kept(watch))
     if answer.kind is AnswerKind.SUPERSEDE:
-        return Verdict(VerdictKind.SUPERSEDE, outcome=answer.outcome, by=answer.by,
-                       text=answer.why)
+        return Supersede(answer.outcome, answer.by, answer.why)
     ending = ContainerEnding(outcome=answer.outcome) if answer.outcome else natural_ending()
-    return Verdict(VerdictKind.GIVE_UP, ending=ending, by=answer.by, text=answer.why,
-                   level=_level_of(answer, node))
+    return GiveUp(ending, answer.by, answer.why, _level_of(answer, node))
 
 
 def way_of(answer: Answer, node: TreeNode) -> Way:

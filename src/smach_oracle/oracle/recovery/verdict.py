@@ -1,54 +1,75 @@
-"""Verdicts of the meta state, for the machine."""
-from enum import Enum
-from typing import FrozenSet, NamedTuple, Optional
+"""The verdict on one failure: where the machine goes from the meta state (paper, section IV-A).
+
+There are four kinds, and no other way out. `execution.applying` carries them out.
+"""
+from typing import FrozenSet, NamedTuple, Optional, Union
 
 from ..machine.tree_node import TreeNode
 from ..places.way import Way
 from .failure import ContainerEnding
 
 
-class VerdictKind(Enum):
-    """Ways out of the meta state."""
+class JumpTo(NamedTuple):
+    """Go to a state, its userdata as the settings say."""
 
-    JUMP = 'jump'  # to a state, its userdata as the settings say
-    SUPERSEDE = 'supersede'  # the failed state counts as having ended with `outcome`
-    GIVE_UP = 'give up'  # end, or go on, as `ending` says
-    PREEMPTED = 'preempted'  # a preempt or a shutdown ended the recovery. `ending` as above
-
-
-class Verdict(NamedTuple):
-    """One way out of the meta state."""
-
-    kind: VerdictKind
-    way: Optional[Way] = None  # JUMP
-    outcome: str = ''  # SUPERSEDE
-    ending: ContainerEnding = ContainerEnding()
+    way: Way
     by: str = ''  # the expert's name
     text: str = ''
-    # JUMP: userdata keys of the container where the ways meet that survive a restore
+    # userdata keys of the container where the ways meet that survive a restore
     written: FrozenSet[str] = frozenset()
-    # JUMP: the level above that decided on it, as if its own state had failed
-    decided_by: Optional[TreeNode] = None
-    restarts: bool = False  # JUMP: with the userdata of the start, in all containers
-    level: Optional[TreeNode] = None  # GIVE_UP: the container that ends. None: that of the failure
+    decided_by: Optional[TreeNode] = None  # the level above, as if its own state had failed
+    restarts: bool = False  # with the userdata of the start, in all containers
 
-    @property
-    def arrives_at(self) -> Optional[TreeNode]:
-        """Return the level above that goes on, once the containers below it are left.
 
-        None means no other.
-        """
-        if self.way is not None:
-            return self.way.meets if self.way.left else None
-        return self.level
+class Supersede(NamedTuple):
+    """Go on as if the failed state had ended with `outcome`."""
 
-    def leads_to(self) -> str:
-        """Return the state or outcome that the meta state leads to.
+    outcome: str
+    by: str = ''
+    text: str = ''
 
-        It is '' where it raises, and where a level above goes on.
-        """
-        if self.arrives_at is not None:
-            return ''
-        if self.way is not None:
-            return self.way.first
-        return self.outcome or self.ending.state or self.ending.outcome or ''
+
+class GiveUp(NamedTuple):
+    """End, or go on, as `ending` says."""
+
+    ending: ContainerEnding
+    by: str = ''
+    text: str = ''
+    level: Optional[TreeNode] = None  # the container that ends. None: that of the failure
+
+
+class Preempted(NamedTuple):
+    """End, or go on, as `ending` says: a preempt or a shutdown has ended the recovery.
+
+    `ending` is None where the trial ends early, and the container has no outcome.
+    """
+
+    ending: Optional[ContainerEnding] = None
+
+
+Verdict = Union[JumpTo, Supersede, GiveUp, Preempted]
+
+
+def arrives_at(verdict: Verdict) -> Optional[TreeNode]:
+    """Return the level above that goes on, once the containers below it are left.
+
+    None means no other.
+    """
+    if isinstance(verdict, JumpTo):
+        return verdict.way.meets if verdict.way.left else None
+    return verdict.level if isinstance(verdict, GiveUp) else None
+
+
+def leads_to(verdict: Verdict) -> str:
+    """Return the state or outcome that the meta state leads to.
+
+    It is '' where it raises, and where a level above goes on.
+    """
+    if arrives_at(verdict) is not None:
+        return ''
+    if isinstance(verdict, JumpTo):
+        return verdict.way.first
+    if isinstance(verdict, Supersede):
+        return verdict.outcome
+    ending = verdict.ending
+    return '' if ending is None else ending.state or ending.outcome or ''

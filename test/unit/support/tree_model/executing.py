@@ -99,15 +99,15 @@ class _InTurn(OracleState):
 
     def execute(self, ud: Any) -> str:
         """Recover, as its class does."""
-        recovery: Any = self._recovery
-        if recovery._failure.is_held_back:
-            self._world.turns.wait('{}/{}'.format(self._node.path, recovery._failure.state))
+        recovery: Any = self._recovering
+        if recovery.failure.is_held_back:
+            self._world.turns.wait('{}/{}'.format(self._node.path, recovery.failure.state))
             self._await_preempt(recovery)
         return super().execute(ud)
 
     def _await_preempt(self, recovery: Any) -> None:
         """Where a Concurrence around is about to stop its branches, wait for that."""
-        if owed_branches(self._node.machine._states[recovery._failure.state]):
+        if owed_branches(self._node.machine._states[recovery.failure.state]):
             end = time.monotonic() + self._world.patience_s
             while not recovery.stopped() and time.monotonic() < end:
                 time.sleep(0.001)  # it comes in the thread of a branch beside

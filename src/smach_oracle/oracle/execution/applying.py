@@ -1,0 +1,171 @@
+"""Carries out a verdict: the one place that moves a machine from the meta state."""
+from typing import Any, Mapping, Optional, Sequence
+
+from ..machine.repeats import leave_for, note_superseded
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_view import missing_keys
+from ..places.way import Way
+from ..records.events import EventKind
+from ..records.state_record import StateRecord
+from ..records.visits import VisitResult
+from ..recovery.failure import Failure, leaving_outcome, natural_ending, route_of
+from ..recovery.occasions import FirstStep, Occasion, Superseding
+from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at
+from .entering import prepare_entry
+from .going_on import ask_to_go_on
+from .oracle_state import OracleState
+from .starting_over import restore_start
+from .transitions import go_to, message_of, obey_preempt, stop_left_behind, terminate
+
+
+def leaving(node: TreeNode, failure: Failure) -> str:
+    """Return the outcome with which a container ends that is left: nobody goes by it."""
+    failing = node.in_force.failing
+    natural = natural_ending(failure, node.machine.get_registered_outcomes(), failing)
+    return leaving_outcome(node.machine, failing, natural.outcome)
+
+
+class Applying:
+    """One verdict on its way out of the meta state.
+
+    Its methods return the container's outcome, or None where the machine goes on.
+    """
+
+    def __init__(self, node: TreeNode, record: StateRecord, occasion: Occasion,
+                 meta: OracleState) -> None:
+        self._node = node
+        self._machine = node.machine
+        self._record = record
+        self._occasion = occasion
+        self._meta = meta
+
+    def apply(self, verdict: Verdict) -> Optional[str]:
+        """Go as a verdict says.
+
+        :raises Exception: what the machine would raise without an oracle, where that gives up.
+        """
+        if isinstance(verdict, Supersede):
+            self._count_superseded(verdict.outcome)
+        if self._node.tree.early_end.why is not None:
+            if self._record.label in self._machine._states:
+                self._machine._set_current_state(self._record.label)
+            stop_left_behind(self._node)
+            return None
+        if arrives_at(verdict) not in (None, self._node):
+            return self._depart()
+        if isinstance(verdict, JumpTo):
+            self._jump(verdict)
+            return None
+        if isinstance(verdict, Supersede):
+            return self._supersede(verdict)
+        if isinstance(verdict, GiveUp):
+            return self._give_up(verdict)
+        return self._preempted(verdict)
+
+    def _count_superseded(self, outcome: str) -> None:
+        node, record = self._node, self._record
+        if self._occasion.superseding is Superseding.TAKES_BACK:
+            record.take_back_failure()
+            node.records.history.supersede(record.label, outcome)
+        elif self._occasion.superseding is Superseding.COUNTS:
+            node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED)
+            note_superseded(node, record.label)
+        else:
+            node.records.history.count_superseded(record.label, outcome)
+
+    def _depart(self) -> str:
+        """End the container, which is left for a level above."""
+        self._service_preempt()
+        return self._terminate(leaving(self._node, self._occasion.failure))
+
+    def _jump(self, jump: JumpTo) -> None:
+        node, way = self._node, jump.way
+        if jump.restarts:  # with the userdata of the start in all containers
+            restore_start(node)
+            leave_for(node, way.first)
+            ask_to_go_on(node, way.first)
+            userdata, missing = 'start', None
+        else:
+            entry = prepare_entry(way, jump.written, 'jumping')
+            userdata, missing = entry.userdata, entry.missing
+        self._note_entry(way.first)
+        self._go_on(way.first, jump.by, jump.text, userdata, missing, self._across(way))
+
+    def _across(self, way: Way) -> Mapping[str, str]:
+        """Return what is told of a jump that crosses containers."""
+        below = self._occasion.below
+        return {**({} if below is None else {'from': below.failed}),
+                **({'to': way.down[-1].path} if len(way.down) > 1 else {})}
+
+    def _supersede(self, verdict: Supersede) -> Optional[str]:
+        route = route_of(self._machine, self._record.label, verdict.outcome)
+        self._node.emit(EventKind.SUPERSEDE, state=self._record.label, outcome=verdict.outcome,
+                        target=route.target, by=verdict.by, text=verdict.text)
+        if not route.is_state:
+            return self._terminate(route.target)
+        self._note_entry(route.target)
+        self._go_on(route.target, verdict.by)
+        return None
+
+    def _note_entry(self, label: str) -> None:
+        """Note that the machine comes to this state by the oracle alone."""
+        if self._node.settings.still_running_s:
+            self._node.record(label).enter_by_oracle()
+
+    def _give_up(self, verdict: GiveUp) -> Optional[str]:
+        ending, text, node = verdict.ending, verdict.text, self._node
+        told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
+        node.gave_up = ending.state is None
+        node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
+                  target=ending.state or '', by=verdict.by, text=told)
+        if ending.error is not None:  # SMACH has logged it where it was made
+            raise ending.error
+        if ending.state is not None:
+            self._go_on(ending.state, verdict.by, text)
+            return None
+        return self._terminate(str(ending.outcome))
+
+    def _preempted(self, verdict: Preempted) -> Optional[str]:
+        ending = verdict.ending
+        if self._machine.preempt_requested():
+            self._node.tell_preempt()
+        if ending is not None and ending.state is not None:
+            if ending.obeys:  # the author's own transition: the request goes on with it
+                obey_preempt(self._node, self._meta)
+            self._go_on(ending.state)
+            return None
+        self._service_preempt()
+        if ending is not None and ending.error is not None:
+            raise ending.error
+        return self._terminate(str(None if ending is None else ending.outcome))
+
+    def _service_preempt(self) -> None:
+        self._meta.service_preempt()
+        self._machine.service_preempt()
+
+    def _go_on(self, target: str, by: str = '', text: str = '', userdata: str = 'keep',
+               missing: Optional[Sequence[str]] = None,
+               across: Optional[Mapping[str, str]] = None) -> None:
+        """Leave the meta state for a state."""
+        node = self._node
+        if missing is None:
+            missing = missing_keys(self._machine, target, self._machine.userdata._data)
+        if self._is_told(target, by):
+            data = {'missing_keys': list(missing), 'userdata': userdata, **(across or {})}
+            self._tell_jump(target, by, text, data)
+        go_to(node, message_of(node.settings.oracle_label, target, target), target)
+
+    def _is_told(self, target: str, by: str) -> bool:
+        """Whether the observers hear of it: not where an uncounted visit is made again."""
+        again = self._occasion.first is FirstStep.ENTER_AGAIN and target == self._record.label
+        return bool(by) or not again
+
+    def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, Any]) -> None:
+        self._node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
+                        data=data)
+        self._node.records.count_oracle_edge(target)
+
+    def _terminate(self, outcome: str) -> str:
+        """Leave the meta state for a container outcome."""
+        self._node.records.count_oracle_edge(outcome)
+        return terminate(self._node, self._node.settings.oracle_label, outcome, outcome)

@@ -1,0 +1,108 @@
+"""Why the oracle is entered, as data: one constructor for each case.
+
+Which phases of a recovery do anything, what is counted and what is told follows from it alone.
+"""
+import enum
+from typing import Callable, NamedTuple, Optional
+
+from ..asking.question import Answer
+from ..decision.policy import FailureContext
+from ..records.state_record import Unfinished
+from .failure import Failure
+from .verdict import Verdict
+
+
+class FirstStep(enum.Enum):
+    """What a recovery begins with."""
+
+    DECIDE = 'decide'  # as a policy does
+    ASK = 'ask'  # a person, since nobody else is to decide: `why`
+    OBEY = 'obey'  # what was answered, or decided below, already
+    ENTER_AGAIN = 'enter again'  # once the robot is well
+    WAIT_AND_DECIDE = 'wait and decide'  # likewise
+
+
+class Superseding(enum.Enum):
+    """How a visit counts of which an expert says what it has ended with."""
+
+    TAKES_BACK = 'takes back'  # the failure that was counted
+    COUNTS = 'counts'  # as a visit, which it was not before
+    RECORDS = 'records'  # in the history, where it is counted already
+
+
+class FromBelow(NamedTuple):
+    """A verdict on a failure in a container below, which was left for this one."""
+
+    verdict: Verdict
+    failed: str  # path of the state that failed
+    why_not: Callable[[], str]  # what prevents it by now, '' where nothing does
+
+
+class Occasion(NamedTuple):
+    """One reason to enter the oracle, after a visit of a state."""
+
+    failure: Failure  # of that state, or what stands for one
+    context: FailureContext
+    outcome: str  # with what the state has ended, '' where it has not
+    what: str  # the same in a word, for the log
+    first: FirstStep = FirstStep.DECIDE
+    superseding: Superseding = Superseding.TAKES_BACK
+    continuous: bool = False
+    is_told: bool = True  # the observers hear of a transition to the oracle
+    is_logged: bool = True  # as a failure
+    why: str = ''  # a person is asked, or the robot is not well, '' where a preempt came meanwhile
+    keeps: bool = False  # without an answer the trial is kept for the next start
+    answer: Optional[Answer] = None  # given while the state still ran
+    below: Optional[FromBelow] = None
+
+
+def failed(failure: Failure, context: FailureContext, continuous: bool = False) -> Occasion:
+    """A state has failed, or overran, or was held back since it is not to be repeated."""
+    return Occasion(
+        failure, context, failure.outcome, failure.outcome or failure.kind.name.lower(),
+        superseding=Superseding.TAKES_BACK if failure.is_counted else Superseding.COUNTS,
+        continuous=continuous)
+
+
+def interrupted(failure: Failure, context: FailureContext, before: Unfinished,
+                continuous: bool = False) -> Occasion:
+    """A visit was begun before the program was stopped. `before`: how it stood."""
+    occasion = failed(failure, context, continuous)
+    if not before.asks:
+        return occasion
+    if failure.is_held_back:
+        return occasion._replace(keeps=True)
+    return occasion._replace(first=FirstStep.ASK, why=before.asks, keeps=before.keeps,
+                             continuous=False)
+
+
+def taken_out(failure: Failure, context: FailureContext, answer: Answer, outcome: str) -> Occasion:
+    """A state was ended by an answer while it still ran. `failure`: as if it had failed."""
+    return Occasion(failure, context, outcome, outcome or 'taken_out', FirstStep.OBEY,
+                    Superseding.RECORDS, is_logged=False, answer=answer)
+
+
+def arrived(failure: Failure, context: FailureContext, below: FromBelow, outcome: str,
+            is_own: bool) -> Occasion:
+    """A state was left for this level. `failure`: if it has to be asked about.
+
+    `is_own`: the decision was made on this level, as if the state had failed.
+    """
+    return Occasion(failure, context, outcome, outcome or 'left', FirstStep.OBEY,
+                    Superseding.TAKES_BACK if is_own else Superseding.RECORDS, is_logged=False,
+                    below=below)
+
+
+def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
+    """A state has failed while the robot was not well. The visit counts nowhere.
+
+    `why`: the robot is not well, or '' where a preempt or a shutdown is under way.
+    """
+    return failed(failure, context)._replace(
+        first=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why)
+
+
+def often_unwell(failure: Failure, context: FailureContext, continuous: bool,
+                 why: str) -> Occasion:
+    """A state has failed while the robot was not well, too often not to be counted."""
+    return failed(failure, context, continuous)._replace(first=FirstStep.WAIT_AND_DECIDE, why=why)
