@@ -143,6 +143,8 @@ def test_waits():
     m.waits(event)
 '''
 
+CODE, CHECKS = 'src', 'test'  # the folders of a small project
+
 
 @pytest.fixture
 def workshop(tmp_path, monkeypatch):
@@ -151,10 +153,10 @@ def workshop(tmp_path, monkeypatch):
     monkeypatch.setattr(trying, 'SPARE_S', 3.0)
     monkeypatch.setattr(trying, 'SLOWER', 1.0)
     root = tmp_path / 'tree'
-    for name, text in (('src/m.py', MODULE), ('test/test_m.py', TEST)):
+    for name, text in ((CODE + '/m.py', MODULE), (CHECKS + '/test_m.py', TEST)):
         (root / name).parent.mkdir(parents=True)
         (root / name).write_text(text)
-    project = trying.Project(root, 'src', 'test')
+    project = trying.Project(root, CODE, CHECKS)
     return project, trying.Workshop(project, tmp_path, 1)
 
 
@@ -192,16 +194,16 @@ def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop)
 
 def test_tests_that_fail_without_a_mutant_are_named(workshop):
     project, shop = workshop
-    for path in project.root.parent.glob('*/test/test_m.py'):
+    for path in project.root.parent.glob('*/{}/test_m.py'.format(CHECKS)):
         path.write_text('def test_it(): assert False')
-    with pytest.raises(trying.TestsNotRun, match='test/test_m.py fails without a mutant'):
+    with pytest.raises(trying.TestsNotRun, match=CHECKS + '/test_m.py fails without a mutant'):
         list(shop.look())
 
 
 def test_a_test_that_fails_once_does_not_kill(workshop):
     project, shop = workshop
     reaches = list(shop.look())
-    for path in project.root.parent.glob('0/test/test_m.py'):
+    for path in project.root.parent.glob('0/{}/test_m.py'.format(CHECKS)):
         path.write_text('import os, m\ndef test_it():\n  if not os.path.exists("been"):\n'
                         '    open("been", "w")\n    assert False')
     alive, = [mutant for mutant in project.mutants() if mutant.after == 'a > b']
