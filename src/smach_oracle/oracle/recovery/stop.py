@@ -62,8 +62,10 @@ def winds_down(node: TreeNode) -> bool:
 
     The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
     """
-    for each in (node, *node.running_around()):
-        if each.machine.preempt_requested():
+    around = [node, *node.running_around()]
+    is_stop = around[-1].machine.preempt_requested()  # and not of a part, which is left
+    for each in around:
+        if is_stop and each.machine.preempt_requested():
             return True
         if each.records.has_obeyed:
             return each.records.winds_down()

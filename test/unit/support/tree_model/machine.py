@@ -227,7 +227,7 @@ class MachinePart(Part, Recovering):
         part: Any = self
         while part is not None:
             if isinstance(part, MachinePart):
-                if part.flag:
+                if part.flag and (part is self or self.run.top.flag):
                     return True
                 if part.work is not None:
                     return bool(part.work)
