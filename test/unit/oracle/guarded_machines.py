@@ -19,7 +19,7 @@ def chain(**states):
     labels = list(states)
     with machine:
         for label, following in zip(labels, labels[1:] + ['done']):
-            good = 'ok' if isinstance(states[label], Scripted) else 'done'
+            good = 'ok' if 'ok' in states[label].get_registered_outcomes() else 'done'
             smach.StateMachine.add(label, states[label], {good: following})
     return machine
 

@@ -6,6 +6,7 @@ the machine goes to AWAY. So each phase that there is runs. `Options` give one o
 import threading
 from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
+import guarded_machines
 import pytest
 from guarded_machines import OUTCOMES
 from machines import FakeHealth, Scripted, Watched, goto, supersede
@@ -128,12 +129,8 @@ class WaitsForIt(smach.State):
 
 def chain(**states: Any) -> smach.StateMachine:
     """States in this order, and AWAY, which ends the machine well, and which none leads to."""
-    machine = smach.StateMachine(outcomes=OUTCOMES)
-    labels = list(states)
+    machine = guarded_machines.chain(**states)
     with machine:
-        for label, following in zip(labels, labels[1:] + ['done']):
-            good = 'done' if isinstance(states[label], smach.Container) else 'ok'
-            smach.StateMachine.add(label, states[label], {good: following})
         smach.StateMachine.add('AWAY', Scripted(), {'ok': 'done'})
     return machine
 

@@ -3,6 +3,7 @@ import os
 import threading
 
 from branch_machines import Item, iterator_over
+from guarded_machines import OUTCOMES, chain
 from held_machines import Held
 from machines import (
     FakeExpert,
@@ -20,19 +21,7 @@ from pinned import told
 
 import smach
 
-OUTCOMES = ['done', 'aborted', 'preempted']
 ASKS = {'max_recoveries': 0}
-
-
-def chain(**states):
-    """A machine of these states: 'ok' or 'done' leads to the next, all else falls through."""
-    machine = smach.StateMachine(outcomes=OUTCOMES)
-    labels = list(states)
-    with machine:
-        for label, following in zip(labels, labels[1:] + ['done']):
-            good = 'ok' if isinstance(states[label], Scripted) else 'done'
-            smach.StateMachine.add(label, states[label], {good: following})
-    return machine
 
 
 def both(left, right):
