@@ -15,7 +15,14 @@ from .entering import prepare_entry
 from .going_on import ask_to_go_on
 from .oracle_state import OracleState
 from .starting_over import restore_start
-from .transitions import go_to, message_of, obey_preempt, stop_left_behind, terminate
+from .transitions import (
+    be_back,
+    go_to,
+    message_of,
+    obey_preempt,
+    stop_left_behind,
+    terminate,
+)
 
 
 def leaving(node: TreeNode, failure: Failure) -> str:
@@ -47,8 +54,7 @@ class Applying:
         if isinstance(verdict, Supersede):
             self._count_superseded(verdict.outcome)
         if self._node.tree.early_end.why is not None:
-            if self._record.label in self._machine._states:
-                self._machine._set_current_state(self._record.label)
+            be_back(self._node, self._record.label)
             stop_left_behind(self._node)
             return None
         if arrives_at(verdict) not in (None, self._node):
@@ -129,15 +135,15 @@ class Applying:
         ending = verdict.ending
         if self._machine.preempt_requested():
             self._node.tell_preempt()
-        if ending is not None and ending.state is not None:
+        if ending.state is not None:
             if ending.obeys:  # the author's own transition: the request goes on with it
                 obey_preempt(self._node, self._meta)
             self._go_on(ending.state)
             return None
         self._service_preempt()
-        if ending is not None and ending.error is not None:
+        if ending.error is not None:
             raise ending.error
-        return self._terminate(str(None if ending is None else ending.outcome))
+        return self._terminate(str(ending.outcome))
 
     def _service_preempt(self) -> None:
         self._meta.service_preempt()

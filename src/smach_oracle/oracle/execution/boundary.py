@@ -43,8 +43,9 @@ def _locked(node: TreeNode) -> Iterator[None]:
 
 def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]:
     machine, control = node.machine, node.tree.control
-    obeyed = was_preempted and (is_drawn or not machine.preempt_requested())
-    asked = machine.preempt_requested() and not obeyed
+    stands = machine.preempt_requested()
+    obeyed = was_preempted and (is_drawn or not stands)
+    asked = stands and not obeyed
     stops = asked or is_asked_around(node)
     if not (stops or was_preempted):
         control.stop_is_over()

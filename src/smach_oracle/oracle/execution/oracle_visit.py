@@ -16,7 +16,7 @@ from ..recovery.verdict import Preempted, Verdict, arrives_at
 from .applying import Applying, leaving
 from .departure import depart
 from .oracle_state import OracleState
-from .transitions import go_to, message_of
+from .transitions import be_back, go_to, message_of
 
 _NO_FACTS: Mapping[str, Any] = {}
 
@@ -32,14 +32,8 @@ def visit_oracle(node: TreeNode, record: StateRecord, occasion: Occasion) -> Opt
         verdict = _recover(node, record, occasion, meta)
         return Applying(node, record, occasion, meta).apply(verdict)
     except BaseException:
-        be_back(node, record)
+        be_back(node, record.label)
         raise
-
-
-def be_back(node: TreeNode, record: StateRecord) -> None:
-    """Have the failed state as the current one again, as without an oracle."""
-    if record.label in node.machine._states:
-        node.machine._set_current_state(record.label)
 
 
 def _enter(node: TreeNode, record: StateRecord, occasion: Occasion) -> OracleState:

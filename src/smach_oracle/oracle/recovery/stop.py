@@ -27,9 +27,13 @@ def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None
 
     :param cleans_within: the state is entered again, a machine with a clean-up of its own.
     """
-    outermost = [node, *node.running_around()][-1]
-    if outermost.machine.preempt_requested():
+    if _is_stop(node):
         node.records.note_obeyed(label, cleans_within)
+
+
+def _is_stop(node: TreeNode) -> bool:
+    """Whether the outermost container is asked to stop, and not a part of it, which is left."""
+    return bool([node, *node.running_around()][-1].machine.preempt_requested())
 
 
 def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -> None:
@@ -62,9 +66,8 @@ def winds_down(node: TreeNode) -> bool:
 
     The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
     """
-    around = [node, *node.running_around()]
-    is_stop = around[-1].machine.preempt_requested()  # and not of a part, which is left
-    for each in around:
+    is_stop = _is_stop(node)
+    for each in (node, *node.running_around()):
         if is_stop and each.machine.preempt_requested():
             return True
         if each.records.has_obeyed:

@@ -41,10 +41,10 @@ class GiveUp(NamedTuple):
 class Preempted(NamedTuple):
     """End, or go on, as `ending` says: a preempt or a shutdown has ended the recovery.
 
-    `ending` is None where the trial ends early, and the container has no outcome.
+    `ending` is empty where the trial ends early, and the container has no outcome.
     """
 
-    ending: Optional[ContainerEnding] = None
+    ending: ContainerEnding = ContainerEnding()
 
 
 Verdict = Union[JumpTo, Supersede, GiveUp, Preempted]
@@ -71,5 +71,4 @@ def leads_to(verdict: Verdict) -> str:
         return verdict.way.first
     if isinstance(verdict, Supersede):
         return verdict.outcome
-    ending = verdict.ending
-    return '' if ending is None else ending.state or ending.outcome or ''
+    return verdict.ending.state or verdict.ending.outcome or ''
