@@ -10,6 +10,7 @@ of an empty service over the same way, made by the expert right before each answ
 its own, expert's process to robot's. --check fails where the median answer takes more than the
 limit.
 """
+
 import argparse
 import os
 import queue
@@ -26,7 +27,8 @@ OWN = '/latency_robot/expert_query'
 EMPTY = '/latency_robot/empty'
 
 sys.path.insert(
-    0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest'))
+    0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'test', 'rostest')
+)
 
 
 def main():
@@ -45,12 +47,14 @@ def main():
 
 
 def parse():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--questions', type=int, default=300)
     parser.add_argument('--shared', action='store_true')
-    parser.add_argument('--check', action='store_true',
-                        help='fail above {:g} empty calls'.format(LIMIT))
+    parser.add_argument(
+        '--check', action='store_true', help='fail above {:g} empty calls'.format(LIMIT)
+    )
     parser.add_argument('--role', default='robot', help=argparse.SUPPRESS)
     parser.add_argument('--server', help=argparse.SUPPRESS)
     return parser.parse_args()
@@ -76,7 +80,8 @@ class Processes:
 
     def start(self, command):
         self._started.append(
-            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        )
 
     def start_master(self):
         """Start a master on a free port, for us and for all that is started after it; wait until it
@@ -85,6 +90,7 @@ class Processes:
         from own_master import wait_for_master
 
         from smach_oracle.experiment.launching import free_port
+
         port = free_port()
         uri = 'http://localhost:{}'.format(port)
         os.environ['ROS_MASTER_URI'] = uri
@@ -99,6 +105,7 @@ def measure(server, questions):
     from std_srvs.srv import Empty, EmptyResponse
 
     from smach_oracle.ros.expert.client import ExpertQueryClient
+
     rospy.init_node('latency_robot', disable_signals=True, log_level=rospy.WARN)
     rospy.Service(EMPTY, Empty, lambda _: EmptyResponse())
     client = ExpertQueryClient(server)
@@ -123,6 +130,7 @@ def answer_everything(server):
 
     from smach_oracle.msg import ExpertDecision, OpenQueries
     from smach_oracle.srv import AnswerQuery
+
     rospy.init_node('latency_expert')
     waiting = queue.Queue()
     rospy.Subscriber(server + '/open', OpenQueries, waiting.put, queue_size=10)
@@ -151,6 +159,7 @@ def serve():
     import rospy
 
     from smach_oracle.ros.expert.server import ExpertQueryServer
+
     rospy.init_node('shared')
     ExpertQueryServer('~expert_query')
     rospy.spin()
@@ -161,12 +170,21 @@ def report(latencies, calls, options):
     cuts = statistics.quantiles(latencies, n=100, method='inclusive')
     unit_s = statistics.median(calls)
     print(
-        '{} answers, {} server: median {:.1f} ms, p95 {:.1f} ms, p99 {:.1f} ms, slowest {:.1f} ms'.
-        format(len(latencies), 'shared' if options.shared else 'own', cuts[49] * 1e3,
-               cuts[94] * 1e3, cuts[98] * 1e3,
-               max(latencies) * 1e3))
-    print('an empty call: median {:.1f} ms; an answer takes {:.1f} of them (limit: {:g})'.format(
-        unit_s * 1e3, cuts[49] / unit_s, LIMIT))
+        '{} answers, {} server: median {:.1f} ms, p95 {:.1f} ms, p99 {:.1f} ms, '
+        'slowest {:.1f} ms'.format(
+            len(latencies),
+            'shared' if options.shared else 'own',
+            cuts[49] * 1e3,
+            cuts[94] * 1e3,
+            cuts[98] * 1e3,
+            max(latencies) * 1e3,
+        )
+    )
+    print(
+        'an empty call: median {:.1f} ms; an answer takes {:.1f} of them (limit: {:g})'.format(
+            unit_s * 1e3, cuts[49] / unit_s, LIMIT
+        )
+    )
     return int(options.check and cuts[49] > LIMIT * unit_s)
 
 

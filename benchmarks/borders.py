@@ -9,6 +9,7 @@ stores, answers, a machine that runs, the robot's health, its skills, its interf
 What comes past a border, or hangs for a minute, is shown with the smallest example that Hypothesis
 finds. With --check there are fewer examples, and the exit status is 1 where there is any.
 """
+
 import argparse
 import logging
 import sys
@@ -46,8 +47,12 @@ def main() -> int:
             print('{:42} FAULT'.format(border.name))
             traceback.print_exc()
             continue
-        print('{:42} {:8} {:8} {:8.1f}'.format(
-            border.name, ends['taken'], ends['refused'], time.monotonic() - began_s), flush=True)
+        print(
+            '{:42} {:8} {:8} {:8.1f}'.format(
+                border.name, ends['taken'], ends['refused'], time.monotonic() - began_s
+            ),
+            flush=True,
+        )
     print('{} borders, {} examples each, {} faults'.format(len(chosen), each, faults))
     return 1 if arguments.check and faults else 0
 
@@ -55,9 +60,12 @@ def main() -> int:
 def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--examples', type=int, default=0,
-                        help='of all borders together (default: {}, with --check {})'.format(
-                            TRIED, CHECKED))
+    parser.add_argument(
+        '--examples',
+        type=int,
+        default=0,
+        help='of all borders together (default: {}, with --check {})'.format(TRIED, CHECKED),
+    )
     parser.add_argument('--only', default='', metavar='WORDS', help='borders with these words')
     parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
     return parser.parse_args()

@@ -10,6 +10,7 @@ reply has come. A hand counts from the page's message (let go, or the stop butto
 joint target has been reached. --check fails where one of ten marks takes more than 300 ms, or one
 of ten stops more than 100 ms.
 """
+
 import argparse
 import asyncio
 import contextlib
@@ -32,7 +33,7 @@ ANY_IMAGE = '0.000000000'  # the stamp that stands for the image in use
 CAMERA = '/head_camera/rgb/image_raw'
 HERE = os.path.dirname(os.path.abspath(__file__))
 FIXTURES = os.path.join(HERE, '..', 'test', 'rostest')
-LAUNCH = '''<launch>{nice}
+LAUNCH = """<launch>{nice}
   <node pkg="smach_oracle" type="perception_interface" name="perception_interface">
     <rosparam command="load" file="$(find smach_oracle)/launch/perception_interface.yaml"/>
   </node>
@@ -40,7 +41,7 @@ LAUNCH = '''<launch>{nice}
     <rosparam command="load" file="{fixtures}/teleoperation.yaml"/>
   </node>
   <node pkg="smach_oracle" type="expert_console" name="expert_console" args="_port:={port}"/>
-</launch>'''
+</launch>"""
 
 sys.path.insert(0, FIXTURES)
 
@@ -59,12 +60,16 @@ class Page:
         """Sign in, as a browser does."""
         from tornado.httpclient import AsyncHTTPClient, HTTPRequest
         from tornado.websocket import websocket_connect
+
         answer = await AsyncHTTPClient().fetch('http://{}/session'.format(self._address))
         cookie = answer.headers['Set-Cookie'].split(';')[0]
         self._socket = await websocket_connect(
-            HTTPRequest('ws://{}/socket'.format(self._address), headers={
-                'Origin': 'http://' + self._address, 'Cookie': cookie}),
-            max_message_size=1 << 26)
+            HTTPRequest(
+                'ws://{}/socket'.format(self._address),
+                headers={'Origin': 'http://' + self._address, 'Cookie': cookie},
+            ),
+            max_message_size=1 << 26,
+        )
         reader = asyncio.get_running_loop().create_task(self._read())
         reader.add_done_callback(lambda _: None)
         self._headers = {'Cookie': cookie, 'X-Xsrf': json.loads(answer.body)['xsrf']}
@@ -93,8 +98,7 @@ class Page:
         """Send a command; what its reply comes to."""
         self._number += 1
         self._replies[self._number] = reply = asyncio.get_running_loop().create_future()
-        self._socket.write_message(
-            json.dumps(dict(arguments, id=self._number, do=command)))
+        self._socket.write_message(json.dumps(dict(arguments, id=self._number, do=command)))
         return reply
 
     async def section(self, name, wanted=bool):
@@ -108,10 +112,13 @@ class Page:
 
     async def start_interface(self, robot, name):
         """Answer the question of a robot by an interface; the question's key."""
+
         def asked(questions):
             return any(each['robot'] == robot for each in questions or ())
-        key = next(each['key'] for each in await self.section('questions', asked)
-                   if each['robot'] == robot)
+
+        key = next(
+            each['key'] for each in await self.section('questions', asked) if each['robot'] == robot
+        )
         await self.ask('claim', question=key)
         await self.ask('answer', question=key, kind='interface', name=name, outputs=[], why='')
         return key
@@ -119,15 +126,20 @@ class Page:
     async def look_on(self):
         """Show the camera, as a page does: the next frame once the last is there."""
         from tornado.httpclient import AsyncHTTPClient, HTTPClientError
-        sensors = (await self.section('sensors', lambda it: it and any(
-            each['topic'] == CAMERA for each in it['sensors'])))['sensors']
+
+        sensors = (
+            await self.section(
+                'sensors', lambda it: it and any(each['topic'] == CAMERA for each in it['sensors'])
+            )
+        )['sensors']
         number = next(each['id'] for each in sensors if each['topic'] == CAMERA)
         newest = 0
         while True:
             with contextlib.suppress(HTTPClientError):
                 answer = await AsyncHTTPClient().fetch(
                     'http://{}/sample/{}?after={}&width=640'.format(self._address, number, newest),
-                    headers=self._headers)
+                    headers=self._headers,
+                )
                 newest = int(answer.headers.get('X-Sequence', newest))
             await asyncio.sleep(0.05)
 
@@ -135,8 +147,9 @@ class Page:
 async def measured_marks(page, marks, region):
     """s that each takes, and s of it in the interface."""
     key = await page.start_interface('/marker', 'perception')
-    await page.section('sensors', lambda it: it and key in it['perception']
-                       and it['perception'][key]['image'])
+    await page.section(
+        'sensors', lambda it: it and key in it['perception'] and it['perception'][key]['image']
+    )
     region = {'question': key, 'stamp': ANY_IMAGE, 'region': region, 'strokes': []}
     until_s = time.monotonic() + 60.0
     while not (await page.send('mark', **region))['ok'] and time.monotonic() < until_s:
@@ -186,8 +199,16 @@ async def drive(page, key, arm, up):
 
 def wish(key, held, up):
     """The arguments of one command of a held button."""
-    return {'question': key, 'frame': 'base', 'arm': '', 'sent': 1e3 * time.monotonic(),
-            'held': held, 'linear': [0, 0, up], 'angular': [0, 0, 0], 'gripper': ''}
+    return {
+        'question': key,
+        'frame': 'base',
+        'arm': '',
+        'sent': 1e3 * time.monotonic(),
+        'held': held,
+        'linear': [0, 0, up],
+        'angular': [0, 0, 0],
+        'gripper': '',
+    }
 
 
 class Robots:
@@ -204,11 +225,13 @@ class Robots:
         from own_master import wait_for_master
 
         from smach_oracle.experiment.launching import free_port
+
         port, self.port = free_port(), free_port()
         os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
         self._start('roscore', '-p', str(port))
         wait_for_master(os.environ['ROS_MASTER_URI'])
         import rospy
+
         rospy.init_node('benchmark', disable_signals=True)
         with open(os.path.join(FIXTURES, 'teleoperation_arm.urdf'), encoding='utf-8') as file:
             rospy.set_param('robot_description', file.read())
@@ -217,21 +240,31 @@ class Robots:
             file.write(LAUNCH.format(fixtures=FIXTURES, port=self.port, nice=self._parameters()))
         self._start('roslaunch', launch)
         for name, robot in (('marking', 'marker'), ('teleoperation', 'driver')):
-            self._start(sys.executable, os.path.join(FIXTURES, 'console_{}_robot.py'.format(name)),
-                        '__name:=' + robot)
+            self._start(
+                sys.executable,
+                os.path.join(FIXTURES, 'console_{}_robot.py'.format(name)),
+                '__name:=' + robot,
+            )
         return self
 
     def _parameters(self):
-        return '' if self._nice is None else ''.join(
-            '<param name="{}_interface/nice" value="{}"/>'.format(name, self._nice)
-            for name in ('perception', 'manipulation'))
+        return (
+            ''
+            if self._nice is None
+            else ''.join(
+                '<param name="{}_interface/nice" value="{}"/>'.format(name, self._nice)
+                for name in ('perception', 'manipulation')
+            )
+        )
 
     def _start(self, *command):
         self._processes.append(
-            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
+            subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        )
 
     def __exit__(self, *_error):
         import rospy
+
         rospy.signal_shutdown('measured')
         for process in reversed(self._processes):
             process.send_signal(signal.SIGINT)
@@ -267,30 +300,42 @@ async def measure(options, port, camera, arm):
     page = await Page(port).open()
     looking = asyncio.get_running_loop().create_task(page.look_on())
     rows, columns = np.nonzero(camera.pixels(CAN_INDEX))
-    (left, right), (top, bottom) = ((int(each.min()) - 8, int(each.max()) + 8)
-                                    for each in (columns, rows))
+    (left, right), (top, bottom) = (
+        (int(each.min()) - 8, int(each.max()) + 8) for each in (columns, rows)
+    )
     region = [[left, top], [right, top], [right, bottom], [left, bottom]]
     with load(options.busy):
         taken = await measured_marks(page, options.marks, region)
         taken.update(await measured_stops(page, arm, options.stops))
     looking.cancel()
-    print('{} processes that never rest beside {} cores; {} marks, {} stops of each kind'.format(
-        options.busy, os.cpu_count(), options.marks, options.stops))
+    print(
+        '{} processes that never rest beside {} cores; {} marks, {} stops of each kind'.format(
+            options.busy, os.cpu_count(), options.marks, options.stops
+        )
+    )
     good = True
     for what, times in taken.items():
         limit_s = LIMITS_S[what]
         middle, high, most = 1e3 * np.percentile(times, (50, SHARE, 100))
         good = good and high <= 1e3 * limit_s
-        print('{:22s} p50 {:4.0f} ms   p{} {:4.0f} ms   most {:4.0f} ms   limit {:4.0f} ms'.format(
-            what, middle, SHARE, high, most, 1e3 * limit_s))
+        print(
+            '{:22s} p50 {:4.0f} ms   p{} {:4.0f} ms   most {:4.0f} ms   limit {:4.0f} ms'.format(
+                what, middle, SHARE, high, most, 1e3 * limit_s
+            )
+        )
     return good
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--busy', type=int, default=os.cpu_count(),
-                        help='processes that never rest (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--busy',
+        type=int,
+        default=os.cpu_count(),
+        help='processes that never rest (default: %(default)s)',
+    )
     parser.add_argument('--marks', type=int, default=30, help='default: %(default)s')
     parser.add_argument('--stops', type=int, default=15, help='of each kind (default: %(default)s)')
     parser.add_argument('--nice', help='of the interfaces (default: their own)')
@@ -302,6 +347,7 @@ def main():
         from published_camera import PublishedCamera
         from teleoperation_fixtures import FakeArm
         from waiting import wait_for
+
         camera = PublishedCamera('head_camera', [TABLE, CAN, BOX], streams=True)
         arm = FakeArm()
         ConsolePage.port = robots.port

@@ -8,6 +8,7 @@ that fails is tried again up to three times, then the script is started over up 
 are the trials that failed, those that a retry or a restart cured, and those in which the cause was
 still there when the state was tried again, by the world's own log. Seeds are below 1000.
 """
+
 import argparse
 import csv
 import pathlib
@@ -31,24 +32,48 @@ def report(kind: str, courses: List[Course]) -> None:
     ended = [each.ended for each in courses]
     failed = [each for each in courses if each.failed]
     restarted = [each for each in failed if each.cured_by != 'retry']
-    print(HEAD.format(kind, len(courses), len(failed), ended.count('retry'),
-                      ended.count('restart'), ended.count('failed'), ended.count('false success'),
-                      '{}/{}'.format(sum(each.there_at_retry for each in failed), len(failed)),
-                      '{}/{}'.format(sum(each.there_at_restart for each in restarted),
-                                     len(restarted)), label(courses)), flush=True)
+    print(
+        HEAD.format(
+            kind,
+            len(courses),
+            len(failed),
+            ended.count('retry'),
+            ended.count('restart'),
+            ended.count('failed'),
+            ended.count('false success'),
+            '{}/{}'.format(sum(each.there_at_retry for each in failed), len(failed)),
+            '{}/{}'.format(sum(each.there_at_restart for each in restarted), len(restarted)),
+            label(courses),
+        ),
+        flush=True,
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--task', choices=TASKS, default=TASKS[0])
     parser.add_argument('--kind', nargs='*', help='these kinds alone')
-    parser.add_argument('--trials', type=int, default=10,
-                        help='for each kind (default: %(default)s)')
+    parser.add_argument(
+        '--trials', type=int, default=10, help='for each kind (default: %(default)s)'
+    )
     parser.add_argument('--csv', type=pathlib.Path, help='a file that gets a row for each trial')
     args = parser.parse_args()
-    print(HEAD.format('cause', 'trials', 'failed', 'retry', 'restart', 'never', 'false',
-                      'at retry', 'restarted', 'label'))
+    print(
+        HEAD.format(
+            'cause',
+            'trials',
+            'failed',
+            'retry',
+            'restart',
+            'never',
+            'false',
+            'at retry',
+            'restarted',
+            'label',
+        )
+    )
     world, rows = World(binning=2), []
     for kind in args.kind or KINDS[args.task]:
         scenes = scenes_of(lambda seed: draw(args.task, seed, False), kind, args.trials, SEEDS)

@@ -13,6 +13,7 @@ thread faster, or enters the system faster. So the yardstick does the same kinds
 the same shares as the store: more than half is Python code, a sixth hands the moment to the thread
 that writes, and the rest is SQLite. All take turns, in short rounds, and the median counts.
 """
+
 import argparse
 import json
 import sqlite3
@@ -54,8 +55,10 @@ class Clock:
         begun = self._begun = self._begun or now
         self.left -= 1
         if not self.left:
-            self.each = ((now[0] - begun[0]) / self._transitions,
-                         (now[1] - begun[1]) / self._transitions)
+            self.each = (
+                (now[0] - begun[0]) / self._transitions,
+                (now[1] - begun[1]) / self._transitions,
+            )
         return self.left
 
 
@@ -63,8 +66,12 @@ class Writing(smach.State):
     """Gives one key after the other a new value."""
 
     def __init__(self, clock: Clock) -> None:
-        smach.State.__init__(self, ['again', 'done'], ['k%d' % i for i in range(KEYS)],
-                             ['k%d' % i for i in range(KEYS)])
+        smach.State.__init__(
+            self,
+            ['again', 'done'],
+            ['k%d' % i for i in range(KEYS)],
+            ['k%d' % i for i in range(KEYS)],
+        )
         self._clock = clock
 
     def execute(self, userdata: Any) -> str:
@@ -85,8 +92,9 @@ def values() -> Dict[str, object]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--check', action='store_true')
     parser.add_argument('--transitions', type=int, default=5000, help='(default: %(default)s)')
     parser.add_argument('--folder', help='where the stores are made (default: a temporary one)')
@@ -102,21 +110,37 @@ def report(folder: Path, options: argparse.Namespace) -> int:
         'yardstick': yardstick,
         'OFF': lambda transitions, path: measure(transitions, path, 'OFF'),
         'NORMAL': lambda transitions, path: measure(transitions, path, 'NORMAL'),
-        'FULL': lambda transitions, path: measure(transitions, path, 'FULL')}
+        'FULL': lambda transitions, path: measure(transitions, path, 'FULL'),
+    }
     rounds: List[Dict[str, Times]] = []
     for number in range(ROUNDS):
-        rounds.append({name: times(max(1, options.transitions // ROUNDS),
-                                   str(folder / '{}_{}.db'.format(name, number)))
-                       for name, times in measured.items()})
+        rounds.append(
+            {
+                name: times(
+                    max(1, options.transitions // ROUNDS),
+                    str(folder / '{}_{}.db'.format(name, number)),
+                )
+                for name, times in measured.items()
+            }
+        )
     print('{:>10} {:>16} {:>14}'.format('', 'processor, us', 'wall, us'))
     for name in list(measured)[1:]:
-        processor, wall = (1e6 * median([each[name][kind] - each['bare'][kind] for each in rounds])
-                           for kind in (0, 1))
+        processor, wall = (
+            1e6 * median([each[name][kind] - each['bare'][kind] for each in rounds])
+            for kind in (0, 1)
+        )
         print('{:>10} {:>16.0f} {:>14.0f}'.format(name, processor, wall))
-    ratio = median([(each['OFF'][0] - each['bare'][0]) / (each['yardstick'][0] - each['bare'][0])
-                    for each in rounds])
-    print('by transition, {} keys, {} bytes: OFF takes {:.2f} times the yardstick, limit {:g}'
-          .format(KEYS, BYTES, ratio, LIMIT))
+    ratio = median(
+        [
+            (each['OFF'][0] - each['bare'][0]) / (each['yardstick'][0] - each['bare'][0])
+            for each in rounds
+        ]
+    )
+    print(
+        'by transition, {} keys, {} bytes: OFF takes {:.2f} times the yardstick, limit {:g}'.format(
+            KEYS, BYTES, ratio, LIMIT
+        )
+    )
     return int(options.check and ratio > LIMIT)
 
 
@@ -129,8 +153,7 @@ def measure(transitions: int, store: Optional[str] = None, synchronous: str = 'O
     with machine:
         smach.StateMachine.add('A', Writing(clock), {'again': 'B'})
         smach.StateMachine.add('B', Writing(clock), {'again': 'A'})
-    settings = {} if store is None else {'checkpoint': store,
-                                         'checkpoint_synchronous': synchronous}
+    settings = {} if store is None else {'checkpoint': store, 'checkpoint_synchronous': synchronous}
     OracleContainer.wrap(machine, settings=settings).execute()
     return clock.each
 
@@ -147,7 +170,8 @@ def yardstick(transitions: int, path: str) -> Times:
 
 
 class PythonWork:
-    """Python code of many places: a loop would stay in the processor's caches, the store does not.
+    """Python code of many places: a loop would stay in the processor's caches, the store
+    does not.
     """
 
     def __init__(self) -> None:
@@ -167,10 +191,13 @@ class SimplestWriter:
 
     def __init__(self, path: str) -> None:
         self._database = sqlite3.connect(path, isolation_level=None, check_same_thread=False)
-        for statement in ('PRAGMA journal_mode = WAL', 'PRAGMA synchronous = OFF',
-                          'CREATE TABLE moments (number INTEGER PRIMARY KEY, at REAL)',
-                          'CREATE TABLE facts (moment INTEGER, name TEXT, text TEXT)',
-                          'CREATE INDEX facts_of ON facts (moment)'):
+        for statement in (
+            'PRAGMA journal_mode = WAL',
+            'PRAGMA synchronous = OFF',
+            'CREATE TABLE moments (number INTEGER PRIMARY KEY, at REAL)',
+            'CREATE TABLE facts (moment INTEGER, name TEXT, text TEXT)',
+            'CREATE INDEX facts_of ON facts (moment)',
+        ):
             self._database.execute(statement)
         self._ready = threading.Condition(threading.Lock())
         self._waiting: Optional[List[Tuple[str, str]]] = None
@@ -210,8 +237,9 @@ class SimplestWriter:
         database = self._database
         database.execute('BEGIN IMMEDIATE')
         moment = database.execute('INSERT INTO moments (at) VALUES (?)', (time.time(),)).lastrowid
-        database.executemany('INSERT INTO facts VALUES (?, ?, ?)',
-                             [(moment, *fact) for fact in facts])
+        database.executemany(
+            'INSERT INTO facts VALUES (?, ?, ?)', [(moment, *fact) for fact in facts]
+        )
         database.execute('COMMIT')
 
 

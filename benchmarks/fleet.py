@@ -14,6 +14,7 @@ on are told as the most within the second and within the last tenth of the kills
 where memory has not grown by more than a tenth, and threads and files by no more than two a robot:
 they come and go with its connections. The exit status is 1 where something does not hold.
 """
+
 import argparse
 import random
 import signal
@@ -30,18 +31,20 @@ WATCHED = ('server', 'console_1')
 DEADLINE_S, LEASE_S, LONGEST_S = 20.0, 3.0, 3.0
 MORE_MEMORY = 1.1  # what counts as flat: a tenth more
 MORE_A_ROBOT = 2  # threads or files: what counts as flat
-LEFT = '''
+LEFT = """
 import rospy
 from smach_oracle.msg import OpenQueries
 rospy.init_node('left', anonymous=True)
 print('LEFT', len(rospy.wait_for_message('{}/open', OpenQueries, 60.0).queries))
-'''
+"""
 
 
 def main() -> int:
     from killed_fleet import KilledFleet
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--robots', type=int, default=10, help='(default: %(default)s)')
     parser.add_argument('--kills', type=int, default=100, help='(default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='(default: %(default)s)')
@@ -54,8 +57,13 @@ def main() -> int:
         try:
             samples: List[Dict[str, Dict[str, int]]] = []
             killed = Killed(options)
-            fleet.run_under_kills(killed.draw, options.kills, options.seed, LONGEST_S,
-                                  lambda number: samples.append(sample(fleet)))
+            fleet.run_under_kills(
+                killed.draw,
+                options.kills,
+                options.seed,
+                LONGEST_S,
+                lambda number: samples.append(sample(fleet)),
+            )
             found = fleet.judge()
             left = open_questions(fleet.env)
         finally:
@@ -64,10 +72,16 @@ def main() -> int:
     if left != 'LEFT 0':
         wrong.append('questions at the server: {}'.format(left))
     for name, value in (
-            ('robots', options.robots), ('kills', options.kills), *sorted(killed.counts.items()),
-            ('rounds', found.rounds), ('questions', found.questions),
-            ('answered', found.answered), ('expired', found.expired),
-            ('resumed', found.resumed), ('seconds', round(time.monotonic() - begun_s))):
+        ('robots', options.robots),
+        ('kills', options.kills),
+        *sorted(killed.counts.items()),
+        ('rounds', found.rounds),
+        ('questions', found.questions),
+        ('answered', found.answered),
+        ('expired', found.expired),
+        ('resumed', found.resumed),
+        ('seconds', round(time.monotonic() - begun_s)),
+    ):
         print('{:26} {:>8}'.format(name, value))
     wrong += growth(samples, options.robots)
     for text in wrong:
@@ -105,8 +119,10 @@ def growth(samples: List[Dict[str, Dict[str, int]]], robots: int) -> List[str]:
     wrong = []
     for name in WATCHED:
         for what in ('kB', 'threads', 'files'):
-            first, last = (max(each[name][what] for each in some) for some in (
-                samples[tenth:2 * tenth] or samples, samples[-tenth:]))
+            first, last = (
+                max(each[name][what] for each in some)
+                for some in (samples[tenth : 2 * tenth] or samples, samples[-tenth:])
+            )
             print('{:26} {:>8} {:>8}'.format('{}: {}'.format(name, what), first, last))
             if last > (first * MORE_MEMORY if what == 'kB' else first + more):
                 wrong.append('{} has grown from {} to {} {}'.format(name, first, last, what))
@@ -116,8 +132,14 @@ def growth(samples: List[Dict[str, Dict[str, int]]], robots: int) -> List[str]:
 def open_questions(env: Dict[str, str]) -> str:
     """Return what the server's list says."""
     from killed_fleet import SERVER
-    done = subprocess.run([sys.executable, '-c', LEFT.format(SERVER)], env=env, check=False,
-                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+
+    done = subprocess.run(
+        [sys.executable, '-c', LEFT.format(SERVER)],
+        env=env,
+        check=False,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+    )
     lines = done.stdout.decode('utf-8', 'replace').strip().splitlines()
     return lines[-1] if lines else ''
 

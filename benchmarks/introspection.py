@@ -11,6 +11,7 @@ server is subtracted. The time is that of the process, not of the wall, so that 
 slows nothing but the benchmark. --check ends with status 1 where ours takes more than the limit,
 or the viewer misses a container.
 """
+
 import argparse
 import json
 import os
@@ -52,15 +53,22 @@ def main() -> int:
 
 
 def parse() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--upstream', metavar='PATH',
-                        help='checkout of executive_smach, to be measured too')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--upstream', metavar='PATH', help='checkout of executive_smach, to be measured too'
+    )
     parser.add_argument('--containers', type=int, default=500, help='(default: %(default)s)')
-    parser.add_argument('--seconds', type=float, default=20.0,
-                        help='that each row is measured (default: %(default)s)')
-    parser.add_argument('--check', action='store_true',
-                        help='fail above {:g} %% of a core'.format(LIMIT_PERCENT))
+    parser.add_argument(
+        '--seconds',
+        type=float,
+        default=20.0,
+        help='that each row is measured (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--check', action='store_true', help='fail above {:g} %% of a core'.format(LIMIT_PERCENT)
+    )
     parser.add_argument('--role', default='', help=argparse.SUPPRESS)
     parser.add_argument('--server', default='', help=argparse.SUPPRESS)
     parser.add_argument('--wrapped', action='store_true', help=argparse.SUPPRESS)
@@ -74,10 +82,14 @@ class Master:
         from own_master import wait_for_master
 
         from smach_oracle.experiment.launching import free_port
+
         port = free_port()
         os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
-        self._process = subprocess.Popen(['rosmaster', '--core', '-p', str(port)],
-                                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self._process = subprocess.Popen(
+            ['rosmaster', '--core', '-p', str(port)],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         wait_for_master(os.environ['ROS_MASTER_URI'])
 
     def __exit__(self, *_error: Any) -> None:
@@ -98,25 +110,34 @@ def measure_all(options: argparse.Namespace) -> Dict[str, Cost]:
         'no server': measure(options, 'none', viewed=False),
         'ours': measure(options, 'ours', viewed=False),
         'ours, with a viewer': measure(options, 'ours', viewed=True),
-        'ours, wrapped, with a viewer': measure(options, 'ours', viewed=True, wrapped=True)
+        'ours, wrapped, with a viewer': measure(options, 'ours', viewed=True, wrapped=True),
     }
     if options.upstream:
         from harness.upstream import environment
+
         upstream = environment(Path(options.upstream).resolve())
         rows['upstream'] = measure(options, 'upstream', viewed=False, more_env=upstream)
-        rows['upstream, with a viewer'] = measure(options, 'upstream', viewed=True,
-                                                  more_env=upstream)
+        rows['upstream, with a viewer'] = measure(
+            options, 'upstream', viewed=True, more_env=upstream
+        )
         rows["ours on upstream's engine, wrapped, with a viewer"] = measure(
-            options, 'ours', viewed=True, wrapped=True, more_env=upstream)
+            options, 'ours', viewed=True, wrapped=True, more_env=upstream
+        )
     return rows
 
 
-def measure(options: argparse.Namespace, server: str, viewed: bool, wrapped: bool = False,
-            more_env: Optional[Dict[str, str]] = None) -> Cost:
+def measure(
+    options: argparse.Namespace,
+    server: str,
+    viewed: bool,
+    wrapped: bool = False,
+    more_env: Optional[Dict[str, str]] = None,
+) -> Cost:
     """Run one node, with a viewer perhaps."""
     viewer = start(options, ['--role', 'viewer'], {}) if viewed else None
-    node = start(options, ['--role', 'node', '--server', server] + ['--wrapped'] * wrapped,
-                 more_env or {})
+    node = start(
+        options, ['--role', 'node', '--server', server] + ['--wrapped'] * wrapped, more_env or {}
+    )
     try:
         told = json.loads(said(node))
         seen = json.loads(said(viewer)) if viewer is not None else [0, 0]
@@ -129,10 +150,17 @@ def measure(options: argparse.Namespace, server: str, viewed: bool, wrapped: boo
 
 
 def start(options: argparse.Namespace, role: List[str], more_env: Dict[str, str]) -> Any:
-    command = [sys.executable, __file__, '--containers', str(options.containers), '--seconds',
-               str(options.seconds)]
-    return subprocess.Popen(command + role, env=dict(os.environ, **more_env),
-                            stdout=subprocess.PIPE)
+    command = [
+        sys.executable,
+        __file__,
+        '--containers',
+        str(options.containers),
+        '--seconds',
+        str(options.seconds),
+    ]
+    return subprocess.Popen(
+        command + role, env=dict(os.environ, **more_env), stdout=subprocess.PIPE
+    )
 
 
 def said(process: Any) -> str:
@@ -159,18 +187,21 @@ def make_tree(count: int, wrapped: bool) -> Any:
         smach_add(root, 'GROUP_{}'.format(number), group)
     if wrapped:
         from smach_oracle.oracle import OracleContainer
+
         OracleContainer.wrap(root, name='TREE')
     return root
 
 
 def make_container() -> Any:
     import smach
+
     machine = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
     machine.userdata.update(make_userdata(smach))
     with machine:
         for label, following in (('DETECT', 'PICK'), ('PICK', 'PLACE'), ('PLACE', 'succeeded')):
-            smach.StateMachine.add(label, smach.State(outcomes=['succeeded', 'aborted']),
-                                   {'succeeded': following})
+            smach.StateMachine.add(
+                label, smach.State(outcomes=['succeeded', 'aborted']), {'succeeded': following}
+            )
     return machine
 
 
@@ -183,12 +214,14 @@ def make_userdata(smach: Any) -> Any:
 
 def smach_add(machine: Any, label: str, state: Any) -> None:
     import smach
+
     with machine:
         smach.StateMachine.add(label, state, {'succeeded': 'DETECT'})
 
 
 def be_node(options: argparse.Namespace) -> int:
     import rospy
+
     rospy.init_node('viewed', disable_signals=True, log_level=rospy.WARN)
     tree = make_tree(options.containers, options.wrapped)
     server = make_server(options.server, tree)
@@ -198,8 +231,10 @@ def be_node(options: argparse.Namespace) -> int:
     began_s, cpu_s = time.monotonic(), time.process_time()
     time.sleep(options.seconds)
     share = (time.process_time() - cpu_s) / (time.monotonic() - began_s)
-    print('MEASURED ' + json.dumps({
-        'percent': 100.0 * share, 'threads': threading.active_count()}), flush=True)
+    print(
+        'MEASURED ' + json.dumps({'percent': 100.0 * share, 'threads': threading.active_count()}),
+        flush=True,
+    )
     rospy.signal_shutdown('measured')
     return 0
 
@@ -209,8 +244,10 @@ def make_server(kind: str, tree: Any) -> Any:
         return None
     if kind == 'upstream':
         import smach_ros
+
         return smach_ros.IntrospectionServer(SERVER, tree, '/TREE')
     from smach_oracle.ros.introspection.introspection_server import IntrospectionServer
+
     return IntrospectionServer(SERVER, tree, '/TREE')
 
 
@@ -222,6 +259,7 @@ def be_viewer(options: argparse.Namespace) -> int:
     import rospy
 
     from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
+
     rospy.init_node('viewer', anonymous=True, disable_signals=True, log_level=rospy.WARN)
     structures, statuses, begun = set(), set(), threading.Event()
 
@@ -229,11 +267,21 @@ def be_viewer(options: argparse.Namespace) -> int:
         def note(message: Any) -> None:
             begun.set()
             paths.add(message.path)
+
         return note
-    rospy.Subscriber(SERVER + '/smach/container_structure', SmachContainerStructure,
-                     noted(structures), queue_size=VIEWER_QUEUE)
-    rospy.Subscriber(SERVER + '/smach/container_status', SmachContainerStatus, noted(statuses),
-                     queue_size=VIEWER_QUEUE)
+
+    rospy.Subscriber(
+        SERVER + '/smach/container_structure',
+        SmachContainerStructure,
+        noted(structures),
+        queue_size=VIEWER_QUEUE,
+    )
+    rospy.Subscriber(
+        SERVER + '/smach/container_status',
+        SmachContainerStatus,
+        noted(statuses),
+        queue_size=VIEWER_QUEUE,
+    )
     begun.wait(60.0)
     time.sleep(SETTLE_S)
     for paths in (structures, statuses):
@@ -247,21 +295,32 @@ def be_viewer(options: argparse.Namespace) -> int:
 def report(rows: Dict[str, Cost], options: argparse.Namespace) -> int:
     """Print the table; return the exit status."""
     idle = rows.pop('no server').percent
-    print('{} containers; a node without a server takes {:.2f} % of a core'.format(
-        options.containers, idle))
+    print(
+        '{} containers; a node without a server takes {:.2f} % of a core'.format(
+            options.containers, idle
+        )
+    )
     print('| server | % of a core | Python threads | structures seen | statuses seen |')
     print('|---|---|---|---|---|')
     for name, cost in rows.items():
-        print('| {} | {:.2f} | {} | {} | {} |'.format(
-            name, cost.percent - idle, cost.threads, cost.structures, cost.statuses))
-    for name, theirs in (('ours', 'upstream'),
-                         ('ours, with a viewer', 'upstream, with a viewer')):
+        print(
+            '| {} | {:.2f} | {} | {} | {} |'.format(
+                name, cost.percent - idle, cost.threads, cost.structures, cost.statuses
+            )
+        )
+    for name, theirs in (('ours', 'upstream'), ('ours, with a viewer', 'upstream, with a viewer')):
         if theirs in rows:
-            print("{}: upstream's takes {:.0f} times as much".format(
-                name, (rows[theirs].percent - idle) / max(rows[name].percent - idle, 0.01)))
+            print(
+                "{}: upstream's takes {:.0f} times as much".format(
+                    name, (rows[theirs].percent - idle) / max(rows[name].percent - idle, 0.01)
+                )
+            )
     ours = {name: cost for name, cost in rows.items() if name.startswith('ours')}
-    missed = [name for name, cost in ours.items() if name.endswith('viewer')
-              and min(cost.structures, cost.statuses) < options.containers]
+    missed = [
+        name
+        for name, cost in ours.items()
+        if name.endswith('viewer') and min(cost.structures, cost.statuses) < options.containers
+    ]
     dear = [name for name, cost in ours.items() if cost.percent - idle > LIMIT_PERCENT]
     for name in missed + dear:
         print('LIMIT BROKEN: {}'.format(name), file=sys.stderr)

@@ -12,6 +12,7 @@ event is used twice, what was promised is stored, no question is answered twice,
 --upstream takes the smach found at PATH. With --check, 60 programs are killed on this engine, and
 the exit status is 1 where anything is wrong. So it is without.
 """
+
 import argparse
 import sys
 import time
@@ -25,8 +26,9 @@ CHECKED = 60  # kills
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--kills', type=int, default=1000, help='(default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='(default: %(default)s)')
     parser.add_argument('--jobs', type=int, default=2, help='at a time (default: %(default)s)')
@@ -38,11 +40,19 @@ def main() -> int:
     kills = CHECKED if options.check else options.kills
     begun_s = time.monotonic()
     with ProcessPoolExecutor(options.jobs) as pool:
-        shares = [kills // options.jobs + (number < kills % options.jobs)
-                  for number in range(options.jobs)]
-        courses = [course for found in pool.map(
-            kill_share, ['{}-{}'.format(options.seed, number) for number in range(options.jobs)],
-            shares) for course in found]
+        shares = [
+            kills // options.jobs + (number < kills % options.jobs)
+            for number in range(options.jobs)
+        ]
+        courses = [
+            course
+            for found in pool.map(
+                kill_share,
+                ['{}-{}'.format(options.seed, number) for number in range(options.jobs)],
+                shares,
+            )
+            for course in found
+        ]
     return report(courses, time.monotonic() - begun_s)
 
 
@@ -50,6 +60,7 @@ def kill_share(seed: str, kills: int) -> list:
     """Kill programs in a process of this pool."""
     from oracle_overhead import silence
     from random_kills.killing import kill_many
+
     silence()
     return kill_many(seed, kills)
 
@@ -57,12 +68,13 @@ def kill_share(seed: str, kills: int) -> list:
 def report(courses: list, took_s: float) -> int:
     wrong = [(course.seed, text) for course in courses for text in course.wrong]
     for name, value in (
-            ('kills', sum(course.kills for course in courses)),
-            ('trees', len(courses)),
-            ('resumed', sum(course.resumed for course in courses)),
-            ('visits that were repeated', sum(course.states_again for course in courses)),
-            ('trees that went wrong', len({seed for seed, _ in wrong})),
-            ('seconds', round(took_s))):
+        ('kills', sum(course.kills for course in courses)),
+        ('trees', len(courses)),
+        ('resumed', sum(course.resumed for course in courses)),
+        ('visits that were repeated', sum(course.states_again for course in courses)),
+        ('trees that went wrong', len({seed for seed, _ in wrong})),
+        ('seconds', round(took_s)),
+    ):
         print('{:26} {:>8}'.format(name, value))
     for seed, text in wrong[:MOST_SHOWN]:
         print('tree {}: {}'.format(seed, text))

@@ -13,6 +13,7 @@ A trial is worse where it ended in true success undisturbed, by the judge of the
 when killed. At most one trial in fifty may be worse, and none may hang. Otherwise the exit status
 is 1. Seeds below 1000 are those that the robot was tuned on.
 """
+
 import argparse
 import json
 import os
@@ -52,13 +53,15 @@ class Ended(NamedTuple):
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--task', choices=TASKS, nargs='+', default=TASKS, help='(default: both)')
     parser.add_argument('--trials', type=int, default=50, help='of each (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=1, help='of the first (default: %(default)s)')
-    parser.add_argument('--instants', type=int, default=1,
-                        help='seed of the instants (default: %(default)s)')
+    parser.add_argument(
+        '--instants', type=int, default=1, help='seed of the instants (default: %(default)s)'
+    )
     options = parser.parse_args()
     if options.trials < 1 or options.seed < 0:
         parser.error('--trials must be 1 or more and --seed 0 or more')
@@ -89,15 +92,26 @@ def kill_in_task(task: str, options: argparse.Namespace) -> bool:
                 hung += 'hung' in (undisturbed.outcome, killed.outcome)
                 asked += killed.questions
                 asked_undisturbed += undisturbed.questions
-                print(HEAD.format(seed, told(undisturbed), told(killed), round(at, 1), '{} -> {}'
-                                  .format(undisturbed.questions, killed.questions),
-                                  killed.killed_in
-                                  + ('' if killed.success else ': ' + killed.why)), flush=True)
+                print(
+                    HEAD.format(
+                        seed,
+                        told(undisturbed),
+                        told(killed),
+                        round(at, 1),
+                        '{} -> {}'.format(undisturbed.questions, killed.questions),
+                        killed.killed_in + ('' if killed.success else ': ' + killed.why),
+                    ),
+                    flush=True,
+                )
         finally:
             robot.stop()
-    print('{}: {} trials, worse: {} {}, better: {}, hung: {}, questions: {} undisturbed, {} killed'
-          .format(task, options.trials, len(worse), worse or '', better, hung, asked_undisturbed,
-                  asked), flush=True)
+    print(
+        '{}: {} trials, worse: {} {}, better: {}, hung: {}, '
+        'questions: {} undisturbed, {} killed'.format(
+            task, options.trials, len(worse), worse or '', better, hung, asked_undisturbed, asked
+        ),
+        flush=True,
+    )
     return bool(hung) or len(worse) > WORSE_SHARE * options.trials
 
 
@@ -123,12 +137,16 @@ class RobotUnderKills:
 
         :raises SystemExit: where it does not come.
         """
-        ready = subprocess.run(['timeout', str(READY_S), 'bash', '-c', READY],
-                               env=self._launch.environment, stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL)
+        ready = subprocess.run(
+            ['timeout', str(READY_S), 'bash', '-c', READY],
+            env=self._launch.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
         if ready.returncode:
-            raise SystemExit('killed_pr2: no world:'
-                             + last_words(Path(self._folder) / LOG_FILE, 20))
+            raise SystemExit(
+                'killed_pr2: no world:' + last_words(Path(self._folder) / LOG_FILE, 20)
+            )
 
     def stop(self) -> None:
         """End all that was started."""
@@ -162,13 +180,22 @@ class RobotUnderKills:
             truth = json.loads(stream.readlines()[-1])
         if truth['seed'] != seed:
             raise RuntimeError('the world told of seed {seed} last'.format(**truth))
-        return Ended(outcome, truth['success'], questions, (ended_s or 0.0) - (began_s or 0.0),
-                     killed_in, truth['why'])
+        return Ended(
+            outcome,
+            truth['success'],
+            questions,
+            (ended_s or 0.0) - (began_s or 0.0),
+            killed_in,
+            truth['why'],
+        )
 
     def _reset(self, seed: int) -> None:
-        answer = subprocess.run(['rosservice', 'call', '/world/reset', 'seed: {}'.format(seed)],
-                                env=self._launch.environment, stdout=subprocess.PIPE,
-                                stderr=subprocess.STDOUT)
+        answer = subprocess.run(
+            ['rosservice', 'call', '/world/reset', 'seed: {}'.format(seed)],
+            env=self._launch.environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
         if b'ok: True' not in answer.stdout:
             raise RuntimeError('world/reset: ' + answer.stdout.decode())
 
@@ -176,12 +203,26 @@ class RobotUnderKills:
         """Start the executive."""
         with open(os.path.join(self._folder, 'executive.log'), 'a') as log:
             return subprocess.Popen(
-                [sys.executable, str(ROOT / 'scripts' / 'oracle_run'), '--config',
-                 str(ROOT / 'src' / 'smach_oracle' / 'tasks' / (self._task + '.yaml')),
-                 '--name', self._task.upper(), '--checkpoint', self._store, *words,
-                 str(ROSTESTS / 'killed_pr2_robot.py'), self._task, self._journal,
-                 '__name:=' + self._task, '_pass_time:=/world/pass_time'],
-                env=self._launch.environment, stdout=log, stderr=subprocess.STDOUT)
+                [
+                    sys.executable,
+                    str(ROOT / 'scripts' / 'oracle_run'),
+                    '--config',
+                    str(ROOT / 'src' / 'smach_oracle' / 'tasks' / (self._task + '.yaml')),
+                    '--name',
+                    self._task.upper(),
+                    '--checkpoint',
+                    self._store,
+                    *words,
+                    str(ROSTESTS / 'killed_pr2_robot.py'),
+                    self._task,
+                    self._journal,
+                    '__name:=' + self._task,
+                    '_pass_time:=/world/pass_time',
+                ],
+                env=self._launch.environment,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+            )
 
     def _told(self, word: str) -> Optional[str]:
         """Return what stands behind a word in the journal; None where it is not there."""

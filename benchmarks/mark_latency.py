@@ -10,6 +10,7 @@ OpenCV's GrabCut alone, over each of the same frames at as many pixels as the in
 measured in between. What is measured is the processor's time, so that others on the machine do not
 count. --check fails where the median of any of them is above the limit.
 """
+
 import argparse
 import sys
 import time
@@ -40,31 +41,40 @@ from smach_oracle.srv import SegmentObjectResponse
 
 LIMIT = 2.5  # runs of GrabCut alone
 FRAMES, REPEATS = 6, 4
-GRAB_CUT_SIZE = (int((WORK_AREA * 4 / 3)**0.5), int((WORK_AREA * 3 / 4)**0.5))  # px
-BODIES = [Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22)),
-          Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.80, 0.10, 0.78), colour=(0.1, 0.3, 0.9)),
-          Body('box', 'box', (0.05, 0.05, 0.14), (0.68, -0.15, 0.79), colour=(0.2, 0.8, 0.2))]
+GRAB_CUT_SIZE = (int((WORK_AREA * 4 / 3) ** 0.5), int((WORK_AREA * 3 / 4) ** 0.5))  # px
+BODIES = [
+    Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22)),
+    Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.80, 0.10, 0.78), colour=(0.1, 0.3, 0.9)),
+    Body('box', 'box', (0.05, 0.05, 0.14), (0.68, -0.15, 0.79), colour=(0.2, 0.8, 0.2)),
+]
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--check', action='store_true',
-                        help='fail above {} times GrabCut alone'.format(LIMIT))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--check', action='store_true', help='fail above {} times GrabCut alone'.format(LIMIT)
+    )
     check = parser.parse_args().check
     taken, alone = {}, []
     for index in range(FRAMES):
-        seen = see(BODIES, camera_at((0.05, 0.03, 1.38), (0.75, 0.02 * index, 0.75)),
-                   np.random.default_rng(index))
+        seen = see(
+            BODIES,
+            camera_at((0.05, 0.03, 1.38), (0.75, 0.02 * index, 0.75)),
+            np.random.default_rng(index),
+        )
         image = CameraImage(*seen.image)
         rows, columns = np.nonzero(seen.bodies == 1)
-        around = rectangle(columns.min() - 8,
-                           rows.min() - 8,
-                           np.ptp(columns) + 16,
-                           np.ptp(rows) + 16)
+        around = rectangle(
+            columns.min() - 8, rows.min() - 8, np.ptp(columns) + 16, np.ptp(rows) + 16
+        )
         stroke = Stroke(False, around[:2] + [0.0, 2.0])
-        drawings = (('rectangle', around, []), ('with strokes', around, [stroke] * 5),
-                    ('whole image', rectangle(0, 0, 640, 480), []))
+        drawings = (
+            ('rectangle', around, []),
+            ('with strokes', around, [stroke] * 5),
+            ('whole image', rectangle(0, 0, 640, 480), []),
+        )
         for _ in range(REPEATS):
             alone.append(grab_cut_in(image))
             for name, region, strokes in drawings:
@@ -75,8 +85,11 @@ def main():
     for name, times in taken.items():
         middle, high = np.percentile(times, (50, 90))
         worst = max(worst, middle / unit_s)
-        print('{:13s} {:4.2f} times   p50 {:5.1f} ms   p90 {:5.1f} ms   of {}'.format(
-            name, middle / unit_s, 1e3 * middle, 1e3 * high, len(times)))
+        print(
+            '{:13s} {:4.2f} times   p50 {:5.1f} ms   p90 {:5.1f} ms   of {}'.format(
+                name, middle / unit_s, 1e3 * middle, 1e3 * high, len(times)
+            )
+        )
     print('limit: {} times'.format(LIMIT))
     return int(check and worst > LIMIT)
 
@@ -89,8 +102,15 @@ def grab_cut_in(image):
     cv2.setRNGSeed(1)
     within = (12, 12, GRAB_CUT_SIZE[0] - 24, GRAB_CUT_SIZE[1] - 24)
     begun_s = time.process_time()
-    cv2.grabCut(small, labels, within, np.zeros((1, 65)), np.zeros((1, 65)), ITERATIONS,
-                cv2.GC_INIT_WITH_RECT)
+    cv2.grabCut(
+        small,
+        labels,
+        within,
+        np.zeros((1, 65)),
+        np.zeros((1, 65)),
+        ITERATIONS,
+        cv2.GC_INIT_WITH_RECT,
+    )
     return time.process_time() - begun_s
 
 
@@ -101,7 +121,8 @@ def marked_in(image, region, strokes):
     try:
         segmented = segment(image, region, strokes)
         parts = output_messages(
-            ObjectInImage(segmented, Header(frame_id='base'), scene(image, segmented), ''))
+            ObjectInImage(segmented, Header(frame_id='base'), scene(image, segmented), '')
+        )
         answer.object, answer.size = parts['object'], parts['size']
         answer.cloud, mask = parts['cloud'], segmented.mask
         answer.ok = True

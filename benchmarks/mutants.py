@@ -14,6 +14,7 @@ not counted. The exit status is 1 where fewer than 95% of the others are killed.
 It takes seconds to minutes for each mutant, so it is a command for a weekly job. It changes copies
 of the tree alone, and needs Debian's python3-coverage.
 """
+
 import argparse
 import collections
 import contextlib
@@ -77,14 +78,24 @@ def main() -> int:
 
 def parse_arguments() -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--mutants', type=int, default=200, help='(default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, help='of the choice (default: %(default)s)')
-    parser.add_argument('--jobs', type=int, default=os.cpu_count() or 1,
-                        help='mutants at a time (default: %(default)s)')
-    parser.add_argument('--only', metavar='NAME', nargs='+', default=[],
-                        help='try these alone, such as machine/repeats.py:52:9:0')
+    parser.add_argument(
+        '--jobs',
+        type=int,
+        default=os.cpu_count() or 1,
+        help='mutants at a time (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--only',
+        metavar='NAME',
+        nargs='+',
+        default=[],
+        help='try these alone, such as machine/repeats.py:52:9:0',
+    )
     parser.add_argument('--report', metavar='FILE', help='write each mutant to this CSV file, too')
     return parser.parse_args()
 
@@ -99,14 +110,19 @@ def choose(arguments: argparse.Namespace) -> List[Mutant]:
             sys.exit('no such mutant: {}'.format(', '.join(missing)))
         return [named[name] for name in arguments.only]
     random.Random(arguments.seed).shuffle(every)
-    wanted = every[:arguments.mutants]
-    print('{} of {} mutants of {}, seed {}'.format(
-        len(wanted), len(every), EXECUTIVE.mutated, arguments.seed), flush=True)
+    wanted = every[: arguments.mutants]
+    print(
+        '{} of {} mutants of {}, seed {}'.format(
+            len(wanted), len(every), EXECUTIVE.mutated, arguments.seed
+        ),
+        flush=True,
+    )
     return wanted
 
 
-def try_all(workshop: Workshop, mutants: Sequence[Mutant], reaches: List[Reach],
-            trials: List[Trial]) -> None:
+def try_all(
+    workshop: Workshop, mutants: Sequence[Mutant], reaches: List[Reach], trials: List[Trial]
+) -> None:
     """Try each mutant, show what became of it, and add that to the trials."""
     known = equivalents()
     with contextlib.closing(workshop.try_all(mutants, reaches)) as found:
@@ -118,9 +134,16 @@ def try_all(workshop: Workshop, mutants: Sequence[Mutant], reaches: List[Reach],
 
 def show(trial: Trial, number: str, is_known: bool) -> None:
     """Say what became of a mutant. `is_known`: it is listed as equivalent."""
-    print('{:>8}  {:10} {:6.1f} s  {:40} {}'.format(
-        number, 'equivalent' if is_known else trial.verdict, trial.took_s, trial.mutant.name,
-        trial.by), flush=True)
+    print(
+        '{:>8}  {:10} {:6.1f} s  {:40} {}'.format(
+            number,
+            'equivalent' if is_known else trial.verdict,
+            trial.took_s,
+            trial.mutant.name,
+            trial.by,
+        ),
+        flush=True,
+    )
     if is_known and not trial.is_alive:
         print('    it is listed as equivalent, and a test sees it', flush=True)
     if trial.is_alive and not is_known:
@@ -144,8 +167,16 @@ def write_report(trials: Sequence[Trial], path: str) -> None:
         writer = csv.writer(file)
         writer.writerow(('name', 'verdict', 'by', 'tests', 'seconds') + Change._fields)
         for trial in trials:
-            writer.writerow((trial.mutant.name, trial.verdict, trial.by, trial.tests,
-                             '{:.1f}'.format(trial.took_s)) + change_of(trial.mutant))
+            writer.writerow(
+                (
+                    trial.mutant.name,
+                    trial.verdict,
+                    trial.by,
+                    trial.tests,
+                    '{:.1f}'.format(trial.took_s),
+                )
+                + change_of(trial.mutant)
+            )
 
 
 def summarise(trials: Sequence[Trial]) -> int:
@@ -164,8 +195,9 @@ def summarise(trials: Sequence[Trial]) -> int:
     counted = rows['all']['mutants'] - rows['all']['equivalent']
     killed = rows['all']['killed'] + rows['all']['hung']
     share = killed / counted if counted else 1.0
-    print('\nkilled: {} of {}, {:.1%} (at least {:.0%})'.format(killed, counted, share,
-                                                               LEAST_KILLED))
+    print(
+        '\nkilled: {} of {}, {:.1%} (at least {:.0%})'.format(killed, counted, share, LEAST_KILLED)
+    )
     return int(share < LEAST_KILLED)
 
 

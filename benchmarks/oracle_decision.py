@@ -7,6 +7,7 @@ Both are measured in one run, best of many: a failure, from the end of the faile
 into the next, for each policy that goes by rates, with the preconditions met. With --check the exit
 status is 1 where the ratio is above 1.5.
 """
+
 import argparse
 import itertools
 import sys
@@ -50,9 +51,11 @@ def machine_after(visits: int, policy: str) -> Tuple[Any, List[float]]:
     with machine:
         smach.StateMachine.add('A', state, {'ok': 'B'})
         smach.StateMachine.add('B', Failing(), {'ok': 'A'})
-    OracleContainer.wrap(machine,
-                         settings={'policy': policy, 'max_recoveries': 10**9,
-                                   'memory': 10**6}, preconditions={'A': [lambda ud: True]})
+    OracleContainer.wrap(
+        machine,
+        settings={'policy': policy, 'max_recoveries': 10**9, 'memory': 10**6},
+        preconditions={'A': [lambda ud: True]},
+    )
     left = [FAILURES]
 
     def told(ud: Any, active: List[str]) -> None:
@@ -78,8 +81,9 @@ def machine_after(visits: int, policy: str) -> Tuple[Any, List[float]]:
 def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--check', action='store_true',
-                        help='exit with status 1 where the limit is missed')
+    parser.add_argument(
+        '--check', action='store_true', help='exit with status 1 where the limit is missed'
+    )
     parser.add_argument('--visits', type=int, default=10**6, help='visits before the first failure')
     args = parser.parse_args()
     silence()
@@ -91,8 +95,8 @@ def main() -> int:
         worst = max(worst, many / few)
         print(
             '{}: a decision takes {:.1f} us after ten visits, {:.1f} us after {}: {:.2f} times '
-            '(limit {:g})'
-            .format(policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT))
+            '(limit {:g})'.format(policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT)
+        )
     return 1 if args.check and worst > LIMIT else 0
 
 

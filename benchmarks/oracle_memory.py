@@ -7,6 +7,7 @@ A two-state loop whose userdata is written at each visit runs N transitions; the
 read after a tenth of them and at the end. With --check the exit status is 1 where it grew by more
 than 1 MiB in between.
 """
+
 import argparse
 import itertools
 import sys
@@ -45,14 +46,14 @@ def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--check', action='store_true', help='exit with status 1 where memory grew')
-    parser.add_argument('--transitions', type=int, default=10 ** 7, help='transitions in all')
+    parser.add_argument('--transitions', type=int, default=10**7, help='transitions in all')
     args = parser.parse_args()
     silence()
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', Writing(False), {'ok': 'B'})
         smach.StateMachine.add('B', Writing(True), {'ok': 'A'})
-    OracleContainer.wrap(machine, settings={'max_recoveries': 10 ** 9, 'policy': 'prose'})
+    OracleContainer.wrap(machine, settings={'max_recoveries': 10**9, 'policy': 'prose'})
     readings = []
 
     def read(last: bool) -> bool:
@@ -61,9 +62,14 @@ def main() -> int:
 
     tenth = args.transitions // 10
     smach.set_shutdown_check(
-        itertools.chain(itertools.repeat(False, tenth), map(read, [False]),
-                        itertools.repeat(False, args.transitions - tenth), map(read, [True]),
-                        itertools.repeat(True)).__next__)
+        itertools.chain(
+            itertools.repeat(False, tenth),
+            map(read, [False]),
+            itertools.repeat(False, args.transitions - tenth),
+            map(read, [True]),
+            itertools.repeat(True),
+        ).__next__
+    )
     begin = time.perf_counter()
     machine.execute()
     elapsed_s = time.perf_counter() - begin
@@ -72,8 +78,10 @@ def main() -> int:
     print(
         '{} transitions in {:.0f} s, {} of them failures; resident {} KiB after a tenth, {} KiB '
         'at the end '
-        '(may grow by {})'.format(args.transitions, elapsed_s, failures, readings[0], readings[-1],
-                                  LIMIT_KIB))
+        '(may grow by {})'.format(
+            args.transitions, elapsed_s, failures, readings[0], readings[-1], LIMIT_KIB
+        )
+    )
     return 1 if args.check and readings[-1] - readings[0] > LIMIT_KIB else 0
 
 

@@ -10,6 +10,7 @@ nobody observes. The rounds alternate and the best of each counts, so that neigh
 do not. Nested: the same two states three machines deep. The aim is 12 bare steps; with --check the
 exit status is 1 above 15, which leaves room for a busy machine.
 """
+
 import argparse
 import itertools
 import sys
@@ -69,7 +70,8 @@ def bare_step_s(count: int) -> float:
 def machine_step_s(machine: smach.StateMachine, count: int) -> float:
     """Seconds that one transition of `machine` takes, the loop in its `execute` included."""
     smach.set_shutdown_check(
-        itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
+        itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__
+    )
     begin = time.perf_counter()
     try:
         machine.execute()
@@ -88,25 +90,35 @@ def silence() -> None:
 def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--check', action='store_true',
-                        help='exit with status 1 where the limit is missed')
+    parser.add_argument(
+        '--check', action='store_true', help='exit with status 1 where the limit is missed'
+    )
     parser.add_argument('--transitions', type=int, default=20000, help='transitions in each round')
     parser.add_argument('--rounds', type=int, default=60, help='rounds; the best counts')
     args = parser.parse_args()
     silence()
     observed = OracleContainer.wrap(two_state_loop())
     observed.events.observers.append(lambda event: None)
-    machines = (two_state_loop(), OracleContainer.wrap(two_state_loop()),
-                OracleContainer.wrap(nested_loop()), observed)
-    rounds = [(bare_step_s(args.transitions * 2),) +
-              tuple(machine_step_s(machine, args.transitions) for machine in machines)
-              for _ in range(args.rounds)]
+    machines = (
+        two_state_loop(),
+        OracleContainer.wrap(two_state_loop()),
+        OracleContainer.wrap(nested_loop()),
+        observed,
+    )
+    rounds = [
+        (bare_step_s(args.transitions * 2),)
+        + tuple(machine_step_s(machine, args.transitions) for machine in machines)
+        for _ in range(args.rounds)
+    ]
     bare, *costs = (min(column) for column in zip(*rounds))
     engine, wrapped, nested, watched = (cost / bare for cost in costs)
     print('engine: {}'.format(smach.__file__))
-    print('bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f}, nested {:.1f}, '
-          'observed too {:.1f} (wrapped and nested: aim {:g}, limit {:g})'.format(
-              bare * 1e9, engine, wrapped, nested, watched, AIM, LIMIT))
+    print(
+        'bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f}, nested {:.1f}, '
+        'observed too {:.1f} (wrapped and nested: aim {:g}, limit {:g})'.format(
+            bare * 1e9, engine, wrapped, nested, watched, AIM, LIMIT
+        )
+    )
     return 1 if args.check and max(wrapped, nested) > LIMIT else 0
 
 

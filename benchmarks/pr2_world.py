@@ -8,6 +8,7 @@ Prints the real-time factor (simulated s per wall s), the world's share of the t
 and each state's, the robot's planning and perception included. --check fails where simulated time
 does not run faster than the wall's.
 """
+
 import argparse
 import collections
 import contextlib
@@ -28,23 +29,35 @@ WAITING = 'waiting for others'
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--task', default='pick_and_place', help='(default: %(default)s)')
     parser.add_argument('--trials', type=int, default=5, help='(default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the first trial (default: %(default)s)')
-    parser.add_argument('--oracle', action='store_true',
-                        help='recover, and ask the scripted expert')
-    parser.add_argument('--check', action='store_true',
-                        help='fail where it is slower than real time')
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the first trial (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--oracle', action='store_true', help='recover, and ask the scripted expert'
+    )
+    parser.add_argument(
+        '--check', action='store_true', help='fail where it is slower than real time'
+    )
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         words = [
-            '--task', args.task, '--trials',
-            str(args.trials), '--seed',
-            str(args.seed), '--jobs', '1', '--output', folder + '/trials', '--variants',
-            'with' if args.oracle else 'without'
+            '--task',
+            args.task,
+            '--trials',
+            str(args.trials),
+            '--seed',
+            str(args.seed),
+            '--jobs',
+            '1',
+            '--output',
+            folder + '/trials',
+            '--variants',
+            'with' if args.oracle else 'without',
         ]
         with contextlib.redirect_stdout(io.StringIO()) as told:
             code = run_trials(words)
@@ -53,8 +66,9 @@ def main() -> int:
             return code
         factor = report(load_trials([folder]).trials, states_of(folder))
     if args.check and factor < LEAST_FACTOR:
-        print('slower than real time: {:.2f}, at least {:.1f} is wanted'.format(
-            factor, LEAST_FACTOR))
+        print(
+            'slower than real time: {:.2f}, at least {:.1f} is wanted'.format(factor, LEAST_FACTOR)
+        )
         return 1
     return 0
 
@@ -76,8 +90,10 @@ def add_states(events: Sequence[Event], spent: Dict[str, float]) -> None:
             entered[event.state] = event.wall_time
         elif event.kind in (EventKind.TRANSITION, EventKind.FAILURE) and event.state in entered:
             spent[event.state] += event.wall_time - entered.pop(event.state)
-        elif event.kind in (EventKind.JUMP, EventKind.SUPERSEDE,
-                            EventKind.GIVE_UP) and event.state in entered:
+        elif (
+            event.kind in (EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP)
+            and event.state in entered
+        ):
             spent['(expert)'] += event.wall_time - entered.pop(event.state)
 
 
@@ -87,9 +103,10 @@ def report(trials: List[TrialSummary], states: Dict[str, float]) -> float:
     wall_s, sim_s = sum(truth.wall_s for truth in truths), sum(truth.sim_s for truth in truths)
     print(
         '{} trials on {} cores: {:.1f} s a trial, {:.1f} s of simulated time; real-time factor '
-        '{:.2f}'
-        .format(len(truths), os.cpu_count(), wall_s / len(truths), sim_s / len(truths),
-                sim_s / wall_s))
+        '{:.2f}'.format(
+            len(truths), os.cpu_count(), wall_s / len(truths), sim_s / len(truths), sim_s / wall_s
+        )
+    )
     world: Dict[str, float] = collections.defaultdict(float)
     for truth in truths:
         for name, share in truth.share.items():

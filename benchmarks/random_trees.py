@@ -12,6 +12,7 @@ disagrees is shown with its seed, and runs again alone by --only. --upstream tak
 at PATH. With --check the exit status is 1 where anything disagrees, hangs, or leaves a thread
 behind.
 """
+
 import argparse
 import collections
 import sys
@@ -31,16 +32,29 @@ def main() -> int:
     if arguments.upstream:
         sys.path.insert(0, arguments.upstream)
     silence()
-    seeds: List[Any] = [arguments.only] if arguments.only else [
-        arguments.seed + number for number in range(arguments.trees)]
+    seeds: List[Any] = (
+        [arguments.only]
+        if arguments.only
+        else [arguments.seed + number for number in range(arguments.trees)]
+    )
     counts: Counter[str] = collections.Counter()
     for seed in seeds:
         try_tree(seed, bool(arguments.upstream), counts)
-    for name in ('trees', 'decisions', 'questions', 'jumps across containers', 'disagreements',
-                 'hangs', 'threads left', 'preempts that went wrong'):
+    for name in (
+        'trees',
+        'decisions',
+        'questions',
+        'jumps across containers',
+        'disagreements',
+        'hangs',
+        'threads left',
+        'preempts that went wrong',
+    ):
         print('{:26} {:>8}'.format(name, counts[name]))
-    faults = sum(counts[name] for name in (
-        'disagreements', 'hangs', 'threads left', 'preempts that went wrong'))
+    faults = sum(
+        counts[name]
+        for name in ('disagreements', 'hangs', 'threads left', 'preempts that went wrong')
+    )
     return 1 if arguments.check and faults else 0
 
 
@@ -48,8 +62,9 @@ def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
     parser.add_argument('--trees', type=int, default=500, help='(default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=0,
-                        help='of the first tree (default: %(default)s)')
+    parser.add_argument(
+        '--seed', type=int, default=0, help='of the first tree (default: %(default)s)'
+    )
     parser.add_argument('--only', metavar='SEED', help='try the tree of this seed alone')
     parser.add_argument('--upstream', metavar='PATH', help='folder with an upstream smach')
     parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
@@ -76,10 +91,17 @@ def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:
     shape = UPSTREAM if is_upstream else ANY
     found = compare(draw(seed, shape), is_upstream)
     kinds = collections.Counter(event[0] for _, event in found.executed.course)
-    counts.update({
-        'trees': 1, 'decisions': kinds['DECISION'], 'questions': kinds['QUERY_OPENED'],
-        'jumps across containers': found.model.cross_jumps, 'hangs': int(found.is_hung),
-        'threads left': len(found.threads_left), 'disagreements': int(not found.is_fine)})
+    counts.update(
+        {
+            'trees': 1,
+            'decisions': kinds['DECISION'],
+            'questions': kinds['QUERY_OPENED'],
+            'jumps across containers': found.model.cross_jumps,
+            'hangs': int(found.is_hung),
+            'threads left': len(found.threads_left),
+            'disagreements': int(not found.is_fine),
+        }
+    )
     if not found.is_fine and counts['disagreements'] <= MOST_SHOWN:
         print(found.report())
     for wrong in disturb(draw(seed)):

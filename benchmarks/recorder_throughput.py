@@ -7,6 +7,7 @@ recorder. With --trials many short trials follow each other, one bag each, and t
 where a later trial takes more memory, files, threads or time than an early one. Needs no ROS
 master. `recorder_throughput.py --help` shows the options.
 """
+
 import argparse
 import glob
 import os
@@ -78,12 +79,13 @@ def recorded_numbers(folder: str) -> List[int]:
     numbers = []
     with Reader(path) as reader:
         for _, _, data in reader.messages(
-            [item for item in reader.connections if item.topic.endswith('events')]):
+            [item for item in reader.connections if item.topic.endswith('events')]
+        ):
             # uint8 kind, Header (seq, stamp, frame_id), float64 wall_time, string trial_id, uint64
             # seq
             start = 1 + 12 + 4 + int.from_bytes(data[13:17], 'little') + 8
-            start += 4 + int.from_bytes(data[start:start + 4], 'little')
-            numbers.append(int.from_bytes(data[start:start + 8], 'little'))
+            start += 4 + int.from_bytes(data[start : start + 4], 'little')
+            numbers.append(int.from_bytes(data[start : start + 8], 'little'))
     return numbers
 
 
@@ -100,10 +102,14 @@ def growth_of(trials: int, folder: str) -> int:
         begin = time.perf_counter()
         for _ in range(tenth):
             run(5, recorder)
-        readings.append({
-            'ms per trial': (time.perf_counter() - begin) / tenth * 1e3,
-            'peak memory, MB': peak_rss_mb(), 'threads': threading.active_count(),
-            'open files': len(os.listdir('/proc/self/fd'))})
+        readings.append(
+            {
+                'ms per trial': (time.perf_counter() - begin) / tenth * 1e3,
+                'peak memory, MB': peak_rss_mb(),
+                'threads': threading.active_count(),
+                'open files': len(os.listdir('/proc/self/fd')),
+            }
+        )
     closed = recorder.close(60.0)
     bags = len(glob.glob(folder + '/bags/*.bag'))
     print('{} trials, {} bags'.format(10 * tenth, bags))
@@ -111,26 +117,35 @@ def growth_of(trials: int, folder: str) -> int:
     for name, most in MOST_GROWTH.items():
         ratio = late[name] / early[name]
         grown = grown or ratio > most
-        print('{:<16} {:8.2f} at a tenth {:8.2f} at the end {:6.2f} x (at most {:.1f})'.format(
-            name, early[name], late[name], ratio, most))
+        print(
+            '{:<16} {:8.2f} at a tenth {:8.2f} at the end {:6.2f} x (at most {:.1f})'.format(
+                name, early[name], late[name], ratio, most
+            )
+        )
     return 0 if closed and bags == 10 * tenth and not grown else 1
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--transitions', type=int, default=100_000,
-                        help='of the recorded trial (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument(
-        '--folder', help='for the bags, to try a certain disk (default: that for temporary files)')
-    parser.add_argument('--trials', type=int, default=0,
-                        help='run so many short trials instead, e.g. 10000')
+        '--transitions',
+        type=int,
+        default=100_000,
+        help='of the recorded trial (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--folder', help='for the bags, to try a certain disk (default: that for temporary files)'
+    )
+    parser.add_argument(
+        '--trials', type=int, default=0, help='run so many short trials instead, e.g. 10000'
+    )
     args = parser.parse_args()
     smach.set_loggers(*[lambda text: None] * 4)
     folder = tempfile.mkdtemp(dir=args.folder)
     try:
-        return (growth_of(args.trials, folder) if args.trials
-                else measure(args.transitions, folder))
+        return growth_of(args.trials, folder) if args.trials else measure(args.transitions, folder)
     finally:
         shutil.rmtree(folder)
 
@@ -148,21 +163,33 @@ def measure(transitions: int, folder: str) -> int:
     closing_s = time.perf_counter() - closing
     grown_mb = peak_rss_mb() - before_mb
     whole = recorded_numbers(folder + '/bags') == list(range(count.events)) and closed
-    print('{} transitions, {} events, {:.1f} MB of bag'.format(transitions, count.events,
-                                                               bag_mb(folder + '/bags')))
-    for name, seconds in (('no observer', bare_s), ('a counting observer', counted_s),
-                          ('recorded', recorded_s)):
-        print('{:<24} {:8.2f} us per transition {:10.0f} events/s {:7.1f} x'.format(
-            name, seconds / transitions * 1e6, count.events / seconds, seconds / bare_s))
+    print(
+        '{} transitions, {} events, {:.1f} MB of bag'.format(
+            transitions, count.events, bag_mb(folder + '/bags')
+        )
+    )
+    for name, seconds in (
+        ('no observer', bare_s),
+        ('a counting observer', counted_s),
+        ('recorded', recorded_s),
+    ):
+        print(
+            '{:<24} {:8.2f} us per transition {:10.0f} events/s {:7.1f} x'.format(
+                name, seconds / transitions * 1e6, count.events / seconds, seconds / bare_s
+            )
+        )
     print('written to the end {:.2f} s after the trial'.format(closing_s))
-    print('events lost: {}; numbering without a gap: {}'.format(recorder.losses.events,
-                                                                'yes' if whole else 'NO'))
+    print(
+        'events lost: {}; numbering without a gap: {}'.format(
+            recorder.losses.events, 'yes' if whole else 'NO'
+        )
+    )
     print('memory: peak grew by {:.1f} MB while recording'.format(grown_mb))
     return 0 if whole else 1
 
 
 def bag_mb(folder: str) -> float:
-    return sum(os.path.getsize(path) for path in glob.glob(folder + '/*.bag')) / 2 ** 20
+    return sum(os.path.getsize(path) for path in glob.glob(folder + '/*.bag')) / 2**20
 
 
 if __name__ == '__main__':

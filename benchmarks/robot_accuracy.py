@@ -7,6 +7,7 @@ A can is gripped, lifted and shaken; then both tasks are run in N scenes each th
 fail. Compare its figures before and after a change of the world's physics. Scenes are tuned on
 seeds below 1000: use those here.
 """
+
 import argparse
 import re
 import time
@@ -52,8 +53,14 @@ class TrialOutcome(NamedTuple):
 def grasp_scene(mass: float, friction: float) -> Scene:
     """A can on a table."""
     table = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70))
-    can = Body('can', 'cylinder', (0.031, 0.031, CAN_HEIGHT), (0.70, -0.20, 0.78), mass=mass,
-               friction=friction)
+    can = Body(
+        'can',
+        'cylinder',
+        (0.031, 0.031, CAN_HEIGHT),
+        (0.70, -0.20, 0.78),
+        mass=mass,
+        friction=friction,
+    )
     return Scene('grasp', 3, (table, can), Goal('stands_at', ''))
 
 
@@ -63,8 +70,11 @@ class BlindHand:
     def __init__(self, world: World) -> None:
         self._world, self._robot = world, DirectRobot(world)
         self._chain = JointChain.from_urdf(
-            pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['right'],
-            fixed={'torso_lift_joint': world.joints()['torso_lift_joint']})
+            pr2_urdf().read_text(),
+            BASE_FRAME,
+            TOOL_FRAME['right'],
+            fixed={'torso_lift_joint': world.joints()['torso_lift_joint']},
+        )
 
     def angles(self) -> np.ndarray:
         joints = self._robot.joints()
@@ -116,7 +126,8 @@ def slip(mass: float, friction: float, effort: float) -> str:
         after = inverse(world.tool_pose('right')) @ world.body_pose('can')
         turn = np.degrees(np.arccos(np.clip(before[:3, 2] @ after[:3, 2], -1.0, 1.0)))
         return '{:.1f} mm, {:.1f} degrees'.format(
-            1000 * np.linalg.norm(after[:3, 3] - before[:3, 3]), turn)
+            1000 * np.linalg.norm(after[:3, 3] - before[:3, 3]), turn
+        )
     finally:
         world.close()
 
@@ -139,17 +150,30 @@ def trial(task: str, seed: int, world: World) -> TrialOutcome:
     world.step(60)
     verdict = judge(world, scene.goal)
     number = re.search(r'([\d.]+) cm', verdict.why)
-    return TrialOutcome(seed, failed, text or verdict.why, verdict.success,
-                        float(number.group(1)) if number else np.nan, door,
-                        time.process_time() - cpu, sim_s)
+    return TrialOutcome(
+        seed,
+        failed,
+        text or verdict.why,
+        verdict.success,
+        float(number.group(1)) if number else np.nan,
+        door,
+        time.process_time() - cpu,
+        sim_s,
+    )
 
 
 def report(task: str, outcomes: Sequence[TrialOutcome]) -> None:
     """Print how the trials of a task went."""
     good = [each for each in outcomes if each.success]
-    print('\n{}: {} of {} succeed; {:.2f} processor s and {:.1f} s of simulated time each'.format(
-        task, len(good), len(outcomes), np.mean([each.cpu_s for each in outcomes]),
-        np.mean([each.sim_s for each in outcomes])))
+    print(
+        '\n{}: {} of {} succeed; {:.2f} processor s and {:.1f} s of simulated time each'.format(
+            task,
+            len(good),
+            len(outcomes),
+            np.mean([each.cpu_s for each in outcomes]),
+            np.mean([each.sim_s for each in outcomes]),
+        )
+    )
     print('  off the goal: {}'.format(spread([each.off_cm for each in good], 'cm')))
     for state in ANGLES:
         angles = [each.door[state] for each in outcomes if state in each.door]
@@ -163,23 +187,36 @@ def report(task: str, outcomes: Sequence[TrialOutcome]) -> None:
 def spread(values: List[float], unit: str) -> str:
     """Least, median and most."""
     known = [value for value in values if np.isfinite(value)]
-    return '{:.2f} / {:.2f} / {:.2f} {} (least, median, most of {})'.format(
-        min(known), float(np.median(known)), max(known), unit, len(known)) if known else 'none'
+    return (
+        '{:.2f} / {:.2f} / {:.2f} {} (least, median, most of {})'.format(
+            min(known), float(np.median(known)), max(known), unit, len(known)
+        )
+        if known
+        else 'none'
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--table', type=int, default=40,
-                        help='trials of pick and place (default: %(default)s)')
-    parser.add_argument('--kitchen', type=int, default=15,
-                        help='trials of drink retrieval (default: %(default)s)')
-    parser.add_argument('--first', type=int, default=500,
-                        help='seed of the first trial (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--table', type=int, default=40, help='trials of pick and place (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--kitchen', type=int, default=15, help='trials of drink retrieval (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--first', type=int, default=500, help='seed of the first trial (default: %(default)s)'
+    )
     args = parser.parse_args()
     for mass, friction, effort in GRASPS:
-        print('a can of {} kg, friction {}, gripped with {:g} N and shaken: {}'.format(
-            mass, friction, effort, slip(mass, friction, effort)), flush=True)
+        print(
+            'a can of {} kg, friction {}, gripped with {:g} N and shaken: {}'.format(
+                mass, friction, effort, slip(mass, friction, effort)
+            ),
+            flush=True,
+        )
     world = World()
     for task, count in (('pick_and_place', args.table), ('drink_retrieval', args.kitchen)):
         if count:

@@ -9,6 +9,7 @@ first execute, on a master of its own. A process that has not ended 20 s later c
 counts as whole where rosbag reads it to its end. The exit status is 1 where a bag is not whole, or
 oracle_run hangs. The bare script may hang as well: in rospy's own clean-up.
 """
+
 import argparse
 import collections
 import os
@@ -21,21 +22,28 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'rostest')
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--signals', type=int, default=40,
-                        help='to processes of each kind (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the instants (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--signals', type=int, default=40, help='to processes of each kind (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the instants (default: %(default)s)'
+    )
     options = parser.parse_args()
     from own_master import wait_for_master
     from signalled_programs import KINDS, signal_many
 
     from smach_oracle.experiment.launching import free_port
+
     port = free_port()
     os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
-    master = subprocess.Popen(['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL,
-                              stderr=subprocess.DEVNULL)
+    master = subprocess.Popen(
+        ['rosmaster', '--core', '-p', str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
         wait_for_master(os.environ['ROS_MASTER_URI'])
         endings = signal_many(options.signals, options.seed)

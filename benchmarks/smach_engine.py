@@ -13,6 +13,7 @@ that neighbours on the machine do not count. --upstream measures the smach found
 a process of its own with a bare loop of its own. --check ends with status 1 where a limit is
 broken, the last one being that memory stays flat over --transitions transitions.
 """
+
 import argparse
 import itertools
 import json
@@ -33,6 +34,7 @@ MEMORY_LIMIT_KB = 1024
 
 def two_states(smach, with_userdata: bool) -> Dict[str, object]:
     """States A and B that end with outcomes x and y."""
+
     class Fixed(smach.State):
         def __init__(self, outcome):
             smach.State.__init__(self, outcomes=[outcome])
@@ -66,6 +68,7 @@ def bare_loop(smach) -> Callable[[int], float]:
         for _ in range(count):
             label = transitions[label][states[label].execute(ud)]  # type: ignore[attr-defined]
         return (time.perf_counter() - begin) / count
+
     return run
 
 
@@ -80,10 +83,12 @@ def machine_loop(smach, with_userdata: bool) -> Callable[[int], float]:
 
     def run(count: int) -> float:
         smach.set_shutdown_check(
-            itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__)
+            itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__
+        )
         begin = time.perf_counter()
         machine.execute()
         return (time.perf_counter() - begin) / count
+
     return run
 
 
@@ -93,6 +98,7 @@ def import_silenced():
 
     def silent(msg: str) -> None:
         """A logger that nobody hears."""
+
     smach.set_loggers(silent, silent, silent, silent)
     return smach
 
@@ -100,14 +106,17 @@ def import_silenced():
 def measure(steps: int, rounds: int) -> Dict[str, float]:
     """Seconds a step, of the bare loop and of each row."""
     smach = import_silenced()
-    loops = {'bare loop': bare_loop(smach), 'outcome only': machine_loop(smach, False),
-             'userdata read and written': machine_loop(smach, True)}
+    loops = {
+        'bare loop': bare_loop(smach),
+        'outcome only': machine_loop(smach, False),
+        'userdata read and written': machine_loop(smach, True),
+    }
     times: Dict[str, List[float]] = {name: [] for name in loops}
     for _ in range(rounds):
         for name, loop in loops.items():
             times[name].append(loop(steps))
     return {
-        name: statistics.median(sorted(taken)[:max(1, rounds // 4)])
+        name: statistics.median(sorted(taken)[: max(1, rounds // 4)])
         for name, taken in times.items()
     }
 
@@ -125,24 +134,34 @@ def measure_in_process(path: str, steps: int, rounds: int) -> Dict[str, float]:
     """The same for the smach at `path`."""
     command = [
         sys.executable,
-        os.path.abspath(__file__), '--json', '--steps',
-        str(steps), '--rounds',
-        str(rounds)
+        os.path.abspath(__file__),
+        '--json',
+        '--steps',
+        str(steps),
+        '--rounds',
+        str(rounds),
     ]
-    done = subprocess.run(command, env=dict(os.environ, PYTHONPATH=path), stdout=subprocess.PIPE,
-                          check=True)
+    done = subprocess.run(
+        command, env=dict(os.environ, PYTHONPATH=path), stdout=subprocess.PIPE, check=True
+    )
     times: Dict[str, float] = json.loads(done.stdout.decode())
     return times
 
 
 def print_table(ours: Dict[str, float], upstream: Optional[Dict[str, float]]) -> None:
     """Rows of nanoseconds and ratios, as in doc/smach_engine.md."""
-    print('| a step of | ns | x bare loop | limit |%s' %
-          (' upstream ns | upstream x |' if upstream else ''))
+    print(
+        '| a step of | ns | x bare loop | limit |%s'
+        % (' upstream ns | upstream x |' if upstream else '')
+    )
     print('|---|---|---|---|%s' % ('---|---|' if upstream else ''))
     for name in ours:
-        row = '| %s | %.0f | %.1f | %s |' % (name, ours[name] * 1e9, ours[name] / ours['bare loop'],
-                                             LIMITS.get(name, ''))
+        row = '| %s | %.0f | %.1f | %s |' % (
+            name,
+            ours[name] * 1e9,
+            ours[name] / ours['bare loop'],
+            LIMITS.get(name, ''),
+        )
         if upstream:
             row += ' %.0f | %.1f |' % (upstream[name] * 1e9, upstream[name] / upstream['bare loop'])
         print(row)
@@ -151,15 +170,22 @@ def print_table(ours: Dict[str, float], upstream: Optional[Dict[str, float]]) ->
 def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description='Cost of a transition, in steps of the bare loop.')
-    parser.add_argument('--check', action='store_true',
-                        help='end with status 1 where a limit is broken')
-    parser.add_argument('--upstream', metavar='PATH',
-                        help='folder with an upstream smach to measure too')
-    parser.add_argument('--steps', type=int, default=3000,
-                        help='steps a round (default: %(default)s)')
+    parser.add_argument(
+        '--check', action='store_true', help='end with status 1 where a limit is broken'
+    )
+    parser.add_argument(
+        '--upstream', metavar='PATH', help='folder with an upstream smach to measure too'
+    )
+    parser.add_argument(
+        '--steps', type=int, default=3000, help='steps a round (default: %(default)s)'
+    )
     parser.add_argument('--rounds', type=int, default=200, help='rounds (default: %(default)s)')
-    parser.add_argument('--transitions', type=int, default=10000000,
-                        help='transitions for the memory check (default: %(default)s)')
+    parser.add_argument(
+        '--transitions',
+        type=int,
+        default=10000000,
+        help='transitions for the memory check (default: %(default)s)',
+    )
     parser.add_argument('--json', action='store_true', help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -171,16 +197,19 @@ def main() -> int:
         print(json.dumps(measure(arguments.steps, arguments.rounds)))
         return 0
     ours = measure_in_process(SRC, arguments.steps, arguments.rounds)
-    upstream = arguments.upstream and measure_in_process(arguments.upstream, arguments.steps,
-                                                         arguments.rounds)
+    upstream = arguments.upstream and measure_in_process(
+        arguments.upstream, arguments.steps, arguments.rounds
+    )
     print_table(ours, upstream or None)
     if not arguments.check:
         return 0
     broken = [name for name, limit in LIMITS.items() if ours[name] > limit * ours['bare loop']]
     sys.path.insert(0, SRC)
     grown_kb = memory_growth_kb(arguments.transitions)
-    print('memory: %d kB more after %d transitions (limit %d)' %
-          (grown_kb, arguments.transitions, MEMORY_LIMIT_KB))
+    print(
+        'memory: %d kB more after %d transitions (limit %d)'
+        % (grown_kb, arguments.transitions, MEMORY_LIMIT_KB)
+    )
     if grown_kb > MEMORY_LIMIT_KB:
         broken.append('memory')
     for name in broken:

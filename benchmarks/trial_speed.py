@@ -11,6 +11,7 @@ A machine with other work takes more processor time for the same, up to twice as
 physics, of a world at rest, are timed now and then in the same run, as a yardstick. --check fails
 where a trial takes more steps' time than the goal leaves for it on the machine of STEP_US.
 """
+
 import argparse
 import collections
 import contextlib
@@ -156,8 +157,9 @@ def name_of(pid: int) -> str:
     named = [word for word in words if word.startswith(b'__name:=')]
     if named:
         return os.fsdecode(named[0].partition(b'=')[2])
-    return os.path.basename(os.fsdecode(next(
-        (word for word in words[1:] if not word.startswith(b'-')), words[0])))
+    return os.path.basename(
+        os.fsdecode(next((word for word in words[1:] if not word.startswith(b'-')), words[0]))
+    )
 
 
 def processor_s(pid: int) -> float:
@@ -189,35 +191,58 @@ def cost_of(job: str, looks: List[Look]) -> Optional[JobCost]:
     if first is None or last is None or last.ended <= first.ended:
         return None
     trials = last.ended - first.ended
-    counted = truths[first.ended:last.ended]
-    cpu = {name: (used - first.cpu_s.get(name, 0.0)) / trials
-           for name, used in last.cpu_s.items()}
+    counted = truths[first.ended : last.ended]
+    cpu = {name: (used - first.cpu_s.get(name, 0.0)) / trials for name, used in last.cpu_s.items()}
     world: Dict[str, float] = collections.defaultdict(float)
     for truth in counted:
         for what, seconds in truth.get('cpu_s', {}).items():
             world[what] += seconds / trials
-    between = looks[looks.index(first):looks.index(last)]
+    between = looks[looks.index(first) : looks.index(last)]
     return JobCost(
-        os.path.basename(os.path.dirname(job)), trials, cpu, dict(world),
+        os.path.basename(os.path.dirname(job)),
+        trials,
+        cpu,
+        dict(world),
         max(0.0, sum(first.cpu_s.values()) - first.ended * sum(cpu.values())),
         sum(not look.busy for look in between) / max(1, len(between)),
         sum(truth['wall_s'] for truth in counted) / trials,
-        sum(truth['sim_s'] for truth in counted) / trials)
+        sum(truth['sim_s'] for truth in counted) / trials,
+    )
 
 
-def measure(task: str, trials: int, seed: int,
-            variants: str) -> Tuple[int, List[JobCost], float, str]:
+def measure(
+    task: str, trials: int, seed: int, variants: str
+) -> Tuple[int, List[JobCost], float, str]:
     """Run the trials; the exit code, what they cost, s of a step, and what run_trials printed."""
     with tempfile.TemporaryDirectory() as folder:
         output = os.path.realpath(folder) + '/trials'
-        words = ['--task', task, '--trials', str(trials), '--seed', str(seed), '--jobs', '1',
-                 '--output', output, '--variants', variants]
+        words = [
+            '--task',
+            task,
+            '--trials',
+            str(trials),
+            '--seed',
+            str(seed),
+            '--jobs',
+            '1',
+            '--output',
+            output,
+            '--variants',
+            variants,
+        ]
         with contextlib.redirect_stdout(io.StringIO()) as told, Watch(output) as watch:
             code = run_trials(words)
-        costs = [cost_of(job, looks) for job, looks in sorted(watch.looks.items())
-                 if (Path(job) / TRUTH_FILE).exists()]
-        return (code, [cost for cost in costs if cost is not None],
-                statistics.median(watch.steps_s or [0.0]), told.getvalue())
+        costs = [
+            cost_of(job, looks)
+            for job, looks in sorted(watch.looks.items())
+            if (Path(job) / TRUTH_FILE).exists()
+        ]
+        return (
+            code,
+            [cost for cost in costs if cost is not None],
+            statistics.median(watch.steps_s or [0.0]),
+            told.getvalue(),
+        )
 
 
 def report(task: str, costs: List[JobCost]) -> float:
@@ -226,26 +251,41 @@ def report(task: str, costs: List[JobCost]) -> float:
     whole = 0.0
     for cost in costs:
         whole += (cost.total_s + cost.start_s / JOB_TRIALS) / count
-        print('\n{}: {} trials, {:.2f} processor s a trial, {:.1f} s of simulated time, {:.2f} s '
-              'of the wall\'s; the start {:.1f} processor s'.format(
-                  cost.name, cost.trials, cost.total_s, cost.sim_s, cost.wall_s, cost.start_s))
+        print(
+            '\n{}: {} trials, {:.2f} processor s a trial, {:.1f} s of simulated time, {:.2f} s '
+            "of the wall's; the start {:.1f} processor s".format(
+                cost.name, cost.trials, cost.total_s, cost.sim_s, cost.wall_s, cost.start_s
+            )
+        )
         print_shares('by process', cost.cpu_s, cost.total_s)
         print_shares('by what is done', kinds_of(cost), cost.total_s)
-        print('  {:<30}{:>8.1f}% of the wall\'s time'.format('waiting', 100 * cost.waiting))
+        print("  {:<30}{:>8.1f}% of the wall's time".format('waiting', 100 * cost.waiting))
     trials, minutes = GOALS[task]
     goal = CORES * minutes * 60.0 / trials
-    print('\n{}: {:.2f} processor s a trial, the goal is {:.2f}; {:.1f} trials a minute on {} '
-          'cores, the goal is {:.1f}; {} trials in {:.1f} minutes, the goal is {:g}'.format(
-              task, whole, goal, CORES * 60.0 / whole, CORES, trials / minutes, trials,
-              trials * whole / CORES / 60.0, minutes))
+    print(
+        '\n{}: {:.2f} processor s a trial, the goal is {:.2f}; {:.1f} trials a minute on {} '
+        'cores, the goal is {:.1f}; {} trials in {:.1f} minutes, the goal is {:g}'.format(
+            task,
+            whole,
+            goal,
+            CORES * 60.0 / whole,
+            CORES,
+            trials / minutes,
+            trials,
+            trials * whole / CORES / 60.0,
+            minutes,
+        )
+    )
     return whole
 
 
 def kinds_of(cost: JobCost) -> Dict[str, float]:
     """Processor s of a trial by what is done in them."""
-    kinds = {'physics': cost.world_s.get('physics', 0.0),
-             'rendering': cost.world_s.get('camera', 0.0),
-             'planning and perception': sum(cost.cpu_s.get(name, 0.0) for name in PLANNING)}
+    kinds = {
+        'physics': cost.world_s.get('physics', 0.0),
+        'rendering': cost.world_s.get('camera', 0.0),
+        'planning and perception': sum(cost.cpu_s.get(name, 0.0) for name in PLANNING),
+    }
     world = cost.cpu_s.get('pr2_world', 0.0)
     kinds['the rest of the world'] = max(0.0, world - kinds['physics'] - kinds['rendering'])
     kinds['the others'] = max(0.0, cost.total_s - sum(kinds.values()))
@@ -261,19 +301,28 @@ def print_shares(title: str, spent: Dict[str, float], whole_s: float) -> None:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--task', default='pick_and_place', choices=sorted(GOALS),
-                        help='(default: %(default)s)')
-    parser.add_argument('--trials', type=int, default=20,
-                        help='of each variant, 3 or more (default: %(default)s)')
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the first trial (default: %(default)s)')
-    parser.add_argument('--variants', choices=('both', 'with', 'without'), default='both',
-                        help='with the oracle or without (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--task', default='pick_and_place', choices=sorted(GOALS), help='(default: %(default)s)'
+    )
+    parser.add_argument(
+        '--trials', type=int, default=20, help='of each variant, 3 or more (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the first trial (default: %(default)s)'
+    )
+    parser.add_argument(
+        '--variants',
+        choices=('both', 'with', 'without'),
+        default='both',
+        help='with the oracle or without (default: %(default)s)',
+    )
     parser.add_argument('--json', help='file that gets the figures')
-    parser.add_argument('--check', action='store_true',
-                        help='fail where the limit in steps is missed')
+    parser.add_argument(
+        '--check', action='store_true', help='fail where the limit in steps is missed'
+    )
     args = parser.parse_args()
     if args.trials < 3:
         parser.error('--trials must be 3 or more: the first and the last are not counted')

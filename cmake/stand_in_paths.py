@@ -9,6 +9,7 @@ A copy with the marker is a stand-in, ours or that of another workspace, and doe
 folder without `__init__.py` (a checkout that happens to be named `smach`) is no package either.
 Nothing is imported: the real smach_ros would pull in rospy.
 """
+
 import importlib.util
 import os
 import re
@@ -17,16 +18,20 @@ import sys
 
 NAMES = ('control_msgs', 'smach', 'smach_msgs', 'smach_ros')
 MARKER = '.smach_oracle_stand_in'
-OF_STAND_INS = re.compile(r'/smach_oracle/stand_ins/(?:{})/(?:python|share)/?$'.format(
-    '|'.join(NAMES)))
+OF_STAND_INS = re.compile(
+    r'/smach_oracle/stand_ins/(?:{})/(?:python|share)/?$'.format('|'.join(NAMES))
+)
 
 
 def find_upstream(name: str) -> str:
     """Return the folder that holds the upstream package `name`, or an empty string."""
     whole = list(sys.path)
     # sys.path[0] is the folder of this file
-    sys.path[:] = [folder for folder in whole[1:] if folder
-                   and not os.path.exists(os.path.join(folder, name, MARKER))]
+    sys.path[:] = [
+        folder
+        for folder in whole[1:]
+        if folder and not os.path.exists(os.path.join(folder, name, MARKER))
+    ]
     try:
         spec = importlib.util.find_spec(name)
     finally:
@@ -41,8 +46,11 @@ def exports(folder: str) -> str:
     absent = [name for name in NAMES if not find_upstream(name)]
     lines = []
     for variable, kind in (('PYTHONPATH', 'python'), ('ROS_PACKAGE_PATH', 'share')):
-        entries = [entry for entry in os.environ.get(variable, '').split(os.pathsep)
-                   if entry and not OF_STAND_INS.search(entry)]
+        entries = [
+            entry
+            for entry in os.environ.get(variable, '').split(os.pathsep)
+            if entry and not OF_STAND_INS.search(entry)
+        ]
         entries += [os.path.join(folder, name, kind) for name in absent]
         lines.append('export {}={}'.format(variable, shlex.quote(os.pathsep.join(entries))))
     return '\n'.join(lines)

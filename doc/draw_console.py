@@ -9,6 +9,7 @@ console_question.png and console_machine.png. `pr2` writes console_perception.pn
 console_3d.png and console_replay.png, and takes some minutes. Each starts a ROS master of its own.
 Look at what they have drawn.
 """
+
 import argparse
 import os
 import shutil
@@ -27,30 +28,31 @@ CAMERA = '/head_camera/rgb/image_raw'
 CLOUD = '/head_camera/depth_registered/points'
 TABLE, HAND = (0.7, -0.05, 0.7), (0.55, -0.4, 0.85)  # m in base_footprint, to look at
 MARKED = ((0.27, 0.44), (0.405, 0.69))  # two corners around an object, as shares of the image
-PICTURED = '''
+PICTURED = """
 const view = document.querySelector(arguments[0]);
 if (!view || view.width < 100) return false;
 const { data } = view.getContext("2d").getImageData(0, 0, view.width, view.height);
-return new Set(data).size > 50;'''
+return new Set(data).size > 50;"""
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument('--to', default=os.path.join(DOC, 'images'), help='folder of the pictures')
-    parser.add_argument('--of', choices=['kitchen', 'pr2', 'recording'],
-                        help='default: all')
+    parser.add_argument('--of', choices=['kitchen', 'pr2', 'recording'], help='default: all')
     options = parser.parse_args()
     if not options.of:  # a process has one ROS node only
         for each in ('kitchen', 'pr2', 'recording'):
-            subprocess.run([sys.executable, __file__, '--to', options.to, '--of', each],
-                           check=True)
+            subprocess.run([sys.executable, __file__, '--to', options.to, '--of', each], check=True)
         return
     from answer_latency import Processes
+
     with Processes() as processes:
         processes.start_master()
-        {'kitchen': draw_kitchen, 'pr2': draw_pr2,
-         'recording': record_answer}[options.of](processes, options.to)
+        {'kitchen': draw_kitchen, 'pr2': draw_pr2, 'recording': record_answer}[options.of](
+            processes, options.to
+        )
 
 
 def draw_kitchen(_processes, folder):
@@ -83,12 +85,14 @@ def record_answer(_processes, folder):
     rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
     frames = []  # PNG and s that it is shown
     try:
-        RecordedPage.begin('console_robot.py', 'PICK', '1.2', '0', '1', size=(1200, 760),
-                           name='ann')
+        RecordedPage.begin(
+            'console_robot.py', 'PICK', '1.2', '0', '1', size=(1200, 760), name='ann'
+        )
         browser = RecordedPage.browser
 
         def shoot(shown_s):
             frames.append((browser.driver.get_screenshot_as_png(), shown_s))
+
         browser.click('#tab-machines')
         browser.click('.path[title="KITCHEN/FETCH"]')
         browser.find('[id="/alpha/KITCHEN/FETCH/PICK"].failed')
@@ -117,10 +121,22 @@ def write_gif(frames, path):
     import io
 
     from PIL import Image
-    pictures = [Image.open(io.BytesIO(data)).convert('RGB').resize((900, 570), Image.LANCZOS)
-                .quantize(64, dither=Image.NONE) for data, _ in frames]
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], loop=0, optimize=True,
-                     duration=[round(1000 * shown_s) for _, shown_s in frames])
+
+    pictures = [
+        Image.open(io.BytesIO(data))
+        .convert('RGB')
+        .resize((900, 570), Image.LANCZOS)
+        .quantize(64, dither=Image.NONE)
+        for data, _ in frames
+    ]
+    pictures[0].save(
+        path,
+        save_all=True,
+        append_images=pictures[1:],
+        loop=0,
+        optimize=True,
+        duration=[round(1000 * shown_s) for _, shown_s in frames],
+    )
     assert os.path.getsize(path) < MOST_BYTES_MOVING, path
 
 
@@ -145,8 +161,17 @@ def draw_pr2(processes, folder):
     """A trial of the simulated PR2, seen and handled by a person, and replayed from its bag."""
     import rospy
     from console_page import ConsolePage, Node
-    processes.start(['roslaunch', 'smach_oracle', 'pr2.launch', 'scripted_operator:=false',
-                     'benign:=true', 'real_time_factor:=1'])
+
+    processes.start(
+        [
+            'roslaunch',
+            'smach_oracle',
+            'pr2.launch',
+            'scripted_operator:=false',
+            'benign:=true',
+            'real_time_factor:=1',
+        ]
+    )
     bags = tempfile.mkdtemp()
 
     class RobotPage(ConsolePage):
@@ -190,17 +215,23 @@ def look_at(place):
     from std_msgs.msg import Header
 
     from control_msgs.msg import PointHeadAction, PointHeadGoal
+
     head = actionlib.SimpleActionClient('/head_traj_controller/point_head_action', PointHeadAction)
     if not head.wait_for_server():
         raise RuntimeError('the simulated head is not there')
     head.send_goal_and_wait(
-        PointHeadGoal(target=PointStamped(Header(frame_id='base_footprint'), Point(*place)),
-                      pointing_axis=Vector3(0, 0, 1), pointing_frame='wide_stereo_optical_frame'))
+        PointHeadGoal(
+            target=PointStamped(Header(frame_id='base_footprint'), Point(*place)),
+            pointing_axis=Vector3(0, 0, 1),
+            pointing_frame='wide_stereo_optical_frame',
+        )
+    )
 
 
 def mark_an_object(browser, folder):
     """Answer the first question in the image of the failure."""
     from selenium.webdriver.common.action_chains import ActionChains
+
     browser.click(QUESTION.format('pr2'), 120.0)
     expect(browser, 'It is yours.')
     browser.click('.choice.interface[data-name=perception]')
@@ -213,8 +244,16 @@ def mark_an_object(browser, folder):
     action.move_to_element_with_offset(canvas, *first).click_and_hold()
     action.move_to_element_with_offset(canvas, *last).release().perform()
     browser.find('[data-fact=size]')
-    until(lambda: browser.run('return Number(document.querySelector(".object-view .cloud")'
-                              '.dataset.triangles || 0)') > 10000, 'the robot beside the object')
+    until(
+        lambda: (
+            browser.run(
+                'return Number(document.querySelector(".object-view .cloud")'
+                '.dataset.triangles || 0)'
+            )
+            > 10000
+        ),
+        'the robot beside the object',
+    )
     browser.find('.accept[data-settled], [data-settled] .accept')
     take(browser, folder, 'console_perception')
     browser.click('.perception .accept')
@@ -223,6 +262,7 @@ def mark_an_object(browser, folder):
 def drive_the_hand(browser, folder):
     """Answer the second question with the hand, which goes up in the picture."""
     from selenium.webdriver.common.action_chains import ActionChains
+
     scheme(browser, 'dark')
     browser.click(QUESTION.format('pr2'), 60.0)
     browser.click('.choice.interface[data-name=manipulation]')
@@ -246,8 +286,15 @@ def look_in_3d(browser, folder):
     browser.click('#tab-sensors')
     browser.click('.sensor-list [data-topic="{}"]'.format(CLOUD))
     expect(browser, 'of 307200 points', '.cloud-view')
-    until(lambda: browser.run('return Number(document.querySelector(".cloud-view .cloud")'
-                              '.dataset.triangles || 0)') > 10000, 'the robot beside its cloud')
+    until(
+        lambda: (
+            browser.run(
+                'return Number(document.querySelector(".cloud-view .cloud").dataset.triangles || 0)'
+            )
+            > 10000
+        ),
+        'the robot beside its cloud',
+    )
     take(browser, folder, 'console_3d')
     browser.click('.cloud-view .view-close')
     scheme(browser, 'light')
@@ -256,6 +303,7 @@ def look_in_3d(browser, folder):
 def replay(browser, folder):
     """The trial from its bag, as it stood when the second question was answered."""
     from selenium.webdriver.common.keys import Keys
+
     expect(browser, 'live', '#status')
     browser.click('#tab-trials')
     browser.click('.trial[data-number]', 60.0)
@@ -263,8 +311,10 @@ def replay(browser, folder):
     slider.send_keys(Keys.HOME)
     for _ in range(12):
         slider.send_keys(Keys.PAGE_UP)
-        if all(browser.says(words, '.replay-question', 1.0)
-               for words in ('Question about PICK', 'Answer of ann')):
+        if all(
+            browser.says(words, '.replay-question', 1.0)
+            for words in ('Question about PICK', 'Answer of ann')
+        ):
             break
     until(lambda: browser.run(PICTURED, '.replay-images .shown canvas'), 'what was seen')
     take(browser, folder, 'console_replay')
@@ -272,8 +322,10 @@ def replay(browser, folder):
 
 def scheme(browser, name):
     """`light` or `dark`, as a system that prefers it."""
-    browser.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
-        'features': [{'name': 'prefers-color-scheme', 'value': name}]})
+    browser.driver.execute_cdp_cmd(
+        'Emulation.setEmulatedMedia',
+        {'features': [{'name': 'prefers-color-scheme', 'value': name}]},
+    )
 
 
 def until(is_so, what, limit_s=60.0):
@@ -282,6 +334,7 @@ def until(is_so, what, limit_s=60.0):
     :raises AssertionError: where it does not come.
     """
     from waiting import wait_for
+
     if not wait_for(is_so, limit_s):
         raise AssertionError('the page does not show ' + what)
 
@@ -292,8 +345,9 @@ def expect(browser, words, selector='body'):
     :raises AssertionError: where it does not.
     """
     if not browser.says(words, selector, 60.0):
-        raise AssertionError('the page does not say {!r}; it says:\n{}'.format(
-            words, browser.text()))
+        raise AssertionError(
+            'the page does not say {!r}; it says:\n{}'.format(words, browser.text())
+        )
 
 
 def take(browser, folder, name):
@@ -302,6 +356,7 @@ def take(browser, folder, name):
     :raises AssertionError: where it is too large for a document.
     """
     from PIL import Image
+
     path = os.path.join(folder, name + '.png')
     browser.run('document.querySelectorAll("#toasts > *").forEach((each) => each.remove())')
     browser.screenshot(path, *SIZE)
@@ -316,9 +371,10 @@ def take(browser, folder, name):
 def in_few_colours(whole, mixed):
     """Those of the page as they are, those of a camera's image by the nearest of so many."""
     from PIL import Image
+
     counted = sorted(whole.getcolors(whole.width * whole.height), reverse=True)
     frequent = [value for _, colour in counted[:128] for value in colour]
-    others = whole.quantize(mixed, method=Image.FASTOCTREE).getpalette()[:3 * mixed]
+    others = whole.quantize(mixed, method=Image.FASTOCTREE).getpalette()[: 3 * mixed]
     palette = Image.new('P', (1, 1))
     palette.putpalette(frequent + others)
     return whole.quantize(palette=palette, dither=0)

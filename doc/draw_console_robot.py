@@ -1,15 +1,13 @@
 #!/usr/bin/env python3
 """A simulated PR2 for the console's pictures: it leaves the seeing and the picking to people."""
+
 import rospy
 
 import smach
 from smach_oracle import OracleContainer
 
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
-FAILS = {
-    'DETECT_TABLETOP': 'no object stands out of the table',
-    'PICK': 'no grasp is within reach'
-}
+FAILS = {'DETECT_TABLETOP': 'no object stands out of the table', 'PICK': 'no grasp is within reach'}
 OUTPUTS = {'DETECT_TABLETOP': ['table', 'objects', 'sizes'], 'PICK': ['grasp']}
 INPUTS = {'PICK': ['objects', 'arm'], 'PLACE': ['grasp']}
 
@@ -18,8 +16,9 @@ class Work(smach.State):
     """Takes two seconds."""
 
     def __init__(self, label):
-        smach.State.__init__(self, OUTCOMES, input_keys=INPUTS.get(label, []),
-                             output_keys=OUTPUTS.get(label, []))
+        smach.State.__init__(
+            self, OUTCOMES, input_keys=INPUTS.get(label, []), output_keys=OUTPUTS.get(label, [])
+        )
         self._label = label
 
     def execute(self, ud):
@@ -39,18 +38,27 @@ def main():
         for label, following in zip(labels, labels[1:] + ['succeeded']):
             smach.StateMachine.add(label, Work(label), {'succeeded': following})
     OracleContainer.wrap(
-        sm, name='CLEAR_TABLE', settings={
-            'high_from': 0.1, 'moderate_from': 0.05, 'deadline_s': 900.0, 'escalate': False,
+        sm,
+        name='CLEAR_TABLE',
+        settings={
+            'high_from': 0.1,
+            'moderate_from': 0.05,
+            'deadline_s': 900.0,
+            'escalate': False,
             'interfaces': {
                 'perception': {
-                    'action': '/perception_interface', 'states': ['DETECT_TABLETOP'],
-                    'description': 'Mark the object in the camera frame'
-                }, 'manipulation': {
-                    'action': '/manipulation_interface', 'states': ['PICK'],
-                    'description': 'Drive the hand'
-                }
-            }
-        })
+                    'action': '/perception_interface',
+                    'states': ['DETECT_TABLETOP'],
+                    'description': 'Mark the object in the camera frame',
+                },
+                'manipulation': {
+                    'action': '/manipulation_interface',
+                    'states': ['PICK'],
+                    'description': 'Drive the hand',
+                },
+            },
+        },
+    )
     sm.execute()
     rospy.spin()
 

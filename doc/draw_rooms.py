@@ -6,6 +6,7 @@
 
 An arrow means "imports". One that follows from two others is left out.
 """
+
 import ast
 import subprocess
 import sys
@@ -32,7 +33,7 @@ def modules(path: Path) -> Iterator[str]:
             for alias in node.names:
                 yield alias.name
         elif isinstance(node, ast.ImportFrom):
-            base = '.'.join(package[:len(package) - node.level]) if node.level else ''
+            base = '.'.join(package[: len(package) - node.level]) if node.level else ''
             module = '.'.join(filter(None, [base, node.module]))
             for alias in node.names:
                 yield '{}.{}'.format(module, alias.name)
@@ -42,8 +43,9 @@ def imports(names: List[str]) -> Graph:
     """Return which rooms each room imports, the engine among them."""
     graph: Graph = {}
     for room in names:
-        found = [name.split('.') for path in (SOURCES / room).rglob('*.py')
-                 for name in modules(path)]
+        found = [
+            name.split('.') for path in (SOURCES / room).rglob('*.py') for name in modules(path)
+        ]
         inside = {parts[1] for parts in found if parts[0] == 'smach_oracle'} & set(names)
         graph[room] = (inside | {parts[0] for parts in found} & set(ENGINE)) - {room}
     return graph
@@ -63,9 +65,14 @@ def reached(graph: Graph, start: str) -> Set[str]:
 
 def reduced(graph: Graph) -> Graph:
     """Return the graph without the arrows that follow from others."""
-    return {node: {target for target in targets
-                   if not any(target in reached(graph, other) for other in targets - {target})}
-            for node, targets in graph.items()}
+    return {
+        node: {
+            target
+            for target in targets
+            if not any(target in reached(graph, other) for other in targets - {target})
+        }
+        for node, targets in graph.items()
+    }
 
 
 def dot() -> str:
@@ -74,8 +81,9 @@ def dot() -> str:
     lines = ['digraph rooms {', '  rankdir=TB; node [shape=box, fontname="DejaVu Sans"];']
     for room in names:
         packages = sorted(path.parent.name for path in (SOURCES / room).glob('*/__init__.py'))
-        below = ''.join('\\n{}'.format(', '.join(packages[at:at + 3]))
-                        for at in range(0, len(packages), 3))
+        below = ''.join(
+            '\\n{}'.format(', '.join(packages[at : at + 3])) for at in range(0, len(packages), 3)
+        )
         lines.append('  {} [label="{}{}"];'.format(room, room, below))
     lines += ['  {} [style=dashed];'.format(name) for name in ENGINE]
     for room, targets in sorted(reduced(imports(names)).items()):
@@ -90,8 +98,10 @@ def main() -> int:
         sys.stdout.write(text)
         return 0
     PICTURE.with_suffix('.dot').write_text(text, encoding='utf-8')
-    subprocess.run(['dot', '-Tsvg', '-o', str(PICTURE.with_suffix('.svg')),
-                    str(PICTURE.with_suffix('.dot'))], check=True)
+    subprocess.run(
+        ['dot', '-Tsvg', '-o', str(PICTURE.with_suffix('.svg')), str(PICTURE.with_suffix('.dot'))],
+        check=True,
+    )
     return 0
 
 

@@ -7,6 +7,7 @@ It writes drink_retrieval.gif, drink_failure.png, drink_recovered.png and drink_
 trial takes some minutes, on a ROS master of its own. --film draws from a film that is there. Look
 at what it has drawn.
 """
+
 import argparse
 import os
 import subprocess
@@ -29,10 +30,12 @@ MOST_BYTES, MOST_BYTES_MOVING = 200000, 3000000
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--seed', type=int, default=SEED,
-                        help='of the trial (default: %(default)s)')
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        '--seed', type=int, default=SEED, help='of the trial (default: %(default)s)'
+    )
     parser.add_argument('--film', help='file of a film of the launch file (default: make one)')
     parser.add_argument('--to', default=os.path.join(DOC, 'images'), help='folder of the pictures')
     options = parser.parse_args()
@@ -45,10 +48,21 @@ def main():
 def film(seed, folder):
     """The file of a film of that trial."""
     from smach_oracle.experiment.launching import free_port
+
     port = str(free_port())
-    subprocess.run(['roslaunch', '-p', port, 'smach_oracle', 'drink_retrieval.launch',
-                    'seed:={}'.format(seed), 'film:=' + folder], check=True,
-                   env=dict(os.environ, ROS_MASTER_URI='http://localhost:' + port))
+    subprocess.run(
+        [
+            'roslaunch',
+            '-p',
+            port,
+            'smach_oracle',
+            'drink_retrieval.launch',
+            'seed:={}'.format(seed),
+            'film:=' + folder,
+        ],
+        check=True,
+        env=dict(os.environ, ROS_MASTER_URI='http://localhost:' + port),
+    )
     return os.path.join(folder, '{}.mp4'.format(seed))
 
 
@@ -59,6 +73,7 @@ def draw(path, folder):
     """
     from smach_oracle.simulation.node.trial_film import FRAMES_S
     from smach_oracle.simulation.pictures.caption import GREEN, RED
+
     images = images_of(path)
     failed, ended = told_in(images, RED), told_in(images, GREEN)
     assert failed and ended and failed[0] < ended[0], 'no failure, or no success'
@@ -77,6 +92,7 @@ def images_of(path):
     """(h, w, 3) uint8 RGB each, without the codec's noise where there is one colour."""
     from smach_oracle.simulation.pictures.caption import HEIGHT, PAPER
     from smach_oracle.simulation.pictures.portrait import BACKGROUND
+
     video, images = cv2.VideoCapture(path), []
     while True:
         there, image = video.read()
@@ -84,8 +100,10 @@ def images_of(path):
             assert images, '{}: no film'.format(path)
             return images
         image = image[..., ::-1].copy()
-        for part, colour, noise in ((image[:-HEIGHT], BACKGROUND, NOISE),
-                                    (image[-HEIGHT:], PAPER, 3 * NOISE)):
+        for part, colour, noise in (
+            (image[:-HEIGHT], BACKGROUND, NOISE),
+            (image[-HEIGHT:], PAPER, 3 * NOISE),
+        ):
             part[np.abs(part.astype(int) - colour).max(axis=2) < noise] = colour
         images.append(image)
 
@@ -93,19 +111,25 @@ def images_of(path):
 def told_in(images, colour):
     """The numbers of the images whose caption has that colour."""
     from smach_oracle.simulation.pictures.caption import BAR, HEIGHT
-    return [index for index, image in enumerate(images)
-            if np.abs(image[-HEIGHT:, :BAR - 2].mean(axis=(0, 1)) - colour).max() < 30]
+
+    return [
+        index
+        for index, image in enumerate(images)
+        if np.abs(image[-HEIGHT:, : BAR - 2].mean(axis=(0, 1)) - colour).max() < 30
+    ]
 
 
 def during(images, state):
     """The numbers of the images whose caption names that state alone; for '' nothing."""
     from smach_oracle.simulation.pictures.caption import HEIGHT, LEFT, Caption, strip
+
     drawn = strip(Caption(state), images[0].shape[1])[:, LEFT:].astype(int)
 
     def is_so(image):
         seen = image[-HEIGHT:, LEFT:]
         ink = (np.minimum(drawn, seen) < INK).any(axis=2)
         return not ink.any() or np.abs(drawn - seen)[ink].mean() < SAME_INK
+
     return [index for index, image in enumerate(images) if is_so(image)]
 
 
@@ -114,6 +138,7 @@ def shown(images, frames_s):
     and every so many of the others.
     """
     from smach_oracle.simulation.pictures.caption import GREY, HEIGHT
+
     working = set(told_in(images, GREY))
     frames, moved = [], 0
     for index, image in enumerate(images):
@@ -133,6 +158,7 @@ def write_gif(frames, path):
     from PIL import Image
 
     from smach_oracle.simulation.pictures.caption import HEIGHT
+
     colours = palette_of([image for image, _ in frames[::5]])
     palette = Image.new('P', (1, 1))
     palette.putpalette(colours.ravel().tolist())
@@ -149,22 +175,31 @@ def write_gif(frames, path):
         picture = Image.fromarray(drawn, 'P')
         picture.putpalette(palette.getpalette())
         pictures.append(picture)
-    pictures[0].save(path, save_all=True, append_images=pictures[1:], loop=0, optimize=False,
-                     transparency=CLEAR, disposal=1,
-                     duration=[round(1000 * shown_s) for _, shown_s in frames])
+    pictures[0].save(
+        path,
+        save_all=True,
+        append_images=pictures[1:],
+        loop=0,
+        optimize=False,
+        transparency=CLEAR,
+        disposal=1,
+        duration=[round(1000 * shown_s) for _, shown_s in frames],
+    )
     assert os.path.getsize(path) < MOST_BYTES_MOVING, path
 
 
 def palette_of(images):
     """(256, 3) uint8 RGB: also the colours of small things, such as a drink."""
     from PIL import Image
+
     pixels = np.vstack(images).reshape(-1, 3)
-    _, cells, counts = np.unique(pixels // 8 @ np.array([1, 32, 1024]), return_inverse=True,
-                                 return_counts=True)
+    _, cells, counts = np.unique(
+        pixels // 8 @ np.array([1, 32, 1024]), return_inverse=True, return_counts=True
+    )
     means = np.column_stack([np.bincount(cells, channel) / counts for channel in pixels.T])
-    samples = np.repeat(means.round().astype(np.uint8), np.ceil(counts ** 0.5).astype(int), axis=0)
+    samples = np.repeat(means.round().astype(np.uint8), np.ceil(counts**0.5).astype(int), axis=0)
     made = Image.fromarray(samples[None]).quantize(COLOURS, kmeans=3).getpalette()
-    return np.resize(np.array(made[:3 * COLOURS], np.uint8).reshape(-1, 3), (256, 3))
+    return np.resize(np.array(made[: 3 * COLOURS], np.uint8).reshape(-1, 3), (256, 3))
 
 
 def save(image, folder, name):

@@ -3,6 +3,7 @@ smach_oracle COMMAND`.
 
 Run it in the environment of scripts/ros_env when an option has changed.
 """
+
 import json
 import subprocess
 import sys
@@ -15,7 +16,7 @@ HERE = Path(__file__).resolve().parent
 SCRIPTS = HERE.parent / 'scripts'
 TARGET = HERE / '60.completion_words.bash'
 # runs a command up to its parser, and prints what that knows
-ASK = '''
+ASK = """
 import argparse, json, runpy, sys
 
 def known(parser):
@@ -35,13 +36,14 @@ def told(parser, *args, **kwargs):
 argparse.ArgumentParser.parse_args = argparse.ArgumentParser.parse_known_args = told
 sys.argv[:] = [sys.argv[1], 'x']
 runpy.run_path(sys.argv[0], run_name='__main__')
-'''
+"""
 
 
 def ask(script: Path) -> Dict[str, Any]:
     """The options and works that a command's parser knows."""
-    told = subprocess.run([sys.executable, '-c', ASK, str(script)], stdout=subprocess.PIPE,
-                          check=True, timeout=120).stdout
+    told = subprocess.run(
+        [sys.executable, '-c', ASK, str(script)], stdout=subprocess.PIPE, check=True, timeout=120
+    ).stdout
     found: Dict[str, Any] = json.loads(told.decode().splitlines()[-1])
     return found
 
@@ -50,8 +52,11 @@ def lines_of(key: str, known: Dict[str, Any]) -> List[Tuple[str, str]]:
     """Return the words that may follow a command, one of its works, or one of its options."""
     more = [] if ' ' in key else ['--version']
     lines = [(key, ' '.join(sorted([*known['options'], *known['works'], *more])))]
-    lines += [('{} {}'.format(key, option), ' '.join(choices))
-              for option, choices in sorted(known['options'].items()) if choices]
+    lines += [
+        ('{} {}'.format(key, option), ' '.join(choices))
+        for option, choices in sorted(known['options'].items())
+        if choices
+    ]
     for name, below in sorted(known['works'].items()):
         lines += lines_of('{} {}'.format(key, name), below)
     return lines
@@ -64,17 +69,24 @@ def folded(words: str) -> str:
 
 def text() -> str:
     """The whole file."""
-    scripts = [path for path in sorted(SCRIPTS.iterdir())
-               if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')]
+    scripts = [
+        path
+        for path in sorted(SCRIPTS.iterdir())
+        if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')
+    ]
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(ask, scripts))
-    cases = [line for script, known in zip(scripts, found)
-             for line in lines_of(script.name, known)]
-    table = ''.join("    '{}')\n      echo '{}' ;;\n".format(key, folded(words))
-                    for key, words in cases)
-    return ('# The words of 61.completion. Written by write_completion.py.\n'
-            "_smach_oracle_commands='{}'\n\n_smach_oracle_words() {{\n  case $1 in\n{}  esac\n}}\n"
-            .format(folded(' '.join(script.name for script in scripts)), table))
+    cases = [line for script, known in zip(scripts, found) for line in lines_of(script.name, known)]
+    table = ''.join(
+        "    '{}')\n      echo '{}' ;;\n".format(key, folded(words)) for key, words in cases
+    )
+    return (
+        '# The words of 61.completion. Written by write_completion.py.\n'
+        "_smach_oracle_commands='{}'\n\n"
+        '_smach_oracle_words() {{\n  case $1 in\n{}  esac\n}}\n'.format(
+            folded(' '.join(script.name for script in scripts)), table
+        )
+    )
 
 
 if __name__ == '__main__':

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A small SMACH script, as any SMACH user writes it: a cup is found, picked up and put down."""
+
 import sys
 
 import smach
@@ -39,6 +40,7 @@ def build_machine():
 def main():
     """Run the machine in a node."""
     import rospy
+
     rospy.init_node('fetch')
     sys.exit(0 if build_machine().execute() == 'succeeded' else 1)
 

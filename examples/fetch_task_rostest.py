@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Tests of the script fetch_task.py, as it is, in a ROS node: `rostest PACKAGE fetch_task.test`."""
+
 import os
 import sys
 import unittest
@@ -20,15 +21,24 @@ class FetchTaskTest(unittest.TestCase):
         self.assertEqual(run.exit_code, 0)
 
     def test_the_expert_does_what_the_arm_cannot(self):
-        run = run_script(SCRIPT, faults=[crash('PLACE')], ros=True,
-                         settings={'max_recoveries': 0},
-                         expert=expert(supersede('succeeded', about='PLACE')))
+        run = run_script(
+            SCRIPT,
+            faults=[crash('PLACE')],
+            ros=True,
+            settings={'max_recoveries': 0},
+            expert=expert(supersede('succeeded', about='PLACE')),
+        )
         run.trial.assert_asked_about('PLACE', times=1).assert_ended_with('succeeded')
         self.assertEqual(run.exit_code, 0)
 
     def test_without_an_answer_the_script_ends_as_its_author_wrote_it(self):
-        run = run_script(SCRIPT, faults=[fail('PICK')], ros=True, expert=expert(no_answer()),
-                         settings={'max_recoveries': 0})
+        run = run_script(
+            SCRIPT,
+            faults=[fail('PICK')],
+            ros=True,
+            expert=expert(no_answer()),
+            settings={'max_recoveries': 0},
+        )
         run.trial.assert_asked_about('PICK').assert_ended_with('aborted')
         self.assertEqual(run.exit_code, 1)
 

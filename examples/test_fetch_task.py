@@ -1,4 +1,5 @@
 """Tests of fetch_task.py with pytest. They need no ROS master: `python3 -m pytest examples`."""
+
 from fetch_task import build_machine
 
 from smach_oracle.testing import Bench, crash, expert, fail, goto, hang, soak, supersede
@@ -16,8 +17,9 @@ def test_a_failed_grasp_is_tried_again():
 
 def test_a_grasp_that_keeps_failing_is_put_to_the_expert():
     answers = expert(goto('DETECT', about='PICK'), supersede('succeeded', about='PICK'))
-    with Bench(build_machine(), [fail('PICK')], expert=answers,
-               settings={'max_recoveries': 0}) as bench:
+    with Bench(
+        build_machine(), [fail('PICK')], expert=answers, settings={'max_recoveries': 0}
+    ) as bench:
         trial = bench.run()
     trial.assert_asked_about('PICK', times=2).assert_jumped('PICK', to='DETECT')
     trial.assert_ended_with('succeeded')
@@ -30,8 +32,11 @@ def test_an_exception_is_recovered_from():
 
 
 def test_an_arm_that_hangs_is_stopped_at_its_time_limit():
-    with Bench(build_machine(), [hang('PICK', visit=1)],
-               settings={'states': {'PICK': {'time_limit_s': 1.0}}}) as bench:
+    with Bench(
+        build_machine(),
+        [hang('PICK', visit=1)],
+        settings={'states': {'PICK': {'time_limit_s': 1.0}}},
+    ) as bench:
         bench.run().assert_recovered('PICK')
 
 

@@ -2,6 +2,7 @@
 
 Called by scripts/doc, in the environment of scripts/ros_env.
 """
+
 import argparse
 import re
 import shutil
@@ -20,14 +21,30 @@ ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / 'doc'
 GENERATED = {'Reference': ['commands', 'messages', 'services', 'actions', 'api']}
 API = [
-    ('The machine', 'smach_oracle.oracle',
-     ['OracleContainer', 'Settings', 'oracle_of', 'unwrap', 'register_codec', 'OperatorHand']),
+    (
+        'The machine',
+        'smach_oracle.oracle',
+        ['OracleContainer', 'Settings', 'oracle_of', 'unwrap', 'register_codec', 'OperatorHand'],
+    ),
     ('Experts', 'smach_oracle.oracle', ['Expert', 'Question', 'Answer', 'AnswerKind']),
-    ('Failure rates', 'smach_oracle.oracle',
-     ['FailureRate', 'ExponentialFailureRate', 'FailureClass']),
-    ('Errors', 'smach_oracle.oracle.errors',
-     ['OracleError', 'SettingsError', 'AnswerError', 'OperatorError', 'InterfaceError',
-      'CheckpointError', 'TrialError']),
+    (
+        'Failure rates',
+        'smach_oracle.oracle',
+        ['FailureRate', 'ExponentialFailureRate', 'FailureClass'],
+    ),
+    (
+        'Errors',
+        'smach_oracle.oracle.errors',
+        [
+            'OracleError',
+            'SettingsError',
+            'AnswerError',
+            'OperatorError',
+            'InterfaceError',
+            'CheckpointError',
+            'TrialError',
+        ],
+    ),
     ('Front ends', 'smach_oracle.expert.front_end', ['FrontEnd', 'wait_for_question']),
     ('Tests of your machines', 'smach_oracle.testing', []),
 ]
@@ -44,35 +61,58 @@ def api_page() -> str:
         lines += ['## ' + title, '', '```{eval-rst}']
         if names:
             lines += ['.. currentmodule:: ' + module, '']
-        lines += ['.. auto{}:: {}'.format('class' if name[0].isupper() else 'function', name)
-                  for name in names] or ['.. automodule:: ' + module, '   :imported-members:']
+        lines += [
+            '.. auto{}:: {}'.format('class' if name[0].isupper() else 'function', name)
+            for name in names
+        ] or ['.. automodule:: ' + module, '   :imported-members:']
         lines += ['```', '']
     return '\n'.join(lines)
 
 
 def help_of(script: Path) -> str:
     """Return what a command prints at --help."""
-    run = subprocess.run([sys.executable, str(script), '--help'], stdout=subprocess.PIPE,
-                         stderr=subprocess.STDOUT, check=False, timeout=120)
+    run = subprocess.run(
+        [sys.executable, str(script), '--help'],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        check=False,
+        timeout=120,
+    )
     text = re.sub(r'\nMore: .*\n', '', run.stdout.decode())  # the page below, by a path of here
     if run.returncode:
-        raise SystemExit('{} --help ends with exit code {}:\n{}'.format(script, run.returncode,
-                                                                        text))
+        raise SystemExit(
+            '{} --help ends with exit code {}:\n{}'.format(script, run.returncode, text)
+        )
     return text
 
 
 def commands_page() -> str:
     """The page of the commands, each with its help."""
-    scripts = [path for path in sorted((ROOT / 'scripts').iterdir())
-               if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')]
+    scripts = [
+        path
+        for path in sorted((ROOT / 'scripts').iterdir())
+        if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')
+    ]
     with ThreadPoolExecutor(2) as pool:
         helps = list(pool.map(help_of, scripts))
-    lines = ['# Commands', '', 'Run them with `rosrun smach_oracle NAME`. `--help` prints this.',
-             '']
+    lines = [
+        '# Commands',
+        '',
+        'Run them with `rosrun smach_oracle NAME`. `--help` prints this.',
+        '',
+    ]
     for script, text in zip(scripts, helps):
         page = PAGES[script.name] + '.md'
-        lines += ['## ' + script.name, '', '```text', text.rstrip(), '```', '',
-                  'More: [{0}]({0})'.format(page), '']
+        lines += [
+            '## ' + script.name,
+            '',
+            '```text',
+            text.rstrip(),
+            '```',
+            '',
+            'More: [{0}]({0})'.format(page),
+            '',
+        ]
     return '\n'.join(lines)
 
 
@@ -86,8 +126,15 @@ def contents(index: str) -> str:
     """The site's table of contents, from the tables of the index."""
     lines = ['', '```{toctree}', ':hidden:', 'readme', 'contributing', '```', '']
     for name, pages in sections(index):
-        lines += ['```{toctree}', ':hidden:', ':caption: ' + name, *pages,
-                  *GENERATED.get(name, []), '```', '']
+        lines += [
+            '```{toctree}',
+            ':hidden:',
+            ':caption: ' + name,
+            *pages,
+            *GENERATED.get(name, []),
+            '```',
+            '',
+        ]
     return '\n'.join(lines)
 
 
@@ -101,19 +148,25 @@ def write_sources(folder: Path, quick: bool) -> None:
         text = (ROOT / name).read_text(encoding='utf-8').replace('](LICENSE)', '](../LICENSE)')
         text = re.sub(r'((?:\]\(|src="))doc/', r'\1', text)
         (folder / name.lower()).write_text(
-            text.replace('](CONTRIBUTING.md)', '](contributing.md)'), 'utf-8')
+            text.replace('](CONTRIBUTING.md)', '](contributing.md)'), 'utf-8'
+        )
     for page in DOC.glob('*.md'):
         text = page.read_text(encoding='utf-8').replace('](../README.md', '](readme.md')
         text = text.replace('```frozen\n', '```text\n')  # Pygments does not know the first
         (folder / page.name).write_text(text, 'utf-8')
-    generated = [*interface_pages(ROOT), ('api.md', '# Python API\n' if quick else api_page()),
-                 ('commands.md', '# Commands\n' if quick else commands_page())]
+    generated = [
+        *interface_pages(ROOT),
+        ('api.md', '# Python API\n' if quick else api_page()),
+        ('commands.md', '# Commands\n' if quick else commands_page()),
+    ]
     for name, text in generated:
         (folder / name).write_text(text, 'utf-8')
     index = folder / 'index.md'
     index.write_text(index.read_text('utf-8') + contents(index.read_text('utf-8')), 'utf-8')
-    titles = {page.stem: page.read_text('utf-8').split('\n', 1)[0].lstrip('# ')
-              for page in folder.glob('*.md')}
+    titles = {
+        page.stem: page.read_text('utf-8').split('\n', 1)[0].lstrip('# ')
+        for page in folder.glob('*.md')
+    }
     for page in folder.glob('*.md'):
         text = FILES.sub(lambda link: _copied(link, folder), page.read_text('utf-8'))
         text = NAMED.sub(lambda link: '[{}]'.format(titles[link.group(1)]), text)
@@ -135,18 +188,37 @@ def _copied(link: 're.Match[str]', folder: Path) -> str:
 
 def main() -> int:
     parser = argparse.ArgumentParser(
-        prog='scripts/doc', description='Build the documentation as a site, in build/doc/html.')
-    parser.add_argument('--check', action='store_true',
-                        help='only check the pages and the links between them: without the '
-                        'commands and the API, into build/doc/check')
+        prog='scripts/doc', description='Build the documentation as a site, in build/doc/html.'
+    )
+    parser.add_argument(
+        '--check',
+        action='store_true',
+        help='only check the pages and the links between them: without the '
+        'commands and the API, into build/doc/check',
+    )
     quick = parser.parse_args().check
     source = ROOT / 'build' / 'doc' / ('check_source' if quick else 'source')
     target = ROOT / 'build' / 'doc' / ('check' if quick else 'html')
     write_sources(source, quick)
     status = subprocess.run(
-        [sys.executable, '-m', 'sphinx', '-b', 'dummy' if quick else 'html', '-q', '-W',
-         '--keep-going', '-d', str(target.with_name(target.name + '_state')), '-c',
-         str(Path(__file__).parent), str(source), str(target)], check=False).returncode
+        [
+            sys.executable,
+            '-m',
+            'sphinx',
+            '-b',
+            'dummy' if quick else 'html',
+            '-q',
+            '-W',
+            '--keep-going',
+            '-d',
+            str(target.with_name(target.name + '_state')),
+            '-c',
+            str(Path(__file__).parent),
+            str(source),
+            str(target),
+        ],
+        check=False,
+    ).returncode
     if not status and not quick:
         theme.complete(target / '_static')
         print('The site: {}'.format(target / 'index.html'))

@@ -1,4 +1,5 @@
 """Sphinx's settings for the site. The pages come from build.py, which puts them into one folder."""
+
 project = 'smach_oracle'
 author = 'the authors of smach_oracle'
 extensions = ['myst_parser', 'sphinx.ext.autodoc']

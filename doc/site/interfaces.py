@@ -1,9 +1,13 @@
 """Pages of the reference from the files in msg/, srv/ and action/: their comments are the text."""
+
 from pathlib import Path
 from typing import List, NamedTuple, Tuple
 
-KINDS = (('Messages', 'msg', ()), ('Services', 'srv', ('Request', 'Response')),
-         ('Actions', 'action', ('Goal', 'Result', 'Feedback')))
+KINDS = (
+    ('Messages', 'msg', ()),
+    ('Services', 'srv', ('Request', 'Response')),
+    ('Actions', 'action', ('Goal', 'Result', 'Feedback')),
+)
 
 
 class Part(NamedTuple):
@@ -48,8 +52,10 @@ def _cell(text: str) -> str:
 def _table(part: Part) -> List[str]:
     if not part.fields:
         return ['No fields.', '']
-    rows = ['| `{}` | `{}` | {} |'.format(kind, name, _cell(comment))
-            for kind, name, comment in part.fields]
+    rows = [
+        '| `{}` | `{}` | {} |'.format(kind, name, _cell(comment))
+        for kind, name, comment in part.fields
+    ]
     return ['| type | name | meaning |', '|---|---|---|', *rows, '']
 
 
@@ -67,9 +73,14 @@ def interface_pages(root: Path) -> List[Tuple[str, str]]:
     """(name, Markdown) of the three pages."""
     pages = []
     for title, folder, sides in KINDS:
-        lines = ['# {}'.format(title), '', 'From the comments in `{0}/`. `ros{0} show -r` prints '
-                 'them too.'.format(folder) if folder != 'action' else
-                 'From the comments in `action/`.', '']
+        lines = [
+            '# {}'.format(title),
+            '',
+            'From the comments in `{0}/`. `ros{0} show -r` prints them too.'.format(folder)
+            if folder != 'action'
+            else 'From the comments in `action/`.',
+            '',
+        ]
         for path in sorted((root / folder).glob('*.' + folder)):
             lines += _section(path, sides)
         pages.append((title.lower() + '.md', '\n'.join(lines)))

@@ -6,6 +6,7 @@ the switch between light and dark and the marks in the table of contents would b
 that follows the system's wish for dark pages is not in Debian's style, though furo's source has it:
 code would be dark on a light page.
 """
+
 import re
 from pathlib import Path
 

@@ -1,4 +1,5 @@
 """A container that executes all its states at the same time, one thread each."""
+
 import traceback
 from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
@@ -12,6 +13,7 @@ __all__ = ['Concurrence']
 OutcomeCallback = Callable[[Outcomes], Optional[str]]
 ChildTerminationCallback = Callable[[Outcomes], Union[bool, None, Sequence[str]]]
 
+
 class Concurrence(Container):
     """Executes all children in parallel and ends when all have ended.
 
@@ -24,17 +26,23 @@ class Concurrence(Container):
     True preempts the children still running, returning a list of labels preempts those.
     """
 
-    def __init__(self, outcomes: Sequence[str], default_outcome: str,
-                 input_keys: Sequence[str] = (), output_keys: Sequence[str] = (),
-                 outcome_map: Optional[Mapping[str, Mapping[str, str]]] = None,
-                 outcome_cb: Optional[OutcomeCallback] = None,
-                 child_termination_cb: Optional[ChildTerminationCallback] = None) -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str],
+        default_outcome: str,
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        outcome_map: Optional[Mapping[str, Mapping[str, str]]] = None,
+        outcome_cb: Optional[OutcomeCallback] = None,
+        child_termination_cb: Optional[ChildTerminationCallback] = None,
+    ) -> None:
         Container.__init__(self, outcomes, input_keys, output_keys)
         self._states: Dict[str, State] = {}
         self._remappings: Dict[str, Mapping[str, str]] = {}
         self._default_outcome = default_outcome
-        self._outcome_map: Mapping[str, Mapping[str,
-                                                str]] = {} if outcome_map is None else outcome_map
+        self._outcome_map: Mapping[str, Mapping[str, str]] = (
+            {} if outcome_map is None else outcome_map
+        )
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
         self._run: Optional[ParallelRun] = None  # while it executes
@@ -49,18 +57,27 @@ class Concurrence(Container):
         default = self._default_outcome
         errors = []
         if not isinstance(default, str) or (default not in registered and default not in outcomes):
-            errors.append("The default outcome '%s' is not among its outcomes %s." %
-                          (default, allowed))
-        errors.extend("The outcome map leads to '%s', which is not among its outcomes %s." %
-                      (outcome, allowed) for outcome in self._outcome_map
-                      if outcome not in registered and outcome not in outcomes)
-        errors.extend('%s is not callable: %r.' % (name, callback)
-                      for name, callback in (('outcome_cb', self._outcome_cb),
-                                             ('child_termination_cb', self._child_termination_cb))
-                      if callback is not None and not callable(callback))
+            errors.append(
+                "The default outcome '%s' is not among its outcomes %s." % (default, allowed)
+            )
+        errors.extend(
+            "The outcome map leads to '%s', which is not among its outcomes %s."
+            % (outcome, allowed)
+            for outcome in self._outcome_map
+            if outcome not in registered and outcome not in outcomes
+        )
+        errors.extend(
+            '%s is not callable: %r.' % (name, callback)
+            for name, callback in (
+                ('outcome_cb', self._outcome_cb),
+                ('child_termination_cb', self._child_termination_cb),
+            )
+            if callback is not None and not callable(callback)
+        )
         if errors:
-            raise smach.InvalidStateError('This concurrence cannot find its outcome:\n\t%s'
-                                          % '\n\t'.join(errors))
+            raise smach.InvalidStateError(
+                'This concurrence cannot find its outcome:\n\t%s' % '\n\t'.join(errors)
+            )
 
     # -- construction
 
@@ -69,8 +86,9 @@ class Concurrence(Container):
         """Add a state to the innermost open concurrence and return it."""
         concurrence = Concurrence._currently_opened_container()
         if label in concurrence._states:
-            smach.logwarn("Concurrence already has a state '%s'; the new one takes its place." %
-                          label)
+            smach.logwarn(
+                "Concurrence already has a state '%s'; the new one takes its place." % label
+            )
         concurrence._states[label] = state
         concurrence._remappings[label] = {} if remapping is None else remapping
         return state
@@ -85,7 +103,8 @@ class Concurrence(Container):
                 if outcome not in registered:
                     raise smach.InvalidTransitionError(
                         "The outcome map waits for outcome '%s' of state '%s', which has only: %s"
-                        % (outcome, label, registered))
+                        % (outcome, label, registered)
+                    )
 
     # -- execution
 
@@ -97,7 +116,8 @@ class Concurrence(Container):
         """
         if not self._states:
             raise smach.InvalidStateError(
-                'This concurrence has no states; they are added inside `with concurrence:`.')
+                'This concurrence has no states; they are added inside `with concurrence:`.'
+            )
         self._copy_input_keys(parent_ud, self.userdata)
         smach.loginfo('Concurrence starting with userdata: \n\t%s' % list(self.userdata.keys()))
         self.call_start_cbs()
@@ -129,8 +149,13 @@ class Concurrence(Container):
     def _execute_child(self, label: str) -> Any:
         state = self._states[label]
         return state.execute(
-            smach.Remapper(self.userdata, state.get_registered_input_keys(),
-                           state.get_registered_output_keys(), self._remappings[label]))
+            smach.Remapper(
+                self.userdata,
+                state.get_registered_input_keys(),
+                state.get_registered_output_keys(),
+                self._remappings[label],
+            )
+        )
 
     def _child_began(self, label: str) -> None:
         self.call_transition_cbs()
@@ -143,8 +168,9 @@ class Concurrence(Container):
         try:
             preempt_others = self._child_termination_cb(run.outcomes)
         except Exception as err:
-            raise smach.InvalidUserCodeError('Could not execute child termination callback: %s'
-                                             % traceback.format_exc()) from err
+            raise smach.InvalidUserCodeError(
+                'Could not execute child termination callback: %s' % traceback.format_exc()
+            ) from err
         if isinstance(preempt_others, (list, tuple, set, frozenset)):
             run.preempt(preempt_others)
         elif preempt_others:
@@ -163,8 +189,9 @@ class Concurrence(Container):
         if not self.preempt_requested():
             return False
         for label in deaf:
-            smach.logwarn("State '%s' of the concurrence has ended without servicing its preempt." %
-                          label)
+            smach.logwarn(
+                "State '%s' of the concurrence has ended without servicing its preempt." % label
+            )
         if deaf or not run.preempted:
             return False
         smach.loginfo('Concurrence serviced preempt.')
@@ -174,7 +201,8 @@ class Concurrence(Container):
     def _raise_error_of(self, run: ParallelRun) -> None:
         if isinstance(run.error, smach.InvalidStateError):
             raise smach.InvalidStateError(
-                'A state of the concurrence raised an exception.') from run.error
+                'A state of the concurrence raised an exception.'
+            ) from run.error
         if run.error is not None:
             raise run.error
 
@@ -188,8 +216,10 @@ class Concurrence(Container):
         try:
             cb_outcome = self._outcome_cb(outcomes)
         except Exception as err:
-            raise smach.InvalidUserCodeError("Could not execute outcome callback '%s': %s"
-                                             % (self._outcome_cb, traceback.format_exc())) from err
+            raise smach.InvalidUserCodeError(
+                "Could not execute outcome callback '%s': %s"
+                % (self._outcome_cb, traceback.format_exc())
+            ) from err
         if cb_outcome and isinstance(cb_outcome, str):
             return cb_outcome
         log = smach.logerr if cb_outcome else smach.logwarn
@@ -200,9 +230,12 @@ class Concurrence(Container):
         """The entry of the outcome map with most conditions of those that hold, the first of
         several such. An entry without conditions never holds.
         """
-        holding = [(len(conditions), outcome) for outcome, conditions in _entries(self._outcome_map)
-                   if conditions and all(outcomes[label] == wanted
-                                         for label, wanted in _entries(conditions))]
+        holding = [
+            (len(conditions), outcome)
+            for outcome, conditions in _entries(self._outcome_map)
+            if conditions
+            and all(outcomes[label] == wanted for label, wanted in _entries(conditions))
+        ]
         return max(holding, key=lambda entry: entry[0])[1] if holding else None
 
     def request_preempt(self) -> None:
@@ -231,8 +264,10 @@ class Concurrence(Container):
         asked for.
         """
         if set(initial_states) != set(self._states):
-            smach.logwarn('A concurrence begins in all its states %s; it cannot begin in %s alone.'
-                          % (list(self._states), initial_states))
+            smach.logwarn(
+                'A concurrence begins in all its states %s; it cannot begin in %s alone.'
+                % (list(self._states), initial_states)
+            )
         if userdata is not None:
             self.userdata.update(userdata)
 
@@ -243,9 +278,11 @@ class Concurrence(Container):
 
     def get_internal_edges(self) -> List[Edge]:
         """Return each condition of the outcome map as (child outcome, label, container outcome)."""
-        return [(outcome, label, container_outcome)
-                for container_outcome, conditions in _entries(self._outcome_map)
-                for label, outcome in _entries(conditions)]
+        return [
+            (outcome, label, container_outcome)
+            for container_outcome, conditions in _entries(self._outcome_map)
+            for label, outcome in _entries(conditions)
+        ]
 
     # -- copies
 
@@ -262,5 +299,7 @@ def _entries(conditions: Any) -> List[Tuple[Any, Any]]:
         return list(conditions.items())
     if isinstance(conditions, Collection) and not conditions:
         return []
-    raise TypeError("An outcome map is written {outcome: {label: child's outcome}}; %r is no "
-                    'mapping.' % (conditions,))
+    raise TypeError(
+        "An outcome map is written {outcome: {label: child's outcome}}; %r is no "
+        'mapping.' % (conditions,)
+    )

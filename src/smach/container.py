@@ -4,6 +4,7 @@ the border.
 Containers are states, so they nest. While a container is open, ``StateMachine.add(...)`` and its
 like add to it.
 """
+
 import contextlib
 import threading
 import time
@@ -34,8 +35,12 @@ class Container(State):
     _context_kwargs: Sequence[Any] = ()
     _pause_requested = False  # of containers that do not call __init__
 
-    def __init__(self, outcomes: Sequence[str] = (), input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str] = (),
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+    ) -> None:
         State.__init__(self, outcomes, input_keys, output_keys)
         self.userdata = smach.UserData()
         self._pause_requested = False
@@ -56,11 +61,13 @@ class Container(State):
         """
         if not Container._construction_stack:
             raise smach.InvalidStateError(
-                'No container is open; states are added inside `with container:`.')
+                'No container is open; states are added inside `with container:`.'
+            )
         innermost = Container._construction_stack[-1]
         if not isinstance(innermost, cls):
-            raise smach.InvalidStateError('The innermost open container is %r, which is no %s.'
-                                          % (innermost, cls.__name__))
+            raise smach.InvalidStateError(
+                'The innermost open container is %r, which is no %s.' % (innermost, cls.__name__)
+            )
         return innermost
 
     def open(self) -> None:
@@ -79,7 +86,8 @@ class Container(State):
         stack = Container._construction_stack
         if not stack or stack[-1] is not self:
             raise smach.InvalidStateError(
-                'This container is not open, so there is nothing to close.')
+                'This container is not open, so there is nothing to close.'
+            )
         stack.pop()
         Container._construction_lock.release()
 
@@ -113,8 +121,10 @@ class Container(State):
         self._pop_construction_stack()
         if issubclass(exc_type, (smach.InvalidStateError, smach.InvalidTransitionError)):
             return  # logged already, where it was raised
-        smach.logerr('An exception left the construction of a container: \n%s'
-                     % ''.join(traceback.format_exception(exc_type, exc_val, exc_tb)))
+        smach.logerr(
+            'An exception left the construction of a container: \n%s'
+            % ''.join(traceback.format_exception(exc_type, exc_val, exc_tb))
+        )
 
     def check_consistency(self) -> None:
         """Raise InvalidStateError or InvalidTransitionError if the container cannot run,
@@ -159,18 +169,21 @@ class Container(State):
 
     # -- callbacks
 
-    def register_start_cb(self, start_cb: Callable[..., object],
-                          cb_args: Sequence[Any] = ()) -> None:
+    def register_start_cb(
+        self, start_cb: Callable[..., object], cb_args: Sequence[Any] = ()
+    ) -> None:
         """Call ``start_cb(userdata, initial_states, *cb_args)`` when the container starts."""
         self._start_cbs.append((start_cb, cb_args))
 
     def register_transition_cb(
-        self, transition_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
+        self, transition_cb: Callable[..., object], cb_args: Sequence[Any] = ()
+    ) -> None:
         """Call ``transition_cb(userdata, active_states, *cb_args)`` after each transition."""
         self._transition_cbs.append((transition_cb, cb_args))
 
     def register_termination_cb(
-        self, termination_cb: Callable[..., object], cb_args: Sequence[Any] = ()) -> None:
+        self, termination_cb: Callable[..., object], cb_args: Sequence[Any] = ()
+    ) -> None:
         """Call ``termination_cb(userdata, terminal_states, outcome, *cb_args)`` when the container
         ends.
         """
@@ -260,5 +273,6 @@ def _copy_keys(keys: Sequence[str], source: Any, target: Any, kind: str) -> None
         try:
             target[key] = source[key]
         except KeyError:
-            smach.logwarn("The container's %s key '%s' has no value; it is not copied." %
-                          (kind, key))
+            smach.logwarn(
+                "The container's %s key '%s' has no value; it is not copied." % (kind, key)
+            )

@@ -7,10 +7,16 @@ SmachError
 └── InvalidUserCodeError       a state's or callback's own code raised, or broke its userdata
 contract
 """
+
 import smach
 
-__all__ = ['SmachError', 'InvalidTransitionError', 'InvalidStateError', 'InvalidConstructionError',
-           'InvalidUserCodeError']
+__all__ = [
+    'SmachError',
+    'InvalidTransitionError',
+    'InvalidStateError',
+    'InvalidConstructionError',
+    'InvalidUserCodeError',
+]
 
 
 class SmachError(Exception):

@@ -1,4 +1,5 @@
 """A container that executes one state once for each item of a list."""
+
 import traceback
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Union
 from typing import Iterator as Iterator_
@@ -22,9 +23,15 @@ class Iterator(Container):
     there is no remapping, and nothing needs to be declared.
     """
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), it: Items = (), it_label: str = 'it_data',
-                 exhausted_outcome: str = 'exhausted') -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        it: Items = (),
+        it_label: str = 'it_data',
+        exhausted_outcome: str = 'exhausted',
+    ) -> None:
         Container.__init__(self, outcomes, input_keys, output_keys)
         self.register_outcomes([exhausted_outcome])
         self._items: Items = it
@@ -47,9 +54,13 @@ class Iterator(Container):
         iterator._items_label = it_label
 
     @staticmethod
-    def set_contained_state(label: str, state: State, loop_outcomes: Sequence[str] = (),
-                            break_outcomes: Sequence[str] = (),
-                            final_outcome_map: Optional[Mapping[str, str]] = None) -> None:
+    def set_contained_state(
+        label: str,
+        state: State,
+        loop_outcomes: Sequence[str] = (),
+        break_outcomes: Sequence[str] = (),
+        final_outcome_map: Optional[Mapping[str, str]] = None,
+    ) -> None:
         """Set the state that the innermost open iterator executes.
 
         Of ``loop_outcomes`` (go on with the next item) and ``break_outcomes`` (stop) one is enough:
@@ -60,15 +71,19 @@ class Iterator(Container):
             smach.logwarn(
                 'An iterator was given loop_outcomes as well as break_outcomes; either follows '
                 'from '
-                'the other.')
+                'the other.'
+            )
         outcomes = state.get_registered_outcomes()
         iterator._state_label = label
         iterator._state = state
         iterator._break_outcomes = list(break_outcomes) or [
             name for name in outcomes if name not in loop_outcomes
         ]
-        iterator._loop_outcomes = (list(loop_outcomes) if not break_outcomes
-                                   else [name for name in outcomes if name not in break_outcomes])
+        iterator._loop_outcomes = (
+            list(loop_outcomes)
+            if not break_outcomes
+            else [name for name in outcomes if name not in break_outcomes]
+        )
         iterator._final_outcome_map = dict(final_outcome_map or {})
 
     def check_consistency(self) -> None:
@@ -115,8 +130,9 @@ class Iterator(Container):
                 return self._exhausted_outcome
             except Exception as err:
                 raise smach.InvalidUserCodeError(
-                    "Could not get the next item of iterator container's '%s': %s" %
-                    (self._items, traceback.format_exc())) from err
+                    "Could not get the next item of iterator container's '%s': %s"
+                    % (self._items, traceback.format_exc())
+                ) from err
             smach.loginfo('Iterating %s of %s' % (item, self._items))
             self.userdata[self._items_label] = item
             outcome = self._execute_state()
@@ -135,15 +151,18 @@ class Iterator(Container):
             return False
         smach.logerr(
             "Iterator state '%s' returned outcome '%s', which is neither a loop nor a break "
-            "outcome: %s."
-            % (self._state_label, outcome, 'stopping' if self._loop_outcomes else 'going on'))
+            'outcome: %s.'
+            % (self._state_label, outcome, 'stopping' if self._loop_outcomes else 'going on')
+        )
         return bool(self._loop_outcomes)
 
     def _execute_state(self) -> str:
         state = self._state
         if state is None:
-            raise smach.InvalidStateError('This iterator has no state to repeat; give it one with '
-                                          'Iterator.set_contained_state().')
+            raise smach.InvalidStateError(
+                'This iterator has no state to repeat; give it one with '
+                'Iterator.set_contained_state().'
+            )
         # before the first item: later ones are not reached with a preempt pending
         if self.preempt_requested():
             state.request_preempt()
@@ -154,8 +173,9 @@ class Iterator(Container):
             raise
         except Exception as err:
             raise smach.InvalidUserCodeError(
-                "Could not execute iterator state '%s' of type '%s': %s" %
-                (self._state_label, state, traceback.format_exc())) from err
+                "Could not execute iterator state '%s' of type '%s': %s"
+                % (self._state_label, state, traceback.format_exc())
+            ) from err
         return outcome
 
     # -- preemption
@@ -178,8 +198,7 @@ class Iterator(Container):
 
     def __getitem__(self, key: str) -> State:
         if key != self._state_label or self._state is None:
-            text = ("This iterator has no state '%s', only '%s'."
-                    % (key, self._state_label))
+            text = "This iterator has no state '%s', only '%s'." % (key, self._state_label)
             smach.logerr(text)
             raise KeyError(text)
         return self._state
@@ -198,8 +217,10 @@ class Iterator(Container):
         """
         for label in initial_states:
             if label != self._state_label:
-                smach.logwarn("An iterator begins in its only state '%s', not in '%s'." %
-                              (self._state_label, label))
+                smach.logwarn(
+                    "An iterator begins in its only state '%s', not in '%s'."
+                    % (self._state_label, label)
+                )
                 self[label]
         if userdata is not None:
             self.userdata.update(userdata)
@@ -216,6 +237,8 @@ class Iterator(Container):
         """
         label = self._state_label
         edges: List[Edge] = [(outcome, label, label) for outcome in self._loop_outcomes]
-        edges.extend((outcome, label, self._final_outcome_map.get(outcome))
-                     for outcome in self._break_outcomes)
+        edges.extend(
+            (outcome, label, self._final_outcome_map.get(outcome))
+            for outcome in self._break_outcomes
+        )
         return edges

@@ -3,6 +3,7 @@
 Code that logs says ``smach.loginfo(...)`` at the moment of logging, so that :func:`set_loggers`
 reaches every module.
 """
+
 import sys
 from typing import Callable
 

@@ -1,6 +1,7 @@
 """One execution of several states at the same time: the threads, who is running and who ended
 how.
 """
+
 import threading
 import time
 import traceback
@@ -26,8 +27,13 @@ class ParallelRun(object):
     preempts the other states.
     """
 
-    def __init__(self, states: Mapping[str, State], execute: Callable[[str], str],
-                 began: Callable[[str], object], ended: Callable[[str], object]) -> None:
+    def __init__(
+        self,
+        states: Mapping[str, State],
+        execute: Callable[[str], str],
+        began: Callable[[str], object],
+        ended: Callable[[str], object],
+    ) -> None:
         self.outcomes: Outcomes = dict.fromkeys(states)
         self.error: Optional[smach.SmachError] = None
         self.preempted: Set[str] = set()
@@ -41,8 +47,9 @@ class ParallelRun(object):
         self._ready = threading.Event()
         self._running = set(states)
         self._threads = {
-            label: threading.Thread(name='concurrent_split:%s' % label, target=self._run,
-                                    args=(label,), daemon=True)
+            label: threading.Thread(
+                name='concurrent_split:%s' % label, target=self._run, args=(label,), daemon=True
+            )
             for label in states
         }
         self._unfinished: Set[str] = set()
@@ -110,8 +117,9 @@ class ParallelRun(object):
         with self._changed:
             self.outcomes[label] = outcome
             self._running.discard(label)
-        smach.loginfo("Concurrent state '%s' returned outcome '%s' on termination." %
-                      (label, outcome))
+        smach.loginfo(
+            "Concurrent state '%s' returned outcome '%s' on termination." % (label, outcome)
+        )
         with self._callback_lock:
             if not self._left_behind:
                 self._ended(label)
@@ -120,23 +128,27 @@ class ParallelRun(object):
         try:
             outcome = self._execute(label)
         except BaseException as err:
-            raise smach.InvalidStateError("Could not execute child state '%s': %s"
-                                          % (label, traceback.format_exc())) from err
+            raise smach.InvalidStateError(
+                "Could not execute child state '%s': %s" % (label, traceback.format_exc())
+            ) from err
         if outcome is None:
             raise smach.InvalidStateError(
-                "State '%s' of the concurrence ended without an outcome." % label)
+                "State '%s' of the concurrence ended without an outcome." % label
+            )
         registered = self._states[label].get_registered_outcomes()
         if outcome not in registered:
             smach.logerr(
                 "Concurrent state '%s' returned outcome '%s', which it has not registered (only "
-                "%s): no entry "
-                'of the outcome map can match it.' % (label, outcome, registered))
+                '%s): no entry '
+                'of the outcome map can match it.' % (label, outcome, registered)
+            )
         return outcome
 
     def _fail(self, err: BaseException) -> None:
         if not isinstance(err, smach.SmachError):
-            err = smach.InvalidUserCodeError('A callback of a concurrence raised: %s' %
-                                             traceback.format_exc())
+            err = smach.InvalidUserCodeError(
+                'A callback of a concurrence raised: %s' % traceback.format_exc()
+            )
         with self._changed:
             self.error = self.error or err
         self.preempt()
@@ -172,5 +184,5 @@ class ParallelRun(object):
         if left:
             smach.logerr(
                 'Concurrent states %s did not end within %.1f s of being preempted; leaving them '
-                'behind.'
-                % (left, _GRACE_S))
+                'behind.' % (left, _GRACE_S)
+            )

@@ -4,6 +4,7 @@ A state that declares a key as input only gets a :class:`Const` around an object
 Plain values, containers, functions, classes and modules come as they are: they are either immutable
 or not the object's own state.
 """
+
 import collections
 import copy
 import enum
@@ -15,12 +16,29 @@ import smach
 # Checked by identity before anything else, as nearly every value that passes through userdata is
 # one of these.
 PLAIN_TYPES = frozenset(
-    (int, float, str, bool, type(None), bytes, list, tuple, dict, set, frozenset, complex))
+    (int, float, str, bool, type(None), bytes, list, tuple, dict, set, frozenset, complex)
+)
 
-_COME_AS_THEY_ARE: Tuple[type,
-                         ...] = (int, float, complex, str, bytes, bytearray, list, tuple, dict, set,
-                                 frozenset, collections.deque, enum.Enum, type, types.FunctionType,
-                                 types.BuiltinFunctionType, types.MethodType, types.ModuleType)
+_COME_AS_THEY_ARE: Tuple[type, ...] = (
+    int,
+    float,
+    complex,
+    str,
+    bytes,
+    bytearray,
+    list,
+    tuple,
+    dict,
+    set,
+    frozenset,
+    collections.deque,
+    enum.Enum,
+    type,
+    types.FunctionType,
+    types.BuiltinFunctionType,
+    types.MethodType,
+    types.ModuleType,
+)
 
 
 # What was said of attributes that were set on a view: (class of the object, attribute).
@@ -63,9 +81,11 @@ class Const(object):
         what = ('%s.%s' % (of.__module__, of.__qualname__), name)
         if what not in _warned_of:
             _warned_of.add(what)
-            smach.logwarn("A state has set attribute '%s' of a %s that it gets as input only. The "
-                          'object in userdata stays as it was; to change it, declare its key as '
-                          'output, too. This is said once.' % (name, of.__name__))
+            smach.logwarn(
+                "A state has set attribute '%s' of a %s that it gets as input only. The "
+                'object in userdata stays as it was; to change it, declare its key as '
+                'output, too. This is said once.' % (name, of.__name__)
+            )
 
     def __delattr__(self, name: str) -> None:
         text = "Cannot delete attribute '%s': objects of input keys are read-only." % name
@@ -139,8 +159,11 @@ def get_const(obj: Any) -> Any:
 
     It is ``obj`` itself where that has no attributes of its own.
     """
-    if type(obj) in PLAIN_TYPES or issubclass(type(obj), Const) or isinstance(
-            obj, _COME_AS_THEY_ARE):
+    if (
+        type(obj) in PLAIN_TYPES
+        or issubclass(type(obj), Const)
+        or isinstance(obj, _COME_AS_THEY_ARE)
+    ):
         return obj
     if not hasattr(obj, '__dict__'):
         return obj

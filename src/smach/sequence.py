@@ -1,4 +1,5 @@
 """A machine whose states follow each other in the order in which they were added."""
+
 from typing import Any, Mapping, Optional
 from typing import Sequence as Sequence_
 
@@ -17,17 +18,24 @@ class Sequence(StateMachine):
     """
 
     def __init__(
-        self, outcomes: Sequence_[str], connector_outcome: str, input_keys: Sequence_[str] = (),
-        output_keys: Sequence_[str] = ()
+        self,
+        outcomes: Sequence_[str],
+        connector_outcome: str,
+        input_keys: Sequence_[str] = (),
+        output_keys: Sequence_[str] = (),
     ) -> None:
         StateMachine.__init__(self, outcomes, input_keys, output_keys)
         self._connector_outcome = connector_outcome
         self._last_added_seq_label: Optional[str] = None
 
     @staticmethod
-    def add(label: str, state: State, transitions: Optional[Mapping[str, Optional[str]]] = None,
-            remapping: Optional[Mapping[str, str]] = None,
-            constants: Optional[Mapping[str, Any]] = None) -> State:
+    def add(
+        label: str,
+        state: State,
+        transitions: Optional[Mapping[str, Optional[str]]] = None,
+        remapping: Optional[Mapping[str, str]] = None,
+        constants: Optional[Mapping[str, Any]] = None,
+    ) -> State:
         """Add a state to the innermost open sequence and return it. See
         :meth:`StateMachine.add`.
         """
@@ -43,8 +51,14 @@ class Sequence(StateMachine):
                 smach.logerr(
                     "State '%s' of the sequence is followed by '%s' once it has registered the "
                     "outcome '%s'; "
-                    "now it has only %s." %
-                    (self._last_added_seq_label, label, self._connector_outcome, list(transitions)))
+                    'now it has only %s.'
+                    % (
+                        self._last_added_seq_label,
+                        label,
+                        self._connector_outcome,
+                        list(transitions),
+                    )
+                )
             if transitions.get(self._connector_outcome) is None:
                 transitions[self._connector_outcome] = label
         self._last_added_seq_label = label

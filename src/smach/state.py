@@ -1,4 +1,5 @@
 """The smallest piece of a machine: a state with outcomes, userdata keys and a preempt flag."""
+
 from typing import Any, Callable, Dict, Iterable, Optional, Sequence, Set, Tuple
 
 import smach
@@ -14,8 +15,11 @@ class State(object):
     """
 
     def __init__(
-        self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
     ) -> None:
         both = _key_set(io_keys, 'io_keys')
         self._outcomes: Set[str] = set(outcomes)
@@ -81,10 +85,16 @@ class CBState(State):
     A callback decorated with :class:`smach.cb_interface` brings its own outcomes and keys along.
     """
 
-    def __init__(self, cb: Callable[..., Any], cb_args: Sequence[Any] = (),
-                 cb_kwargs: Optional[Dict[str, Any]] = None, outcomes: Iterable[str] = (),
-                 input_keys: Iterable[str] = (), output_keys: Iterable[str] = (),
-                 io_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        cb: Callable[..., Any],
+        cb_args: Sequence[Any] = (),
+        cb_kwargs: Optional[Dict[str, Any]] = None,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
+    ) -> None:
         State.__init__(self, outcomes, input_keys, output_keys, io_keys)
         self._cb = cb
         self._cb_args = cb_args
@@ -102,6 +112,8 @@ class CBState(State):
 
 def _key_set(keys: Iterable[str], argument: str) -> Set[str]:
     if isinstance(keys, str):
-        raise TypeError('%s must be a list of keys, not the single string %r; write [%r]' %
-                        (argument, keys, keys))
+        raise TypeError(
+            '%s must be a list of keys, not the single string %r; write [%r]'
+            % (argument, keys, keys)
+        )
     return set(keys)

@@ -1,4 +1,5 @@
 """The machine: one state at a time, its outcome deciding which comes next."""
+
 import threading
 import traceback
 from typing import Any, Dict, List, Mapping, Optional, Sequence
@@ -28,8 +29,12 @@ class StateMachine(Container):
     # until execute() has looked: whether a method of smach.hooks was overridden or patched
     _is_hooked = True
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+    ) -> None:
         Container.__init__(self, outcomes, input_keys, output_keys)
         self._states: Dict[str, State] = {}
         self._transitions: Dict[str, Dict[str, Optional[str]]] = {}
@@ -56,9 +61,13 @@ class StateMachine(Container):
     # -- construction
 
     @staticmethod
-    def add(label: str, state: State, transitions: Optional[Mapping[str, Optional[str]]] = None,
-            remapping: Optional[Mapping[str, str]] = None,
-            constants: Optional[Mapping[str, Any]] = None) -> State:
+    def add(
+        label: str,
+        state: State,
+        transitions: Optional[Mapping[str, Optional[str]]] = None,
+        remapping: Optional[Mapping[str, str]] = None,
+        constants: Optional[Mapping[str, Any]] = None,
+    ) -> State:
         """Add a state to the innermost open machine and return it.
 
         ``transitions`` maps outcomes of the state to labels or to outcomes of the machine. Outcomes
@@ -72,22 +81,29 @@ class StateMachine(Container):
         machine = StateMachine._currently_opened_container()
         if transitions is not None and not isinstance(transitions, Mapping):
             raise smach.InvalidTransitionError(
-                "The transitions of state '%s' must map outcomes to labels, not be %r." %
-                (label, transitions))
+                "The transitions of state '%s' must map outcomes to labels, not be %r."
+                % (label, transitions)
+            )
         transitions = {} if transitions is None else dict(transitions)
         machine.check_state_spec(label, state, transitions)
         missing: Dict[str, Optional[str]] = {
             outcome: None
-            for outcome in state.get_registered_outcomes() if outcome not in transitions
+            for outcome in state.get_registered_outcomes()
+            if outcome not in transitions
         }
         transitions.update(missing)
         smach.logdebug("State '%s' (%r) leaves by %s" % (label, state, transitions))
         machine._enter_in_tables(label, state, transitions, remapping, constants)
         return state
 
-    def _enter_in_tables(self, label: str, state: State, transitions: Dict[str, Optional[str]],
-                         remapping: Optional[Mapping[str, str]],
-                         constants: Optional[Mapping[str, Any]]) -> None:
+    def _enter_in_tables(
+        self,
+        label: str,
+        state: State,
+        transitions: Dict[str, Optional[str]],
+        remapping: Optional[Mapping[str, str]],
+        constants: Optional[Mapping[str, Any]],
+    ) -> None:
         if self._initial_state_label is None:
             self._initial_state_label = label
         self._states[label] = state
@@ -101,10 +117,14 @@ class StateMachine(Container):
         self._last_added_label = None
 
     @staticmethod
-    def add_auto(label: str, state: State, connector_outcomes: Sequence[str],
-                 transitions: Optional[Mapping[str, Optional[str]]] = None,
-                 remapping: Optional[Mapping[str, str]] = None,
-                 constants: Optional[Mapping[str, Any]] = None) -> State:
+    def add_auto(
+        label: str,
+        state: State,
+        connector_outcomes: Sequence[str],
+        transitions: Optional[Mapping[str, Optional[str]]] = None,
+        remapping: Optional[Mapping[str, str]] = None,
+        constants: Optional[Mapping[str, Any]] = None,
+    ) -> State:
         """Add a state whose ``connector_outcomes`` lead to the state that is added next."""
         machine = StateMachine._currently_opened_container()
         StateMachine.add(label, state, transitions, remapping, constants)
@@ -112,13 +132,15 @@ class StateMachine(Container):
         if not all(outcome in registered for outcome in connector_outcomes):
             raise smach.InvalidStateError(
                 "State '%s' cannot lead on by the outcomes %s: it has registered only %s"
-                % (label, connector_outcomes, registered))
+                % (label, connector_outcomes, registered)
+            )
         machine._last_added_label = label
         machine._connector_outcomes = connector_outcomes
         return state
 
-    def check_state_spec(self, label: str, state: State,
-                         transitions: Mapping[str, Optional[str]]) -> None:
+    def check_state_spec(
+        self, label: str, state: State, transitions: Mapping[str, Optional[str]]
+    ) -> None:
         """Raise InvalidStateError for a used label, InvalidTransitionError for a wrong outcome."""
         if label in self._states:
             raise smach.InvalidStateError("This state machine has a state '%s' already." % label)
@@ -127,17 +149,23 @@ class StateMachine(Container):
             if outcome not in registered:
                 raise smach.InvalidTransitionError(
                     "There is a transition from outcome '%s' of state '%s', which has only %s"
-                    % (outcome, label, registered))
+                    % (outcome, label, registered)
+                )
 
     def check_consistency(self) -> None:
         """Raise InvalidTransitionError where there is no initial state, or a dead transition."""
-        errors = inconsistencies(self._states, self._transitions, self._initial_state_label,
-                                 self.get_registered_outcomes())
+        errors = inconsistencies(
+            self._states,
+            self._transitions,
+            self._initial_state_label,
+            self.get_registered_outcomes(),
+        )
         if errors:
             known = set(self._states).union(self.get_registered_outcomes())
             raise smach.InvalidTransitionError(
-                'This state machine is inconsistent:\n\t%s\nIts states and outcomes: %s' %
-                ('\n\t'.join(errors), sorted(known, key=str)))
+                'This state machine is inconsistent:\n\t%s\nIts states and outcomes: %s'
+                % ('\n\t'.join(errors), sorted(known, key=str))
+            )
 
     # -- execution
 
@@ -185,8 +213,10 @@ class StateMachine(Container):
         self.call_start_cbs()
 
     def _tell_start(self) -> None:
-        smach.loginfo("State machine starting in initial state '%s' with userdata: \n\t%s"
-                      % (self._current_label, list(self.userdata.keys())))
+        smach.loginfo(
+            "State machine starting in initial state '%s' with userdata: \n\t%s"
+            % (self._current_label, list(self.userdata.keys()))
+        )
 
     def _set_current_state(self, state_label: Optional[str]) -> None:
         """Make this state the one that is executed next, or None after the last."""
@@ -214,10 +244,14 @@ class StateMachine(Container):
             visit = self._visits[label]
         except KeyError:
             visit = None
-        if (visit is None or visit.state is not state or visit.userdata is not self.userdata
-                or visit.input_keys is not state._input_keys
-                or visit.output_keys is not state._output_keys
-                or visit.remapping is not self._remappings[label]):
+        if (
+            visit is None
+            or visit.state is not state
+            or visit.userdata is not self.userdata
+            or visit.input_keys is not state._input_keys
+            or visit.output_keys is not state._output_keys
+            or visit.remapping is not self._remappings[label]
+        ):
             visit = self._prepare_visit(label, state)
         lock = self._state_transitioning_lock
         lock.release()
@@ -231,8 +265,10 @@ class StateMachine(Container):
             smach.logerr("State '%s' ended in an error." % label)
             raise
         except Exception as err:
-            raise smach.InvalidUserCodeError("Could not execute state '%s' of type '%s': %s"
-                                             % (label, state, traceback.format_exc())) from err
+            raise smach.InvalidUserCodeError(
+                "Could not execute state '%s' of type '%s': %s"
+                % (label, state, traceback.format_exc())
+            ) from err
         finally:
             lock.acquire()
         try:
@@ -267,7 +303,8 @@ class StateMachine(Container):
         """Make the state's view of the userdata. Keep it for its next visit where that is safe."""
         if label not in self._states:
             raise smach.InvalidStateError(
-                "The current state '%s' is none of %s" % (label, list(self._states)))
+                "The current state '%s' is none of %s" % (label, list(self._states))
+            )
         visit = StateVisit(state, self.userdata, self._remappings[label])
         if visit.may_be_kept:
             self._visits[label] = visit
@@ -282,8 +319,9 @@ class StateMachine(Container):
         if self._preempt_requested and preempted is not None and not preempted.preempt_requested():
             self._preempt_requested = False
         self._set_current_state(None)
-        smach.loginfo("State machine terminating '%s':'%s':'%s'" %
-                      (label, outcome, container_outcome))
+        smach.loginfo(
+            "State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome)
+        )
         self.call_termination_cbs([label], container_outcome)
         return container_outcome
 
@@ -317,8 +355,9 @@ class StateMachine(Container):
         try:
             state.request_preempt()
         except Exception:
-            smach.logerr("Preempting state '%s' raised:\n%s" %
-                         (self._current_label, traceback.format_exc()))
+            smach.logerr(
+                "Preempting state '%s' raised:\n%s" % (self._current_label, traceback.format_exc())
+            )
 
     def _pass_preempt_on(self) -> None:
         """Preempt the state that is to run, unless the last one serviced the pending request."""
@@ -327,8 +366,10 @@ class StateMachine(Container):
         if preempted is None:
             self._preempt_current_state()
         elif preempted.preempt_requested():
-            smach.loginfo("State '%s' has not serviced the preempt; it goes on to state '%s'."
-                          % (self._preempted_label, self._current_label))
+            smach.loginfo(
+                "State '%s' has not serviced the preempt; it goes on to state '%s'."
+                % (self._preempted_label, self._current_label)
+            )
             if preempted is self._current_state:  # or it would look as if it had been asked already
                 preempted.recall_preempt()
             self._preempt_current_state()
@@ -357,8 +398,9 @@ class StateMachine(Container):
         """Return the label at which execution begins, in a list."""
         return [str(self._initial_state_label)]
 
-    def set_initial_state(self, initial_states: Sequence[str],
-                          userdata: Optional[smach.UserData] = None) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: Optional[smach.UserData] = None
+    ) -> None:
         """Begin at this label (one, in a list) from now on, with the keys of ``userdata`` added to
         the machine's.
         """
@@ -367,7 +409,8 @@ class StateMachine(Container):
         if len(labels) > 1:
             smach.logwarn(
                 'A state machine begins in one state; of the initial states %s the first is taken.'
-                % labels)
+                % labels
+            )
         if labels:
             self._initial_state_label = labels[0]
         if userdata is not None:
@@ -379,18 +422,23 @@ class StateMachine(Container):
 
     def get_internal_edges(self) -> List[Edge]:
         """Return all transitions (outcome, from, to). To is None if the outcome falls through."""
-        return [(outcome, label, to) for label, transitions in self._transitions.items()
-                for outcome, to in transitions.items()]
+        return [
+            (outcome, label, to)
+            for label, transitions in self._transitions.items()
+            for outcome, to in transitions.items()
+        ]
 
     # -- copies
 
     def __getstate__(self) -> Dict[str, Any]:
-        return {key: value for key, value in self.__dict__.items()
-                if key not in StateMachine._UNPICKLED}
+        return {
+            key: value for key, value in self.__dict__.items() if key not in StateMachine._UNPICKLED
+        }
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
-        state = dict(state, _state_transitioning_lock=threading.RLock(), _visits={},
-                     _is_running=False)
+        state = dict(
+            state, _state_transitioning_lock=threading.RLock(), _visits={}, _is_running=False
+        )
         # by setattr, as an instance whose __dict__ was never asked for is faster
         for name, value in state.items():
             setattr(self, name, value)

@@ -1,12 +1,16 @@
 """The transitions of a state machine: where they lead, and whether they lead somewhere."""
+
 from typing import Any, Collection, List, Mapping, Optional
 
 import smach
 
 
-def inconsistencies(states: Mapping[str, Any],
-                    transitions: Mapping[str, Mapping[str, Optional[str]]],
-                    initial: Optional[str], outcomes: Collection[str]) -> List[str]:
+def inconsistencies(
+    states: Mapping[str, Any],
+    transitions: Mapping[str, Mapping[str, Optional[str]]],
+    initial: Optional[str],
+    outcomes: Collection[str],
+) -> List[str]:
     """Return what is wrong with a machine, a sentence each, or nothing where it is consistent."""
     errors = []
     if initial is None:
@@ -19,12 +23,14 @@ def inconsistencies(states: Mapping[str, Any],
         if unknown:
             errors.append(
                 "State '%s' leads to %s, which are neither states nor outcomes of the machine."
-                % (label, unknown))
+                % (label, unknown)
+            )
         unbound = [outcome for outcome, to in drawn.items() if not to and outcome not in known]
         if unbound:
             errors.append(
                 "State '%s' has the outcomes %s, which lead to no state and are no outcomes of the "
-                'machine.' % (label, unbound))
+                'machine.' % (label, unbound)
+            )
     return errors
 
 
@@ -38,11 +44,13 @@ def search_target(label: str, state: Any, outcome: Any, transitions: Any) -> Opt
     if outcome not in registered:
         raise smach.InvalidTransitionError(
             "State '%s' (%r) returned '%s', but has registered only the outcomes %s"
-            % (label, state, outcome, registered))
+            % (label, state, outcome, registered)
+        )
     if outcome not in transitions:
         raise smach.InvalidTransitionError(
             "State '%s' has no transition for its outcome '%s', only %s"
-            % (label, outcome, transitions))
+            % (label, outcome, transitions)
+        )
     target: Optional[str] = transitions[outcome]
     return target
 
@@ -57,5 +65,6 @@ def end_of(label: str, outcome: str, target: Optional[str], registered: Collecti
     if outcome not in registered:
         raise smach.InvalidTransitionError(
             "Outcome '%s' of state '%s' leads to '%s', and neither that nor the outcome itself is "
-            'a state or an outcome of the machine.' % (outcome, label, target))
+            'a state or an outcome of the machine.' % (outcome, label, target)
+        )
     return outcome

@@ -4,6 +4,7 @@ Both classes are made for speed: a step of a machine reads and writes through th
 microsecond apart. A read or write of one key is one dictionary operation, which Python itself makes
 atomic. So they need no locks to be safe for several threads.
 """
+
 import copy
 from typing import Any, Callable, Collection, Dict, Iterable, List, Mapping, Union
 
@@ -102,8 +103,13 @@ class Remapper(object):
     # precede every read.
     __slots__ = ('_parts', '__weakref__')
 
-    def __init__(self, ud: Any, input_keys: Collection[str] = (), output_keys: Collection[str] = (),
-                 remapping: Mapping[str, str] = _NO_REMAPPING) -> None:
+    def __init__(
+        self,
+        ud: Any,
+        input_keys: Collection[str] = (),
+        output_keys: Collection[str] = (),
+        remapping: Mapping[str, str] = _NO_REMAPPING,
+    ) -> None:
         # A plain UserData is read and written at its dictionary, anything else through its own item
         # access.
         _set_parts(self, (ud, input_keys, output_keys, remapping, type(ud) is UserData))
@@ -131,8 +137,10 @@ class Remapper(object):
     def __setattr__(self, key: str, value: Any) -> None:
         ud, _, output_keys, remapping, is_plain = _parts_of(self)
         if key not in output_keys:
-            smach.logerr("Userdata key '%s' is not written: the state's output keys are %s."
-                         % (key, _listed(output_keys)))
+            smach.logerr(
+                "Userdata key '%s' is not written: the state's output keys are %s."
+                % (key, _listed(output_keys))
+            )
         elif is_plain:
             ud._data[remapping[key] if key in remapping else key] = value
         else:
@@ -173,14 +181,15 @@ class Remapper(object):
     def _not_an_input(self, key: str) -> Exception:
         return smach.InvalidUserCodeError(
             "Userdata key '%s' is no input key of this state, which has %s; declare it in "
-            "input_keys to read it."
-            % (key, _listed(_parts_of(self)[1])))
+            'input_keys to read it.' % (key, _listed(_parts_of(self)[1]))
+        )
 
     _ud = property(lambda self: _parts_of(self)[0], doc='The userdata behind the view.')
     _input = property(lambda self: _parts_of(self)[1], doc='The keys that may be read.')
     _output = property(lambda self: _parts_of(self)[2], doc='The keys that may be written.')
-    _map = property(lambda self: _parts_of(self)[3],
-                    doc='The keys of the userdata by the names the state uses.')
+    _map = property(
+        lambda self: _parts_of(self)[3], doc='The keys of the userdata by the names the state uses.'
+    )
 
 
 _parts_of: Callable[[Remapper], Any] = Remapper._parts.__get__  # type: ignore[attr-defined]

@@ -1,10 +1,15 @@
 """The shutdown check, and callbacks that declare outcomes and keys."""
+
 from typing import Any, Callable, Iterable, Tuple
 
 import smach
 
 __all__ = [
-    'is_shutdown', 'set_shutdown_check', 'cb_interface', 'has_smach_interface', 'CBInterface'
+    'is_shutdown',
+    'set_shutdown_check',
+    'cb_interface',
+    'has_smach_interface',
+    'CBInterface',
 ]
 
 
@@ -21,16 +26,25 @@ def set_shutdown_check(cb: Callable[[], bool]) -> None:
 def has_smach_interface(obj: Any) -> bool:
     """Whether ``obj`` declares outcomes and userdata keys the way a state does."""
     return all(
-        hasattr(obj, name) for name in ('get_registered_outcomes', 'get_registered_input_keys',
-                                        'get_registered_output_keys'))
+        hasattr(obj, name)
+        for name in (
+            'get_registered_outcomes',
+            'get_registered_input_keys',
+            'get_registered_output_keys',
+        )
+    )
 
 
 class CBInterface(object):
     """A callable together with the outcomes and userdata keys it declares."""
 
     def __init__(
-        self, cb: Callable[..., Any], outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (), io_keys: Iterable[str] = ()
+        self,
+        cb: Callable[..., Any],
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        io_keys: Iterable[str] = (),
     ) -> None:
         self._cb = cb
         self._outcomes = list(outcomes)
@@ -59,8 +73,12 @@ class cb_interface(object):
     An example: ``@cb_interface(outcomes=['done'], input_keys=['x'])``.
     """
 
-    def __init__(self, outcomes: Iterable[str] = (), input_keys: Iterable[str] = (),
-                 output_keys: Iterable[str] = ()) -> None:
+    def __init__(
+        self,
+        outcomes: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
         self._interface = (outcomes, input_keys, output_keys)
 
     def __call__(self, cb: Callable[..., Any]) -> CBInterface:

@@ -1,4 +1,5 @@
 """The part of a state's visit that a machine keeps, so that the next one costs little."""
+
 from typing import Any, Dict, Mapping, Optional
 
 from smach.state import State
@@ -10,14 +11,23 @@ class StateVisit(object):
     identity later.
     """
 
-    __slots__ = ('state', 'userdata', 'input_keys', 'output_keys', 'remapping', 'remapper',
-                 'may_be_kept', 'texts')
+    __slots__ = (
+        'state',
+        'userdata',
+        'input_keys',
+        'output_keys',
+        'remapping',
+        'remapper',
+        'may_be_kept',
+        'texts',
+    )
 
     def __init__(self, state: Any, userdata: Any, remapping: Mapping[str, str]) -> None:
         # A state that computes its keys is asked for them at every visit.
-        self.may_be_kept = (type(state).get_registered_input_keys is State.get_registered_input_keys
-                            and type(state).get_registered_output_keys
-                            is State.get_registered_output_keys)
+        self.may_be_kept = (
+            type(state).get_registered_input_keys is State.get_registered_input_keys
+            and type(state).get_registered_output_keys is State.get_registered_output_keys
+        )
         self.state = state
         self.userdata = userdata
         if self.may_be_kept:

@@ -3,6 +3,7 @@
 `OracleContainer` is the ROS-attached one where rospy is installed, else the bare one. It is looked
 up on first use, so that `smach_oracle.analysis` needs neither ROS nor SMACH.
 """
+
 from typing import Any
 
 __all__ = ['OracleContainer']

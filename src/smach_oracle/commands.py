@@ -1,4 +1,5 @@
 """The start of the commands in scripts/."""
+
 import io
 import os
 import sys
@@ -28,8 +29,12 @@ class _Printed(io.TextIOWrapper):
     """
 
     def __init__(self, stream: TextIO) -> None:
-        super().__init__(stream.buffer, stream.encoding, stream.errors,
-                         line_buffering=stream.isatty() or stream is sys.stderr)
+        super().__init__(
+            stream.buffer,
+            stream.encoding,
+            stream.errors,
+            line_buffering=stream.isatty() or stream is sys.stderr,
+        )
 
     def write(self, text: str) -> int:
         """Write as usual.
@@ -80,6 +85,7 @@ def run(module: str) -> None:
         main = import_module('smach_oracle.' + module).main
     except ImportError as err:
         from smach_oracle.packages import lacking
+
         told = lacking(err)
         if not told:
             raise

@@ -1,4 +1,5 @@
 """The place of the pages about the commands, in a checkout or an install space. Pure."""
+
 from pathlib import Path
 from typing import Optional
 

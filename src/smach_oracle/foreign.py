@@ -1,4 +1,5 @@
 """Looks at objects of other people's classes, which may do anything as they are looked at."""
+
 import threading
 from typing import Any
 
@@ -8,8 +9,10 @@ def ends_program(err: BaseException) -> bool:
 
     A signal handler raises Ctrl-C, or what a `sys.exit` in it raises, in the main thread alone.
     """
-    return (issubclass(type(err), (KeyboardInterrupt, SystemExit))
-            and threading.current_thread() is threading.main_thread())
+    return (
+        issubclass(type(err), (KeyboardInterrupt, SystemExit))
+        and threading.current_thread() is threading.main_thread()
+    )
 
 
 def text_of(value: object) -> str:

@@ -4,6 +4,7 @@ A part that a process has once says here what becomes of it in a forked child: a
 descriptor, an open bag, a store, the trial that runs. The child then neither uses it nor reports to
 it. SIGINT and SIGTERM wait in a thread that forks until the child has let go of everything.
 """
+
 import contextlib
 import fcntl
 import os
@@ -40,6 +41,7 @@ def in_child(decision: Decision) -> None:
     def forget(gone: object) -> None:
         if _of_objects.get(key) is gone:
             del _of_objects[key]
+
     _of_objects[key] = weakref.WeakMethod(decision, forget)
 
 

@@ -1,4 +1,5 @@
 """The message about a missing Python package, and how a command does without one."""
+
 import os
 import re
 import sys
@@ -7,12 +8,16 @@ from importlib import import_module
 from typing import Any
 
 # as doc/install.md says it
-VENV = ('{} -m venv --system-site-packages ~/ros_venv && . ~/ros_venv/bin/activate && '
-        'python3 -m pip install ')
+VENV = (
+    '{} -m venv --system-site-packages ~/ros_venv && . ~/ros_venv/bin/activate && '
+    'python3 -m pip install '
+)
 # module: package, where it has another name
 _PACKAGES = {
-    'cv2': 'opencv-python-headless', 'yaml': 'PyYAML', 'ruamel': 'ruamel.yaml',
-    'backports': 'backports.zstd'
+    'cv2': 'opencv-python-headless',
+    'yaml': 'PyYAML',
+    'ruamel': 'ruamel.yaml',
+    'backports': 'backports.zstd',
 }
 _OF_ROS = re.compile(r'(ros(?!bags)|smach|actionlib|genpy|tf2_|message_filters)\w*|\w+_(msgs|srvs)')
 _PYTHON = frozenset(getattr(sys, 'stdlib_module_names', ()))  # known from 3.10 on
@@ -36,16 +41,24 @@ def lacking(err: ImportError) -> str:
     name = err.name or ''
     package = name.split('.')[0]
     ours = package == 'smach_oracle' and name not in _BUILT
-    if not isinstance(err, ModuleNotFoundError) or not package or ours or package.startswith(
-            '_') or package in _PYTHON:
+    if (
+        not isinstance(err, ModuleNotFoundError)
+        or not package
+        or ours
+        or package.startswith('_')
+        or package in _PYTHON
+    ):
         return ''
     if _OF_ROS.fullmatch(package):
         return (
             'the ROS package {} cannot be imported ({}); build the workspace and source its '
             'setup.bash (in a '
-            'checkout: scripts/setup && source scripts/ros_env)'.format(package, err))
-    return 'the Python package {} cannot be imported ({}); install it: {} (in a checkout: ' \
+            'checkout: scripts/setup && source scripts/ros_env)'.format(package, err)
+        )
+    return (
+        'the Python package {} cannot be imported ({}); install it: {} (in a checkout: '
         'scripts/setup)'.format(package, err, _how_to_install(_PACKAGES.get(package, package)))
+    )
 
 
 def _how_to_install(package: str) -> str:

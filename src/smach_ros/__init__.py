@@ -3,6 +3,7 @@
 Importing this package sends SMACH's log lines to rospy's loggers and lets machines stop when rospy
 shuts down.
 """
+
 import rospy
 import smach
 
@@ -18,6 +19,12 @@ from smach_ros.action_server_wrapper import ActionServerWrapper  # noqa: E402
 from smach_ros.introspection import IntrospectionClient, IntrospectionServer  # noqa: E402
 
 __all__ = [
-    'set_preempt_handler', 'SimpleActionState', 'ServiceState', 'MonitorState', 'ConditionState',
-    'ActionServerWrapper', 'IntrospectionServer', 'IntrospectionClient'
+    'set_preempt_handler',
+    'SimpleActionState',
+    'ServiceState',
+    'MonitorState',
+    'ConditionState',
+    'ActionServerWrapper',
+    'IntrospectionServer',
+    'IntrospectionClient',
 ]

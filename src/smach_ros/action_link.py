@@ -3,6 +3,7 @@
 A link lives as long as the process: states come and go (and machines are executed hundreds of
 times) without opening topics or threads again.
 """
+
 import _thread
 import threading
 import time
@@ -87,8 +88,9 @@ class ActionLink(object):
                     return
             except (OSError, rospy.ROSException) as err:
                 if not complained:
-                    smach.logwarn("Cannot open action '%s' yet, trying on: %s" %
-                                  (self.action_name, err))
+                    smach.logwarn(
+                        "Cannot open action '%s' yet, trying on: %s" % (self.action_name, err)
+                    )
                 complained = True
             time.sleep(RETRY_CONNECT_S if complained else 0.05)
 
@@ -97,7 +99,8 @@ class ActionLink(object):
         client = actionlib.ActionClient(self.action_name, self._spec)
         watch = ServerWatch(client.status_sub)
         self._fast_ends.append(
-            rospy.Subscriber(client.status_sub.name, GoalStatusArray, watch.note_status))
+            rospy.Subscriber(client.status_sub.name, GoalStatusArray, watch.note_status)
+        )
         self.watch = watch
         self.client = client
 
@@ -109,17 +112,24 @@ class ActionLink(object):
         if self._fast_ends:
             return
         base, spec = rospy.remap_name(self.action_name), self._spec()
-        for topic, message in (('goal', spec.action_goal), ('result', spec.action_result),
-                               ('feedback', spec.action_feedback)):
+        for topic, message in (
+            ('goal', spec.action_goal),
+            ('result', spec.action_result),
+            ('feedback', spec.action_feedback),
+        ):
             if topic == 'goal':
                 self._fast_ends.append(
-                    rospy.Publisher(base + '/' + topic, type(message), tcp_nodelay=True,
-                                    queue_size=10))
+                    rospy.Publisher(
+                        base + '/' + topic, type(message), tcp_nodelay=True, queue_size=10
+                    )
+                )
             else:
                 self._fast_ends.append(
-                    rospy.Subscriber(base + '/' + topic, type(message), tcp_nodelay=True))
-        self._fast_ends.append(rospy.Subscriber(base + '/status', GoalStatusArray,
-                                                tcp_nodelay=True))
+                    rospy.Subscriber(base + '/' + topic, type(message), tcp_nodelay=True)
+                )
+        self._fast_ends.append(
+            rospy.Subscriber(base + '/status', GoalStatusArray, tcp_nodelay=True)
+        )
 
     def ready(self) -> bool:
         """Whether a server is connected on all topics, so that neither a goal nor its result can
@@ -139,28 +149,43 @@ class ActionLink(object):
             return ()
         server_id = watch.server_id
         heard = tuple(
-            _heard(topic, server_id) for topic in (client.result_sub, client.feedback_sub))
+            _heard(topic, server_id) for topic in (client.result_sub, client.feedback_sub)
+        )
         told = (client.pub_goal, client.pub_cancel)
-        return heard if all(heard) and all(topic.impl.has_connection(server_id)
-                                           for topic in told) else ()
+        return (
+            heard
+            if all(heard) and all(topic.impl.has_connection(server_id) for topic in told)
+            else ()
+        )
 
     def problem(self, frozen_after_s: float) -> Optional[str]:
         """Return why the server must be regarded as lost, or None. See ServerWatch."""
         return self.watch.problem(frozen_after_s) if self.watch is not None else None
 
-    def send_goal(self, goal: Any, on_transition: Callable[[Any], None],
-                  on_feedback: Callable[[Any, Any], None]) -> Any:
+    def send_goal(
+        self,
+        goal: Any,
+        on_transition: Callable[[Any], None],
+        on_feedback: Callable[[Any, Any], None],
+    ) -> Any:
         """Send ``goal`` (the action's Goal message), and return actionlib's goal handle, which
         keeps the goal tracked.
         """
         if self.client is None:
-            raise smach.InvalidStateError("Action '%s' is not connected: send_goal() before ready()"
-                                          % self.action_name)
+            raise smach.InvalidStateError(
+                "Action '%s' is not connected: send_goal() before ready()" % self.action_name
+            )
         with self._sending:
             return self.client.send_goal(goal, on_transition, on_feedback)
 
 
 def _heard(subscriber: Any, server_id: str) -> Any:
     """The subscriber's connection to the server, or None."""
-    return next((connection for connection in subscriber.impl.connections or ()
-                 if getattr(connection, 'callerid_pub', None) == server_id), None)
+    return next(
+        (
+            connection
+            for connection in subscriber.impl.connections or ()
+            if getattr(connection, 'callerid_pub', None) == server_id
+        ),
+        None,
+    )

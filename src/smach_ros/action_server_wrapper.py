@@ -1,4 +1,5 @@
 """An action server whose goals are executions of a SMACH container."""
+
 import _thread
 import traceback
 from typing import Any, Dict, Iterable, List, Optional
@@ -27,14 +28,23 @@ class ActionServerWrapper(object):
     newer goal or a shutdown of the node preempts the container.
     """
 
-    def __init__(self, server_name: str, action_spec: Any, wrapped_container: Any,
-                 succeeded_outcomes: Iterable[str] = (), aborted_outcomes: Iterable[str] = (),
-                 preempted_outcomes: Iterable[str] = (), goal_key: str = 'action_goal',
-                 feedback_key: str = 'action_feedback', result_key: str = 'action_result',
-                 goal_slots_map: Optional[Dict[str, str]] = None,
-                 feedback_slots_map: Optional[Dict[str, str]] = None,
-                 result_slots_map: Optional[Dict[str, str]] = None, expand_goal_slots: bool = False,
-                 pack_result_slots: bool = False) -> None:
+    def __init__(
+        self,
+        server_name: str,
+        action_spec: Any,
+        wrapped_container: Any,
+        succeeded_outcomes: Iterable[str] = (),
+        aborted_outcomes: Iterable[str] = (),
+        preempted_outcomes: Iterable[str] = (),
+        goal_key: str = 'action_goal',
+        feedback_key: str = 'action_feedback',
+        result_key: str = 'action_result',
+        goal_slots_map: Optional[Dict[str, str]] = None,
+        feedback_slots_map: Optional[Dict[str, str]] = None,
+        result_slots_map: Optional[Dict[str, str]] = None,
+        expand_goal_slots: bool = False,
+        pack_result_slots: bool = False,
+    ) -> None:
         self.wrapped_container = wrapped_container
         self.userdata = smach.UserData()
         self._server_name = server_name
@@ -62,21 +72,25 @@ class ActionServerWrapper(object):
         if len(set().union(*lists)) < sum(len(outcomes) for outcomes in lists):
             smach.logerr(
                 "Action '%s': an outcome is listed as more than one of succeeded, aborted and "
-                "preempted"
-                % self._server_name)
-        for what, slots, message in (('goal', self._goal_slots_map, self._goal_type),
-                                     ('feedback', self._feedback_slots_map, self._feedback_type),
-                                     ('result', self._result_slots_map, self._result_type)):
+                'preempted' % self._server_name
+            )
+        for what, slots, message in (
+            ('goal', self._goal_slots_map, self._goal_type),
+            ('feedback', self._feedback_slots_map, self._feedback_type),
+            ('result', self._result_slots_map, self._result_type),
+        ):
             unknown = sorted(set(slots) - set(message.__slots__))
             if unknown:
                 smach.logerr(
-                    "Action '%s': %s_slots_map names %s, but %s has only %s" %
-                    (self._server_name, what, unknown, message._type, list(message.__slots__)))
+                    "Action '%s': %s_slots_map names %s, but %s has only %s"
+                    % (self._server_name, what, unknown, message._type, list(message.__slots__))
+                )
 
     def run_server(self) -> None:
         """Start serving, in the background."""
-        server = actionlib.SimpleActionServer(self._server_name, self._action_spec,
-                                              execute_cb=self.execute_cb, auto_start=False)
+        server = actionlib.SimpleActionServer(
+            self._server_name, self._action_spec, execute_cb=self.execute_cb, auto_start=False
+        )
         server.register_preempt_callback(self.preempt_cb)
         self._action_server = server
         rospy.on_shutdown(self.preempt_cb)
@@ -87,8 +101,9 @@ class ActionServerWrapper(object):
         """Publish feedback: the container has made a transition."""
         self.publish_feedback(userdata)
 
-    def termination_cb(self, userdata: Any, terminal_states: List[str], container_outcome: str,
-                       *args: Any) -> None:
+    def termination_cb(
+        self, userdata: Any, terminal_states: List[str], container_outcome: str, *args: Any
+    ) -> None:
         """Note that the container has ended with ``container_outcome``. Override it."""
 
     def publish_feedback(self, userdata: Any) -> None:
@@ -96,8 +111,11 @@ class ActionServerWrapper(object):
         server = self._action_server
         if server is None or not server.is_active():
             return
-        fields = {field: key for field, key in self._feedback_slots_map.items()
-                  if key in userdata and field in self._feedback_type.__slots__}
+        fields = {
+            field: key
+            for field, key in self._feedback_slots_map.items()
+            if key in userdata and field in self._feedback_type.__slots__
+        }
         if self._feedback_key not in userdata and not fields:
             return
         key_is_set = self._feedback_key in userdata
@@ -112,16 +130,19 @@ class ActionServerWrapper(object):
         """
         server = self._action_server
         if server is None:
-            raise smach.InvalidStateError("Action '%s' is not served yet: call run_server() first"
-                                          % self._server_name)
+            raise smach.InvalidStateError(
+                "Action '%s' is not served yet: call run_server() first" % self._server_name
+            )
         self._fill_userdata(goal)
         if not server.is_preempt_requested():
             _recall_preempts(self.wrapped_container)
         try:
             outcome = self.wrapped_container.execute(self.userdata)
         except Exception:
-            smach.logerr("Action '%s': the container raised:\n%s" %
-                         (self._server_name, traceback.format_exc()))
+            smach.logerr(
+                "Action '%s': the container raised:\n%s"
+                % (self._server_name, traceback.format_exc())
+            )
             server.set_aborted(self._result_type(), traceback.format_exc().strip().splitlines()[-1])
             return
         self._end_goal(server, outcome)
@@ -152,8 +173,9 @@ class ActionServerWrapper(object):
         try:
             result = self._make_result()
         except (KeyError, AttributeError) as err:
-            smach.logerr("Action '%s': no result could be made from userdata: %r" %
-                         (self._server_name, err))
+            smach.logerr(
+                "Action '%s': no result could be made from userdata: %r" % (self._server_name, err)
+            )
             server.set_aborted(self._result_type(), 'no result could be made: %r' % (err,))
             return
         text = 'container outcome: %s' % outcome
@@ -165,8 +187,9 @@ class ActionServerWrapper(object):
             if outcome not in self._aborted_outcomes:
                 smach.logerr(
                     "Action '%s': the container ended with outcome %r, which is listed neither as "
-                    "succeeded, "
-                    "aborted nor preempted; the goal is aborted" % (self._server_name, outcome))
+                    'succeeded, '
+                    'aborted nor preempted; the goal is aborted' % (self._server_name, outcome)
+                )
             server.set_aborted(result, text)
 
     def preempt_cb(self) -> None:
@@ -180,8 +203,11 @@ class ActionServerWrapper(object):
 
     def _preempt_container(self) -> None:
         server = self._action_server
-        if server is not None and server.is_active() and (server.is_preempt_requested()
-                                                          or shutting_down()):
+        if (
+            server is not None
+            and server.is_active()
+            and (server.is_preempt_requested() or shutting_down())
+        ):
             self.wrapped_container.request_preempt()
 
 

@@ -1,4 +1,5 @@
 """A state that polls a condition."""
+
 import time
 import traceback
 from typing import Any, Callable, Iterable
@@ -21,11 +22,17 @@ class ConditionState(smach.State):
     ``cond_cb`` raises.
     """
 
-    def __init__(self, cond_cb: Callable[[Any], Any], input_keys: Iterable[str] = (),
-                 poll_rate: Any = rospy.Duration(0.05), timeout: Any = None,
-                 max_checks: int = 1) -> None:
-        smach.State.__init__(self, outcomes=['true', 'false', 'preempted'],
-                             input_keys=list(input_keys))
+    def __init__(
+        self,
+        cond_cb: Callable[[Any], Any],
+        input_keys: Iterable[str] = (),
+        poll_rate: Any = rospy.Duration(0.05),
+        timeout: Any = None,
+        max_checks: int = 1,
+    ) -> None:
+        smach.State.__init__(
+            self, outcomes=['true', 'false', 'preempted'], input_keys=list(input_keys)
+        )
         if smach.has_smach_interface(cond_cb):  # its outcomes are not the state's
             self.register_input_keys(cond_cb.get_registered_input_keys())
             self.register_output_keys(cond_cb.get_registered_output_keys())
@@ -49,8 +56,9 @@ class ConditionState(smach.State):
             if self._holds(ud):
                 return 'true'
             checks += 1
-            if 0 <= self._max_checks < checks or (deadline is not None
-                                                  and time.monotonic() >= deadline):
+            if 0 <= self._max_checks < checks or (
+                deadline is not None and time.monotonic() >= deadline
+            ):
                 return 'false'
             self._signal.wait(self.preempt_requested, deadline, pause_s)
         self.service_preempt()
@@ -60,5 +68,6 @@ class ConditionState(smach.State):
         try:
             return bool(self._cond_cb(ud))
         except Exception as err:
-            raise smach.InvalidUserCodeError('Condition callback %r raised:\n%s'
-                                             % (self._cond_cb, traceback.format_exc())) from err
+            raise smach.InvalidUserCodeError(
+                'Condition callback %r raised:\n%s' % (self._cond_cb, traceback.format_exc())
+            ) from err

@@ -1,4 +1,5 @@
 """One goal on its way: what the server says of it, told to the state that sent it."""
+
 import time
 import traceback
 from typing import Any, Optional
@@ -85,14 +86,18 @@ class GoalRun(object):
             return None
         if watch.status_count - self._statuses_before < UNSEEN_STATUSES:
             return None
-        return ('its server reports status, but has taken no notice of the goal for %g s'
-                % UNSEEN_AFTER_S)
+        return (
+            'its server reports status, but has taken no notice of the goal for %g s'
+            % UNSEEN_AFTER_S
+        )
 
     def _result_lost(self) -> Optional[str]:
         if self._ended_at is None or time.monotonic() - self._ended_at < RESULT_AFTER_S:
             return None
-        return ('its server reports the end of the goal, but no result came within %g s'
-                % RESULT_AFTER_S)
+        return (
+            'its server reports the end of the goal, but no result came within %g s'
+            % RESULT_AFTER_S
+        )
 
     def _on_transition(self, handle: Any) -> None:
         state = handle.get_comm_state()

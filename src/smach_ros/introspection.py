@@ -2,6 +2,7 @@
 
 The server is the one that the oracle uses, whichever smach_ros is installed.
 """
+
 from smach_oracle.ros.introspection.introspection_server import (
     INIT_TOPIC,
     STATUS_TOPIC,
@@ -11,5 +12,9 @@ from smach_oracle.ros.introspection.introspection_server import (
 from smach_ros.introspection_client import IntrospectionClient
 
 __all__ = [
-    'IntrospectionServer', 'IntrospectionClient', 'STATUS_TOPIC', 'INIT_TOPIC', 'STRUCTURE_TOPIC'
+    'IntrospectionServer',
+    'IntrospectionClient',
+    'STATUS_TOPIC',
+    'INIT_TOPIC',
+    'STRUCTURE_TOPIC',
 ]

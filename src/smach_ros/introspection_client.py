@@ -1,4 +1,5 @@
 """Finding introspection servers and telling their containers where to start."""
+
 import threading
 import time
 from typing import Any, List, Optional, Sequence
@@ -23,11 +24,20 @@ class IntrospectionClient(object):
 
         It raises what rospy raises if the master does not answer.
         """
-        return sorted(topic[:-len(STATUS_TOPIC)] for topic, kind in rospy.get_published_topics()
-                      if kind == SmachContainerStatus._type and topic.endswith(STATUS_TOPIC))
+        return sorted(
+            topic[: -len(STATUS_TOPIC)]
+            for topic, kind in rospy.get_published_topics()
+            if kind == SmachContainerStatus._type and topic.endswith(STATUS_TOPIC)
+        )
 
-    def set_initial_state(self, server: str, path: str, initial_states: Sequence[str],
-                          initial_userdata: Any = None, timeout: Any = None) -> bool:
+    def set_initial_state(
+        self,
+        server: str,
+        path: str,
+        initial_states: Sequence[str],
+        initial_userdata: Any = None,
+        timeout: Any = None,
+    ) -> bool:
         """Let the container at ``path`` start in ``initial_states``, with ``initial_userdata``
         (UserData) added.
 
@@ -36,15 +46,17 @@ class IntrospectionClient(object):
 
         :raises InvalidUserCodeError: for userdata that cannot be sent.
         """
-        command = SmachContainerInitialStatusCmd(path, list(initial_states),
-                                                 _encode_strictly(initial_userdata))
+        command = SmachContainerInitialStatusCmd(
+            path, list(initial_states), _encode_strictly(initial_userdata)
+        )
         return _Command(server, command).send(deadline_after(seconds(timeout)))
 
 
 def _encode_strictly(userdata: Any) -> str:
     def refuse(key: str, err: Exception) -> None:
-        raise smach.InvalidUserCodeError("Userdata key '%s' cannot be sent: %s" %
-                                         (key, err)) from err
+        raise smach.InvalidUserCodeError(
+            "Userdata key '%s' cannot be sent: %s" % (key, err)
+        ) from err
 
     return encode_userdata({} if userdata is None else userdata._data, refuse)
 
@@ -58,18 +70,21 @@ class _Command(object):
         self._confirmed = threading.Event()
 
     def send(self, deadline: Optional[float]) -> bool:
-        publisher = rospy.Publisher(self._server + INIT_TOPIC, SmachContainerInitialStatusCmd,
-                                    queue_size=1)
-        subscriber = rospy.Subscriber(self._server + STATUS_TOPIC, SmachContainerStatus,
-                                      self._on_status)
+        publisher = rospy.Publisher(
+            self._server + INIT_TOPIC, SmachContainerInitialStatusCmd, queue_size=1
+        )
+        subscriber = rospy.Subscriber(
+            self._server + STATUS_TOPIC, SmachContainerStatus, self._on_status
+        )
         try:
             return self._repeat(publisher, subscriber, deadline)
         finally:
             publisher.unregister()
             subscriber.unregister()
 
-    def _repeat(self, publisher: rospy.Publisher, subscriber: rospy.Subscriber,
-                deadline: Optional[float]) -> bool:
+    def _repeat(
+        self, publisher: rospy.Publisher, subscriber: rospy.Subscriber, deadline: Optional[float]
+    ) -> bool:
         send_at = 0.0
         while not shutting_down() and (deadline is None or time.monotonic() < deadline):
             # Without the status topic we would miss the confirmation, and send a running machine
@@ -83,6 +98,9 @@ class _Command(object):
         return False
 
     def _on_status(self, status: SmachContainerStatus) -> None:
-        if (status.path == self._command.path and status.info == 'REMOTE_INIT'
-                and set(status.initial_states) == set(self._command.initial_states)):
+        if (
+            status.path == self._command.path
+            and status.info == 'REMOTE_INIT'
+            and set(status.initial_states) == set(self._command.initial_states)
+        ):
             self._confirmed.set()

@@ -1,4 +1,5 @@
 """A state that watches a topic."""
+
 import threading
 import traceback
 from typing import Any, Callable, Iterable, Optional
@@ -25,10 +26,20 @@ class MonitorState(smach.State):
     """
 
     def __init__(
-        self, topic: str, msg_type: Any, cond_cb: Callable[[Any, Any], Any], max_checks: int = -1,
-        input_keys: Iterable[str] = (), output_keys: Iterable[str] = ()) -> None:
-        smach.State.__init__(self, outcomes=['valid', 'invalid', 'preempted'],
-                             input_keys=list(input_keys), output_keys=list(output_keys))
+        self,
+        topic: str,
+        msg_type: Any,
+        cond_cb: Callable[[Any, Any], Any],
+        max_checks: int = -1,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+    ) -> None:
+        smach.State.__init__(
+            self,
+            outcomes=['valid', 'invalid', 'preempted'],
+            input_keys=list(input_keys),
+            output_keys=list(output_keys),
+        )
         self._topic = topic
         self._msg_type = msg_type
         self._cond_cb = cond_cb
@@ -46,10 +57,12 @@ class MonitorState(smach.State):
             self.service_preempt()
             return 'preempted'
         watch = _Watch(self._cond_cb, self._max_checks, ud, self._signal)
-        listening = Aside('monitor %s' % self._topic, self._signal,
-                          lambda stopped: self._listen(watch, stopped))
+        listening = Aside(
+            'monitor %s' % self._topic, self._signal, lambda stopped: self._listen(watch, stopped)
+        )
         self._signal.wait(
-            lambda: watch.verdict is not None or listening.ended or self.preempt_requested())
+            lambda: watch.verdict is not None or listening.ended or self.preempt_requested()
+        )
         listening.stop()
         verdict = watch.close()
         if listening.error is not None:
@@ -73,8 +86,9 @@ class MonitorState(smach.State):
 class _Watch(object):
     """One execution: counts and judges the messages that arrive while it is open."""
 
-    def __init__(self, cond_cb: Callable[[Any, Any], Any], max_checks: int, ud: Any,
-                 signal: Signal) -> None:
+    def __init__(
+        self, cond_cb: Callable[[Any, Any], Any], max_checks: int, ud: Any, signal: Signal
+    ) -> None:
         self.verdict: Optional[str] = None
         self._cond_cb = cond_cb
         self._max_checks = max_checks
@@ -108,6 +122,8 @@ class _Watch(object):
         try:
             return bool(self._cond_cb(self._ud, message))
         except Exception:
-            smach.logerr('Condition callback %r raised; its message counts as invalid:\n%s'
-                         % (self._cond_cb, traceback.format_exc()))
+            smach.logerr(
+                'Condition callback %r raised; its message counts as invalid:\n%s'
+                % (self._cond_cb, traceback.format_exc())
+            )
             return False

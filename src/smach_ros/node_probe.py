@@ -1,4 +1,5 @@
 """Asking a ROS node, behind its topics, whether it still lives."""
+
 import http.client
 import threading
 import xmlrpc.client
@@ -40,5 +41,8 @@ def probe_node(node_uri: str, caller_id: str) -> str:
 
 def probe_in_background(node_uri: str, caller_id: str, answer: Callable[[str], None]) -> None:
     """Probe from a short-lived thread and hand the verdict to ``answer``."""
-    threading.Thread(target=lambda: answer(probe_node(node_uri, caller_id)),
-                     name='probe %s' % node_uri, daemon=True).start()
+    threading.Thread(
+        target=lambda: answer(probe_node(node_uri, caller_id)),
+        name='probe %s' % node_uri,
+        daemon=True,
+    ).start()

@@ -5,6 +5,7 @@ closes, the server's node is asked directly: a killed process is known within a 
 second, and a server that is merely silent (a blocked callback queue, a paused simulation clock) is
 not given up.
 """
+
 import time
 from typing import Any, Callable, List, Optional
 
@@ -29,9 +30,12 @@ class ServerWatch(object):
     prober at a time.
     """
 
-    def __init__(self, status_subscriber: Any,
-                 probe: Callable[..., None] = node_probe.probe_in_background,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        status_subscriber: Any,
+        probe: Callable[..., None] = node_probe.probe_in_background,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._subscriber = status_subscriber
         self._probe = probe
         self._clock = clock
@@ -61,9 +65,12 @@ class ServerWatch(object):
 
     def connections(self) -> List[Any]:
         """Open connections to the server's status topic."""
-        return [connection for connection in self._subscriber.impl.connections or ()
-                if getattr(connection, 'callerid_pub', None) == self.server_id
-                and getattr(connection, 'socket', None) is not None]
+        return [
+            connection
+            for connection in self._subscriber.impl.connections or ()
+            if getattr(connection, 'callerid_pub', None) == self.server_id
+            and getattr(connection, 'socket', None) is not None
+        ]
 
     def problem(self, frozen_after_s: float = FROZEN_AFTER_S) -> Optional[str]:
         """Return why the server must be regarded as lost.
@@ -89,13 +96,15 @@ class ServerWatch(object):
             return 'its node %s has given no sign of life for %.0f s' % (self.server_id, silent_s)
         disconnected = self._disconnected_since
         if disconnected is not None and now - disconnected > WITHDRAWN_AFTER_S:
-            return ('node %s no longer serves the action: its status topic was closed'
-                    % self.server_id)
+            return (
+                'node %s no longer serves the action: its status topic was closed' % self.server_id
+            )
         if silent_s > 2 * SILENT_AFTER_S and not self._said_silent:
             self._said_silent = True
             smach.logwarn(
-                'Action server on %s has sent no status for %.0f s; its goal is still awaited' %
-                (self.server_id, silent_s))
+                'Action server on %s has sent no status for %.0f s; its goal is still awaited'
+                % (self.server_id, silent_s)
+            )
         return None
 
     def _ask_node(self, now: float) -> None:
@@ -103,8 +112,11 @@ class ServerWatch(object):
             return
         self._probing, self._probed_at = True, now
         asked_at = self._last_status_at
-        self._probe(self._server_uri, rospy.get_caller_id(),
-                    lambda verdict: self._note_answer(verdict, asked_at))
+        self._probe(
+            self._server_uri,
+            rospy.get_caller_id(),
+            lambda verdict: self._note_answer(verdict, asked_at),
+        )
 
     def _note_answer(self, verdict: str, asked_at: float) -> None:
         self._probing = False

@@ -1,4 +1,5 @@
 """A state that calls a service."""
+
 import copy
 import threading
 import time
@@ -38,14 +39,24 @@ class ServiceState(smach.State):
     """
 
     def __init__(
-        self, service_name: str, service_spec: Any, request: Any = None,
-        request_cb: Optional[Callable[..., Any]] = None, request_cb_args: Iterable[Any] = (),
-        request_cb_kwargs: Optional[Dict[str, Any]] = None, request_key: Optional[str] = None,
-        request_slots: Iterable[str] = (), response_cb: Optional[Callable[..., Any]] = None,
-        response_cb_args: Iterable[Any] = (), response_cb_kwargs: Optional[Dict[str, Any]] = None,
-        response_key: Optional[str] = None, response_slots: Iterable[str] = (),
-        input_keys: Iterable[str] = (), output_keys: Iterable[str] = (),
-        outcomes: Iterable[str] = (), preempt_timeout: Any = rospy.Duration(5.0)
+        self,
+        service_name: str,
+        service_spec: Any,
+        request: Any = None,
+        request_cb: Optional[Callable[..., Any]] = None,
+        request_cb_args: Iterable[Any] = (),
+        request_cb_kwargs: Optional[Dict[str, Any]] = None,
+        request_key: Optional[str] = None,
+        request_slots: Iterable[str] = (),
+        response_cb: Optional[Callable[..., Any]] = None,
+        response_cb_args: Iterable[Any] = (),
+        response_cb_kwargs: Optional[Dict[str, Any]] = None,
+        response_key: Optional[str] = None,
+        response_slots: Iterable[str] = (),
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        preempt_timeout: Any = rospy.Duration(5.0),
     ) -> None:
         smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
         input_keys, output_keys = tuple(input_keys), tuple(output_keys)
@@ -61,15 +72,27 @@ class ServiceState(smach.State):
         self._request_slots = tuple(request_slots)
         self._request_cb: Optional[UserCallback] = None
         if request_cb is not None:
-            self._request_cb = UserCallback('request_cb', request_cb, request_cb_args,
-                                            request_cb_kwargs, input_keys, output_keys)
+            self._request_cb = UserCallback(
+                'request_cb',
+                request_cb,
+                request_cb_args,
+                request_cb_kwargs,
+                input_keys,
+                output_keys,
+            )
             self._request_cb.register_with(self)
         self._response_key = response_key
         self._response_slots = tuple(response_slots)
         self._response_cb: Optional[UserCallback] = None
         if response_cb is not None:
-            self._response_cb = UserCallback('response_cb', response_cb, response_cb_args,
-                                             response_cb_kwargs, input_keys, output_keys)
+            self._response_cb = UserCallback(
+                'response_cb',
+                response_cb,
+                response_cb_args,
+                response_cb_kwargs,
+                input_keys,
+                output_keys,
+            )
             self._response_cb.register_with(self, decides=True)
         self._register_message_keys()
         self._proxy: Any = None
@@ -98,8 +121,8 @@ class ServiceState(smach.State):
         if not call.ended:
             smach.logwarn(
                 "Service '%s' still works on a request that was preempted; going on without its "
-                "answer."
-                % self._service_name)
+                'answer.' % self._service_name
+            )
             self.service_preempt()
             return 'preempted'
         if isinstance(call.error, (rospy.ServiceException, rospy.ROSException, OSError)):
@@ -128,8 +151,9 @@ class ServiceState(smach.State):
                 return True
             except (rospy.ROSException, OSError):
                 if time.monotonic() >= remind_at:
-                    smach.logwarn("Service '%s' is not there yet; the state waits on." %
-                                  self._service_name)
+                    smach.logwarn(
+                        "Service '%s' is not there yet; the state waits on." % self._service_name
+                    )
                     remind_at += REMIND_EVERY_S
                 stopped.wait(PAUSE_S)
         return False
@@ -137,21 +161,26 @@ class ServiceState(smach.State):
     def _make_request(self, ud: Any) -> Any:
         """The request to send, or None if userdata or callback do not provide one (logged)."""
         try:
-            request = copy.deepcopy(self._request if self._request_key is
-                                    None else ud[self._request_key])
+            request = copy.deepcopy(
+                self._request if self._request_key is None else ud[self._request_key]
+            )
             for slot in self._request_slots:
                 setattr(request, slot, ud[slot])
         except (KeyError, AttributeError) as err:
-            smach.logerr("Cannot fill the request of service '%s' from userdata: %r" %
-                         (self._service_name, err))
+            smach.logerr(
+                "Cannot fill the request of service '%s' from userdata: %r"
+                % (self._service_name, err)
+            )
             return None
         if self._request_cb is None:
             return request
         try:
             update = self._request_cb(ud, request)
         except Exception:
-            smach.logerr("Request callback for service '%s' raised:\n%s"
-                         % (self._service_name, traceback.format_exc()))
+            smach.logerr(
+                "Request callback for service '%s' raised:\n%s"
+                % (self._service_name, traceback.format_exc())
+            )
             return None
         return request if update is None else update
 
@@ -161,8 +190,9 @@ class ServiceState(smach.State):
         """
         if self._proxy is None:
             self._proxy = rospy.ServiceProxy(self._service_name, self._service_spec)
-        call = Aside('call %s' % self._service_name, self._signal,
-                     lambda stopped: self._proxy(request))
+        call = Aside(
+            'call %s' % self._service_name, self._signal, lambda stopped: self._proxy(request)
+        )
         self._signal.wait(lambda: call.ended or self.preempt_requested())
         if not call.ended and not shutting_down():
             self._signal.wait(lambda: call.ended, longest_s=seconds(self._preempt_timeout))
@@ -182,12 +212,15 @@ class ServiceState(smach.State):
         try:
             outcome = self._response_cb(ud, response)
         except Exception:
-            smach.logerr("Response callback for service '%s' raised:\n%s"
-                         % (self._service_name, traceback.format_exc()))
+            smach.logerr(
+                "Response callback for service '%s' raised:\n%s"
+                % (self._service_name, traceback.format_exc())
+            )
             return 'aborted'
         if outcome is None or outcome in self.get_registered_outcomes():
             return 'succeeded' if outcome is None else outcome
         smach.logerr(
-            "Response callback for service '%s' returned %r, but the registered outcomes are %s" %
-            (self._service_name, outcome, sorted(self.get_registered_outcomes())))
+            "Response callback for service '%s' returned %r, but the registered outcomes are %s"
+            % (self._service_name, outcome, sorted(self.get_registered_outcomes()))
+        )
         return 'aborted'

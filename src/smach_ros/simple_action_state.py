@@ -1,4 +1,5 @@
 """A state that sends one goal to an action server and ends as the goal does."""
+
 import copy
 import io
 import time
@@ -53,14 +54,26 @@ class SimpleActionState(smach.State):
     """A server whose node neither sends status nor answers for this long (s) is given up."""
 
     def __init__(
-        self, action_name: str, action_spec: Any, goal: Any = None, goal_key: Optional[str] = None,
-        goal_slots: Iterable[str] = (), goal_cb: Optional[Callable[..., Any]] = None,
-        goal_cb_args: Iterable[Any] = (), goal_cb_kwargs: Optional[Dict[str, Any]] = None,
-        result_key: Optional[str] = None, result_slots: Iterable[str] = (),
-        result_cb: Optional[Callable[..., Any]] = None, result_cb_args: Iterable[Any] = (),
-        result_cb_kwargs: Optional[Dict[str, Any]] = None, input_keys: Iterable[str] = (),
-        output_keys: Iterable[str] = (), outcomes: Iterable[str] = (), exec_timeout: Any = None,
-        preempt_timeout: Any = rospy.Duration(60.0), server_wait_timeout: Any = rospy.Duration(60.0)
+        self,
+        action_name: str,
+        action_spec: Any,
+        goal: Any = None,
+        goal_key: Optional[str] = None,
+        goal_slots: Iterable[str] = (),
+        goal_cb: Optional[Callable[..., Any]] = None,
+        goal_cb_args: Iterable[Any] = (),
+        goal_cb_kwargs: Optional[Dict[str, Any]] = None,
+        result_key: Optional[str] = None,
+        result_slots: Iterable[str] = (),
+        result_cb: Optional[Callable[..., Any]] = None,
+        result_cb_args: Iterable[Any] = (),
+        result_cb_kwargs: Optional[Dict[str, Any]] = None,
+        input_keys: Iterable[str] = (),
+        output_keys: Iterable[str] = (),
+        outcomes: Iterable[str] = (),
+        exec_timeout: Any = None,
+        preempt_timeout: Any = rospy.Duration(60.0),
+        server_wait_timeout: Any = rospy.Duration(60.0),
     ) -> None:
         smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
         input_keys, output_keys = tuple(input_keys), tuple(output_keys)
@@ -74,10 +87,12 @@ class SimpleActionState(smach.State):
         self._server_wait_timeout = server_wait_timeout
         self._set_goal(goal, goal_key, goal_slots)
         self._set_result(result_key, result_slots)
-        self._goal_cb = self._adopt('goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, input_keys,
-                                    output_keys)
-        self._result_cb = self._adopt('result_cb', result_cb, result_cb_args, result_cb_kwargs,
-                                      input_keys, output_keys)
+        self._goal_cb = self._adopt(
+            'goal_cb', goal_cb, goal_cb_args, goal_cb_kwargs, input_keys, output_keys
+        )
+        self._result_cb = self._adopt(
+            'result_cb', result_cb, result_cb_args, result_cb_kwargs, input_keys, output_keys
+        )
         self._goal_status: Optional[int] = GoalStatus.PENDING
         self._goal_result: Any = None
         self._goal_status_text = ''  # why the latest goal ended as it did, for people
@@ -90,7 +105,8 @@ class SimpleActionState(smach.State):
         template = self._action_spec().action_goal.goal
         if callable(goal):
             raise smach.InvalidStateError(
-                'goal must be a goal message; a function that makes one goes to goal_cb')
+                'goal must be a goal message; a function that makes one goes to goal_cb'
+            )
         self._goal = template if goal is None else goal
         self._goal_type = template._type
         self._goal_key = key
@@ -101,12 +117,13 @@ class SimpleActionState(smach.State):
     def _set_result(self, key: Optional[str], slots: Iterable[str]) -> None:
         self._result_key = key
         self._result_slots = list(
-            checked_slots('result_slots', slots,
-                          self._action_spec().action_result.result))
+            checked_slots('result_slots', slots, self._action_spec().action_result.result)
+        )
         self.register_output_keys(self._result_slots + ([] if key is None else [key]))
 
-    def _adopt(self, what: str, cb: Optional[Callable[..., Any]], *interface:
-               Any) -> Optional[UserCallback]:
+    def _adopt(
+        self, what: str, cb: Optional[Callable[..., Any]], *interface: Any
+    ) -> Optional[UserCallback]:
         if cb is None:
             return None
         callback = UserCallback(what, cb, *interface)
@@ -135,7 +152,9 @@ class SimpleActionState(smach.State):
             if self._asked_to_stop():
                 return self._preempted('before sending a goal')
             self._goal_status_text = "Action server '%s' did not come within %g s" % (
-                self._action_name, seconds(self._server_wait_timeout) or 0.0)
+                self._action_name,
+                seconds(self._server_wait_timeout) or 0.0,
+            )
             smach.logerr(self._goal_status_text)
             return 'aborted'
         goal = self._make_goal(ud)
@@ -190,8 +209,10 @@ class SimpleActionState(smach.State):
         try:
             update = self._goal_cb(ud, goal)
         except Exception:
-            smach.logerr("Could not execute goal callback of action '%s':\n%s"
-                         % (self._action_name, traceback.format_exc()))
+            smach.logerr(
+                "Could not execute goal callback of action '%s':\n%s"
+                % (self._action_name, traceback.format_exc())
+            )
             return None
         return goal if update is None else update
 
@@ -201,16 +222,19 @@ class SimpleActionState(smach.State):
         try:
             goal.serialize(io.BytesIO())
         except Exception as err:
-            raise smach.InvalidUserCodeError("The goal for action '%s' is no valid %s: %r"
-                                             % (self._action_name, self._goal_type, err)) from err
+            raise smach.InvalidUserCodeError(
+                "The goal for action '%s' is no valid %s: %r"
+                % (self._action_name, self._goal_type, err)
+            ) from err
 
     def _see_through(self, run: GoalRun) -> None:
         """Wait for the goal's end. After this the run is done, or abandoned with the reason in the
         log.
         """
         self._goal_status, self._goal_result = None, None
-        problem = self._follow(run, deadline_after(seconds(self._exec_timeout) or None),
-                               self.preempt_requested)
+        problem = self._follow(
+            run, deadline_after(seconds(self._exec_timeout) or None), self.preempt_requested
+        )
         if not run.done:
             if problem is None:
                 problem = self._cancel(run)
@@ -225,8 +249,9 @@ class SimpleActionState(smach.State):
             # A subclass took over _goal_done_cb, or there was no end to report.
             self._goal_status, self._goal_result = run.status, run.result
 
-    def _follow(self, run: GoalRun, deadline: Optional[float],
-                stop: Callable[[], bool]) -> Optional[str]:
+    def _follow(
+        self, run: GoalRun, deadline: Optional[float], stop: Callable[[], bool]
+    ) -> Optional[str]:
         """Wait for the goal's end, ``stop()``, the deadline or a shutdown (None), or a problem
         (what is wrong).
         """
@@ -243,8 +268,10 @@ class SimpleActionState(smach.State):
     def _cancel(self, run: GoalRun) -> Optional[str]:
         """Cancel, and wait for the server to comply. Returns why it did not."""
         if not self._asked_to_stop():
-            smach.logwarn("Action '%s' timed out after %g s" %
-                          (self._action_name, seconds(self._exec_timeout) or 0.0))
+            smach.logwarn(
+                "Action '%s' timed out after %g s"
+                % (self._action_name, seconds(self._exec_timeout) or 0.0)
+            )
         smach.loginfo("Cancelling the goal of action '%s'" % self._action_name)
         self._status = SimpleActionState.PREEMPTING
         run.cancel()
@@ -253,8 +280,11 @@ class SimpleActionState(smach.State):
             return 'the node shuts down'
         limit_s = seconds(self._preempt_timeout)
         problem = self._follow(run, deadline_after(limit_s), lambda: False)
-        return problem or ('the node shuts down' if shutting_down() else
-                           'its server has not ended it %g s after the cancel' % (limit_s or 0.0))
+        return problem or (
+            'the node shuts down'
+            if shutting_down()
+            else 'its server has not ended it %g s after the cancel' % (limit_s or 0.0)
+        )
 
     def _conclude(self, ud: Any) -> str:
         """Userdata and outcome from the goal's status and result."""
@@ -283,14 +313,17 @@ class SimpleActionState(smach.State):
         try:
             outcome = self._result_cb(ud, self._goal_status, self._goal_result)
         except Exception:
-            smach.logerr("Result callback of action '%s' raised:\n%s" %
-                         (self._action_name, traceback.format_exc()))
+            smach.logerr(
+                "Result callback of action '%s' raised:\n%s"
+                % (self._action_name, traceback.format_exc())
+            )
             return 'aborted'
         if outcome is None or outcome in self.get_registered_outcomes():
             return outcome
         smach.logerr(
-            "Result callback of action '%s' returned %r, but the registered outcomes are %s" %
-            (self._action_name, outcome, sorted(self.get_registered_outcomes())))
+            "Result callback of action '%s' returned %r, but the registered outcomes are %s"
+            % (self._action_name, outcome, sorted(self.get_registered_outcomes()))
+        )
         return 'aborted'
 
     def _goal_active_cb(self) -> None:

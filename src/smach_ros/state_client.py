@@ -1,4 +1,5 @@
 """The goal of an action state as actionlib's users know it."""
+
 import threading
 from typing import Any
 

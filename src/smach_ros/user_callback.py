@@ -1,4 +1,5 @@
 """A script's callback together with the userdata keys it may touch."""
+
 from typing import Any, Callable, Dict, Iterable, Optional, Tuple
 
 import smach
@@ -14,21 +15,30 @@ class UserCallback(object):
     :raises InvalidStateError: if ``cb`` cannot be called.
     """
 
-    def __init__(self, what: str, cb: Callable[..., Any], args: Iterable[Any],
-                 kwargs: Optional[Dict[str, Any]], input_keys: Iterable[str],
-                 output_keys: Iterable[str]) -> None:
+    def __init__(
+        self,
+        what: str,
+        cb: Callable[..., Any],
+        args: Iterable[Any],
+        kwargs: Optional[Dict[str, Any]],
+        input_keys: Iterable[str],
+        output_keys: Iterable[str],
+    ) -> None:
         if not callable(cb):
             raise smach.InvalidStateError('%s must be callable, not %r' % (what, cb))
         self._cb = cb
         self._args = tuple(args)
         self._kwargs = dict(kwargs or {})
         decorated = smach.has_smach_interface(cb)
+        # the formatter does not count a type comment, so that its lines would be too long
+        # fmt: off
         self.input_keys = tuple(
             cb.get_registered_input_keys() if decorated else input_keys)  # type: ignore
         self.output_keys = tuple(
             cb.get_registered_output_keys() if decorated else output_keys)  # type: ignore
         self.outcomes: Tuple[str, ...] = tuple(cb.get_registered_outcomes()) if decorated else (
         )  # type: ignore
+        # fmt: on
 
     def register_with(self, state: smach.State, decides: bool = False) -> None:
         """Give ``state`` the keys this callback brings along, and, if it decides the end, its
@@ -52,6 +62,8 @@ def checked_slots(what: str, slots: Iterable[str], message: Any) -> Tuple[str, .
     slots = tuple(slots)
     unknown = [slot for slot in slots if slot not in message.__slots__]
     if unknown:
-        raise smach.InvalidStateError('%s %s: no such field in %s, which has %s'
-                                      % (what, unknown, message._type, list(message.__slots__)))
+        raise smach.InvalidStateError(
+            '%s %s: no such field in %s, which has %s'
+            % (what, unknown, message._type, list(message.__slots__))
+        )
     return slots

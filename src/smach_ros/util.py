@@ -1,4 +1,5 @@
 """Small helpers for scripts."""
+
 import _thread
 import inspect
 import signal
@@ -39,6 +40,7 @@ def _preempt(container: Any) -> None:
             container.request_preempt()
         finally:
             asked.append(True)
+
     # The handler may have interrupted the executing thread while that held the machine's lock: ask
     # from another one. Where it has interrupted threading, a Thread could not be started.
     _thread.start_new_thread(ask, ())
@@ -49,8 +51,9 @@ def _preempt(container: Any) -> None:
         time.sleep(0.02)
     if _is_running(container):
         smach.logwarn(
-            'The machine did not end within %g s of its preempt; shutting down without it' %
-            STOP_WITHIN_S)
+            'The machine did not end within %g s of its preempt; shutting down without it'
+            % STOP_WITHIN_S
+        )
 
 
 def set_preempt_handler(sc: Any) -> None:
@@ -65,5 +68,6 @@ def set_preempt_handler(sc: Any) -> None:
     if rospy_has_signals or not rospy.core.is_initialized():
         return
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGINT, lambda number, frame: _thread.start_new_thread(
-            sc.request_preempt, ()))
+        signal.signal(
+            signal.SIGINT, lambda number, frame: _thread.start_new_thread(sc.request_preempt, ())
+        )

@@ -1,4 +1,5 @@
 """Waiting that a preempt, a message or a shutdown can end at once, on monotonic wall time."""
+
 import threading
 import time
 from typing import Any, Callable, Optional
@@ -33,8 +34,8 @@ def seconds(duration: Any) -> Optional[float]:
         return float(duration)
     except (TypeError, ValueError) as err:
         raise smach.InvalidStateError(
-            '%r is no duration: give a rospy.Duration, a number of seconds or None' %
-            (duration,)) from err
+            '%r is no duration: give a rospy.Duration, a number of seconds or None' % (duration,)
+        ) from err
 
 
 def deadline_after(timeout_s: Optional[float]) -> Optional[float]:
@@ -57,8 +58,12 @@ class Signal(object):
         with self._condition:
             self._condition.notify_all()
 
-    def wait(self, happened: Callable[[], bool], deadline: Optional[float] = None,
-             longest_s: Optional[float] = None) -> bool:
+    def wait(
+        self,
+        happened: Callable[[], bool],
+        deadline: Optional[float] = None,
+        longest_s: Optional[float] = None,
+    ) -> bool:
         """Wait for ``happened()``, a monotonic ``deadline``, ``longest_s`` or a shutdown, and
         return ``happened()``.
         """

@@ -5,6 +5,7 @@ a second attempt.
 
 Called by scripts/test, in the environment of scripts/ros_env.
 """
+
 import argparse
 import fnmatch
 import signal
@@ -36,8 +37,9 @@ JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'upstream': 2, 'package': 1, 'bench': 1}
 def find_checks(group: str, upstream: Optional[Path], python: Optional[Path]) -> Dict[str, Check]:
     """The checks of one group, by name."""
     if python is not None:
-        return pytest_checks(ROOT, 'unit', by_folder=True, python=str(python),
-                             env=interpreter.environment(python))
+        return pytest_checks(
+            ROOT, 'unit', by_folder=True, python=str(python), env=interpreter.environment(python)
+        )
     if group == 'upstream':
         return upstream_checks(ROOT, upstream) if upstream is not None else {}
     if group == 'lint':
@@ -55,7 +57,8 @@ def select(checks: Dict[str, Check], pattern: str) -> Dict[str, Check]:
     """The checks whose name contains `pattern`, or matches it where it has wildcards."""
     return {
         name: check
-        for name, check in checks.items() if fnmatch.fnmatch(name, '*{}*'.format(pattern))
+        for name, check in checks.items()
+        if fnmatch.fnmatch(name, '*{}*'.format(pattern))
     }
 
 
@@ -76,24 +79,39 @@ def run_group(checks: Dict[str, Check], bench: Bench, jobs: int) -> List[Outcome
 
 
 def parse_arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog='scripts/test',
-                                     description='Set up, then check everything.')
+    parser = argparse.ArgumentParser(
+        prog='scripts/test', description='Set up, then check everything.'
+    )
     parser.add_argument(
-        'group', nargs='?', choices=sorted(JOBS) + ['all'], default='all',
+        'group',
+        nargs='?',
+        choices=sorted(JOBS) + ['all'],
+        default='all',
         help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
         'upstream: on the engine of --upstream; package: build and install; bench: limits on '
-        'speed (default: all)')
-    parser.add_argument('pattern', nargs='?', default='',
-                        help='only checks with this in their name; * is a wildcard')
+        'speed (default: all)',
+    )
+    parser.add_argument(
+        'pattern',
+        nargs='?',
+        default='',
+        help='only checks with this in their name; * is a wildcard',
+    )
     parser.add_argument('--jobs', type=int, help='checks at a time (default: 2, benchmarks 1)')
     parser.add_argument(
-        '--upstream', metavar='PATH', type=Path,
+        '--upstream',
+        metavar='PATH',
+        type=Path,
         help='a checkout of ros/executive_smach, branch noetic-devel: the tests of the executive, '
-        'of SMACH and of wrapped machines run on it too')
+        'of SMACH and of wrapped machines run on it too',
+    )
     parser.add_argument(
-        '--python', metavar='PATH', type=Path,
+        '--python',
+        metavar='PATH',
+        type=Path,
         help='run the unit tests under this interpreter, 3.8 or later, in a venv of its own '
-        '(.venv-X.Y.Z), made of requirements-noetic.txt and requirements-noetic-dev.txt')
+        '(.venv-X.Y.Z), made of requirements-noetic.txt and requirements-noetic-dev.txt',
+    )
     arguments = parser.parse_args()
     if arguments.python is not None:
         if arguments.group not in ('all', 'unit') or arguments.upstream is not None:
@@ -130,8 +148,9 @@ def main() -> int:
     outcomes: List[Outcome] = []
     try:
         for group in JOBS if arguments.group == 'all' else [arguments.group]:
-            checks = select(find_checks(group, arguments.upstream, arguments.python),
-                            arguments.pattern)
+            checks = select(
+                find_checks(group, arguments.upstream, arguments.python), arguments.pattern
+            )
             if checks:
                 print('--- {}'.format(group))
                 outcomes += run_group(checks, bench, arguments.jobs or JOBS[group])
@@ -150,12 +169,14 @@ def _summarise(outcomes: List[Outcome], bench: Bench, seconds: float) -> int:
     skipped = sum(outcome.skipped for outcome in outcomes)
     if skipped:
         print('{} skipped'.format(skipped))
-    passed, failed = (sum(getattr(outcome, name) for outcome in outcomes)
-                      for name in ('passed', 'failed'))
+    passed, failed = (
+        sum(getattr(outcome, name) for outcome in outcomes) for name in ('passed', 'failed')
+    )
     # a check without a single case counts as a failure, and so does a selection that selects
     # nothing
-    failed += sum(1
-                  for outcome in outcomes if not outcome.ok and not outcome.failed) + (not outcomes)
+    failed += sum(1 for outcome in outcomes if not outcome.ok and not outcome.failed) + (
+        not outcomes
+    )
     print(on_upstream(outcomes))
     print(second_attempts(outcomes))
     print('{} passed, {} failed'.format(passed, failed))

@@ -1,4 +1,5 @@
 """The checks of scripts/test, by group. Each takes a `Bench` and returns an `Outcome`."""
+
 import fnmatch
 import os
 import shutil
@@ -30,8 +31,9 @@ class Bench:
     results: Path
     runner: Runner
 
-    def run(self, name: str, command: List[str], timeout_s: float,
-            env: Optional[Dict[str, str]] = None) -> Outcome:
+    def run(
+        self, name: str, command: List[str], timeout_s: float, env: Optional[Dict[str, str]] = None
+    ) -> Outcome:
         """Run one command that passes or fails as a whole."""
         log = self.results / 'log' / (name.replace('/', '_').replace(' ', '_') + '.log')
         started = time.monotonic()
@@ -57,14 +59,14 @@ def lint_checks(root: Path) -> Dict[str, Check]:
     """Linters, types and of the page's scripts, pages, Python 3.8, catkin_lint, launches."""
     checks = {
         'ruff': ['ruff', 'check', '--no-cache', '--output-format', 'concise', '.'],
+        'format': ['ruff', 'format', '--no-cache', '--check', '.'],
         'mypy': [sys.executable, '-m', 'mypy', '--cache-dir', os.devnull],
-        'python 3.8': [sys.executable, '-c', VERMIN, '--target=3.8-', '--no-tips', '--violations'] +
-        PYTHON_SOURCES,
+        'python 3.8': [sys.executable, '-c', VERMIN, '--target=3.8-', '--no-tips', '--violations']
+        + PYTHON_SOURCES,
         'pages and links': [sys.executable, 'doc/site/build.py', '--check'],
         'words': [sys.executable, 'test/unit/house/plain_words.py'],
         'javascript types': ['tsc', '-p', 'jsconfig.json'],
-        'catkin_lint': ['catkin_lint', '--offline', '--strict', '-W2',
-                        str(root)],
+        'catkin_lint': ['catkin_lint', '--offline', '--strict', '-W2', str(root)],
     }
     for launch in sorted((root / 'launch').glob('*.launch')):
         checks['launch/' + launch.name] = [_roslaunch_check(), '-o', os.devnull, str(launch)]
@@ -73,29 +75,49 @@ def lint_checks(root: Path) -> Dict[str, Check]:
 
 def _roslaunch_check() -> str:
     import rospkg
+
     return os.path.join(rospkg.RosPack().get_path('roslaunch'), 'scripts', 'roslaunch-check')
 
 
-def pytest_checks(root: Path, folder: str, by_folder: bool, python: str = sys.executable,
-                  env: Optional[Dict[str, str]] = None) -> Dict[str, Check]:
+def pytest_checks(
+    root: Path,
+    folder: str,
+    by_folder: bool,
+    python: str = sys.executable,
+    env: Optional[Dict[str, str]] = None,
+) -> Dict[str, Check]:
     """pytest on test/FOLDER, as one check or as one per folder and file in it.
 
     :param python: the interpreter that it runs under, with the variables `env`.
     """
     top = root / 'test' / folder
-    parts = sorted({path.relative_to(top).parts[0]
-                    for path in top.rglob('test_*.py')}) if by_folder else ['']
+    parts = (
+        sorted({path.relative_to(top).parts[0] for path in top.rglob('test_*.py')})
+        if by_folder
+        else ['']
+    )
     names = ['/'.join(filter(None, [folder, part])) for part in parts]
     return {name: partial(_pytest, name, env=env, python=python) for name in names}
 
 
-def _pytest(name: str, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None,
-            python: str = sys.executable) -> Outcome:
+def _pytest(
+    name: str,
+    bench: Bench,
+    shown: str = '',
+    env: Optional[Dict[str, str]] = None,
+    python: str = sys.executable,
+) -> Outcome:
     shown = shown or name
     result = bench.results / '{}.xml'.format(shown.replace('/', '-'))
     command = [
-        python, '-m', 'pytest', '-q', '--tb=short', '--junit-xml',
-        str(result), 'test/' + name
+        python,
+        '-m',
+        'pytest',
+        '-q',
+        '--tb=short',
+        '--junit-xml',
+        str(result),
+        'test/' + name,
     ]
     return _with_junit(bench.run(shown, command, MAX_PYTEST_S, env), [result])
 
@@ -134,8 +156,9 @@ def upstream_checks(root: Path, checkout: Path) -> Dict[str, Check]:
     return checks
 
 
-def _rostest(path: Path, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None
-             ) -> Outcome:
+def _rostest(
+    path: Path, bench: Bench, shown: str = '', env: Optional[Dict[str, str]] = None
+) -> Outcome:
     """As rostest's own attribute `retry`: a machine busy with other tests is no failure."""
     shown = shown or 'rostest/' + path.stem
     return _at_most_twice(partial(_run_rostest, path, bench, shown, env), bench)
@@ -152,7 +175,8 @@ def _at_most_twice(attempt: Attempt, bench: Bench) -> Outcome:
     second.attempts = 2
     second.seconds += first.seconds
     second.note = '{} at the second attempt; the first:\n{}\nlog: {}'.format(
-        'passed' if second.ok else 'failed', first.detail.rstrip(), first_log)
+        'passed' if second.ok else 'failed', first.detail.rstrip(), first_log
+    )
     return second
 
 
@@ -167,15 +191,17 @@ def _kept(path: Path) -> Path:
     return kept
 
 
-def _run_rostest(path: Path, bench: Bench, shown: str, more_env: Optional[Dict[str, str]]
-                 ) -> Outcome:
+def _run_rostest(
+    path: Path, bench: Bench, shown: str, more_env: Optional[Dict[str, str]]
+) -> Outcome:
     command = ['rostest', '--package', PACKAGE, '--pkgdir', str(bench.root), str(path)]
     folder = bench.results / shown
     # rostest hands the place of the results on unquoted: it must not have a space in it
     scratch = Path(tempfile.mkdtemp(prefix='rostest-'))
     env = {
-        'ROS_TEST_RESULTS_DIR': str(scratch), 'ROS_LOG_DIR': str(scratch / 'log'),
-        'ROS_HOME': str(scratch / 'home')
+        'ROS_TEST_RESULTS_DIR': str(scratch),
+        'ROS_LOG_DIR': str(scratch / 'log'),
+        'ROS_HOME': str(scratch / 'home'),
     }
     outcome = bench.run(shown, command, MAX_ROSTEST_S, dict(env, **(more_env or {})))
     shutil.rmtree(str(folder), ignore_errors=True)
@@ -188,7 +214,8 @@ def _run_rostest(path: Path, bench: Bench, shown: str, more_env: Optional[Dict[s
 def benchmark_checks(root: Path) -> Dict[str, Check]:
     """Benchmarks that know `--check`: they measure briefly and fail where a limit is missed."""
     files = [
-        path for path in sorted((root / 'benchmarks').glob('*.py'))
+        path
+        for path in sorted((root / 'benchmarks').glob('*.py'))
         if "'--check'" in path.read_text('utf-8')
     ]
     return {'benchmarks/' + path.stem: partial(_benchmark, path) for path in files}

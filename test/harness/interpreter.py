@@ -3,6 +3,7 @@
 It has a venv of its own with the lists for Python 3.8, and sees the system's packages behind those:
 rospy and its kin are plain Python. What is compiled for the system's Python alone it lacks.
 """
+
 import os
 import subprocess
 import sys
@@ -24,14 +25,21 @@ class InterpreterError(ValueError):
 
 def _run(command: List[str]) -> str:
     try:
-        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                              check=False, timeout=900, env=_plain())
+        done = subprocess.run(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            check=False,
+            timeout=900,
+            env=_plain(),
+        )
     except OSError as err:
         raise InterpreterError('{}: {}'.format(command[0], err.strerror)) from err
     text = done.stdout.decode(errors='replace').strip()
     if done.returncode:
-        raise InterpreterError('{} ended with {}:\n{}'.format(' '.join(command), done.returncode,
-                                                              text[-2000:]))
+        raise InterpreterError(
+            '{} ended with {}:\n{}'.format(' '.join(command), done.returncode, text[-2000:])
+        )
     return text
 
 
@@ -58,8 +66,10 @@ def make_venv(root: Path, python: Path) -> Path:
         sys.stdout.flush()
         _run([str(python), '-m', 'venv', '--clear', str(venv)])
         own = str(venv / 'bin' / 'python')
-        _run([own, '-m', 'pip', 'install', '--disable-pip-version-check', '-q'] +
-             [word for each in lists for word in ('-r', str(each))])
+        _run(
+            [own, '-m', 'pip', 'install', '--disable-pip-version-check', '-q']
+            + [word for each in lists for word in ('-r', str(each))]
+        )
         behind = _run([own, '-c', 'import sysconfig; print(sysconfig.get_path("purelib"))'])
         (Path(behind) / 'zz_system.pth').write_text(SYSTEM_PACKAGES + '\n')
         stamp.write_text(key)

@@ -4,6 +4,7 @@ roslaunch puts every node into a session of its own, so that killing the command
 group, is not enough. Every process of a check therefore carries a mark in its environment, by which
 its last descendant is found.
 """
+
 import os
 import signal
 import subprocess
@@ -26,8 +27,14 @@ class Runner:
         self._running: List[subprocess.Popen] = []
         self.stopped = False
 
-    def run(self, command: List[str], log: Path, timeout_s: float, cwd: Path,
-            env: Optional[Dict[str, str]] = None) -> str:
+    def run(
+        self,
+        command: List[str],
+        log: Path,
+        timeout_s: float,
+        cwd: Path,
+        env: Optional[Dict[str, str]] = None,
+    ) -> str:
         """Run `command` with its output in `log`. Return '' on success, else what went wrong."""
         mark = uuid.uuid4().hex
         log.parent.mkdir(parents=True, exist_ok=True)
@@ -35,10 +42,15 @@ class Runner:
             with self._lock:
                 if self.stopped:
                     return 'interrupted'
-                process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT,
-                                           cwd=str(cwd), stdin=subprocess.DEVNULL,
-                                           start_new_session=True,
-                                           env=dict(os.environ, **(env or {}), **{MARK: mark}))
+                process = subprocess.Popen(
+                    command,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    cwd=str(cwd),
+                    stdin=subprocess.DEVNULL,
+                    start_new_session=True,
+                    env=dict(os.environ, **(env or {}), **{MARK: mark}),
+                )
                 self._running.append(process)
         try:
             problem = _wait(process, timeout_s)
@@ -103,8 +115,9 @@ def kill_marked(mark: str) -> List[str]:
         if not found:
             break
         for pid in found:
-            killed[pid] = _read(pid, 'cmdline').replace(b'\0',
-                                                        b' ').decode(errors='replace').strip()
+            killed[pid] = (
+                _read(pid, 'cmdline').replace(b'\0', b' ').decode(errors='replace').strip()
+            )
             try:
                 os.kill(pid, signal.SIGKILL)
             except ProcessLookupError:

@@ -1,4 +1,5 @@
 """What the checks found: counts, times, and JUnit results put together."""
+
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,8 +48,9 @@ def _count(case: ElementTree.Element, outcome: Outcome) -> None:
     if problems:
         outcome.failed += 1
         text = (problems[0].text or problems[0].get('message') or '').strip()
-        outcome.detail += '{}.{}:\n{}\n'.format(case.get('classname', ''), case.get('name', ''),
-                                                _tail(text, 30))
+        outcome.detail += '{}.{}:\n{}\n'.format(
+            case.get('classname', ''), case.get('name', ''), _tail(text, 30)
+        )
     elif case.find('skipped') is not None:
         outcome.skipped += 1
     else:
@@ -71,8 +73,11 @@ def show(outcome: Outcome) -> None:
     counts = '{} passed'.format(outcome.passed)
     for count, word in ((outcome.failed, 'failed'), (outcome.skipped, 'skipped')):
         counts += ', {} {}'.format(count, word) if count else ''
-    print('{} {:<44} {:>6.1f} s  {}'.format('ok  ' if outcome.ok else 'FAIL', outcome.name,
-                                            outcome.seconds, counts))
+    print(
+        '{} {:<44} {:>6.1f} s  {}'.format(
+            'ok  ' if outcome.ok else 'FAIL', outcome.name, outcome.seconds, counts
+        )
+    )
     if not outcome.ok:
         detail = outcome.detail.rstrip() or 'ran, but reported no case'
         detail += '\nlog: ' + outcome.log if outcome.log else ''
@@ -88,13 +93,17 @@ def on_upstream(outcomes: Iterable[Outcome]) -> str:
         return 'upstream: not run'
     passed, skipped = sum(each.passed for each in found), sum(each.skipped for each in found)
     return 'upstream: {} passed, {} failed, {} skipped'.format(
-        passed, sum(max(each.failed, int(not each.ok)) for each in found), skipped)
+        passed, sum(max(each.failed, int(not each.ok)) for each in found), skipped
+    )
 
 
 def second_attempts(outcomes: Iterable[Outcome]) -> str:
     """How many checks were tried twice, and which; said also where none was."""
-    again = ['{} ({})'.format(outcome.name, 'passed then' if outcome.ok else 'failed again')
-             for outcome in outcomes if outcome.attempts > 1]
+    again = [
+        '{} ({})'.format(outcome.name, 'passed then' if outcome.ok else 'failed again')
+        for outcome in outcomes
+        if outcome.attempts > 1
+    ]
     return 'second attempts: {}{}'.format(len(again), ': ' + ', '.join(again) if again else '')
 
 
@@ -109,11 +118,21 @@ def write_junit(outcomes: Iterable[Outcome], path: Path) -> None:
                 found = ElementTree.parse(str(source)).getroot()
                 root.extend([found] if found.tag == 'testsuite' else list(found))
             continue
-        suite = ElementTree.SubElement(root, 'testsuite', name=outcome.name, tests='1',
-                                       failures=str(int(not outcome.ok)),
-                                       time='{:.3f}'.format(outcome.seconds))
-        case = ElementTree.SubElement(suite, 'testcase', classname='checks', name=outcome.name,
-                                      time='{:.3f}'.format(outcome.seconds))
+        suite = ElementTree.SubElement(
+            root,
+            'testsuite',
+            name=outcome.name,
+            tests='1',
+            failures=str(int(not outcome.ok)),
+            time='{:.3f}'.format(outcome.seconds),
+        )
+        case = ElementTree.SubElement(
+            suite,
+            'testcase',
+            classname='checks',
+            name=outcome.name,
+            time='{:.3f}'.format(outcome.seconds),
+        )
         if not outcome.ok:
             ElementTree.SubElement(case, 'failure').text = outcome.detail
     ElementTree.ElementTree(root).write(str(path), encoding='utf-8', xml_declaration=True)

@@ -1,15 +1,18 @@
 """The package builds alone and in catkin workspaces, installs, runs where it was installed, and
 yields to upstream.
 """
+
 import re
 
 import pytest
 from workspace import PYTHON, copy_sources, fake_upstream, run
 
 NAMES = ('smach', 'smach_ros', 'smach_msgs', 'control_msgs')
-WHERE = 'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs, control_msgs; ' \
-        'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__, control_msgs.__file__)"'
-SCRIPT = '''
+WHERE = (
+    'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs, control_msgs; '
+    'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__, control_msgs.__file__)"'
+)
+SCRIPT = """
 import smach
 
 
@@ -28,7 +31,7 @@ machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
 with machine:
     smach.StateMachine.add('FLAKY', Flaky())
 print('ended in', machine.execute())
-'''
+"""
 
 
 @pytest.fixture(scope='module')
@@ -39,8 +42,9 @@ def installed(tmp_path_factory):
     (top / 'out').mkdir()
     run(
         'cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; make -j2; make '
-        'install'
-        .format(PYTHON), top / 'out')
+        'install'.format(PYTHON),
+        top / 'out',
+    )
     (top / 'smach_oracle').rename(top / 'moved_away')
     (top / 'out').rename(top / 'out_moved_away')
     return top
@@ -57,13 +61,17 @@ def test_the_install_space_runs_without_its_sources(installed):
 def test_installed_messages_are_found_by_rosmsg(installed):
     assert 'local_data' in in_installed(installed, 'rosmsg show smach_msgs/SmachContainerStatus')
     assert 'seq' in in_installed(installed, 'rosmsg show smach_oracle/OracleEvent')
-    assert 'max_effort' in in_installed(installed,
-                                        'rosmsg show control_msgs/GripperCommandActionGoal')
+    assert 'max_effort' in in_installed(
+        installed, 'rosmsg show control_msgs/GripperCommandActionGoal'
+    )
 
 
 def test_every_command_is_installed_for_rosrun(installed):
-    commands = {path.name for path in (installed / 'moved_away/scripts').iterdir()
-                if path.read_text().startswith('#!/usr/bin/env python3')}
+    commands = {
+        path.name
+        for path in (installed / 'moved_away/scripts').iterdir()
+        if path.read_text().startswith('#!/usr/bin/env python3')
+    }
     assert commands == {path.name for path in (installed / 'installed/lib/smach_oracle').iterdir()}
 
 
@@ -72,10 +80,12 @@ def test_help_points_to_a_page_that_is_installed_with_all_that_it_links_to(insta
     shown = in_installed(installed, 'rosrun smach_oracle oracle_disk --help')
     assert shown.splitlines()[-1] == 'More: {}'.format(share / 'doc/recording.md')
     for page in (share / 'doc').glob('*.md'):
-        text = re.sub(r'^```.*?^```', '', page.read_text(encoding='utf-8'),
-                      flags=re.MULTILINE | re.DOTALL)
-        links = [link.split('#')[0] for link in re.findall(r'\]\(([^)\s]+)\)', text)
-                 if '://' not in link]
+        text = re.sub(
+            r'^```.*?^```', '', page.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL
+        )
+        links = [
+            link.split('#')[0] for link in re.findall(r'\]\(([^)\s]+)\)', text) if '://' not in link
+        ]
         assert not [link for link in links if not (page.parent / link).exists()], page
 
 
@@ -83,13 +93,13 @@ def test_an_unmodified_script_recovers_under_the_installed_oracle(installed):
     (installed / 'flaky.py').write_text(SCRIPT)
     # without a master, as before the robot is switched on, is not what oracle_run is for: start one
     # on a free port
-    command = '''
+    command = """
         free_port='from smach_oracle.experiment.launching import free_port; print(free_port())'
         port=$(python3 -c "$free_port")
         export ROS_MASTER_URI=http://localhost:$port ROS_HOSTNAME=localhost ROS_LOG_DIR="$PWD/log"
         roscore -p $port >/dev/null 2>&1 & core=$!; trap 'kill -INT $core; wait $core || true' EXIT
         until rosnode list >/dev/null 2>&1; do sleep 0.2; done
-        timeout 60 rosrun smach_oracle oracle_run flaky.py'''
+        timeout 60 rosrun smach_oracle oracle_run flaky.py"""
     assert 'ended in succeeded' in in_installed(installed, command)
 
 
@@ -98,8 +108,9 @@ def test_the_test_kit_and_its_examples_are_installed(installed):
     assert (examples / 'fetch_task_rostest.py').stat().st_mode & 0o111
     passed = in_installed(installed, 'python3 -m pytest -q -p no:cacheprovider {}'.format(examples))
     assert '6 passed' in passed
-    where = in_installed(installed, 'python3 -c "import smach_oracle.testing as kit; '
-                                    'print(kit.__file__)"')
+    where = in_installed(
+        installed, 'python3 -c "import smach_oracle.testing as kit; print(kit.__file__)"'
+    )
     assert str(installed / 'installed') in where
 
 
@@ -113,22 +124,24 @@ def test_launch_files_and_settings_are_installed(installed):
 def test_the_page_of_the_console_is_installed_whole(installed):
     console = 'smach_oracle/expert/console'
     sources = installed / 'moved_away/src' / console
-    target, = (installed / 'installed/lib').glob('python3*/*-packages/' + console)
+    (target,) = (installed / 'installed/lib').glob('python3*/*-packages/' + console)
     names = {
-        path.relative_to(sources)
-        for path in (sources / 'static').rglob('*') if path.is_file()
+        path.relative_to(sources) for path in (sources / 'static').rglob('*') if path.is_file()
     }
     assert names == {
-        path.relative_to(target)
-        for path in (target / 'static').rglob('*') if path.is_file()
+        path.relative_to(target) for path in (target / 'static').rglob('*') if path.is_file()
     }
     assert len(names) > 40
 
 
 def test_no_file_of_ours_is_where_upstreams_belongs(installed):
     prefix = installed / 'installed'
-    assert not [path for name in NAMES for path in prefix.rglob(name)
-                if 'share/smach_oracle/stand_ins' not in str(path)]
+    assert not [
+        path
+        for name in NAMES
+        for path in prefix.rglob(name)
+        if 'share/smach_oracle/stand_ins' not in str(path)
+    ]
     assert (prefix / 'share/smach_oracle/stand_ins/smach_msgs/share/smach_msgs/msg').is_dir()
 
 
@@ -141,8 +154,9 @@ def test_upstream_may_come_after_the_installation_and_go_again(installed, tmp_pa
     assert run(WHERE, tmp_path, setup).count('stand_ins') == len(NAMES)
     come = 'export PYTHONPATH="$PYTHONPATH:{}"; source "{}"; '.format(later, setup)
     names = 'import smach, smach_ros, smach_msgs, control_msgs; print(smach.__file__)'
-    told = run(come + 'python3 -c "{}"; echo $PYTHONPATH $ROS_PACKAGE_PATH'.format(names),
-               tmp_path, setup)
+    told = run(
+        come + 'python3 -c "{}"; echo $PYTHONPATH $ROS_PACKAGE_PATH'.format(names), tmp_path, setup
+    )
     assert str(later / 'smach') in told and 'stand_ins' not in told
 
 
@@ -154,20 +168,23 @@ def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     where = run(WHERE, tmp_path, str(tmp_path / 'devel/setup.bash'))
     assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
     assert 'stand_ins' not in where
-    check = ('import smach_oracle, smach, smach_ros, smach_msgs; '
-             'print(smach.upstream, smach_ros.upstream)')
-    assert 'True True' in run('python3 -c "{}"'.format(check), tmp_path,
-                              str(tmp_path / 'devel/setup.bash'))
+    check = (
+        'import smach_oracle, smach, smach_ros, smach_msgs; '
+        'print(smach.upstream, smach_ros.upstream)'
+    )
+    assert 'True True' in run(
+        'python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel/setup.bash')
+    )
 
 
 def test_an_isolated_workspace_takes_of_ours_what_it_lacks(tmp_path):
     copy_sources(tmp_path / 'src/smach_oracle')
     fake_upstream(tmp_path / 'src', 'smach')
     run('catkin_make_isolated --cmake-args {}'.format(PYTHON), tmp_path)
-    check = 'import smach_oracle, smach, control_msgs; ' \
-            'print(smach.upstream, control_msgs.__file__)'
-    told = run('python3 -c "{}"'.format(check), tmp_path,
-               str(tmp_path / 'devel_isolated/setup.bash'))
+    check = 'import smach_oracle, smach, control_msgs; print(smach.upstream, control_msgs.__file__)'
+    told = run(
+        'python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel_isolated/setup.bash')
+    )
     assert 'True' in told and 'stand_ins/control_msgs' in told
 
 

@@ -1,4 +1,5 @@
 """The site's search finds the words that people look for, also without the summaries."""
+
 import json
 import subprocess
 import sys
@@ -16,17 +17,36 @@ def index(tmp_path_factory):
     """The index of the site that is made of the pages alone."""
     top = tmp_path_factory.mktemp('site')
     build.write_sources(top / 'source', quick=True)
-    subprocess.run([sys.executable, '-m', 'sphinx', '-b', 'html', '-q', '-c',
-                    str(ROOT / 'doc/site'), str(top / 'source'), str(top / 'html')],
-                   timeout=600, check=True)
+    subprocess.run(
+        [
+            sys.executable,
+            '-m',
+            'sphinx',
+            '-b',
+            'html',
+            '-q',
+            '-c',
+            str(ROOT / 'doc/site'),
+            str(top / 'source'),
+            str(top / 'html'),
+        ],
+        timeout=600,
+        check=True,
+    )
     text = (top / 'html/searchindex.js').read_text(encoding='utf-8')
-    return json.loads(text[text.index('{'):text.rindex('}') + 1])
+    return json.loads(text[text.index('{') : text.rindex('}') + 1])
 
 
-@pytest.mark.parametrize('word, page', [
-    ('precondition', 'preconditions'), ('checkpoint', 'survive'), ('teleoperation', 'messages'),
-    ('interface', 'own_interface'), ('move_base', 'navigation')
-])
+@pytest.mark.parametrize(
+    'word, page',
+    [
+        ('precondition', 'preconditions'),
+        ('checkpoint', 'survive'),
+        ('teleoperation', 'messages'),
+        ('interface', 'own_interface'),
+        ('move_base', 'navigation'),
+    ],
+)
 def test_it_finds(index, word, page):
     stem = SearchEnglish({}).stem(word)
     found = [index[part].get(stem, []) for part in ('terms', 'titleterms')]

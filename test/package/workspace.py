@@ -1,4 +1,5 @@
 """Copies of this checkout to build in, and the shells to look at what was built."""
+
 import os
 import shutil
 import subprocess
@@ -6,23 +7,23 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 LEFT_OUT = ('.git', '.venv*', 'build', '.build', 'trials', '__pycache__', '*.pyc', '.*_cache')
-UPSTREAM_CMAKE = '''cmake_minimum_required(VERSION 3.5)
+UPSTREAM_CMAKE = """cmake_minimum_required(VERSION 3.5)
 project({0})
 find_package(catkin REQUIRED)
 catkin_python_setup()
 catkin_package()
-'''
-UPSTREAM_XML = '''<?xml version="1.0"?>
+"""
+UPSTREAM_XML = """<?xml version="1.0"?>
 <package format="2">
   <name>{0}</name><version>2.5.2</version><description>A fake of the upstream package.</description>
   <maintainer email="nobody@example.org">nobody</maintainer><license>BSD</license>
   <buildtool_depend>catkin</buildtool_depend>
 </package>
-'''
-UPSTREAM_SETUP = '''from setuptools import setup
+"""
+UPSTREAM_SETUP = """from setuptools import setup
 from catkin_pkg.python_setup import generate_distutils_setup
 setup(**generate_distutils_setup(packages=['{0}'], package_dir={{'': 'src'}}))
-'''
+"""
 
 
 def copy_sources(target: Path) -> Path:
@@ -38,9 +39,12 @@ def fake_upstream(source_space: Path, name: str) -> None:
     """
     python = source_space / name / 'src' / name
     python.mkdir(parents=True)
-    (python / '__init__.py').write_text("upstream = True\n")
-    for file, text in (('CMakeLists.txt', UPSTREAM_CMAKE), ('package.xml', UPSTREAM_XML),
-                       ('setup.py', UPSTREAM_SETUP)):
+    (python / '__init__.py').write_text('upstream = True\n')
+    for file, text in (
+        ('CMakeLists.txt', UPSTREAM_CMAKE),
+        ('package.xml', UPSTREAM_XML),
+        ('setup.py', UPSTREAM_SETUP),
+    ):
         (source_space / name / file).write_text(text.format(name))
 
 
@@ -50,15 +54,28 @@ def run(command: str, cwd: Path, setup: str = '', timeout_s: float = 300.0) -> s
 
     Raises AssertionError with the output where the command fails.
     """
-    own = ('CMAKE_PREFIX_PATH', 'PYTHONPATH', 'ROS_PACKAGE_PATH', 'PKG_CONFIG_PATH',
-           'LD_LIBRARY_PATH')
+    own = (
+        'CMAKE_PREFIX_PATH',
+        'PYTHONPATH',
+        'ROS_PACKAGE_PATH',
+        'PKG_CONFIG_PATH',
+        'LD_LIBRARY_PATH',
+    )
     env = {name: value for name, value in os.environ.items() if name not in own}
     # Python is all that these tests look at: headers and Lisp for it would take most of the time
     env['ROS_LANG_DISABLE'] = 'gencpp:genlisp:geneus:gennodejs'
-    script = 'set -e; {} {}'.format('source "{}";'.format(setup) if setup else _ros_setup(),
-                                    command)
-    result = subprocess.run(['bash', '-c', script], cwd=str(cwd), env=env, stdout=subprocess.PIPE,
-                            stderr=subprocess.STDOUT, timeout=timeout_s, check=False)
+    script = 'set -e; {} {}'.format(
+        'source "{}";'.format(setup) if setup else _ros_setup(), command
+    )
+    result = subprocess.run(
+        ['bash', '-c', script],
+        cwd=str(cwd),
+        env=env,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=timeout_s,
+        check=False,
+    )
     output = result.stdout.decode(errors='replace')
     assert result.returncode == 0, '{}\n{}'.format(command, output[-6000:])
     return output

@@ -1,4 +1,5 @@
 """What axe-core finds wrong with the page that a browser shows, in each of its looks."""
+
 import importlib.util
 import os
 
@@ -8,19 +9,21 @@ PACKAGE = 'axe_playwright_python'  # of which its axe.min.js alone is used
 CONTRAST = ['color-contrast']
 # the page's theme, what the system prefers, and the rules that are asked: None for all
 LOOKS = [('light', 'dark', None), ('dark', 'light', CONTRAST), ('auto', 'dark', CONTRAST)]
-RUN = '''
+RUN = """
 const [rules, done] = arguments;
 const only = rules ? { runOnly: { type: "rule", values: rules } } : {};
 axe.run(document, { ...only, resultTypes: ["violations"] }).then(({ violations }) => (
   done(violations.flatMap(({ id, nodes }) => nodes.map(({ html, target, any, all, none }) => (
     id + ": " + target.join(" ") + " " + html.slice(0, 160) + " "
     + [...any, ...all, ...none].map(({ message }) => message).join("; ")))))),
-(err) => done([String(err)]));'''
-THEME = '''
+(err) => done([String(err)]));"""
+THEME = """
 document.documentElement.dataset.theme = arguments[0];
-return getComputedStyle(document.documentElement).colorScheme;'''
-RESTS = 'return document.getAnimations().every((each) => each.playState !== "running"' \
+return getComputedStyle(document.documentElement).colorScheme;"""
+RESTS = (
+    'return document.getAnimations().every((each) => each.playState !== "running"'
     ' || each.effect.getTiming().iterations === Infinity)'
+)
 
 
 def violations(browser):
@@ -32,14 +35,22 @@ def violations(browser):
     found = []
     try:
         for theme, system, rules in LOOKS:
-            browser.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {
-                'features': [{'name': 'prefers-color-scheme', 'value': system},
-                             {'name': 'prefers-reduced-motion', 'value': 'reduce'}]})
+            browser.driver.execute_cdp_cmd(
+                'Emulation.setEmulatedMedia',
+                {
+                    'features': [
+                        {'name': 'prefers-color-scheme', 'value': system},
+                        {'name': 'prefers-reduced-motion', 'value': 'reduce'},
+                    ]
+                },
+            )
             wanted = system if theme == 'auto' else theme
             assert browser.run(THEME, theme) == wanted, 'the page follows neither'
             wait_for(lambda: browser.run(RESTS))
-            found += ['{} ({}): {}'.format(theme, system, line)
-                      for line in browser.driver.execute_async_script(RUN, rules)]
+            found += [
+                '{} ({}): {}'.format(theme, system, line)
+                for line in browser.driver.execute_async_script(RUN, rules)
+            ]
     finally:
         browser.driver.execute_cdp_cmd('Emulation.setEmulatedMedia', {'features': []})
         browser.run(THEME, chosen)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """After SIGINT or SIGTERM the arm is stowed behind `preempted`, by topics and actions that work."""
+
 import json
 import signal
 import sys
@@ -19,7 +20,7 @@ from smach_oracle.msg import OracleEvent
 
 # the limit of what the states behind a preempt may take, far more than they need
 LIMIT_S = 8.0
-TASK = '''
+TASK = """
 import sys, time, actionlib, rospy, smach, smach_ros
 from actionlib.msg import TestAction, TestGoal
 from std_msgs.msg import String
@@ -69,7 +70,7 @@ if how == 'in_a_thread':
     runner.join()
 else:
     run()
-'''
+"""
 
 
 class AfterPreemptTest(unittest.TestCase):
@@ -78,8 +79,9 @@ class AfterPreemptTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
         self.heard: List[str] = []
-        subscriber = rospy.Subscriber('/arm', String,
-                                      lambda message: self.heard.append(message.data))
+        subscriber = rospy.Subscriber(
+            '/arm', String, lambda message: self.heard.append(message.data)
+        )
         self.addCleanup(subscriber.unregister)
         self.goals: List[int] = []
         self.server = actionlib.SimpleActionServer('/stow', TestAction, self.stow, auto_start=False)
@@ -95,8 +97,15 @@ class AfterPreemptTest(unittest.TestCase):
         given: Dict[str, float] = {'deadline_s': 1.0}
         if after_preempt_s is not None:
             given['after_preempt_s'] = after_preempt_s
-        task = oracle_run(self, '--config', script(self, json.dumps(given), 'oracle.yaml'),
-                          '--record', self.bags, script(self, TASK), how)
+        task = oracle_run(
+            self,
+            '--config',
+            script(self, json.dumps(given), 'oracle.yaml'),
+            '--record',
+            self.bags,
+            script(self, TASK),
+            how,
+        )
         self.assertTrue(task.says('THERE'), task.output())
         return task
 
@@ -108,9 +117,8 @@ class AfterPreemptTest(unittest.TestCase):
         self.assertIn('RESULT 7 False', task.output())
         self.assertEqual(task.output().count('THERE'), 1, 'no other trial has begun')
         self.assertIn('OUTCOME stowed', task.output())
-        events, = recorded_events(self.bags)
-        self.assertEqual((events[-1].kind, events[-1].outcome),
-                         (OracleEvent.TRIAL_END, 'stowed'))
+        (events,) = recorded_events(self.bags)
+        self.assertEqual((events[-1].kind, events[-1].outcome), (OracleEvent.TRIAL_END, 'stowed'))
 
     def test_a_machine_in_the_main_thread_stows_after_sigint(self) -> None:
         self.check_stowed('', signal.SIGINT)
@@ -160,5 +168,6 @@ class AfterPreemptTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('after_preempt')
     rostest.rosrun('smach_oracle', 'after_preempt', AfterPreemptTest, sys.argv)

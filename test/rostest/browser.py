@@ -1,4 +1,5 @@
 """A headless Chromium for tests of web pages, with a profile of its own."""
+
 import contextlib
 import os
 import shutil
@@ -22,14 +23,24 @@ from urllib3.exceptions import MaxRetryError
 from waiting import wait_for
 
 FLAGS = [
-    '--headless=new', '--no-sandbox', '--disable-gpu', '--no-first-run',
-    '--disable-background-networking', '--disable-component-update', '--disable-sync',
-    '--disable-dev-shm-usage', '--disable-extensions', '--mute-audio',
-    '--disable-background-timer-throttling'
+    '--headless=new',
+    '--no-sandbox',
+    '--disable-gpu',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+    '--disable-dev-shm-usage',
+    '--disable-extensions',
+    '--mute-audio',
+    '--disable-background-timer-throttling',
 ]
 # what is about to be replaced, moved, or uncovered
-NOT_YET = (StaleElementReferenceException, ElementClickInterceptedException,
-           ElementNotInteractableException)
+NOT_YET = (
+    StaleElementReferenceException,
+    ElementClickInterceptedException,
+    ElementNotInteractableException,
+)
 
 
 class Browser:
@@ -39,13 +50,15 @@ class Browser:
         self._profile = tempfile.mkdtemp(prefix='console-browser-')
         options = Options()
         for flag in FLAGS + [
-                '--user-data-dir=' + self._profile, '--window-size={},{}'.format(width, height)
+            '--user-data-dir=' + self._profile,
+            '--window-size={},{}'.format(width, height),
         ]:
             options.add_argument(flag)
         options.accept_insecure_certs = True  # such as tests make themselves
         options.set_capability('goog:loggingPrefs', {'browser': 'ALL'})
-        self.driver = webdriver.Chrome(service=Service(shutil.which('chromedriver')),
-                                       options=options)
+        self.driver = webdriver.Chrome(
+            service=Service(shutil.which('chromedriver')), options=options
+        )
         self.driver.set_page_load_timeout(30)
 
     def close(self):
@@ -64,15 +77,16 @@ class Browser:
         """The first element that is there and shown; raises where none comes in time."""
         found = wait_for(lambda: self._shown(selector), limit_s)
         if not found:
-            raise AssertionError('nothing on the page for {!r}; it says:\n{}'.format(
-                selector,
-                self.text()[:2000]))
+            raise AssertionError(
+                'nothing on the page for {!r}; it says:\n{}'.format(selector, self.text()[:2000])
+            )
         return found
 
     def click(self, selector, limit_s=40.0):
         """Click what is there, shown and enabled; the page may replace, move or cover it in
         between.
         """
+
         def clicked():
             try:
                 element = self._shown(selector)
@@ -83,10 +97,11 @@ class Browser:
                 return self._refused() == before
             except NOT_YET:
                 return False
+
         if not wait_for(clicked, limit_s):
-            raise AssertionError('{!r} cannot be clicked; the page says:\n{}'.format(
-                selector,
-                self.text()[:2000]))
+            raise AssertionError(
+                '{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000])
+            )
 
     def settled(self, element):
         """Whether a click on an element would be taken as meant: the page refuses one that comes
@@ -95,24 +110,29 @@ class Browser:
         return self.run(
             'const it = arguments[0].closest("[data-deliberate]");'
             'if (!it || it.hasAttribute("data-settled")) return true;'
-            'it.scrollIntoView({ block: "center" }); return false', element)
+            'it.scrollIntoView({ block: "center" }); return false',
+            element,
+        )
 
     def _refused(self):
         return self.run('return document.body.dataset.refused')
 
     def press(self, key):
         """A key, to whatever has the focus, once the page takes it as meant."""
+
         def pressed():
             before = self._refused()
             ActionChains(self.driver, duration=0).send_keys(key).perform()
             return self._refused() == before
+
         if not wait_for(pressed):
-            raise AssertionError('{!r} is refused; the page says:\n{}'.format(
-                key,
-                self.text()[:2000]))
+            raise AssertionError(
+                '{!r} is refused; the page says:\n{}'.format(key, self.text()[:2000])
+            )
 
     def hold(self, key):
         """Press a key and hold it, once the page takes it as meant."""
+
         def held():
             before = self._refused()
             ActionChains(self.driver, duration=0).key_down(key).perform()
@@ -120,10 +140,11 @@ class Browser:
                 return True
             ActionChains(self.driver, duration=0).key_up(key).perform()
             return False
+
         if not wait_for(held):
-            raise AssertionError('{!r} cannot be held; the page says:\n{}'.format(
-                key,
-                self.text()[:2000]))
+            raise AssertionError(
+                '{!r} cannot be held; the page says:\n{}'.format(key, self.text()[:2000])
+            )
 
     def tap(self, selector):
         """With a finger, in the middle of what is there and shown, once the page takes it as
@@ -131,9 +152,9 @@ class Browser:
         """
         self.run('arguments[0].scrollIntoView({ block: "center" })', self.find(selector))
         if not wait_for(lambda: self._tapped(selector)):
-            raise AssertionError('{!r} takes no tap; the page says:\n{}'.format(
-                selector,
-                self.text()[:2000]))
+            raise AssertionError(
+                '{!r} takes no tap; the page says:\n{}'.format(selector, self.text()[:2000])
+            )
 
     def _tapped(self, selector):
         element, before = self.find(selector), self._refused()
@@ -144,10 +165,13 @@ class Browser:
             'window.addEventListener("click", () => { window.tapped = true },'
             '{ capture: true, once: true });'
             'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
-            'return [x + width / 2, y + height / 2]', element)
+            'return [x + width / 2, y + height / 2]',
+            element,
+        )
         for kind, points in (('touchStart', [{'x': x, 'y': y}]), ('touchEnd', [])):
-            self.driver.execute_cdp_cmd('Input.dispatchTouchEvent',
-                                        {'type': kind, 'touchPoints': points})
+            self.driver.execute_cdp_cmd(
+                'Input.dispatchTouchEvent', {'type': kind, 'touchPoints': points}
+            )
         wait_for(lambda: self.run('return window.tapped') or self._refused() != before)
         return self._refused() == before
 
@@ -172,31 +196,42 @@ class Browser:
         connections.
         """
         return [
-            entry['message'] for entry in self.driver.get_log('browser')
-            if entry['level'] == 'SEVERE' and 'net::ERR_' not in entry['message']
+            entry['message']
+            for entry in self.driver.get_log('browser')
+            if entry['level'] == 'SEVERE'
+            and 'net::ERR_' not in entry['message']
             and 'WebSocket connection' not in entry['message']
         ]
 
     def screenshot(self, path, width=None, height=None):
         """A picture of the page, at another size where given."""
         if width:
-            self.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
-                'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500})
+            self.driver.execute_cdp_cmd(
+                'Emulation.setDeviceMetricsOverride',
+                {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500},
+            )
             time.sleep(0.5)  # for the picture alone: nothing is proven by it
         self.driver.save_screenshot(path)
 
     def _shown(self, selector):
         try:
-            return next((element for element in self.driver.find_elements(By.CSS_SELECTOR, selector)
-                         if element.is_displayed()), None)
+            return next(
+                (
+                    element
+                    for element in self.driver.find_elements(By.CSS_SELECTOR, selector)
+                    if element.is_displayed()
+                ),
+                None,
+            )
         except StaleElementReferenceException:
             return None
 
 
 def _below(process):
     """The processes that a process has started, and those that they have."""
-    listed = subprocess.run(['ps', '-e', '-o', 'pid=,ppid='], stdout=subprocess.PIPE,
-                            check=True).stdout.decode()
+    listed = subprocess.run(
+        ['ps', '-e', '-o', 'pid=,ppid='], stdout=subprocess.PIPE, check=True
+    ).stdout.decode()
     pairs = [tuple(map(int, line.split())) for line in listed.splitlines()]
     found = []
     new = [pid for pid, parent in pairs if parent == process]

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The console for those who use no mouse, or do not see it: in a real browser, with axe-core."""
+
 import os
 import sys
 import unittest
@@ -21,7 +22,7 @@ DETECT, PLACE = ('.choice.goto[data-name={}]'.format(state) for state in ('DETEC
 FOCUSED = 'return document.activeElement.matches(arguments[0])'
 TOLD = 'return document.getElementById("announcer").textContent'
 # as soon as `n` would open another question than before: no wall clock has a part in it
-N_AT_ONCE = '''
+N_AT_ONCE = """
 const done = arguments[0];
 const pending = () => document.querySelector(".question-row.pending");
 const press = (key) => document.body.dispatchEvent(
@@ -33,13 +34,12 @@ const look = () => {
   press("Escape");
   done([opened, Boolean(document.querySelector(".detail"))]);
 };
-look();'''
+look();"""
 VIEWBOX = 'return document.querySelector(".machines .graph").getAttribute("viewBox")'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Access(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.audited = []
@@ -51,8 +51,9 @@ class Access(ConsolePage, unittest.TestCase):
         self.assertTrue(
             wait_for(lambda: self.browser.run(FOCUSED, selector)),
             '{}: the focus is on {}'.format(
-                selector,
-                self.browser.run('return document.activeElement.outerHTML.slice(0, 300)')))
+                selector, self.browser.run('return document.activeElement.outerHTML.slice(0, 300)')
+            ),
+        )
 
     def keys(self, *keys):
         """To whatever has the focus."""
@@ -87,8 +88,10 @@ class Access(ConsolePage, unittest.TestCase):
         self.assert_accessible('whether to give up')
         self.keys(Keys.ENTER)
         self.focus_is_on('.choice.give_up[data-name=""]')
-        browser.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
-            'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True})
+        browser.driver.execute_cdp_cmd(
+            'Emulation.setDeviceMetricsOverride',
+            {'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True},
+        )
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})
         self.assertTrue(wait_for(lambda: browser.settled(browser.find(DETECT))))
         self.assert_accessible('a question on a phone')
@@ -119,17 +122,24 @@ class Access(ConsolePage, unittest.TestCase):
         browser.click('.path[title=KITCHEN]')
         browser.find('.machines .state')
         self.assert_accessible('a machine')
-        for key, path in ((Keys.ARROW_DOWN, 'KITCHEN/FETCH'), (Keys.ARROW_DOWN, 'KITCHEN/FETCH'),
-                          (Keys.HOME, 'KITCHEN'), (Keys.ARROW_RIGHT, 'KITCHEN/FETCH'),
-                          (Keys.ARROW_LEFT, 'KITCHEN'), (Keys.END, 'KITCHEN/FETCH'),
-                          (Keys.ARROW_UP, 'KITCHEN'), (Keys.ARROW_DOWN, 'KITCHEN/FETCH')):
+        for key, path in (
+            (Keys.ARROW_DOWN, 'KITCHEN/FETCH'),
+            (Keys.ARROW_DOWN, 'KITCHEN/FETCH'),
+            (Keys.HOME, 'KITCHEN'),
+            (Keys.ARROW_RIGHT, 'KITCHEN/FETCH'),
+            (Keys.ARROW_LEFT, 'KITCHEN'),
+            (Keys.END, 'KITCHEN/FETCH'),
+            (Keys.ARROW_UP, 'KITCHEN'),
+            (Keys.ARROW_DOWN, 'KITCHEN/FETCH'),
+        ):
             self.keys(key)
             self.focus_is_on('.path[title="{}"]'.format(path))
         self.keys(Keys.ENTER)
         self.assertTrue(browser.says('KITCHEN/FETCH', '.machines h2'))
         self.focus_is_on('.path[title="KITCHEN/FETCH"][aria-selected=true][tabindex="0"]')
         self.assertEqual(
-            browser.run('return document.querySelectorAll(".path[tabindex=\\"0\\"]").length'), 1)
+            browser.run('return document.querySelectorAll(".path[tabindex=\\"0\\"]").length'), 1
+        )
 
     def test_5_a_drawing_moves_by_keys_and_a_list_says_the_same(self):
         browser = self.browser

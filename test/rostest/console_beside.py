@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A second console on one master takes another name, and the first one lives on."""
+
 import os
 import signal
 import socket
@@ -26,7 +27,6 @@ def served(port):
 
 
 class ConsoleBesideAnother(unittest.TestCase):
-
     def setUp(self):
         self.processes = []
 
@@ -45,8 +45,11 @@ class ConsoleBesideAnother(unittest.TestCase):
     @staticmethod
     def names(begin):
         _, _, services = rosgraph.Master('/test').getSystemState()
-        return {name.rsplit('/', 1)[0] for name, _ in services
-                if name.startswith(begin) and name.endswith('/get_loggers')}
+        return {
+            name.rsplit('/', 1)[0]
+            for name, _ in services
+            if name.startswith(begin) and name.endswith('/get_loggers')
+        }
 
     def test_two_consoles_run_side_by_side(self):
         rospy.set_param('/expert_console/cameras', {'/alpha': ['/beta']})
@@ -54,8 +57,10 @@ class ConsoleBesideAnother(unittest.TestCase):
         # as a person starts it, and as roslaunch does
         second = self.start()
         third = self.start('__name:=expert_console')
-        self.assertEqual(self.names('/expert_console'),
-                         {'/expert_console', '/expert_console_2', '/expert_console_3'})
+        self.assertEqual(
+            self.names('/expert_console'),
+            {'/expert_console', '/expert_console_2', '/expert_console_3'},
+        )
         self.assertEqual(rospy.get_param('/expert_console_3/cameras'), {'/alpha': ['/beta']})
         self.assertTrue(all(served(port) for port in (first, second, third)))
         self.assertEqual([process.poll() for process in self.processes], [None] * 3)
@@ -74,8 +79,9 @@ class ConsoleBesideAnother(unittest.TestCase):
                 file.write('import sys\nsys.modules["cv2"] = None\n')
             path = os.pathsep.join([folder, os.environ.get('PYTHONPATH', '')])
             with open(os.path.join(folder, 'log'), 'w') as log:
-                port = self.start('__name:=blind_console', env=dict(os.environ, PYTHONPATH=path),
-                                  stderr=log)
+                port = self.start(
+                    '__name:=blind_console', env=dict(os.environ, PYTHONPATH=path), stderr=log
+                )
             with urllib.request.urlopen('http://127.0.0.1:{}/'.format(port), timeout=20) as page:
                 self.assertIn('<html', page.read().decode())
             with open(log.name) as file:

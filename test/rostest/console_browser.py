@@ -2,6 +2,7 @@
 """The operator console in a real browser: real node, real master, a real machine under a real
 oracle.
 """
+
 import os
 import subprocess
 import sys
@@ -19,20 +20,20 @@ from smach_oracle.msg import ConsoleCommand, OracleEvent
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
 YOURS = 'It is yours.'
-UNKNOWN_SUCCESS = '''return import("/static/js/answering/state_choices.js").then(
+UNKNOWN_SUCCESS = """return import("/static/js/answering/state_choices.js").then(
 ({ stateLines }) => (
   stateLines({ state: "PICK", success: null, class: 0, visits: 0, missing: [], preconditions: [],
     blocked: "", repeats: [], runs_again: [], helped: [0, 0], container: "" },
-  { state: "PLACE", running: false }).map((line) => line ? line.textContent : "").join("")))'''
-NO_PLACE = '''return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
+  { state: "PLACE", running: false }).map((line) => line ? line.textContent : "").join("")))"""
+NO_PLACE = """return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
   const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));
   const view = new GraphView(() => {});
   view.set("/alpha", { path: "A", oracle: "O", drawn: true, size: [9, 9], states, outcomes: [],
     edges: [] });
   return view.root.querySelectorAll(".state").length;
-})'''
+})"""
 
-BARS = '''return import("/static/js/questions/claim_bar.js").then(({ ClaimBar }) => {
+BARS = """return import("/static/js/questions/claim_bar.js").then(({ ClaimBar }) => {
   const bar = new ClaimBar({ leave() {}, claim() {}, takeOver() {} });
   const now = { holder: "ann", status: "claimed", interface: "" };
   return [false, true].map((mayAnswer) => {
@@ -40,12 +41,11 @@ BARS = '''return import("/static/js/questions/claim_bar.js").then(({ ClaimBar })
       problem: "", mayAnswer });
     return bar.root.textContent;
   });
-})'''
+})"""
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class ConsoleInABrowser(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.bags = cls.make_folder()
@@ -66,31 +66,47 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
     def test_1_a_question_is_shown_whole_and_answered_in_two_actions(self):
         browser = self.browser
         browser.find(QUESTION)
-        self.assertTrue(wait_for(lambda: browser.driver.title.startswith('(1)')),
-                        'the title says so')
+        self.assertTrue(
+            wait_for(lambda: browser.driver.title.startswith('(1)')), 'the title says so'
+        )
         browser.click(QUESTION)
         self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
-        for told in ('raised an exception', '<b>mug</b>', 'window.hacked', 'missing: grasp',
-                     'assist', '"mug"'):
+        for told in (
+            'raised an exception',
+            '<b>mug</b>',
+            'window.hacked',
+            'missing: grasp',
+            'assist',
+            '"mug"',
+        ):
             self.assertIn(told, browser.text())
         self.assertTrue(browser.says('DETECT unknown'), 'the preconditions are looked at')
         self.assertIsNone(
             browser.run('return window.hacked || document.querySelector(".failure b") || null'),
-            'what a robot says is text')
+            'what a robot says is text',
+        )
         self.assertTrue(
-            wait_for(lambda: browser.run(
-                'return document.getElementById("/alpha/KITCHEN/FETCH/PICK")'
-                '.classList.contains("failed")'
-            )), 'the failed state is marked in its graph')
+            wait_for(
+                lambda: browser.run(
+                    'return document.getElementById("/alpha/KITCHEN/FETCH/PICK")'
+                    '.classList.contains("failed")'
+                )
+            ),
+            'the failed state is marked in its graph',
+        )
         browser.find('[data-output=grasp]').send_keys('{"width_m": 0.04}')
         browser.click('.choice.supersede[data-name=succeeded]')
-        self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'),
-                        'what happened next')
         self.assertTrue(
-            wait_for(lambda: 'succeeded' in self.outcomes(OracleEvent.TRIAL_END, 'outcome')))
+            browser.says('PICK counts as having ended with succeeded.', '.follow-up'),
+            'what happened next',
+        )
+        self.assertTrue(
+            wait_for(lambda: 'succeeded' in self.outcomes(OracleEvent.TRIAL_END, 'outcome'))
+        )
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[0], 'operator')
         self.assertTrue(
-            wait_for(lambda: 'answer' in [told.command for told in self.audited if told.ok]))
+            wait_for(lambda: 'answer' in [told.command for told in self.audited if told.ok])
+        )
         self.assertEqual(browser.errors(), [])
 
     def test_2_a_page_comes_back_with_its_claim_after_the_server_was_restarted(self):
@@ -107,7 +123,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('live', '#status', 40.0))
         self.assertTrue(browser.says(YOURS, limit_s=40.0), 'the claim is kept')
         self.assertEqual(
-            browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost')
+            browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost'
+        )
 
     def test_3_a_second_console_takes_over_and_answers(self):
         browser = self.browser
@@ -122,7 +139,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         self.assertTrue(browser.says('operator works on it.'))
         self.assertFalse(
-            browser.find('.choice.goto').is_enabled(), 'nobody answers what another one holds')
+            browser.find('.choice.goto').is_enabled(), 'nobody answers what another one holds'
+        )
         browser.click('[data-action=take-over]')
         self.assertTrue(browser.says(YOURS))
         first, second = browser.driver.window_handles
@@ -131,30 +149,39 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.driver.switch_to.window(second)
         browser.find('.stage').click()
         self.assertTrue(
-            wait_for(lambda: browser.settled(browser.find('.choice.goto[data-name=PLACE]'))))
+            wait_for(lambda: browser.settled(browser.find('.choice.goto[data-name=PLACE]')))
+        )
         browser.find('body').send_keys('3')
         self.assertTrue(browser.says('The machine goes to PLACE.', '.follow-up'))
         self.assertEqual(self.outcomes(OracleEvent.QUERY_ANSWERED, 'by')[-1], 'bob')
-        self.assertIn(('take_over', 'bob', True),
-                      [(told.command, told.expert, told.ok) for told in self.audited])
+        self.assertIn(
+            ('take_over', 'bob', True),
+            [(told.command, told.expert, told.ok) for told in self.audited],
+        )
 
     def test_3_on_a_phone_two_taps_answer_and_what_happens_next_is_at_the_top(self):
         browser = self.browser
         browser.click('.follow-up [data-action=back]')
-        browser.driver.execute_cdp_cmd('Emulation.setDeviceMetricsOverride', {
-            'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True})
+        browser.driver.execute_cdp_cmd(
+            'Emulation.setDeviceMetricsOverride',
+            {'width': 390, 'height': 844, 'deviceScaleFactor': 1, 'mobile': True},
+        )
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})
         browser.tap(QUESTION)
         self.assertTrue(browser.says(YOURS))
-        self.assertTrue(browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'),
-                        'how often it helped before')
         self.assertTrue(
-            wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled()))
+            browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'),
+            'how often it helped before',
+        )
+        self.assertTrue(
+            wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled())
+        )
         browser.tap('.choice.goto[data-name=PLACE]')
         self.assertTrue(browser.says('The trial ended with succeeded.', '.follow-up'))
         top, bottom = browser.run(
             'const box = document.querySelector(".follow-up").getBoundingClientRect();'
-            'return [box.top, box.bottom]')
+            'return [box.top, box.bottom]'
+        )
         self.assertTrue(0 < top < bottom < 844, (top, bottom))
 
     def test_4_machines_and_trials_are_shown(self):
@@ -179,8 +206,9 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertIn('as a viewer', viewers)
         self.assertEqual(operators, 'ann works on it. Take it over', 'a role may change')
         browser.find('.timeline .mark')
-        self.assertTrue(wait_for(lambda: not browser.text('.trial-detail p').startswith('0 s')),
-                        'it runs on')
+        self.assertTrue(
+            wait_for(lambda: not browser.text('.trial-detail p').startswith('0 s')), 'it runs on'
+        )
         self.assertEqual(browser.errors(), [])
 
     def test_5_every_command_about_a_trial_is_in_its_bag(self):
@@ -194,6 +222,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
                             for _, message, _ in bag.read_messages('/alpha/expert_query/audit')
                         ]
             return commands
+
         self.assertTrue(wait_for(lambda: 'take_over' in told()))
         self.assertEqual(told()[:2], ['claim', 'answer'])
 
@@ -220,21 +249,24 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.sign_in(self.token_of('viewer', tokens))
         self.assertTrue(browser.says('(viewer)', '#person'), browser.text())
         browser.driver.switch_to.window(second)
-        self.assertTrue(browser.says('bob (viewer)'),
-                        'the other page is signed in, too, once it is looked at')
+        self.assertTrue(
+            browser.says('bob (viewer)'), 'the other page is signed in, too, once it is looked at'
+        )
         self.assert_accessible('a viewer')
         browser.click('#person')
         browser.click('dialog button')
         for page in (second, first):
             browser.driver.switch_to.window(page)
-            self.assertTrue(browser.says('Sign in', 'form h2'),
-                            'to sign out ends all pages of this browser')
             self.assertTrue(
-                browser.says('You have signed out' +
-                             (' on another page' if page == first else '.')))
+                browser.says('Sign in', 'form h2'), 'to sign out ends all pages of this browser'
+            )
+            self.assertTrue(
+                browser.says('You have signed out' + (' on another page' if page == first else '.'))
+            )
             self.assert_accessible('the sign-in')
-            self.assertEqual(browser.text('#nav'), '',
-                             'nothing leads back to what was shown before')
+            self.assertEqual(
+                browser.text('#nav'), '', 'nothing leads back to what was shown before'
+            )
         self.sign_in(self.token_of('viewer', tokens))
         browser.click('#tab-questions')
         browser.click(QUESTION)
@@ -244,15 +276,31 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
     def test_7_encrypted_the_page_and_its_socket_work_and_the_cookie_is_for_nothing_else(self):
         browser, tokens = self.browser, os.path.join(self.bags, 'tokens')
         certificate, key = (os.path.join(self.bags, name) for name in ('own.pem', 'own.key'))
-        subprocess.run([
-            'openssl', 'req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
-            '/CN=localhost', '-keyout', key, '-out', certificate
-        ], check=True, stderr=subprocess.PIPE)
+        subprocess.run(
+            [
+                'openssl',
+                'req',
+                '-x509',
+                '-newkey',
+                'rsa:2048',
+                '-nodes',
+                '-days',
+                '2',
+                '-subj',
+                '/CN=localhost',
+                '-keyout',
+                key,
+                '-out',
+                certificate,
+            ],
+            check=True,
+            stderr=subprocess.PIPE,
+        )
         type(self).console.stop()
         browser.driver.delete_all_cookies()
-        type(self).console = self.start_console('_token_file:=' + tokens,
-                                                '_certificate:=' + certificate,
-                                                '_private_key:=' + key)
+        type(self).console = self.start_console(
+            '_token_file:=' + tokens, '_certificate:=' + certificate, '_private_key:=' + key
+        )
         self.assertTrue(wait_for(self.page_is_served, 40.0))
         browser.driver.get(self.page.replace('http', 'https'))
         browser.find('#token', 40.0).send_keys(self.token_of('operator', tokens))
@@ -260,35 +308,46 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('live', '#status'), 'its socket is encrypted as well')
         self.assertEqual(
             browser.run(
-                'return fetch("session").then((answer) => answer.json()).then((it) => it.role)'),
-            'operator')
-        cookie, = [
+                'return fetch("session").then((answer) => answer.json()).then((it) => it.role)'
+            ),
+            'operator',
+        )
+        (cookie,) = [
             each for each in browser.driver.get_cookies() if each['name'].startswith('console_')
         ]
-        self.assertEqual((cookie['secure'], cookie['httpOnly'], cookie['sameSite']),
-                         (True, True, 'Strict'))
+        self.assertEqual(
+            (cookie['secure'], cookie['httpOnly'], cookie['sameSite']), (True, True, 'Strict')
+        )
         self.assertEqual(browser.run('return document.cookie'), '', 'no script can read it')
 
     def test_8_the_page_runs_nothing_that_is_not_its_own(self):
         browser = self.browser
-        image = "'<img src=x onerror=\"window.hacked = 1\">'"
+        image = '\'<img src=x onerror="window.hacked = 1">\''
         for attack in (
-                'document.body.insertAdjacentHTML("beforeend", {})'.format(image),
-                'document.body.innerHTML = ' + image, 'eval("window.hacked = 1")',
-                'new Function("window.hacked = 1")()', 'setTimeout("window.hacked = 1")',
-                'const it = document.createElement("script"); it.append("window.hacked = 1");'
-                'document.body.append(it)', 'location.href = "javascript:window.hacked = 1"',
-                'const it = document.createElement("b"); it.setAttribute("onclick", '
-                '"window.hacked = 1");'
-                'document.body.append(it); it.click()'):
+            'document.body.insertAdjacentHTML("beforeend", {})'.format(image),
+            'document.body.innerHTML = ' + image,
+            'eval("window.hacked = 1")',
+            'new Function("window.hacked = 1")()',
+            'setTimeout("window.hacked = 1")',
+            'const it = document.createElement("script"); it.append("window.hacked = 1");'
+            'document.body.append(it)',
+            'location.href = "javascript:window.hacked = 1"',
+            'const it = document.createElement("b"); it.setAttribute("onclick", '
+            '"window.hacked = 1");'
+            'document.body.append(it); it.click()',
+        ):
             browser.run(  # not at once: the policy does not bind what a test runs itself
-                'return new Promise((done) => setTimeout(() => {{ setTimeout(done, 100); {} }}))'.
-                format(attack))
+                'return new Promise((done) => setTimeout(() => {{ '
+                'setTimeout(done, 100); {} }}))'.format(attack)
+            )
             self.assertIsNone(browser.run('return window.hacked'), attack)
-        browser.run('return fetch("https://127.0.0.1:{}/session").catch(() => null)'.format(
-            self.port))
-        self.assertTrue(any('connect-src' in error for error in browser.errors()),
-                        'and it speaks to nobody else')
+        browser.run(
+            'return fetch("https://127.0.0.1:{}/session").catch(() => null)'.format(self.port)
+        )
+        self.assertTrue(
+            any('connect-src' in error for error in browser.errors()),
+            'and it speaks to nobody else',
+        )
 
 
 if __name__ == '__main__':

@@ -2,6 +2,7 @@
 """Whose camera a question shows, and how old its images are, in a real browser: /alpha has none of
 its own at first, and a latched image an hour old.
 """
+
 import os
 import sys
 import threading
@@ -20,12 +21,15 @@ from waiting import wait_for
 from smach_oracle.ros.images import colour_image
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
-FOREIGN, LATCHED, OWN = ('/beta/camera/image_raw', '/alpha/latched/image_raw',
-                         '/hall/camera/image_raw')
+FOREIGN, LATCHED, OWN = (
+    '/beta/camera/image_raw',
+    '/alpha/latched/image_raw',
+    '/hall/camera/image_raw',
+)
 HOUR_S = 3600.0
-TOPICS = '''return [...document.querySelectorAll(
+TOPICS = """return [...document.querySelectorAll(
   ".situation-camera option, .situation-camera .view")].map((each) => (
-  each.value || each.dataset.topic))'''
+  each.value || each.dataset.topic))"""
 
 
 def picture(stamp, level=90):
@@ -34,7 +38,6 @@ def picture(stamp, level=90):
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Cameras(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.foreign = rospy.Publisher(FOREIGN, Image, queue_size=1)
@@ -65,7 +68,7 @@ class Cameras(ConsolePage, unittest.TestCase):
         browser = self.browser
         latched = rospy.Publisher(LATCHED, Image, queue_size=1, latch=True)
         latched.publish(picture(rospy.Time.now() - rospy.Duration(HOUR_S)))
-        self.assertTrue(wait_for(lambda: self.shown() == {LATCHED}), 'it bears the robot\'s name')
+        self.assertTrue(wait_for(lambda: self.shown() == {LATCHED}), "it bears the robot's name")
         browser.click('[data-action=live-camera]')
         self.assertTrue(browser.says('1:0', '.pane.now .image-age.old'), browser.text('.pane.now'))
         self.assertIn('h old', browser.text('.pane.now .image-age'))
@@ -76,12 +79,22 @@ class Cameras(ConsolePage, unittest.TestCase):
         rospy.set_param('/alpha/failure_cameras', [OWN])
         self.assertTrue(wait_for(lambda: OWN in self.shown()))
         self.assertNotIn(FOREIGN, self.shown())
-        self.assertTrue(wait_for(lambda: browser.run(
-            'const choice = document.querySelector(".situation-camera select");'
-            'choice.value = arguments[0];'
-            'choice.dispatchEvent(new Event("change")); return choice.value', OWN) == OWN))
-        self.assertTrue(browser.says('s old', '.pane.now .image-age:not(.old)'),
-                        browser.text('.pane.now'))
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    browser.run(
+                        'const choice = document.querySelector(".situation-camera select");'
+                        'choice.value = arguments[0];'
+                        'choice.dispatchEvent(new Event("change")); return choice.value',
+                        OWN,
+                    )
+                    == OWN
+                )
+            )
+        )
+        self.assertTrue(
+            browser.says('s old', '.pane.now .image-age:not(.old)'), browser.text('.pane.now')
+        )
         self.assertEqual(browser.errors(), [])
 
     def test_4_the_setting_goes_before_all_else(self):

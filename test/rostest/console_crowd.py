@@ -2,6 +2,7 @@
 """A crowd without a token stops nobody who has one: 1,100 idle connections at the usual limit on
 files, and wrong tokens from many addresses. A person signs in, claims and answers among them.
 """
+
 import http.client
 import json
 import os
@@ -28,7 +29,6 @@ GO_TO_PLACE = '.choice.goto[data-name=PLACE]'
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Crowd(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
@@ -41,15 +41,22 @@ class Crowd(ConsolePage, unittest.TestCase):
 
     @classmethod
     def start_console(cls, *more):
-        return Node('prlimit', '--nofile={0}:{0}'.format(USUAL_FILES),
-                    find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
-                    '__name:=expert_console', '_token_file:=' + cls.tokens, *more)
+        return Node(
+            'prlimit',
+            '--nofile={0}:{0}'.format(USUAL_FILES),
+            find_node('smach_oracle', 'expert_console')[0],
+            '_port:={}'.format(cls.port),
+            '__name:=expert_console',
+            '_token_file:=' + cls.tokens,
+            *more,
+        )
 
     def crowd(self):
         """Open them all; those that the console closes are let go of."""
         for number in range(CROWD):
-            line = socket.create_connection(('127.0.0.1', self.port), 20.0,
-                                            (ADDRESSES[number % len(ADDRESSES)], 0))
+            line = socket.create_connection(
+                ('127.0.0.1', self.port), 20.0, (ADDRESSES[number % len(ADDRESSES)], 0)
+            )
             self.addCleanup(line.close)
 
     def guess(self, address):
@@ -59,8 +66,11 @@ class Crowd(ConsolePage, unittest.TestCase):
         line.request('GET', '/session')
         answer = line.getresponse()
         xsrf = json.loads(answer.read())['xsrf']
-        headers = {'Cookie': answer.getheader('Set-Cookie').split(';')[0], 'X-Xsrf': xsrf,
-                   'Origin': 'http://127.0.0.1:{}'.format(self.port)}
+        headers = {
+            'Cookie': answer.getheader('Set-Cookie').split(';')[0],
+            'X-Xsrf': xsrf,
+            'Origin': 'http://127.0.0.1:{}'.format(self.port),
+        }
         headers['Host'] = '127.0.0.1:{}'.format(self.port)
         codes = set()
         for _ in range(4):
@@ -83,8 +93,15 @@ class Crowd(ConsolePage, unittest.TestCase):
         browser.find(GO_TO_PLACE)
         self.crowd()
         browser.click(GO_TO_PLACE)
-        self.assertTrue(wait_for(lambda: ('PLACE', OracleEvent.JUMP) in [
-            (event.target, event.kind) for event in self.events]), browser.text())
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    ('PLACE', OracleEvent.JUMP)
+                    in [(event.target, event.kind) for event in self.events]
+                )
+            ),
+            browser.text(),
+        )
         self.assertEqual(browser.errors(), [])
 
     def token(self):

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A machine that was killed, on the console in a real browser: looked at, changed, gone on."""
+
 import os
 import signal
 import sys
@@ -20,7 +21,7 @@ from smach_oracle.store.store_file import StoreFile
 if WITH_BROWSER:
     from browser import Browser
     from selenium.webdriver.support.ui import Select
-SCRIPT = '''
+SCRIPT = """
 import os, sys, time, smach
 class Pick(smach.State):
     def __init__(self):
@@ -44,14 +45,21 @@ with sm:
     smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
     smach.StateMachine.add('PLACE', Place(), {'succeeded': 'succeeded'})
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 DOWN = '.down-machine[data-machine=TASK]'
-GO_ON, CHANGE, DROP = ('{} [data-action={}-stored]'.format(DOWN, each)
-                       for each in ('goto', 'edit', 'drop'))
-STATE, KEY, JSON = (DOWN + ' ' + each for each in (
-    '[aria-label^="State at"]', '[aria-label^="Userdata"]', '[aria-label^="New value"]'))
+GO_ON, CHANGE, DROP = (
+    '{} [data-action={}-stored]'.format(DOWN, each) for each in ('goto', 'edit', 'drop')
+)
+STATE, KEY, JSON = (
+    DOWN + ' ' + each
+    for each in (
+        '[aria-label^="State at"]',
+        '[aria-label^="Userdata"]',
+        '[aria-label^="New value"]',
+    )
+)
 # a command of this browser without its page, and the reply to it
-COMMAND = '''
+COMMAND = """
 const [command, done] = arguments;
 fetch("session").then((answer) => answer.json()).then(({ xsrf }) => {
   const socket = new WebSocket(location.origin.replace("http", "ws") + "/socket");
@@ -62,18 +70,18 @@ fetch("session").then((answer) => answer.json()).then(({ xsrf }) => {
     if (re === 1) post(2, command);
     if (re === 2) { socket.close(); done(message); }
   };
-});'''
+});"""
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class DownTest(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.port = free_port()
         cls.folder = cls.make_folder()
         cls.store, cls.tokens, cls.done = (
-            os.path.join(cls.folder, name) for name in ('robot.db', 'tokens', 'done'))
+            os.path.join(cls.folder, name) for name in ('robot.db', 'tokens', 'done')
+        )
         cls.audited = []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         cls.console = cls.start_console('_stores:=' + cls.store, '_token_file:=' + cls.tokens)
@@ -89,8 +97,9 @@ class DownTest(ConsolePage, unittest.TestCase):
         cls.console.stop()
 
     def start(self):
-        return oracle_run(self, '--checkpoint', self.store, '--resume', script(self, SCRIPT),
-                          self.done)
+        return oracle_run(
+            self, '--checkpoint', self.store, '--resume', script(self, SCRIPT), self.done
+        )
 
     def kill(self, task):
         task.signal(signal.SIGKILL)
@@ -123,8 +132,9 @@ class DownTest(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('there is no such store', '.down-problem'))
         task = self.start()
         self.assertTrue(task.says('PICKS', 40.0), task.output())
-        self.assertTrue(wait_for(
-            lambda: not self.is_shown('.down-machines:not([hidden])'), 20.0), 'it lives')
+        self.assertTrue(
+            wait_for(lambda: not self.is_shown('.down-machines:not([hidden])'), 20.0), 'it lives'
+        )
         self.kill(task)
         told = browser.text(DOWN + ' summary')
         self.assertIn('TASK', told)
@@ -160,16 +170,28 @@ class DownTest(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('TASK/PLACE was next', DOWN + ' summary'))
         self.assert_accessible('a machine that is down')
         log = self.stored()[1]
-        self.assertEqual([line.what for line in log],
-                         ['trial 1: TASK: cup = "blue"', 'trial 1: go to PLACE'])
+        self.assertEqual(
+            [line.what for line in log], ['trial 1: TASK: cup = "blue"', 'trial 1: go to PLACE']
+        )
         self.assertTrue(all(line.who.startswith('eva (console, session ') for line in log), log)
-        self.assertTrue(wait_for(lambda: [
-            (each.command, each.role, each.expert, each.ok) for each in self.audited
-            if each.command.endswith('_stored')] == [
-                ('drop_stored', 'viewer', 'eva', False),
-                ('edit_stored', 'operator', 'eva', False),
-                ('edit_stored', 'operator', 'eva', True),
-                ('goto_stored', 'operator', 'eva', True)]), self.audited)
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    [
+                        (each.command, each.role, each.expert, each.ok)
+                        for each in self.audited
+                        if each.command.endswith('_stored')
+                    ]
+                    == [
+                        ('drop_stored', 'viewer', 'eva', False),
+                        ('edit_stored', 'operator', 'eva', False),
+                        ('edit_stored', 'operator', 'eva', True),
+                        ('goto_stored', 'operator', 'eva', True),
+                    ]
+                )
+            ),
+            self.audited,
+        )
 
     def test_3_while_it_runs_nobody_changes_it_and_dropped_it_is_over(self):
         browser = self.browser

@@ -2,6 +2,7 @@
 """The simulated PR2 driven from a real browser, with its camera beside: where the hand goes, and
 how soon it stands.
 """
+
 import contextlib
 import os
 import shutil
@@ -50,17 +51,19 @@ class Robot:
         self._buffer = tf2_ros.Buffer()
         self._listener = tf2_ros.TransformListener(self._buffer)
         self.joints, self.commands, self.states, self.audited = [], [], [], []
-        for topic, kind, take in (('joint_states', JointState, self.joints.append),
-                                  ('manipulation_interface/command', TeleopCommand,
-                                   self.commands.append), ('manipulation_interface/state',
-                                                           TeleopState, self.states.append),
-                                  ('expert_console/audit', ConsoleCommand, self.audited.append)):
+        for topic, kind, take in (
+            ('joint_states', JointState, self.joints.append),
+            ('manipulation_interface/command', TeleopCommand, self.commands.append),
+            ('manipulation_interface/state', TeleopState, self.states.append),
+            ('expert_console/audit', ConsoleCommand, self.audited.append),
+        ):
             rospy.Subscriber(topic, kind, take, queue_size=200, tcp_nodelay=True)
 
     def pose(self, frame):
         """4x4, the base from a frame, by TF."""
-        found = self._buffer.lookup_transform(BASE, frame, rospy.Time(),
-                                              rospy.Duration(20)).transform
+        found = self._buffer.lookup_transform(
+            BASE, frame, rospy.Time(), rospy.Duration(20)
+        ).transform
         at, turn = found.translation, found.rotation
         return from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
@@ -71,41 +74,59 @@ class Robot:
 
     def arm(self, message, side):
         """(7,) rad."""
-        return np.array([position for name, position in zip(message.name, message.position)
-                         if name.startswith(side[0] + '_') and 'gripper' not in name])
+        return np.array(
+            [
+                position
+                for name, position in zip(message.name, message.position)
+                if name.startswith(side[0] + '_') and 'gripper' not in name
+            ]
+        )
 
     def moved_last(self, side, since):
         """When (s) an arm was last told to be elsewhere than right before; `since`: looked at from
         then on.
         """
         told = [each for each in self.joints if each.header.stamp.to_sec() >= since]
-        return max((after.header.stamp.to_sec() for before, after in zip(told, told[1:])
-                    if np.abs(self.arm(after, side) - self.arm(before, side)).max() > STANDS),
-                   default=0.0)
+        return max(
+            (
+                after.header.stamp.to_sec()
+                for before, after in zip(told, told[1:])
+                if np.abs(self.arm(after, side) - self.arm(before, side)).max() > STANDS
+            ),
+            default=0.0,
+        )
 
     def look_at_the_table(self):
         """Tilts the camera, too: its axes are others than the base's."""
-        head = actionlib.SimpleActionClient('head_traj_controller/point_head_action',
-                                            PointHeadAction)
+        head = actionlib.SimpleActionClient(
+            'head_traj_controller/point_head_action', PointHeadAction
+        )
         assert head.wait_for_server(rospy.Duration(60))
-        head.send_goal_and_wait(PointHeadGoal(
-            target=PointStamped(Header(frame_id='base_link'), Point(0.6, -0.2, 0.7)),
-            pointing_axis=Vector3(0, 0, 1), pointing_frame=CAMERA))
+        head.send_goal_and_wait(
+            PointHeadGoal(
+                target=PointStamped(Header(frame_id='base_link'), Point(0.6, -0.2, 0.7)),
+                pointing_axis=Vector3(0, 0, 1),
+                pointing_frame=CAMERA,
+            )
+        )
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Drive(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.robot = Robot()
         port = free_port()
         cls.line = ThinLine(port)
         rospy.set_param('/expert_console/cameras', {'/alpha': ['/head_camera']})
-        cls.console = Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(port),
-                           '__name:=expert_console')
-        cls.machine = Node(sys.executable, os.path.join(HERE, 'console_drive_pr2_robot.py'),
-                           '__name:=alpha')
+        cls.console = Node(
+            find_node('smach_oracle', 'expert_console')[0],
+            '_port:={}'.format(port),
+            '__name:=expert_console',
+        )
+        cls.machine = Node(
+            sys.executable, os.path.join(HERE, 'console_drive_pr2_robot.py'), '__name:=alpha'
+        )
         cls.browser = Browser(1360, 1000)
         cls.robot.look_at_the_table()
         assert wait_for(cls.page_is_served, 40.0)
@@ -140,8 +161,10 @@ class Drive(unittest.TestCase):
         """Wait until the arm does; its tool's pose."""
         now = rospy.Time.now().to_sec()
         self.assertTrue(
-            wait_for(lambda: rospy.Time.now().to_sec() - max(now, self.robot.moved_last(side, now))
-                     > 0.3))
+            wait_for(
+                lambda: rospy.Time.now().to_sec() - max(now, self.robot.moved_last(side, now)) > 0.3
+            )
+        )
         return self.robot.pose(TOOLS[side])
 
     def drive(self, key, side='right'):
@@ -157,15 +180,18 @@ class Drive(unittest.TestCase):
 
     def take_the_wheel(self):
         """Or keep it; what the page says counts once the console agrees."""
+
         def agreed():
             told = [
-                each.command for each in self.robot.audited
+                each.command
+                for each in self.robot.audited
                 if each.ok and each.command.endswith('_wheel')
             ]
             drives = told[-1:] == ['take_wheel']
             if drives == ('You drive.' in self.browser.text('.driver')):
                 return 'drives' if drives else 'stands by'
             return ''
+
         if wait_for(agreed, 40.0) != 'drives':
             self.browser.click('.wheel', 40.0)
             self.assertTrue(wait_for(lambda: agreed() == 'drives', 40.0))
@@ -181,7 +207,8 @@ class Drive(unittest.TestCase):
         right = self.stands('right')
         self.assert_along(self.drive('w', 'left'), np.array([1.0, 0.0, 0.0]))
         self.assertLess(
-            np.abs(self.robot.pose(TOOLS['right']) - right).max(), 0.01, 'the other one stands')
+            np.abs(self.robot.pose(TOOLS['right']) - right).max(), 0.01, 'the other one stands'
+        )
         browser.click('[data-arm=right]')
         browser.find('[data-arm=right][aria-pressed=true]')
 
@@ -195,15 +222,17 @@ class Drive(unittest.TestCase):
         self.assert_along(self.drive('w'), axis)
         self.key(Keys.ARROW_LEFT, True)
         begin = self.robot.pose(TOOLS['right'])
-        self.assertTrue(wait_for(lambda: abs(self.turned(begin)) > 0.35),
-                        'it turns about the camera\'s vertical')
+        self.assertTrue(
+            wait_for(lambda: abs(self.turned(begin)) > 0.35), "it turns about the camera's vertical"
+        )
         self.key(Keys.ARROW_LEFT, False)
         browser.click('[data-frame=tool]')
         axis = self.stands('right')[:3, 0]
-        self.assertLess(axis[0], 0.97, 'the tool\'s axis is none of the base\'s')
+        self.assertLess(axis[0], 0.97, "the tool's axis is none of the base's")
         self.assert_along(self.drive('s'), -axis)
         self.assertLess(
-            np.abs(self.robot.pose(TOOLS['left']) - left).max(), 0.01, 'the other one stands')
+            np.abs(self.robot.pose(TOOLS['left']) - left).max(), 0.01, 'the other one stands'
+        )
 
     def turned(self, begin):
         """rad."""
@@ -219,7 +248,12 @@ class Drive(unittest.TestCase):
                     'const c = document.querySelector(".drive-camera canvas");'
                     'if (!c || c.width < 100) return false; const d = '
                     'c.getContext("2d").getImageData(0, 0, c.width, c.height);'
-                    'return new Set(d.data).size > 50'), 40.0), 'the camera\'s picture')
+                    'return new Set(d.data).size > 50'
+                ),
+                40.0,
+            ),
+            "the camera's picture",
+        )
         begin = self.stands('right')
         pad = browser.find('.pad[data-move=left]')
         self.assertTrue(wait_for(lambda: browser.settled(pad)))
@@ -240,11 +274,13 @@ class Drive(unittest.TestCase):
         begun = rospy.Time.now().to_sec() - 0.3
         with stop():
             self.assertTrue(
-                wait_for(lambda: rospy.Time.now().to_sec() - self.robot.moved_last('right', begun) >
-                         0.4))
+                wait_for(
+                    lambda: rospy.Time.now().to_sec() - self.robot.moved_last('right', begun) > 0.4
+                )
+            )
             held = [each.dead_man for each in self.robot.commands]
             last = len(held) - 1 - held[::-1].index(True)
-            told = self.robot.commands[last:last + 2][-1]  # the release, where there is one
+            told = self.robot.commands[last : last + 2][-1]  # the release, where there is one
             self.key(key, False)
         moved = self.robot.moved_last('right', begun)
         # it stood before: this says nothing
@@ -258,8 +294,9 @@ class Drive(unittest.TestCase):
         while len(times) < 2 or min(times) >= STOPS_WITHIN_S and len(times) < 8:
             self.take_the_wheel()
             times.append(self.time_to_stop(stop, 'ad'[len(times) % 2]))
-        rospy.loginfo('%s: stands after %s ms', what,
-                      ['{:.0f}'.format(each * 1e3) for each in times])
+        rospy.loginfo(
+            '%s: stands after %s ms', what, ['{:.0f}'.format(each * 1e3) for each in times]
+        )
         self.assertLess(min(times), STOPS_WITHIN_S, (what, times))
 
     def test_4_it_stands_when_the_key_is_let_go_the_page_is_hidden_or_the_link_is_lost(self):
@@ -272,7 +309,8 @@ class Drive(unittest.TestCase):
         def hidden():
             self.browser.run(
                 'Object.defineProperty(document, "hidden", {value: true, configurable: true});'
-                'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden')
+                'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'
+            )
             yield
 
         @contextlib.contextmanager
@@ -291,23 +329,34 @@ class Drive(unittest.TestCase):
         self.browser.click('[data-frame=base]')
         below = self.stands('right')[:3, 3] - [0.0, 0.0, 0.2]
         boxes = rospy.Publisher('collision_map', CollisionBoxes, queue_size=1, latch=True)
-        boxes.publish(CollisionBoxes(Header(frame_id=BASE), 'map', ['table'], [Pose(
-            Point(*below), Quaternion(0, 0, 0, 1))], [Vector3(0.6, 0.6, 0.04)]))
+        boxes.publish(
+            CollisionBoxes(
+                Header(frame_id=BASE),
+                'map',
+                ['table'],
+                [Pose(Point(*below), Quaternion(0, 0, 0, 1))],
+                [Vector3(0.6, 0.6, 0.04)],
+            )
+        )
         self.addCleanup(boxes.publish, CollisionBoxes(Header(frame_id=BASE), '', [], [], []))
         self.assertTrue(self.browser.says('1 box', '[data-fact=around]'))
         self.key('f', True)
-        self.assertTrue(wait_for(lambda: 'table' in self.robot.states[-1].limit),
-                        self.robot.states[-1])
+        self.assertTrue(
+            wait_for(lambda: 'table' in self.robot.states[-1].limit), self.robot.states[-1]
+        )
         self.assertTrue(self.browser.says('table', '.drive-light'), 'the page says what slows it')
-        self.assertTrue(wait_for(lambda: self.robot.states[-1].speed < 0.5),
-                        'the nearer the slower')
+        self.assertTrue(
+            wait_for(lambda: self.robot.states[-1].speed < 0.5), 'the nearer the slower'
+        )
         self.key('f', False)
 
     def test_6_the_gripper_and_then_the_machine_goes_on(self):
         browser = self.browser
         self.take_the_wheel()
-        for key, moved in (('c', lambda: self.robot.joint(FINGER) < 0.01),
-                           ('o', lambda: self.robot.joint(FINGER) > 0.04)):
+        for key, moved in (
+            ('c', lambda: self.robot.joint(FINGER) < 0.01),
+            ('o', lambda: self.robot.joint(FINGER) > 0.04),
+        ):
             self.key(key, True)
             self.assertTrue(wait_for(moved), (key, self.robot.joint(FINGER)))
             self.key(key, False)
@@ -316,10 +365,12 @@ class Drive(unittest.TestCase):
         self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'))
         placed = wait_for(lambda: rospy.get_param('/alpha/placed', None))
         self.assertEqual(placed['frame'], BASE)
-        self.assertLess(np.linalg.norm(tool[:3, 3] - placed['at']), 0.03,
-                        'of the arm that was driven')
+        self.assertLess(
+            np.linalg.norm(tool[:3, 3] - placed['at']), 0.03, 'of the arm that was driven'
+        )
         self.assertTrue(
-            wait_for(lambda: 'leave_wheel' in [told.command for told in self.robot.audited]))
+            wait_for(lambda: 'leave_wheel' in [told.command for told in self.robot.audited])
+        )
         self.assertEqual(browser.errors(), [])
 
 

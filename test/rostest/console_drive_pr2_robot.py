@@ -2,6 +2,7 @@
 """A PR2 that never picks anything up by itself: its PLACE tells, as a parameter, what it was
 given.
 """
+
 import rospy
 
 import smach
@@ -41,14 +42,20 @@ def main():
         smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Place())
     OracleContainer.wrap(
-        sm, name='FETCH', settings={
-            'prior': 0.8, 'deadline_s': 600.0, 'interfaces': {
+        sm,
+        name='FETCH',
+        settings={
+            'prior': 0.8,
+            'deadline_s': 600.0,
+            'interfaces': {
                 'manipulation': {
-                    'action': '/manipulation_interface', 'description': 'Drive the hand',
-                    'states': ['PICK']
+                    'action': '/manipulation_interface',
+                    'description': 'Drive the hand',
+                    'states': ['PICK'],
                 }
-            }
-        })
+            },
+        },
+    )
     sm.execute()
     rospy.spin()
 

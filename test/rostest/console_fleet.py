@@ -2,6 +2,7 @@
 """One expert, ten robots; two consoles on one robot. Real nodes, real consoles, one real
 browser.
 """
+
 import os
 import shutil
 import signal
@@ -43,10 +44,16 @@ class Console:
     def __init__(self, name):
         self.port = free_port()
         self.audited = []
-        self._subscriber = rospy.Subscriber('/{}/audit'.format(name), ConsoleCommand,
-                                            self.audited.append)
-        self.process = subprocess.Popen([find_node('smach_oracle', 'expert_console')[0],
-                                         '_port:={}'.format(self.port), '__name:=' + name])
+        self._subscriber = rospy.Subscriber(
+            '/{}/audit'.format(name), ConsoleCommand, self.audited.append
+        )
+        self.process = subprocess.Popen(
+            [
+                find_node('smach_oracle', 'expert_console')[0],
+                '_port:={}'.format(self.port),
+                '__name:=' + name,
+            ]
+        )
 
     def told(self):
         return [(told.command, told.expert, told.robot, told.ok) for told in self.audited]
@@ -59,16 +66,23 @@ class Console:
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Fleet(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
-        cls.robots = subprocess.Popen([sys.executable, os.path.join(
-            os.path.dirname(os.path.abspath(__file__)), 'console_fleet_robots.py'), str(ROBOTS)])
+        cls.robots = subprocess.Popen(
+            [
+                sys.executable,
+                os.path.join(os.path.dirname(os.path.abspath(__file__)), 'console_fleet_robots.py'),
+                str(ROBOTS),
+            ]
+        )
         cls.first, cls.second = Console('console_a'), Console('console_b')
         cls.open, cls.audited = {}, []
         for number in range(ROBOTS):
-            rospy.Subscriber('/robot_{}/expert_query/open'.format(number), OpenQueries,
-                             lambda message, each=number: cls.open.update({each: message.queries}))
+            rospy.Subscriber(
+                '/robot_{}/expert_query/open'.format(number),
+                OpenQueries,
+                lambda message, each=number: cls.open.update({each: message.queries}),
+            )
         rospy.Subscriber('/robot_9/expert_query/audit', ConsoleCommand, cls.audited.append)
         cls.browser = Browser()
         wait_for(lambda: served(cls.first.port) and served(cls.second.port), 40.0)
@@ -102,13 +116,15 @@ class Fleet(unittest.TestCase):
         """As any other front end does."""
         before = int(self.browser.text('#tab-questions .badge'))
         for number in numbers:
-            rospy.ServiceProxy('/robot_{}/expert_query/answer'.format(number),
-                               AnswerQuery)(self.open[number][0].query.query_id,
-                                            ExpertDecision(kind=ExpertDecision.GOTO,
-                                                           state='PLAN_{}'.format(number),
-                                                           by='somebody'))
-        self.assertTrue(self.browser.says(str(before - len(numbers)), '#tab-questions .badge'),
-                        'the page knows')
+            rospy.ServiceProxy('/robot_{}/expert_query/answer'.format(number), AnswerQuery)(
+                self.open[number][0].query.query_id,
+                ExpertDecision(
+                    kind=ExpertDecision.GOTO, state='PLAN_{}'.format(number), by='somebody'
+                ),
+            )
+        self.assertTrue(
+            self.browser.says(str(before - len(numbers)), '#tab-questions .badge'), 'the page knows'
+        )
 
     def hold(self, selector):
         """Press the mouse on it."""
@@ -130,34 +146,51 @@ class Fleet(unittest.TestCase):
         self.hold(ROW.format(5))
         self.answer_elsewhere(0)
         self.let_go()
-        self.assertTrue(browser.says('/robot_5 · JOB', '.detail-head'),
-                        'the list moved under the mouse, or the page refused the press ({} refused '
-                        'so far); it says:\n{}'.format(
-                            browser.run('return document.body.dataset.refused || 0'),
-                            browser.text()[:1500]))
+        self.assertTrue(
+            browser.says('/robot_5 · JOB', '.detail-head'),
+            'the list moved under the mouse, or the page refused the press ({} refused '
+            'so far); it says:\n{}'.format(
+                browser.run('return document.body.dataset.refused || 0'), browser.text()[:1500]
+            ),
+        )
         self.assertTrue(
             wait_for(
-                lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(0))))
+                lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(0))
+            )
+        )
         self.assertTrue(browser.says(YOURS))
         browser.run('document.querySelector(arguments[0]).focus()', ROW.format(6))
         self.answer_elsewhere(1)
         self.assertTrue(
             wait_for(
-                lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(1))))
-        self.assertEqual(browser.run('return document.activeElement.dataset.key.split("/")[1]'),
-                         'robot_6')
+                lambda: browser.run('return !document.querySelector(arguments[0])', ROW.format(1))
+            )
+        )
+        self.assertEqual(
+            browser.run('return document.activeElement.dataset.key.split("/")[1]'), 'robot_6'
+        )
         browser.click('#tab-machines')
         self.assertTrue(
-            wait_for(lambda: len(
-                browser.run('return [...document.querySelectorAll(".picker .path")]'
-                            '.map((each) => each.title)')) == ROBOTS))
+            wait_for(
+                lambda: (
+                    len(
+                        browser.run(
+                            'return [...document.querySelectorAll(".picker .path")]'
+                            '.map((each) => each.title)'
+                        )
+                    )
+                    == ROBOTS
+                )
+            )
+        )
         named = browser.text('.picker .group:nth-child(8) .robot')
         self.hold('.picker .group:nth-child(8) .path')
         self.answer_elsewhere(2)
         self.assertTrue(wait_for(lambda: rospy.get_param('/robot_2/ended', False)))
         self.let_go()
-        self.assertTrue(browser.says(named, '.machine-card .head'),
-                        'neither does the tree of machines')
+        self.assertTrue(
+            browser.says(named, '.machine-card .head'), 'neither does the tree of machines'
+        )
         browser.click('#tab-questions')
         self.assertEqual(browser.errors(), [])
 
@@ -167,23 +200,39 @@ class Fleet(unittest.TestCase):
         for number in by_console:
             browser.click(ROW.format(number))
             self.assertTrue(browser.says('/robot_{} · JOB'.format(number), '.detail-head'))
-            self.assertIn('RuntimeError: /robot_{} is stuck'.format(number),
-                          browser.text('.failure .text'))
+            self.assertIn(
+                'RuntimeError: /robot_{} is stuck'.format(number), browser.text('.failure .text')
+            )
             self.assertTrue(browser.says(YOURS))
             browser.click('.choice.goto[data-name=PLAN_{}]'.format(number))
             self.assertTrue(
-                browser.says('The robot has your answer: go to PLAN_{}'.format(number),
-                             '.follow-up'))
+                browser.says(
+                    'The robot has your answer: go to PLAN_{}'.format(number), '.follow-up'
+                )
+            )
             browser.click('.follow-up [data-action=back]')
-        self.assertTrue(wait_for(lambda: all(rospy.get_param('/robot_{}/ended'.format(each), False)
-                                             for each in range(8))))
-        self.assertEqual([self.went(number) for number in range(8)],
-                         [[number] for number in range(8)], 'each went where it was sent')
+        self.assertTrue(
+            wait_for(
+                lambda: all(
+                    rospy.get_param('/robot_{}/ended'.format(each), False) for each in range(8)
+                )
+            )
+        )
+        self.assertEqual(
+            [self.went(number) for number in range(8)],
+            [[number] for number in range(8)],
+            'each went where it was sent',
+        )
         self.assertEqual([self.went(number) for number in (8, 9)], [[], []], 'nobody else did')
         self.assertTrue(
             wait_for(
-                lambda: [told[2] for told in self.first.told() if told[0] == 'answer' and told[3]
-                         ] == ['/robot_{}'.format(each) for each in by_console]), self.first.told())
+                lambda: (
+                    [told[2] for told in self.first.told() if told[0] == 'answer' and told[3]]
+                    == ['/robot_{}'.format(each) for each in by_console]
+                )
+            ),
+            self.first.told(),
+        )
         self.assertTrue(browser.says('2', '#tab-questions .badge'))
 
     def test_3_two_consoles_on_one_robot_take_over_is_explicit_and_logged(self):
@@ -206,10 +255,16 @@ class Fleet(unittest.TestCase):
         self.assertTrue(browser.says('bob has taken this question over.'))
         self.assertFalse(browser.find('.choice.goto').is_enabled(), 'it is hers no longer')
         self.assertTrue(
-            wait_for(lambda: ('take_over', 'bob') in [(told.command, told.expert)
-                                                      for told in self.audited]), 'for the bag')
+            wait_for(
+                lambda: (
+                    ('take_over', 'bob') in [(told.command, told.expert) for told in self.audited]
+                )
+            ),
+            'for the bag',
+        )
         self.assertTrue(
-            wait_for(lambda: ('take_over', 'bob', '/robot_9', True) in self.second.told()))
+            wait_for(lambda: ('take_over', 'bob', '/robot_9', True) in self.second.told())
+        )
         self.assertNotIn('take_over', [told[0] for told in self.first.told()])
 
     def test_4_a_console_that_dies_loses_its_claim_with_the_lease(self):
@@ -226,8 +281,9 @@ class Fleet(unittest.TestCase):
         self.assertTrue(browser.says('The robot has your answer: go to PLAN_9', '.follow-up'))
         self.assertTrue(wait_for(lambda: self.went(9) == [9]), 'meanwhile the other console works')
         browser.click('.follow-up [data-action=back]')
-        self.assertTrue(browser.says('waiting', ROW.format(8), LEASE_S + 20.0),
-                        'the claim has run out')
+        self.assertTrue(
+            browser.says('waiting', ROW.format(8), LEASE_S + 20.0), 'the claim has run out'
+        )
         self.assertGreater(time.monotonic() - killed_s, 5.0)
         browser.click(ROW.format(8))
         self.assertTrue(browser.says(YOURS), 'without taking anything over')
@@ -235,8 +291,13 @@ class Fleet(unittest.TestCase):
         self.assertTrue(wait_for(lambda: self.went(8) == [8]))
         self.assertTrue(
             wait_for(
-                lambda: [told[1] for told in self.second.told()
-                         if told[0] == 'answer' and told[3]] == ['bob', 'bob']), self.second.told())
+                lambda: (
+                    [told[1] for told in self.second.told() if told[0] == 'answer' and told[3]]
+                    == ['bob', 'bob']
+                )
+            ),
+            self.second.told(),
+        )
         self.assertEqual(browser.errors(), [])
 
 

@@ -2,6 +2,7 @@
 """Many robots, each a process of its own: their WORK fails, each goes where it is sent, and tells
 where that was.
 """
+
 import os
 import signal
 import sys
@@ -44,8 +45,9 @@ def run(number, robots):
         smach.StateMachine.add('WORK', Work())
         for each in range(robots):
             smach.StateMachine.add('PLAN_{}'.format(each), Plan(each))
-    OracleContainer.wrap(sm, name='JOB',
-                         settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0})
+    OracleContainer.wrap(
+        sm, name='JOB', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0}
+    )
     sm.execute()
     rospy.set_param('~ended', True)
     rospy.spin()
@@ -64,6 +66,7 @@ def main(robots):
     def end(*_):
         for child in children:
             os.kill(child, signal.SIGTERM)
+
     signal.signal(signal.SIGTERM, end)
     for child in children:
         os.waitpid(child, 0)

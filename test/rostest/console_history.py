@@ -2,6 +2,7 @@
 """The situation now and the past, in a real browser: preconditions, the camera at the failure,
 replay, and old bags.
 """
+
 import os
 import sys
 import unittest
@@ -31,12 +32,12 @@ PICK = '.choice.goto[data-name=PICK]'
 MIDDLE = (
     'const c = document.querySelector(arguments[0]); if (!c) return null; const p = '
     'c.getContext("2d")'
-    '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]')
+    '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]'
+)
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class SituationAndHistory(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.port = free_port()
@@ -49,8 +50,11 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         cls.open = []
         cls.printed = rospy.Publisher('/alpha/interface_output', InterfaceOutput, queue_size=1)
         rospy.Subscriber('/alpha/expert_query/open', OpenQueries, cls.open.append)
-        cls.robot = Node(sys.executable, os.path.join(os.path.dirname(os.path.abspath(__file__)),
-                                                      'console_history_robot.py'), '__name:=alpha')
+        cls.robot = Node(
+            sys.executable,
+            os.path.join(os.path.dirname(os.path.abspath(__file__)), 'console_history_robot.py'),
+            '__name:=alpha',
+        )
         cls.console = cls.start_console()
         cls.browser = Browser(1360, 1000)
         wait_for(cls.page_is_served, 40.0)
@@ -73,15 +77,20 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         told = browser.text(PICK)
         self.assertIn("camera_answers unknown: raised RuntimeError('no <b>camera</b>')", told)
         self.assertIn('DETECT unknown: only running it would tell; its last visit succeeded', told)
-        self.assertTrue(browser.says('has not come back for', '.choice.goto[data-name=PLACE]'),
-                        'and holds nobody up')
+        self.assertTrue(
+            browser.says('has not come back for', '.choice.goto[data-name=PLACE]'),
+            'and holds nobody up',
+        )
         rospy.set_param('/alpha/hand_is_free', True)
-        self.assertTrue(browser.says('hand_is_free holds', PICK),
-                        'what changes is told while the question is open')
+        self.assertTrue(
+            browser.says('hand_is_free holds', PICK),
+            'what changes is told while the question is open',
+        )
         self.assertIn('as of', browser.text(PICK))
         self.assert_accessible('preconditions')
-        self.assertEqual(rospy.get_param('/alpha/looked_at_the_door'), 1,
-                         'what hangs is not called again')
+        self.assertEqual(
+            rospy.get_param('/alpha/looked_at_the_door'), 1, 'what hangs is not called again'
+        )
 
     def test_2_the_frame_of_the_failure_is_there_and_a_live_one_beside_it(self):
         browser = self.browser
@@ -96,9 +105,13 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
         browser.click('[data-action=live-camera]')
         self.assertTrue(
-            wait_for(lambda: (lambda now: now and now[2] > now[0] + 40)
-                     (browser.run(MIDDLE, '.pane.now .camera-view.shown canvas'))),
-            'the live one has changed')
+            wait_for(
+                lambda: (lambda now: now and now[2] > now[0] + 40)(
+                    browser.run(MIDDLE, '.pane.now .camera-view.shown canvas')
+                )
+            ),
+            'the live one has changed',
+        )
         self.assertEqual(browser.run(MIDDLE, '.failure-image canvas'), red, 'the other has not')
 
     def test_3_outputs_are_written_as_what_they_are(self):
@@ -122,14 +135,20 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
     def test_4_a_trial_is_replayed_from_its_bag_after_a_restart(self):
         browser = self.browser
         self.assertTrue(
-            wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:]))
+            wait_for(lambda: [name for name in os.listdir(self.bags) if name.endswith('.bag')][1:])
+        )
         with rosbag.Bag(
-                os.path.join(self.bags,
-                             min(name for name in os.listdir(self.bags) if name[0] == '2'))) as bag:
-            told = {topic: message for topic, message, _ in bag.read_messages(
-                ['/alpha/interface_output', '/alpha/failure_frames'])}
-        self.assertEqual(told['/alpha/interface_output'].lines, ['ready'],
-                         'what interfaces print is in the bag')
+            os.path.join(self.bags, min(name for name in os.listdir(self.bags) if name[0] == '2'))
+        ) as bag:
+            told = {
+                topic: message
+                for topic, message, _ in bag.read_messages(
+                    ['/alpha/interface_output', '/alpha/failure_frames']
+                )
+            }
+        self.assertEqual(
+            told['/alpha/interface_output'].lines, ['ready'], 'what interfaces print is in the bag'
+        )
         self.assertEqual(told['/alpha/failure_frames'].topics, [CAMERA])
         type(self).console.stop()
         self.assertTrue(browser.says('connection lost', '#status'))
@@ -148,15 +167,20 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('PICK failed', '.replay-words'))
         self.assertIn('PICK failed', slider.get_attribute('aria-valuetext'))
-        self.assertTrue(wait_for(lambda: self.classes('PICK') >= {'failed'}),
-                        'in the graph of that trial')
-        self.assertLess(float(slider.get_attribute('aria-valuenow')),
-                        float(slider.get_attribute('aria-valuemax')))
+        self.assertTrue(
+            wait_for(lambda: self.classes('PICK') >= {'failed'}), 'in the graph of that trial'
+        )
+        self.assertLess(
+            float(slider.get_attribute('aria-valuenow')),
+            float(slider.get_attribute('aria-valuemax')),
+        )
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Question about PICK', '.replay-question'))
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
-        self.assertTrue(wait_for(lambda: browser.run(MIDDLE, '.replay-images .shown canvas')),
-                        'what was seen then')
+        self.assertTrue(
+            wait_for(lambda: browser.run(MIDDLE, '.replay-images .shown canvas')),
+            'what was seen then',
+        )
         self.assert_accessible('a replay')
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Answer of operator: supersede succeeded', '.replay-question'))
@@ -164,9 +188,16 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'), 'one event back')
 
     def classes(self, label):
-        return set((self.browser.run(
-            'const e = document.getElementById(arguments[0]); return e && '
-            'e.getAttribute("class")', 'replayed/FETCH/' + label) or '').split())
+        return set(
+            (
+                self.browser.run(
+                    'const e = document.getElementById(arguments[0]); return e && '
+                    'e.getAttribute("class")',
+                    'replayed/FETCH/' + label,
+                )
+                or ''
+            ).split()
+        )
 
     def test_5_it_plays_by_itself_and_follows_a_finger(self):
         browser = self.browser
@@ -174,18 +205,22 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         slider.send_keys(Keys.HOME)
         browser.run('document.querySelector(".replay-speed").value = "0.25"')
         browser.click('[data-replay=play]')
-        self.assertTrue(wait_for(lambda: 'active' in self.classes('DETECT')),
-                        'it has come to the first state')
+        self.assertTrue(
+            wait_for(lambda: 'active' in self.classes('DETECT')), 'it has come to the first state'
+        )
         browser.click('[data-replay=play]')
         stopped = slider.get_attribute('aria-valuenow')
         self.assertGreater(float(stopped), 0.0)
         right = int(slider.rect['width'] / 2) - 20
         ActionChains(browser.driver).move_to_element_with_offset(slider, right, 5).click().perform()
         self.assertTrue(
-            wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped)))
+            wait_for(lambda: float(slider.get_attribute('aria-valuenow')) > float(stopped))
+        )
         browser.click('.event-log .event:last-child')
-        self.assertTrue(browser.says('The trial of FETCH began.', '.replay-words'),
-                        'a line of the log leads there')
+        self.assertTrue(
+            browser.says('The trial of FETCH began.', '.replay-words'),
+            'a line of the log leads there',
+        )
         self.assertEqual(browser.errors(), [])
 
 

@@ -5,6 +5,7 @@ done by somebody else.
 Of PICK's preconditions one function looks at a parameter, one raises, one hangs, and one is a
 state.
 """
+
 import threading
 
 import rosgraph
@@ -57,14 +58,18 @@ def main():
         if label == 'DETECT':
             return Detect(label, [], 0.1)
         return Work(label, ['PICK'], 0.1, ['grasp', 'fits', 'tries'] if label == 'PICK' else [])
+
     sm = chain(['DETECT', 'PICK', 'PLACE'], make)
     sm.userdata.grasp, sm.userdata.fits, sm.userdata.tries = [1, 2], False, 3
     OracleContainer.wrap(
-        sm, name='FETCH', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0},
+        sm,
+        name='FETCH',
+        settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0},
         preconditions={
             'PICK': [hand_is_free, camera_answers, 'DETECT'],
-            'PLACE': [(door_is_shut, smach.CBState(lambda ud: 'done', ['done']))]
-        })
+            'PLACE': [(door_is_shut, smach.CBState(lambda ud: 'done', ['done']))],
+        },
+    )
     while not rospy.is_shutdown():
         sm.execute()
 

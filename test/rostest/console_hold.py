@@ -2,6 +2,7 @@
 """A machine under oracle_run, held from the page in a real browser: stopped by who may only look,
 paused, let go, with breakpoints and confirmations.
 """
+
 import os
 import sys
 import unittest
@@ -26,7 +27,6 @@ SETTINGS = '{states: {INNER/FOURTH: {autonomy: confirm}}}'
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Hold(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.folder = cls.make_folder()
@@ -46,17 +46,24 @@ class Hold(ConsolePage, unittest.TestCase):
 
     @classmethod
     def start_robot(cls, robot, *arguments):
-        return Node(find_node('smach_oracle', 'oracle_run')[0], '--config', cls.config,
-                    os.path.join(HERE, robot), '__name:=alpha')
+        return Node(
+            find_node('smach_oracle', 'oracle_run')[0],
+            '--config',
+            cls.config,
+            os.path.join(HERE, robot),
+            '__name:=alpha',
+        )
 
     def stands(self, words):
         self.assertTrue(self.browser.says(words, STANDING), self.browser.text())
 
     def commands(self):
         """Without those that command nothing."""
-        return [(each.command, each.role, each.ok) for each in self.audited
-                if '_machine' in each.command or each.command in (
-                    'confirm_state', 'set_breakpoint')]
+        return [
+            (each.command, each.role, each.ok)
+            for each in self.audited
+            if '_machine' in each.command or each.command in ('confirm_state', 'set_breakpoint')
+        ]
 
     @staticmethod
     def outcomes():
@@ -118,8 +125,9 @@ class Hold(ConsolePage, unittest.TestCase):
         browser.click(RESUME)
         self.assertTrue(browser.says('still to be confirmed: FOURTH', '.hand-reply'))
         self.assertTrue(wait_for(lambda: not self.told[-1].machines[0].paused), 'it says so')
-        self.assertTrue(browser.says('Confirm: FOURTH in {}/INNER will run'.format(MACHINE),
-                                     CONFIRM))
+        self.assertTrue(
+            browser.says('Confirm: FOURTH in {}/INNER will run'.format(MACHINE), CONFIRM)
+        )
         browser.click(CONFIRM)
         self.stands('Runs: FOURTH in {}/INNER.'.format(MACHINE))
         browser.click(PAUSE)

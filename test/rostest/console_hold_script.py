@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A plain SMACH script, trial after trial: each state runs until it is let go, or preempted."""
+
 import rospy
 
 import smach

@@ -2,6 +2,7 @@
 """What is live and what is not, in a real browser: the console stopped, the master dead, the robot
 stopped or killed. A master and nodes of its own.
 """
+
 import os
 import sys
 import unittest
@@ -20,7 +21,7 @@ ANSWER = '.choice.goto[data-name=PLACE]'
 LIVE = 'live'
 SILENT = 'Nothing is heard from {} any more.'
 # what a page says of a robot when neither it nor the console has been heard for a while
-GONE = '''
+GONE = """
 const paths = ["page/store.js", "page/liveness.js"];
 return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
   [{ Store }, { Liveness }]) => {
@@ -34,10 +35,12 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
   const silent = liveness.gone({ server: "s", robot: "/r" });
   tell(9);
   return [silent, liveness.gone({ server: "s", robot: "/r" })];
-});'''
+});"""
 # a claim that runs out, and cannot be made again at once: whether it is kept, and how often it was
 # asked for
-KEPT = OF_A_QUESTION % '''
+KEPT = (
+    OF_A_QUESTION
+    % """
   const asked = async () => {
     await new Promise((done) => { setTimeout(done); });
     return told.filter((name) => name === "claim").length;
@@ -54,30 +57,30 @@ KEPT = OF_A_QUESTION % '''
   detail.claimedAt = -Infinity;
   detail.tick();
   found.push(await asked(), said("ann"));
-  return found;'''
+  return found;"""
+)
 # which commands wait for nothing, where all are silent and the person has no name
-PASSES = '''
+PASSES = """
 return import("/static/js/page/gate.js").then(({ Gate }) => {
   const silent = () => "silent";
   const gate = new Gate({ store: { questions: [{ key: "q" }] }, refusal: silent,
     refusalOfRobot: silent }, () => false, async () => false);
   return arguments[0].filter((name) => gate.before(name, { question: "q", robot: "/r" }) === null);
-});'''
+});"""
 STOPS = ['stop_hand', 'leave_wheel', 'release', 'stop_machine', 'pause_machine']
 ANSWERS = ['answer', 'hand_over', 'resume_machine', 'step_machine', 'confirm_state']
 GREY = 'return getComputedStyle(document.querySelector(".detail .answers")).filter'
 # what lies between the button that stops and the page, by how it is shown
-COLOURS_OF_STOP = '''
+COLOURS_OF_STOP = """
 let found = [];
 for (let it = document.querySelector(".detail .machine-hand .stop"); it; it = it.parentElement) {
   found.push(getComputedStyle(it).filter);
 }
-return [...new Set(found)];'''
+return [...new Set(found)];"""
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Live(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.master_port = free_port()
@@ -98,19 +101,26 @@ class Live(ConsolePage, unittest.TestCase):
     def answerable(self):
         """Whether the question comes to be live, held, and may be answered."""
         browser = self.browser
-        return browser.says(LIVE, '#status') and browser.says('It is yours.') and wait_for(
-            lambda: browser.find(ANSWER).is_enabled() and browser.run(GREY) == 'none')
+        return (
+            browser.says(LIVE, '#status')
+            and browser.says('It is yours.')
+            and wait_for(lambda: browser.find(ANSWER).is_enabled() and browser.run(GREY) == 'none')
+        )
 
     def refused(self, who):
         """Whether the page comes to say who is silent, is grey, and takes no answer."""
         browser = self.browser
         return browser.says(SILENT.format(who), '.silence-bar') and wait_for(
-            lambda: browser.run(GREY) == 'grayscale(1)' and not browser.find(ANSWER).is_enabled())
+            lambda: browser.run(GREY) == 'grayscale(1)' and not browser.find(ANSWER).is_enabled()
+        )
 
     def test_1_the_ages_of_the_last_words_are_shown(self):
         browser = self.browser
-        for told, where in (('console 0 s', '#ages'), ('master 0 s', '#ages'),
-                            ('heard 0 s ago', '.last-word')):
+        for told, where in (
+            ('console 0 s', '#ages'),
+            ('master 0 s', '#ages'),
+            ('heard 0 s ago', '.last-word'),
+        ):
             self.assertTrue(browser.says(told, where), told)
         browser.click('#tab-machines')
         self.assertTrue(browser.says('/alpha · heard', '.machine-card .head'))
@@ -123,8 +133,9 @@ class Live(ConsolePage, unittest.TestCase):
             browser.click(ANSWER)
             self.assertTrue(browser.says('console silent for', '#status'))
             self.assertTrue(self.refused('the console'))
-            self.assertTrue(browser.says('whether it has your answer is not known',
-                                         '.claim-bar .problem'))
+            self.assertTrue(
+                browser.says('whether it has your answer is not known', '.claim-bar .problem')
+            )
             self.assertIn('No reply within 20 s to “answer”', browser.text('#toasts'))
             self.assertTrue(browser.says('conn', '#status'), 'it tries to come back')
         finally:
@@ -140,8 +151,7 @@ class Live(ConsolePage, unittest.TestCase):
         self.assertEqual(self.browser.run(PASSES, STOPS + ANSWERS), STOPS)
 
     def test_2_a_claim_that_could_not_be_made_again_is_tried_again(self):
-        self.assertEqual(self.browser.run(KEPT),
-                         [2, True, 2, 3, 'It is yours. Leave it to others'])
+        self.assertEqual(self.browser.run(KEPT), [2, True, 2, 3, 'It is yours. Leave it to others'])
 
     def test_3_with_a_dead_master_no_answer_is_sent(self):
         self.master.kill()
@@ -169,8 +179,13 @@ class Live(ConsolePage, unittest.TestCase):
             self.assertEqual(self.browser.run(COLOURS_OF_STOP), ['none'], 'it keeps its colours')
             self.assertEqual(self.browser.text('#status'), LIVE, 'the others are heard')
             self.browser.click('#tab-machines')
-            self.assertTrue(wait_for(lambda: self.browser.run(
-                'return Boolean(document.querySelector(".machine-card.silent"))')))
+            self.assertTrue(
+                wait_for(
+                    lambda: self.browser.run(
+                        'return Boolean(document.querySelector(".machine-card.silent"))'
+                    )
+                )
+            )
             self.browser.click('#tab-questions')
         finally:
             self.robot.thaw()
@@ -183,8 +198,9 @@ class Live(ConsolePage, unittest.TestCase):
         self.assertNotIn('answered elsewhere', browser.text())
         type(self).robot = self.start_robot('console_robot.py', 'PICK', '0.1', '0', '9')
         browser.find(QUESTION)
-        self.assertIn('/alpha is gone', browser.text('.claim-bar'),
-                      'that question does not come back')
+        self.assertIn(
+            '/alpha is gone', browser.text('.claim-bar'), 'that question does not come back'
+        )
         browser.click('.claim-bar .inline')
         browser.click(QUESTION)
         self.assertTrue(self.answerable())

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The console's eye in a real browser: an object marked with the mouse in a real interface, sensors
 looked at, and a robot with its cloud in 3D."""
+
 import os
 import sys
 import unittest
@@ -31,18 +32,21 @@ CAN_INDEX = 1
 QUESTION = '.question-row.pending[data-key^="/alpha/"]'  # an earlier one may still be about to go
 CAMERA = '/head_camera/rgb/image_raw'
 DEPTH = '/head_camera/depth_registered/image_raw'
-DRAWN = ('const [view, name] = [document.querySelector(arguments[0]), arguments[1]];'
-         'return view ? Number(view.dataset[name] || 0) : 0')
-PICTURE = ('const view = document.querySelector(arguments[0]);'
-           'const image = view.getContext("2d").getImageData(0, 0, view.width, view.height);'
-           'const data = new Uint32Array(image.data.buffer);'
-           'return [data.reduce((sum, each) => (sum * 31 + each) >>> 0, view.width),'
-           ' data.reduce((sum, each) => sum + (each ? 1 : 0), 0)]')
+DRAWN = (
+    'const [view, name] = [document.querySelector(arguments[0]), arguments[1]];'
+    'return view ? Number(view.dataset[name] || 0) : 0'
+)
+PICTURE = (
+    'const view = document.querySelector(arguments[0]);'
+    'const image = view.getContext("2d").getImageData(0, 0, view.width, view.height);'
+    'const data = new Uint32Array(image.data.buffer);'
+    'return [data.reduce((sum, each) => (sum * 31 + each) >>> 0, view.width),'
+    ' data.reduce((sum, each) => sum + (each ? 1 : 0), 0)]'
+)
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Marking(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         publish_description()
@@ -60,8 +64,9 @@ class Marking(ConsolePage, unittest.TestCase):
         middle = np.array([canvas.size['width'], canvas.size['height']]) / 2.0
         places = [np.rint(np.array(point, float) * scale - middle) for point in points]
         action = ActionChains(self.browser.driver, duration=20)
-        action.move_to_element_with_offset(canvas,
-                                           *(int(each) for each in places[0])).click_and_hold()
+        action.move_to_element_with_offset(
+            canvas, *(int(each) for each in places[0])
+        ).click_and_hold()
         for place in places[1:]:
             action.move_to_element_with_offset(canvas, *(int(each) for each in place))
         action.release().perform()
@@ -78,23 +83,28 @@ class Marking(ConsolePage, unittest.TestCase):
 
     def assert_the_object_is_drawn_in_3d(self, canvas):
         own = int(self.browser.text('[data-fact=points]'))
-        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'points') > own + 5000),
-                        'it, and what is around it')
-        self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') > 10000),
-                        'the robot next to it')
+        self.assertTrue(
+            wait_for(lambda: self.drawn(canvas, 'points') > own + 5000), 'it, and what is around it'
+        )
+        self.assertTrue(
+            wait_for(lambda: self.drawn(canvas, 'triangles') > 10000), 'the robot next to it'
+        )
         before, pixels = self.browser.run(PICTURE, canvas)
         self.assertGreater(pixels, 5000)
         self.browser.find(canvas).send_keys(Keys.ARROW_LEFT)
-        self.assertTrue(wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before),
-                        'a key turns it')
+        self.assertTrue(
+            wait_for(lambda: self.browser.run(PICTURE, canvas)[0] != before), 'a key turns it'
+        )
 
     def cross_to(self, point):
         """With the arrow keys, to a pixel of the image; 'It begins at' and the like tell where."""
-        for axis, keys in enumerate(((Keys.ARROW_LEFT, Keys.ARROW_RIGHT), (Keys.ARROW_UP,
-                                                                           Keys.ARROW_DOWN))):
+        for axis, keys in enumerate(
+            ((Keys.ARROW_LEFT, Keys.ARROW_RIGHT), (Keys.ARROW_UP, Keys.ARROW_DOWN))
+        ):
             steps = int(point[axis] - self.cross[axis])
-            ActionChains(self.browser.driver, duration=0).key_down(
-                Keys.SHIFT).send_keys(*[keys[steps > 0]] * abs(steps)).key_up(Keys.SHIFT).perform()
+            ActionChains(self.browser.driver, duration=0).key_down(Keys.SHIFT).send_keys(
+                *[keys[steps > 0]] * abs(steps)
+            ).key_up(Keys.SHIFT).perform()
         self.cross = [int(each) for each in point]
 
     def assert_a_region_is_marked_by_keys(self):
@@ -114,7 +124,8 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.find('[data-fact=size]')
         self.assertTrue(
             wait_for(lambda: [told.ok for told in self.told('mark')[marked:]] == [True]),
-            'cut out once')
+            'cut out once',
+        )
 
     def test_1_an_object_is_marked_in_the_frame_and_the_machine_goes_on_with_it(self):
         browser = self.browser
@@ -127,12 +138,20 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.find('[data-fact=size]')
         middle = np.array(self.around_the_can(), float).mean(axis=0)
         self.assertTrue(
-            wait_for(lambda: browser.run(
-                'return document.querySelector(".drawing").getContext("2d")'
-                '.getImageData(arguments[0], arguments[1], 1, 1).data[3]',
-                *(int(each) for each in middle))), 'the mask lies over the object')
-        print('from the end of the drawing to the mask on the screen: {} ms'.format(
-            browser.run('return document.querySelector(".perception").dataset.shownAfter')))
+            wait_for(
+                lambda: browser.run(
+                    'return document.querySelector(".drawing").getContext("2d")'
+                    '.getImageData(arguments[0], arguments[1], 1, 1).data[3]',
+                    *(int(each) for each in middle),
+                )
+            ),
+            'the mask lies over the object',
+        )
+        print(
+            'from the end of the drawing to the mask on the screen: {} ms'.format(
+                browser.run('return document.querySelector(".perception").dataset.shownAfter')
+            )
+        )
         self.assert_the_object_is_drawn_in_3d('.object-view .cloud')
         self.assert_accessible('a marked object')
         browser.click('[data-tool=background]')
@@ -142,15 +161,19 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assertEqual([told.ok for told in self.told('mark')], [True, True])
         browser.click('.perception .accept')
         self.assertTrue(wait_for(lambda: rospy.has_param('/alpha/picked')))
-        self.assertLess(np.linalg.norm(np.subtract(rospy.get_param('/alpha/picked'), CAN.position)),
-                        0.02)
+        self.assertLess(
+            np.linalg.norm(np.subtract(rospy.get_param('/alpha/picked'), CAN.position)), 0.02
+        )
         self.assertTrue(
-            browser.says('DETECT_TABLETOP counts as having ended with succeeded.', '.follow-up'))
+            browser.says('DETECT_TABLETOP counts as having ended with succeeded.', '.follow-up')
+        )
         self.assertTrue(wait_for(lambda: self.told('hand_over')))
-        self.assertEqual([(told.ok, told.expert) for told in self.told('hand_over')],
-                         [(True, 'operator')])
+        self.assertEqual(
+            [(told.ok, told.expert) for told in self.told('hand_over')], [(True, 'operator')]
+        )
         self.assertTrue(
-            self.told('hand_over')[0].query_id, 'it is told which question it was about')
+            self.told('hand_over')[0].query_id, 'it is told which question it was about'
+        )
         self.assertEqual(browser.errors(), [])
 
     def test_2_giving_up_asks_again(self):
@@ -162,8 +185,10 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assert_a_region_is_marked_by_keys()
         browser.click('.perception .quit')
         self.assertTrue(browser.says('It asks again', '.follow-up', 30.0))
-        self.assertTrue(wait_for(lambda: not browser.text('.perception')),
-                        'the tools are gone with the interface')
+        self.assertTrue(
+            wait_for(lambda: not browser.text('.perception')),
+            'the tools are gone with the interface',
+        )
 
     def test_3_a_camera_is_listened_to_while_somebody_looks(self):
         browser = self.browser
@@ -172,22 +197,29 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.click('[data-topic="{}"]'.format(CAMERA))
         browser.find('.camera-view.shown')
         self.assertTrue(
-            wait_for(lambda: browser.run(
-                'const view = document.querySelector(".camera-view .image");'
-                'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, '
-                '1).data[0] > 20'
-            )))
+            wait_for(
+                lambda: browser.run(
+                    'const view = document.querySelector(".camera-view .image");'
+                    'return view.width === 640 && view.getContext("2d").getImageData(320, 300, 1, '
+                    '1).data[0] > 20'
+                )
+            )
+        )
         self.assertEqual(self.camera.viewers, 1)
         self.assert_accessible('a camera')
         # as when a session has become too old while its page was open
         browser.driver.delete_all_cookies()
         self.camera.show([TABLE._replace(colour=(0.1, 0.1, 0.9))])
         self.assertTrue(
-            wait_for(lambda: browser.run(
-                'const view = document.querySelector(".camera-view .image");'
-                'const [red, , blue] = view.getContext("2d").getImageData(320, 336, 1, 1).data; '
-                'return blue > red + 40'
-            )))
+            wait_for(
+                lambda: browser.run(
+                    'const view = document.querySelector(".camera-view .image");'
+                    'const [red, , blue] = view.getContext("2d")'
+                    '.getImageData(320, 336, 1, 1).data; '
+                    'return blue > red + 40'
+                )
+            )
+        )
         self.camera.show([TABLE, CAN, BOX])
         self.assertTrue(any('401' in entry for entry in browser.errors()), 'it was refused once')
         browser.click('.camera-view .view-close')
@@ -198,7 +230,8 @@ class Marking(ConsolePage, unittest.TestCase):
         self.joints.publish(JointState(name=['elbow'], position=[1.25]))
         points = np.random.default_rng(1).uniform(-1, 1, (50000, 3))
         self.cloud.publish(
-            cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8)))
+            cloud_message(points, Header(frame_id=OPTICAL), np.full(points.shape, 200, np.uint8))
+        )
         browser.click('[data-topic="/joint_states"]')
         self.assertTrue(browser.says('1.250', '.joints-view'))
         self.assert_accessible('joints')
@@ -210,19 +243,29 @@ class Marking(ConsolePage, unittest.TestCase):
     def test_5_the_robot_stands_in_its_cloud_and_moves_as_its_joints_say(self):
         browser, canvas = self.browser, '.cloud-view .cloud'
         self.assertTrue(
-            wait_for(lambda: self.drawn(canvas, 'triangles') > 10000 and self.drawn(
-                canvas, 'points') == 20000),
-            (self.drawn(canvas, 'triangles'), self.drawn(canvas,
-                                                         'points'), browser.text('.cloud-view')))
+            wait_for(
+                lambda: (
+                    self.drawn(canvas, 'triangles') > 10000
+                    and self.drawn(canvas, 'points') == 20000
+                )
+            ),
+            (
+                self.drawn(canvas, 'triangles'),
+                self.drawn(canvas, 'points'),
+                browser.text('.cloud-view'),
+            ),
+        )
         self.assert_accessible('a cloud and its robot')
         before = browser.run(PICTURE, canvas)[0]
         self.joints.publish(
-            JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5]))
+            JointState(name=['torso_lift_joint', 'l_shoulder_pan_joint'], position=[0.3, 1.5])
+        )
         self.assertTrue(wait_for(lambda: browser.run(PICTURE, canvas)[0] != before))
         self.assertNotIn('No transform', browser.text('.cloud-view'))
         browser.run(
             'const choice = document.querySelector(".cloud-view .beside"); choice.value = "";'
-            'choice.dispatchEvent(new Event("change"))')
+            'choice.dispatchEvent(new Event("change"))'
+        )
         self.assertTrue(wait_for(lambda: self.drawn(canvas, 'triangles') == 0), 'the cloud alone')
         self.assertEqual(browser.errors(), [])
 
@@ -232,8 +275,10 @@ class Marking(ConsolePage, unittest.TestCase):
             browser.click('.sensor-list [data-topic="{}"]'.format(topic))
         browser.click('.sensor-list [data-topic="{} as a cloud"]'.format(DEPTH))
         self.assertTrue(browser.says('of 307200 points', '.cloud-view'))
-        self.assertTrue(wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000),
-                        'with the robot')
+        self.assertTrue(
+            wait_for(lambda: self.drawn('.cloud-view .cloud', 'triangles') > 10000),
+            'with the robot',
+        )
         # 422: the first image may have come before the first camera_info, and the page was told so
         self.assertEqual([entry for entry in browser.errors() if '422' not in entry], [])
 
@@ -242,18 +287,23 @@ class Marking(ConsolePage, unittest.TestCase):
         early = rospy.Publisher('early', PointCloud2, queue_size=1, latch=True)
         early.publish(
             cloud_message(
-                np.random.default_rng(1).uniform(-1, 1, (500, 3)), Header(frame_id='early')))
+                np.random.default_rng(1).uniform(-1, 1, (500, 3)), Header(frame_id='early')
+            )
+        )
         browser.click('.sensor-list [data-topic="/early"]')
         self.assertTrue(browser.says('No transform from early', view), browser.text(view))
         self.assertEqual(self.drawn(view + ' .cloud', 'triangles'), 0)
         self.camera.tell_place('early')
-        self.assertTrue(wait_for(lambda: self.drawn(view + ' .cloud', 'triangles') > 10000),
-                        browser.text(view))
+        self.assertTrue(
+            wait_for(lambda: self.drawn(view + ' .cloud', 'triangles') > 10000), browser.text(view)
+        )
         browser.click('.sensor-list [data-topic="/early"]')
 
     def test_7_a_robot_description_that_would_do_harm_is_told_in_a_sentence(self):
-        rospy.set_param('/evil/robot_description',
-                        '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>')
+        rospy.set_param(
+            '/evil/robot_description',
+            '<!DOCTYPE robot [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>',
+        )
         evil = '[data-topic="/evil/robot_description"]'
         self.browser.click('.sensor-list ' + evil)
         self.assertTrue(self.browser.says('entities; that is not allowed', '.view' + evil))

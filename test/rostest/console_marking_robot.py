@@ -2,6 +2,7 @@
 """A robot that never sees anything by itself: its PICK tells, as a parameter, where it was told
 that the object is.
 """
+
 import rospy
 
 import smach
@@ -40,14 +41,22 @@ def main():
         smach.StateMachine.add('DETECT_TABLETOP', Detect(), {'succeeded': 'PICK'})
         smach.StateMachine.add('PICK', Pick())
     OracleContainer.wrap(
-        sm, name='FETCH', settings={
-            'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False, 'interfaces': {
+        sm,
+        name='FETCH',
+        settings={
+            'prior': 0.8,
+            'high_from': 0.75,
+            'deadline_s': 300.0,
+            'escalate': False,
+            'interfaces': {
                 'perception': {
-                    'action': '/perception_interface', 'states': ['DETECT_TABLETOP'],
-                    'description': 'Mark the object in the camera frame'
+                    'action': '/perception_interface',
+                    'states': ['DETECT_TABLETOP'],
+                    'description': 'Mark the object in the camera frame',
                 }
-            }
-        })
+            },
+        },
+    )
     while not rospy.is_shutdown():
         sm.execute()
 

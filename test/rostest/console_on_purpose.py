@@ -2,6 +2,7 @@
 """The console commands nothing by accident, and says what an answer has led to: in a real browser,
 with a real machine under a real oracle.
 """
+
 import os
 import sys
 import unittest
@@ -24,7 +25,7 @@ PLACE_KEY = '3'
 GIVE_UP = '.choice.give_up[data-name=""]'
 # what a second tap, and then its key, do as soon as there is something to tap: no wall clock has a
 # part in it
-TAP_AT_ONCE = '''
+TAP_AT_ONCE = """
 const [row, answer, done] = arguments;
 const tap = (element) => {
   const it = { bubbles: true, cancelable: true, detail: 1 };
@@ -40,9 +41,9 @@ const look = () => {
   document.body.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
   done(key);
 };
-look();'''
+look();"""
 # opened in the very frame in which it is listed, and left at once
-OPEN_AND_LEAVE = '''
+OPEN_AND_LEAVE = """
 const [row, done] = arguments;
 const shown = () => Boolean(document.querySelector(".detail"));
 const look = () => {
@@ -60,24 +61,29 @@ const look = () => {
   key("Escape");
   done([opened, openedByKey, shown(), Number(document.body.dataset.refused || 0)]);
 };
-look();'''
-MOVE_AND_TAP = '''
+look();"""
+MOVE_AND_TAP = """
 const [selector] = arguments;
 const box = document.createElement("div");
 box.style.height = "60px";
 document.querySelector(".answer-form").prepend(box);
 document.querySelector(selector).click();
-box.remove();'''
+box.remove();"""
 # somebody takes a question over; the list that shows it comes later than the reply
-TAKEN = OF_A_QUESTION % '''
+TAKEN = (
+    OF_A_QUESTION
+    % """
   said("bob");
   await detail.claim("take_over");
   said("bob");
-  return [said("ann"), said("carl")];'''
+  return [said("ann"), said("carl")];"""
+)
 # a press that was not meant opens another question than the one that is worked on: what was told
 # then, after the way back, and once the other one has been seen; which one the others are told that
 # it is; and what is still typed
-ANOTHER_BY_ACCIDENT = OF_A_QUESTION % '''
+ANOTHER_BY_ACCIDENT = (
+    OF_A_QUESTION
+    % """
   const { questions } = await import("/static/js/questions/question_panel.js");
   const panel = questions.create(app);
   document.body.append(panel.root);
@@ -109,9 +115,10 @@ ANOTHER_BY_ACCIDENT = OF_A_QUESTION % '''
   panel.close();
   app.current = "";
   panel.root.remove();
-  return seen;'''
+  return seen;"""
+)
 # "No, go back" from giving up a container above that may end as the failed one may
-GO_BACK = '''
+GO_BACK = """
 return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
   const make = (outcome, key, words, act) => {
     const button = document.createElement("button");
@@ -129,9 +136,9 @@ return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
   const focused = document.activeElement.dataset.container;
   part.root.remove();
   return focused;
-});'''
+});"""
 # a robot that is held after an answer, and whose silence ends
-HELD = '''
+HELD = """
 return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
   let gone = "";
   const app = { current: "questions", connection: { request: async () => ({}) },
@@ -147,9 +154,9 @@ return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
     shown.update();
     return shown.hint.textContent;
   });
-});'''
+});"""
 # how a machine stands whose state ORACLE is its oracle, by its graph or as no other state, or not
-STANDING = '''
+STANDING = """
 return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
   const machine = { path: "TOP", running: true, paused: true, by: "ann", breakpoints: [], active: [
     { path: "TOP", state: "ORACLE", held: "", confirm: false },
@@ -161,13 +168,12 @@ return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
   return [words("", ["ORACLE"], { ...asked, status: "pending" }), words("ORACLE", []),
     words("", [], { ...asked, status: "pending" }),
     words("ORACLE", [], { ...asked, status: "interface" })];
-});'''
+});"""
 REFUSED = 'the page had just changed there'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class OnPurpose(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.audited, cls.events = [], []
@@ -198,8 +204,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.find(QUESTION)
         browser.driver.refresh()
         browser.driver.set_script_timeout(40)
-        self.assertEqual(browser.driver.execute_async_script(OPEN_AND_LEAVE, QUESTION),
-                         [True, True, False, 0])
+        self.assertEqual(
+            browser.driver.execute_async_script(OPEN_AND_LEAVE, QUESTION), [True, True, False, 0]
+        )
         self.assertTrue(stays(lambda: not self.claims(), 1.5), 'who leaves at once sends nothing')
         browser.driver.refresh()
         self.assertEqual(self.press_at_once(QUESTION), 0)
@@ -210,8 +217,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(self.press_at_once('[data-action=confirm-give-up]'), 1, 'this sends')
         self.press('\ue00c')
         self.press('\ue00c')
-        self.assertTrue(wait_for(lambda: not browser.run(
-            'return document.querySelector(".detail")')))
+        self.assertTrue(
+            wait_for(lambda: not browser.run('return document.querySelector(".detail")'))
+        )
         browser.driver.refresh()
         self.assertEqual(self.answers(), [])
 
@@ -225,12 +233,17 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(self.answers(), [])
         self.assertTrue(wait_for(lambda: browser.settled(browser.find(GO_TO_PLACE))))
         browser.run(MOVE_AND_TAP, GO_TO_PLACE)
-        self.assertEqual(browser.run('return document.body.dataset.refused'), '3',
-                         'the tap, the key, and what has moved under the pointer')
+        self.assertEqual(
+            browser.run('return document.body.dataset.refused'),
+            '3',
+            'the tap, the key, and what has moved under the pointer',
+        )
         self.assertTrue(browser.says('It is yours.'))
         self.assertEqual(self.answers(), [])
-        self.assertTrue(browser.says('Waits for an answer about PICK in KITCHEN/FETCH.',
-                                     '.detail .standing'), browser.text('.detail .standing'))
+        self.assertTrue(
+            browser.says('Waits for an answer about PICK in KITCHEN/FETCH.', '.detail .standing'),
+            browser.text('.detail .standing'),
+        )
 
     def test_2_giving_up_is_confirmed_and_can_be_undone(self):
         browser = self.browser
@@ -247,8 +260,10 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.click('[data-action=confirm-give-up]')
         self.assertTrue(browser.says('Giving up in'))
         self.press('\ue00c')  # Escape
-        self.assertTrue(browser.says('as the failure would have ended', '.give-up-part'),
-                        'undone, and the question is still shown')
+        self.assertTrue(
+            browser.says('as the failure would have ended', '.give-up-part'),
+            'undone, and the question is still shown',
+        )
         browser.click('.other-ends summary')
         browser.click('.choice.give_up[data-name=succeeded]')
         self.assertTrue(browser.says('KITCHEN/FETCH ends with succeeded', '.give-up-asking'))
@@ -256,11 +271,16 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.find('.follow-up'))
         self.assertEqual(len(self.answers()), 1, 'sent once, undone twice')
         self.assertTrue(
-            wait_for(lambda: OracleEvent.GIVE_UP in [event.kind for event in self.events]))
-        self.assertTrue(browser.says('The robot gives up, as you said', '.follow-up .gave-up'),
-                        'that is no success')
-        self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'),
-                        'after more than eight steps')
+            wait_for(lambda: OracleEvent.GIVE_UP in [event.kind for event in self.events])
+        )
+        self.assertTrue(
+            browser.says('The robot gives up, as you said', '.follow-up .gave-up'),
+            'that is no success',
+        )
+        self.assertTrue(
+            browser.says('The trial is over: it ended with succeeded.', '.follow-up'),
+            'after more than eight steps',
+        )
         self.assertIn('earlier steps are left out', browser.text('.follow-up'))
 
     def test_3_single_letter_keys_can_be_turned_off(self):
@@ -269,8 +289,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.find(QUESTION)
         browser.click('#keys')
         self.press('n')
-        self.assertTrue(stays(lambda: not browser.run('return document.querySelector(".detail")'),
-                              0.5))
+        self.assertTrue(
+            stays(lambda: not browser.run('return document.querySelector(".detail")'), 0.5)
+        )
         browser.click('#keys')
         browser.press('n')
         browser.find('.detail')
@@ -278,8 +299,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.click('#keys')
         for key in (PLACE_KEY, 's', 'g'):
             self.press(key)
-        self.assertTrue(stays(lambda: len(self.answers()) == 1
-                              and browser.find(GO_TO_PLACE).is_enabled(), 0.5))
+        self.assertTrue(
+            stays(lambda: len(self.answers()) == 1 and browser.find(GO_TO_PLACE).is_enabled(), 0.5)
+        )
         self.assertNotIn('Give up?', browser.text())
         browser.click('#keys')
         self.assertEqual(browser.errors(), [])
@@ -314,32 +336,57 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(mine, 'It is yours. Leave it to others')
         self.assertIn('carl has taken this question over.', taken)
         self.assertEqual(browser.run(GO_BACK), 'TOP', 'the focus is where it was')
-        self.assertEqual(browser.run(ANOTHER_BY_ACCIDENT), [
-            'claim', 'b', 'claim', 'a', 'the mug lies', 'claim', 'claim,release,claim', 'b', 'b',
-            ''])
+        self.assertEqual(
+            browser.run(ANOTHER_BY_ACCIDENT),
+            [
+                'claim',
+                'b',
+                'claim',
+                'a',
+                'the mug lies',
+                'claim',
+                'claim,release,claim',
+                'b',
+                'b',
+                '',
+            ],
+        )
         waits = 'It waits until somebody lets it go on.'
         self.assertEqual(browser.run(HELD), [waits, 'gone', waits])
         ends = 'Paused by ann. Runs to its end: PICK in TOP.'
-        self.assertEqual(browser.run(STANDING), [
-            'Paused by ann. Runs to its end: ORACLE in TOP, PICK in TOP.',
-            ends + ' The oracle of TOP decides what follows.',
-            ends + ' Waits for an answer about GRASP in TOP.',
-            ends + ' Interface hand runs for GRASP in TOP.'])
+        self.assertEqual(
+            browser.run(STANDING),
+            [
+                'Paused by ann. Runs to its end: ORACLE in TOP, PICK in TOP.',
+                ends + ' The oracle of TOP decides what follows.',
+                ends + ' Waits for an answer about GRASP in TOP.',
+                ends + ' Interface hand runs for GRASP in TOP.',
+            ],
+        )
         self.assertEqual(browser.errors(), [])
 
     def test_6_a_machine_with_a_server_of_its_own_is_listed_once(self):
         def known():
             heard = dict(rosgraph.Master('/test').getSystemState()[1])
             return '/expert_console' in heard.get(OWN_SERVER + '/smach/container_structure', [])
+
         browser = self.browser
         self.assertTrue(wait_for(known), 'the console follows it')
         browser.click('#tab-machines')
         browser.find('[id="/alpha/KITCHEN/FETCH"]')
         # it tells its structure every 2 s
         self.assertTrue(
-            stays(lambda: browser.run(
-                'return [...document.querySelectorAll(".picker .robot")]'
-                '.map((robot) => robot.textContent)') == ['/alpha'], 5.0))
+            stays(
+                lambda: (
+                    browser.run(
+                        'return [...document.querySelectorAll(".picker .robot")]'
+                        '.map((robot) => robot.textContent)'
+                    )
+                    == ['/alpha']
+                ),
+                5.0,
+            )
+        )
 
 
 if __name__ == '__main__':

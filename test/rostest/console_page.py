@@ -1,6 +1,7 @@
 """The console as a node of its own, a robot that asks, and a real browser at the page: for a class
 of tests.
 """
+
 import os
 import shutil
 import signal
@@ -17,7 +18,7 @@ from smach_oracle.experiment.launching import free_port
 HERE = os.path.dirname(os.path.abspath(__file__))
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 # pressed in the very frame in which it comes: no wall clock has a part in it
-PRESS_AT_ONCE = '''
+PRESS_AT_ONCE = """
 const [selector, done] = arguments;
 const look = () => {
   const button = [...document.querySelectorAll(selector)].find((each) => each.offsetParent);
@@ -27,10 +28,10 @@ const look = () => {
   button.dispatchEvent(new MouseEvent("click", it));
   done(Number(document.body.dataset.refused || 0));
 };
-look();'''
+look();"""
 # a page's view of a question of the robot /r, for ann, and what a test does with it: `said` has the
 # list tell who holds it, `replies` are those to claims, `told` are the names of all commands
-OF_A_QUESTION = '''
+OF_A_QUESTION = """
 const paths = ["questions/question_detail.js", "page/store.js", "page/liveness.js"];
 return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async (
   [{ QuestionDetail }, { Store }, { Liveness }]) => {
@@ -58,7 +59,7 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
     return detail.claimBar.root.textContent;
   };
 %s
-});'''
+});"""
 
 
 class Node:
@@ -90,13 +91,13 @@ class Node:
 class ConsolePage:
     """Beside unittest.TestCase."""
 
-
     @classmethod
     def begin(cls, robot, *arguments, size=(), name='operator'):
         """Start the console, the robot /alpha (a file beside this one, and its arguments) and a
         browser at the page, of somebody who has given that name before.
         """
         from browser import Browser
+
         cls.port = free_port()
         cls.page = 'http://localhost:{}/'.format(cls.port)
         cls.console = cls.start_console()
@@ -140,8 +141,12 @@ class ConsolePage:
 
     @classmethod
     def start_console(cls, *more):
-        return Node(find_node('smach_oracle', 'expert_console')[0], '_port:={}'.format(cls.port),
-                    '__name:=expert_console', *more)
+        return Node(
+            find_node('smach_oracle', 'expert_console')[0],
+            '_port:={}'.format(cls.port),
+            '__name:=expert_console',
+            *more,
+        )
 
     @classmethod
     def page_is_served(cls):
@@ -151,6 +156,7 @@ class ConsolePage:
     def assert_accessible(self, view):
         """axe-core finds nothing wrong with what the page shows now, in any of its colours."""
         from accessibility import violations
+
         self.assertEqual([view] + violations(self.browser), [view])
 
     def press_at_once(self, selector):

@@ -2,6 +2,7 @@
 """Who works on a question: a name is asked for, a claim belongs to one browser, who else looks is
 shown, and an answer needs a claim. Two real browsers, and a raw socket.
 """
+
 import json
 import os
 import sys
@@ -29,15 +30,23 @@ YOURS = 'It is yours.'
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class People(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         from browser import Browser
+
         cls.open, cls.answered = [], []
-        rospy.Subscriber('/alpha/expert_query/open', OpenQueries,
-                         lambda message: cls.open.append(message.queries))
-        rospy.Subscriber('/alpha/oracle/events', OracleEvent, lambda message: message.kind
-                         == OracleEvent.QUERY_ANSWERED and cls.answered.append(message.by))
+        rospy.Subscriber(
+            '/alpha/expert_query/open',
+            OpenQueries,
+            lambda message: cls.open.append(message.queries),
+        )
+        rospy.Subscriber(
+            '/alpha/oracle/events',
+            OracleEvent,
+            lambda message: (
+                message.kind == OracleEvent.QUERY_ANSWERED and cls.answered.append(message.by)
+            ),
+        )
         cls.begin('console_robot.py', 'PICK', '0.1', '0', '9', name='')
         cls.phone = Browser(390, 844)
         cls.phone.driver.get(cls.page)
@@ -62,12 +71,18 @@ class People(ConsolePage, unittest.TestCase):
         self.assertEqual(self.holder(), '', 'nobody claims without a name')
         self.assert_accessible('whose name is asked for')
         self.assertEqual(browser.run('return document.activeElement.id'), 'expert')
-        self.assertTrue(browser.run('return document.querySelector(".name-demand")'
-                                    '.getBoundingClientRect().top > innerHeight / 2'),
-                        'what stops a hand is at the top')
+        self.assertTrue(
+            browser.run(
+                'return document.querySelector(".name-demand")'
+                '.getBoundingClientRect().top > innerHeight / 2'
+            ),
+            'what stops a hand is at the top',
+        )
         browser.find('#no-name').send_keys(Keys.ESCAPE)
-        self.assertTrue(browser.says('your name is needed', '.claim-bar .problem'),
-                        'Esc leaves the dialog alone')
+        self.assertTrue(
+            browser.says('your name is needed', '.claim-bar .problem'),
+            'Esc leaves the dialog alone',
+        )
         browser.click('[data-action=claim]')
         browser.click('#no-name')
         self.assertTrue(browser.says('your name is needed', '.claim-bar .problem'))
@@ -79,7 +94,7 @@ class People(ConsolePage, unittest.TestCase):
         browser.driver.refresh()
         self.assertTrue(browser.says('ann', '#person'), 'it is remembered')
         browser.click(QUESTION)
-        self.assertTrue(browser.says(YOURS), 'the claim is this browser\'s')
+        self.assertTrue(browser.says(YOURS), "the claim is this browser's")
 
     def test_2_another_browser_of_the_same_name_does_not_hold_the_claim(self):
         phone = self.phone
@@ -93,19 +108,27 @@ class People(ConsolePage, unittest.TestCase):
         self.assertTrue(self.browser.says(YOURS), 'it stays where it was')
 
     def test_3_who_else_looks_is_shown(self):
-        self.assertTrue(self.browser.says('Also looking at it: ann (in another browser).',
-                                          '.onlookers'))
+        self.assertTrue(
+            self.browser.says('Also looking at it: ann (in another browser).', '.onlookers')
+        )
         self.phone.click('.detail-head .back')
-        self.assertTrue(wait_for(lambda: self.browser.run(
-            'return document.querySelector(".onlookers").hidden')))
+        self.assertTrue(
+            wait_for(lambda: self.browser.run('return document.querySelector(".onlookers").hidden'))
+        )
         self.phone.click(QUESTION)
         self.assertTrue(self.browser.says('Also looking at it', '.onlookers'))
 
     def test_4_a_raw_socket_answers_nothing_that_it_has_not_claimed(self):
         said = tornado.ioloop.IOLoop().run_sync(self.answer_raw, 40)
         self.assertEqual([each['ok'] for each in said], [False] * 3)
-        for told, reply in zip(('say your name first', 'take it over first',
-                                'ann works on this question in another browser'), said):
+        for told, reply in zip(
+            (
+                'say your name first',
+                'take it over first',
+                'ann works on this question in another browser',
+            ),
+            said,
+        ):
             self.assertIn(told, reply['message'])
         self.assertEqual(self.answered, [])
         self.assertEqual(self.holder(), 'ann')
@@ -115,16 +138,25 @@ class People(ConsolePage, unittest.TestCase):
         with urllib.request.urlopen(self.page + 'session') as reply:
             session = json.loads(reply.read().decode())
             cookie = reply.headers['Set-Cookie'].split(';')[0]
-        socket = await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(
-            self.page.replace('http', 'ws', 1) + 'socket',
-            headers={'Origin': self.page.rstrip('/'), 'Cookie': cookie}))
+        socket = await tornado.websocket.websocket_connect(
+            tornado.httpclient.HTTPRequest(
+                self.page.replace('http', 'ws', 1) + 'socket',
+                headers={'Origin': self.page.rstrip('/'), 'Cookie': cookie},
+            )
+        )
         key = '/alpha/expert_query ' + self.open[-1][0].query.query_id
         answer = {'do': 'answer', 'question': key, 'kind': 'goto', 'name': 'PLACE'}
         replies = {}
-        for number, command in enumerate((
-                {'do': 'hello', 'xsrf': session['xsrf'], 'expert': ''}, answer,
-                {'do': 'hello', 'xsrf': session['xsrf'], 'expert': 'ann'}, answer,
-                {'do': 'claim', 'question': key}), 1):
+        for number, command in enumerate(
+            (
+                {'do': 'hello', 'xsrf': session['xsrf'], 'expert': ''},
+                answer,
+                {'do': 'hello', 'xsrf': session['xsrf'], 'expert': 'ann'},
+                answer,
+                {'do': 'claim', 'question': key},
+            ),
+            1,
+        ):
             await socket.write_message(json.dumps(dict(command, id=number)))
             while number not in replies:
                 message = json.loads(await socket.read_message())

@@ -2,6 +2,7 @@
 """A robot for the console's tests: a real machine under a real oracle, whose PICK fails until its
 work is done.
 """
+
 import sys
 
 import rospy
@@ -18,8 +19,9 @@ class Work(smach.State):
     """Succeeds after some time; the labels in `failing` fail."""
 
     def __init__(self, label, failing, time_s, output_keys=(), input_keys=()):
-        smach.State.__init__(self, OUTCOMES, input_keys=list(input_keys),
-                             output_keys=list(output_keys))
+        smach.State.__init__(
+            self, OUTCOMES, input_keys=list(input_keys), output_keys=list(output_keys)
+        )
         self._label = label
         self._failing = failing
         self._time_s = time_s
@@ -45,14 +47,23 @@ def chain(labels, make):
 
 def make_machine(failing, time_s, size):
     """Fetch, nested: DETECT, PICK, PLACE; `size`: so many further states around it."""
+
     def pick(label):
-        return Work(label, failing, time_s, ['grasp'] if label == 'PICK' else [],
-                    {'PICK': ['object'], 'PLACE': ['grasp']}.get(label, []))
+        return Work(
+            label,
+            failing,
+            time_s,
+            ['grasp'] if label == 'PICK' else [],
+            {'PICK': ['object'], 'PLACE': ['grasp']}.get(label, []),
+        )
+
     inner = chain(['DETECT', 'PICK', 'PLACE'], pick)
     inner.register_input_keys(['object'])
     labels = ['STEP_{:02}_OF_A_LONG_JOB'.format(number) for number in range(size)]
-    sm = chain(['MOVE_ARMS_ASIDE', 'FETCH'] + labels,
-               lambda label: inner if label == 'FETCH' else Work(label, failing, time_s))
+    sm = chain(
+        ['MOVE_ARMS_ASIDE', 'FETCH'] + labels,
+        lambda label: inner if label == 'FETCH' else Work(label, failing, time_s),
+    )
     sm.userdata.object = {'name': 'mug', 'weight_kg': 0.3}
     return sm
 
@@ -67,14 +78,19 @@ def main(argv):
     rospy.init_node('robot')
     sm = make_machine(failing, time_s, size)
     OracleContainer.wrap(
-        sm, name='KITCHEN', settings={
-            'prior': prior, 'high_from': 0.75, 'deadline_s': 300.0, 'escalate': False,
-            'states': {'FETCH/PICK': {'preconditions': ['DETECT']}}, 'interfaces': {
-                'assist': {
-                    'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']
-                }
-            }
-        })
+        sm,
+        name='KITCHEN',
+        settings={
+            'prior': prior,
+            'high_from': 0.75,
+            'deadline_s': 300.0,
+            'escalate': False,
+            'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
+            'interfaces': {
+                'assist': {'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']}
+            },
+        },
+    )
     if rospy.get_param('~own_introspection', False):
         IntrospectionServer('/a_server_of_its_own', sm, '/SM_ROOT').start()
     for _ in range(trials):

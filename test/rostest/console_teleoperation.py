@@ -2,6 +2,7 @@
 """A hand driven from a real browser, by held keys and buttons, through an interface that is started
 on demand.
 """
+
 import os
 import sys
 import time
@@ -28,17 +29,17 @@ STOPS_WITHIN_S = 0.1
 QUEUED = 2  # commands that the console's publisher may hold
 QUESTION = '.question-row[data-key^="/alpha/"]'
 # a button that has just moved, held by a key
-HELD_AT_ONCE = '''
+HELD_AT_ONCE = """
 const pad = document.querySelector(".pad[data-move=up]");
 const box = document.createElement("div");
 box.style.height = "60px";
 pad.parentElement.before(box);
 const key = { key: " ", code: "Space", bubbles: true, cancelable: true };
 pad.dispatchEvent(new KeyboardEvent("keydown", key));
-box.remove();'''
+box.remove();"""
 
 # the wheel is taken, and a letter pressed in the very frame in which it comes to move the hand
-KEY_AT_ONCE = '''
+KEY_AT_ONCE = """
 const done = arguments[0];
 const wheel = document.querySelector(".wheel");
 const pad = document.querySelector(".pad[data-move=up]");
@@ -56,7 +57,7 @@ const take = () => {
   wheel.click();
   press();
 };
-take();'''
+take();"""
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -68,10 +69,12 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         cls.arm, cls.lag = FakeArm(), MachineLag()
         cls.audited, cls.states, cls.commands = [], [], []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
-        rospy.Subscriber('/manipulation_interface/state', TeleopState, cls.states.append,
-                         tcp_nodelay=True)
-        rospy.Subscriber('/manipulation_interface/command', TeleopCommand, cls.heard,
-                         tcp_nodelay=True)
+        rospy.Subscriber(
+            '/manipulation_interface/state', TeleopState, cls.states.append, tcp_nodelay=True
+        )
+        rospy.Subscriber(
+            '/manipulation_interface/command', TeleopCommand, cls.heard, tcp_nodelay=True
+        )
         cls.begin('console_teleoperation_robot.py', size=(1360, 1000))
 
     @classmethod
@@ -99,6 +102,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             late_s = self.late_s(let_go)
             afterwards()
             return late_s
+
         assert_soon(measure, STOPS_WITHIN_S)
 
     def assert_moves_nothing(self, what):
@@ -124,12 +128,14 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=manipulation]')
         refused = browser.run('return Number(document.body.dataset.refused || 0)')
-        self.assertEqual(self.press_at_once('[data-action=stop-hand]'), refused,
-                         'nothing delays it')
+        self.assertEqual(
+            self.press_at_once('[data-action=stop-hand]'), refused, 'nothing delays it'
+        )
         self.assertTrue(wait_for(lambda: [told.ok for told in self.told('stop_hand')] == [True]))
         browser.find('.manipulation', 40.0)
-        self.assertTrue(browser.says('was started for this question', '.output'),
-                        'its output is there')
+        self.assertTrue(
+            browser.says('was started for this question', '.output'), 'its output is there'
+        )
         self.assertFalse(browser.find('.pad[data-move=up]').is_enabled(), 'nobody drives yet')
         self.assert_accessible('a hand that somebody may drive')
         browser.click('.wheel')
@@ -161,15 +167,18 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         def release():
             ActionChains(self.browser.driver, duration=0).release().perform()
 
-        self.assert_stops(press,
-                          lambda: self.browser.run('window.dispatchEvent(new Event("blur"))'),
-                          release)
+        self.assert_stops(
+            press, lambda: self.browser.run('window.dispatchEvent(new Event("blur"))'), release
+        )
         self.assertLess(self.height(), before)
         self.assert_stops(
-            press, lambda: self.browser.run(
+            press,
+            lambda: self.browser.run(
                 'Object.defineProperty(document, "hidden", {value: true, configurable: true});'
-                'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'),
-            release)
+                'document.dispatchEvent(new Event("visibilitychange")); delete document.hidden'
+            ),
+            release,
+        )
 
     def settled_pad(self, move):
         """A button that the page takes as pressed on purpose: it has not just moved."""
@@ -185,14 +194,19 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             browser.run('arguments[0].focus()', self.settled_pad(move))
             chain().key_down(key).perform()
             self.assertTrue(self.moves())
+
         before = self.height()
         self.assert_stops(partial(press, ' ', 'up'), lambda: chain().key_up(' ').perform())
         self.assertGreater(self.height(), before)
-        self.assert_stops(partial(press, Keys.ENTER, 'down'),
-                          lambda: chain().key_up(Keys.ENTER).perform())
+        self.assert_stops(
+            partial(press, Keys.ENTER, 'down'), lambda: chain().key_up(Keys.ENTER).perform()
+        )
         other = 'document.querySelector("[data-frame=base]").focus()'
-        self.assert_stops(partial(press, ' ', 'down'), partial(browser.run, other),
-                          lambda: chain().key_up(' ').perform())
+        self.assert_stops(
+            partial(press, ' ', 'down'),
+            partial(browser.run, other),
+            lambda: chain().key_up(' ').perform(),
+        )
         self.assertTrue(self.browser.says('You drive.', '.driver'), 'nothing else was pressed')
         self.assert_moves_nothing(lambda: browser.run(HELD_AT_ONCE))
         self.assertGreater(int(browser.run('return document.body.dataset.refused || 0')), 0)
@@ -204,7 +218,8 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         browser.driver.set_script_timeout(60)
         refused = []
         self.assert_moves_nothing(
-            lambda: refused.append(browser.driver.execute_async_script(KEY_AT_ONCE)))
+            lambda: refused.append(browser.driver.execute_async_script(KEY_AT_ONCE))
+        )
         self.assertEqual(refused, [1])
         browser.click('#keys')
         self.assert_moves_nothing(lambda: self.key(True))  # letters are turned off
@@ -222,6 +237,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             self.key(False)
             self.browser.click('.wheel')
             self.assertTrue(self.browser.says('You drive.', '.driver'))
+
         self.assert_stops(self.hold_key, partial(self.browser.run, press), take_it_again)
         self.assertTrue(self.told('stop_hand')[-1].ok)
 
@@ -231,24 +247,30 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         at = [{'x': box['x'] + box['width'] / 2, 'y': box['y'] + box['height'] / 2}] if pad else []
         self.browser.driver.execute_cdp_cmd(
             'Input.dispatchTouchEvent',
-            {'type': 'touchStart' if pad else 'touchEnd', 'touchPoints': at})
+            {'type': 'touchStart' if pad else 'touchEnd', 'touchPoints': at},
+        )
 
     def test_3_a_finger_moves_the_hand_as_long_as_it_rests_on_a_button(self):
-        asks = ('return arguments[0].dispatchEvent('
-                'new MouseEvent("contextmenu", {bubbles: true, cancelable: true}))')
+        asks = (
+            'return arguments[0].dispatchEvent('
+            'new MouseEvent("contextmenu", {bubbles: true, cancelable: true}))'
+        )
         pad = self.settled_pad('up')
 
         def touch():
             self.finger(pad)
             self.assertTrue(self.moves())
+
         touch()
         self.assertFalse(self.browser.run(asks, pad), 'no menu, which a phone would show by now')
         self.assertTrue(self.moves(), 'still')
         self.finger()
         self.assert_stops(touch, self.finger)
-        self.assert_stops(touch,
-                          partial(self.browser.run, asks, self.browser.find('.manipulation-head')),
-                          self.finger)
+        self.assert_stops(
+            touch,
+            partial(self.browser.run, asks, self.browser.find('.manipulation-head')),
+            self.finger,
+        )
 
     def pad(self, held=True, forward=1.0, **more):
         """Put a fake gamepad where the page looks for one; returns when it has looked."""
@@ -259,8 +281,11 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             'const pad = { id: "fake", connected: true, mapping: "standard", axes: [0, -forward, '
             '0, 0], buttons };'
             'Object.assign(pad, more); window.looks = 0;'
-            'navigator.getGamepads = () => { window.looks += 1; return [null, pad]; };', held,
-            forward, more)
+            'navigator.getGamepads = () => { window.looks += 1; return [null, pad]; };',
+            held,
+            forward,
+            more,
+        )
         self.assertTrue(wait_for(lambda: self.browser.run('return window.looks') > 1))
 
     def pushed(self):
@@ -271,20 +296,26 @@ class Teleoperation(ConsolePage, unittest.TestCase):
     def test_4_a_gamepad_moves_the_hand_while_its_shoulder_button_is_held(self):
         self.assert_moves_nothing(lambda: self.pad(mapping=''))  # its axes might be any
         self.assertTrue(
-            self.browser.says('fake has a layout that this browser does not know', '.hint'))
+            self.browser.says('fake has a layout that this browser does not know', '.hint')
+        )
         self.assert_moves_nothing(lambda: self.pad(held=False))  # a stick alone moves nothing
         self.assertTrue(self.browser.says('fake moves while a shoulder button is held', '.hint'))
         self.push_the_pad()
         fast = wait_for(self.pushed)
         self.pad(forward=0.5)
-        self.assertTrue(wait_for(lambda: self.pushed() and abs(self.pushed() - fast / 2) < 1e-6),
-                        'half as fast')
+        self.assertTrue(
+            wait_for(lambda: self.pushed() and abs(self.pushed() - fast / 2) < 1e-6), 'half as fast'
+        )
         self.pad(forward=0.1)
-        self.assertTrue(wait_for(lambda: self.pushed() == 0.0),
-                        'a stick at rest is never quite in the middle')
+        self.assertTrue(
+            wait_for(lambda: self.pushed() == 0.0), 'a stick at rest is never quite in the middle'
+        )
         self.assert_stops(self.push_the_pad, lambda: self.pad(held=False))
-        for lost in ('navigator.getGamepads()[1].connected = false',
-                     'navigator.getGamepads = () => []', 'window.dispatchEvent(new Event("blur"))'):
+        for lost in (
+            'navigator.getGamepads()[1].connected = false',
+            'navigator.getGamepads = () => []',
+            'window.dispatchEvent(new Event("blur"))',
+        ):
             self.assert_stops(self.push_the_pad, partial(self.browser.run, lost))
             # held all along: to move again it must be let go first
             self.assert_moves_nothing(self.pad)
@@ -316,16 +347,19 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             time.sleep(0.2)  # so long have the youngest of those that are held back waited
             relayed = len(self.commands)
             self.console.thaw()
-            self.assertTrue(wait_for(lambda: len(self.commands) > relayed),
-                            'the late ones have come')
+            self.assertTrue(
+                wait_for(lambda: len(self.commands) > relayed), 'the late ones have come'
+            )
             self.assert_moves_nothing(lambda: None)
             held = [
                 command.header.stamp for _, command in self.commands[relayed:] if command.dead_man
             ]
-            self.assertEqual([stamp for stamp in held if stamp > frozen[-1]], [],
-                             'none that moves it')
+            self.assertEqual(
+                [stamp for stamp in held if stamp > frozen[-1]], [], 'none that moves it'
+            )
             # those had been relayed before, and were on their way out
             self.assertLessEqual(len(held), QUEUED)
+
         frozen = []
         self.assert_stops(self.drive_by_key, freeze, go_on)
 
@@ -348,6 +382,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
             self.browser.click(QUESTION)
             self.browser.click('.wheel', 40.0)
             self.assertTrue(self.browser.says('You drive.', '.driver', 30.0))
+
         self.assert_stops(self.drive_by_key, kill, another_browser)
 
     def test_7_the_gripper_and_the_end(self):
@@ -358,11 +393,14 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('holds something', '.drive-facts'))
         browser.click('.finish')
         self.assertTrue(browser.says('PICK counts as having ended with succeeded.', '.follow-up'))
-        self.assertTrue(wait_for(lambda: rospy.get_param('/alpha/placed', '') == 'base_footprint'),
-                        'the grasp is told')
+        self.assertTrue(
+            wait_for(lambda: rospy.get_param('/alpha/placed', '') == 'base_footprint'),
+            'the grasp is told',
+        )
         self.assertTrue(wait_for(lambda: self.told('leave_wheel')))
-        self.assertEqual({told.ok
-                          for told in self.told('take_wheel') + self.told('hand_over')}, {True})
+        self.assertEqual(
+            {told.ok for told in self.told('take_wheel') + self.told('hand_over')}, {True}
+        )
         self.assertIn('relayed', self.told('leave_wheel')[-1].arguments)
         self.assertTrue(self.told('take_wheel')[0].query_id)
         self.assertEqual(self.told('drive'), [], 'sessions are audited, not every command')

@@ -2,6 +2,7 @@
 """A robot whose PICK never succeeds by itself; a person may drive its hand, through an interface
 started on demand.
 """
+
 import rospy
 
 import smach
@@ -39,15 +40,22 @@ def main():
         smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Place())
     OracleContainer.wrap(
-        sm, name='FETCH', settings={
-            'prior': 0.8, 'deadline_s': 300.0, 'interfaces': {
+        sm,
+        name='FETCH',
+        settings={
+            'prior': 0.8,
+            'deadline_s': 300.0,
+            'interfaces': {
                 'manipulation': {
-                    'action': '/manipulation_interface', 'description': 'Drive the hand',
-                    'states': ['PICK'], 'node': 'smach_oracle manipulation_interface',
-                    'args': ['__name:=manipulation_interface']
+                    'action': '/manipulation_interface',
+                    'description': 'Drive the hand',
+                    'states': ['PICK'],
+                    'node': 'smach_oracle manipulation_interface',
+                    'args': ['__name:=manipulation_interface'],
                 }
-            }
-        })
+            },
+        },
+    )
     sm.execute()
     rospy.spin()
 

@@ -2,6 +2,7 @@
 """A page does not wear out: a question that was opened and left leaves nothing behind in it, and
 the list of trials comes only while somebody looks at it.
 """
+
 import os
 import sys
 import unittest
@@ -17,7 +18,7 @@ WARM_UP, QUESTIONS, EVERY = 10, 200, 40
 MOST = {'nodes': 1.0, 'listeners': 0.1}  # growth a question; it has some 400 and 60
 
 # everything that the page's sockets get
-LISTEN = '''
+LISTEN = """
 window.heard = [];
 const Socket = window.WebSocket;
 window.WebSocket = class extends Socket {
@@ -25,13 +26,12 @@ window.WebSocket = class extends Socket {
     super(...given);
     this.addEventListener("message", ({ data }) => window.heard.push(JSON.parse(data)));
   }
-};'''
+};"""
 LISTS = 'return window.heard.filter((each) => each.lists || each.sections?.trials)'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Worn(ConsolePage, unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.begin('console_robot.py', 'PICK', '0.05', '0', '1')

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Front ends, servers and askers that die: what becomes of the question."""
+
 import os
 import subprocess
 import sys
@@ -42,8 +43,13 @@ default: {kind: ignore}
 """
 
 
-TOPICS = {'/goal': ExpertQueryActionGoal, '/status': GoalStatusArray, '/open': OpenQueries,
-          '/feedback': ExpertQueryActionFeedback, '/result': ExpertQueryActionResult}
+TOPICS = {
+    '/goal': ExpertQueryActionGoal,
+    '/status': GoalStatusArray,
+    '/open': OpenQueries,
+    '/feedback': ExpertQueryActionFeedback,
+    '/result': ExpertQueryActionResult,
+}
 
 
 class Recording:
@@ -51,8 +57,10 @@ class Recording:
 
     def __init__(self):
         self._heard = []
-        self._subscribers = [rospy.Subscriber(SHARED + end, kind, self._note, SHARED + end)
-                             for end, kind in TOPICS.items()]
+        self._subscribers = [
+            rospy.Subscriber(SHARED + end, kind, self._note, SHARED + end)
+            for end, kind in TOPICS.items()
+        ]
 
     def _note(self, message, topic):
         self._heard.append((topic, message, rospy.Time.now()))
@@ -70,8 +78,13 @@ class Recording:
 
 def play(path):
     """Play a bag to its end."""
-    subprocess.run(['rosbag', 'play', '--quiet', path], check=True, timeout=60,
-                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        ['rosbag', 'play', '--quiet', path],
+        check=True,
+        timeout=60,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def goto(state='DETECT'):
@@ -79,7 +92,6 @@ def goto(state='DETECT'):
 
 
 class TestExpertFaults(unittest.TestCase):
-
     def server(self):
         process = Process.installed('expert_query_server', '__name:=shared', '_asker_gone_s:=1.0')
         self.addCleanup(process.kill)
@@ -107,17 +119,20 @@ class TestExpertFaults(unittest.TestCase):
         holder = Process.role('hold', SHARED)
         self.addCleanup(holder.kill)
         self.assertTrue(wait_for(lambda: any(each.holder == 'holder' for each in ann.questions())))
-        listed, = ann.questions()
+        (listed,) = ann.questions()
         self.assertEqual(listed.status, OpenQuery.CLAIMED)
-        self.assertTrue(stays(lambda: ann.questions()[0].holder == 'holder', 2.0),
-                        'it renews its claim of 1.5 s')
+        self.assertTrue(
+            stays(lambda: ann.questions()[0].holder == 'holder', 2.0),
+            'it renews its claim of 1.5 s',
+        )
         self.assertIn('holder works on this question', ann.answer(listed, goto()).message)
         holder.kill()
         self.assertTrue(wait_for(lambda: ann.questions()[0].status == OpenQuery.PENDING))
         self.assertTrue(ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual([what[:2] for what in asked.progress], [('claimed', 'holder'),
-                                                                 ('released', 'holder')])
+        self.assertEqual(
+            [what[:2] for what in asked.progress], [('claimed', 'holder'), ('released', 'holder')]
+        )
 
     def test_a_server_killed_and_restarted_is_asked_again(self):
         first = self.server()
@@ -131,8 +146,9 @@ class TestExpertFaults(unittest.TestCase):
         self.server()
         listed = wait_for_question(ann, 40.0)
         self.assertEqual(listed.goal.query_id, self.id())
-        self.assertLess(listed.deadline_s - time.monotonic(), 59.0,
-                        'the deadline does not begin again')
+        self.assertLess(
+            listed.deadline_s - time.monotonic(), 59.0, 'the deadline does not begin again'
+        )
         self.assertTrue(ann.answer(listed, goto('PICK')).ok)
         self.assertTrue(asked.wait())
         self.assertEqual(asked.answer.state, 'PICK')
@@ -162,8 +178,10 @@ class TestExpertFaults(unittest.TestCase):
             playing = threading.Thread(target=play, args=(bag,))
             playing.start()
             while playing.is_alive():
-                seen.update(tuple(each.goal.query_id for each in front_end.questions())
-                            for front_end in front_ends)
+                seen.update(
+                    tuple(each.goal.query_id for each in front_end.questions())
+                    for front_end in front_ends
+                )
                 playing.join(0.01)
             self.assertEqual(seen, {(self.id(),)})
             self.assertEqual(asked.progress, [], 'its server was there all the time')
@@ -199,8 +217,9 @@ class TestExpertFaults(unittest.TestCase):
         server.kill()
         self.assertTrue(asked.wait())
         self.assertIsNone(asked.answer)
-        with self.assertRaisesRegex(ServerGoneError,
-                                    '/shared/expert_query/answer cannot be reached'):
+        with self.assertRaisesRegex(
+            ServerGoneError, '/shared/expert_query/answer cannot be reached'
+        ):
             ann._servers[SHARED].answer('q', goto())
 
     def test_a_server_that_hangs_holds_no_front_end_up(self):
@@ -211,8 +230,9 @@ class TestExpertFaults(unittest.TestCase):
         self.assertTrue(ann.claim(listed).ok)
         server.freeze()
         with mock.patch.object(followed_server, 'CALL_LIMIT_S', 1.0):
-            with self.assertRaisesRegex(ServerGoneError,
-                                        '/shared/expert_query/answer does not answer'):
+            with self.assertRaisesRegex(
+                ServerGoneError, '/shared/expert_query/answer does not answer'
+            ):
                 ann.answer(listed, goto())
         begun_s = time.monotonic()
         with self.assertRaisesRegex(ServerGoneError, 'does not answer'):
@@ -244,8 +264,9 @@ class TestExpertFaults(unittest.TestCase):
         self.addCleanup(asker.kill)
         listed = wait_for_question(ann, 40.0)
         self.assertIsNotNone(listed)
-        self.assertTrue(stays(lambda: ann.find(listed.key), 2.0),
-                        'it stays open as long as the robot is there')
+        self.assertTrue(
+            stays(lambda: ann.find(listed.key), 2.0), 'it stays open as long as the robot is there'
+        )
         asker.kill()
         self.assertTrue(wait_for(lambda: ann.connected(SHARED) and ann.find(listed.key) is None))
         response = ann.answer(listed, goto())
@@ -276,19 +297,24 @@ class TestExpertFaults(unittest.TestCase):
             client = self.client('')  # a server of our own
             first = self.ask(client)
             self.assertTrue(first.wait())
-        self.assertEqual((first.answer.state, first.answer.by, first.answer.why),
-                         ('DETECT', 'scripted_expert', 'look again'))
+        self.assertEqual(
+            (first.answer.state, first.answer.by, first.answer.why),
+            ('DETECT', 'scripted_expert', 'look again'),
+        )
         self.assertEqual(first.progress, [('claimed', 'scripted_expert', 'claimed')])
         second = Asked(client, make_question('second'))
         self.assertTrue(second.wait())
-        self.assertEqual((second.answer.kind, second.answer.outputs),
-                         (AnswerKind.SUPERSEDE, {'grasped': ['mug', 1]}))
+        self.assertEqual(
+            (second.answer.kind, second.answer.outputs),
+            (AnswerKind.SUPERSEDE, {'grasped': ['mug', 1]}),
+        )
         ignored = Asked(client, make_question('third', failed_state='PLACE', deadline_s=1.0))
         self.assertTrue(ignored.wait())
         self.assertIsNone(ignored.answer)
         poured = StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR',))
-        unconfirmed = Asked(client, make_question('fourth', failed_state='POUR', deadline_s=1.0,
-                                                  choices=(poured,)))
+        unconfirmed = Asked(
+            client, make_question('fourth', failed_state='POUR', deadline_s=1.0, choices=(poured,))
+        )
         self.assertTrue(unconfirmed.wait())
         self.assertIsNone(unconfirmed.answer, 'the rule does not confirm that it is repeated')
         self.assertLess(expert.interrupt(), EXIT_S)

@@ -1,4 +1,5 @@
 """Questions, and ways to put and watch them, for the tests of the expert's side."""
+
 import os
 import signal
 import subprocess
@@ -23,22 +24,40 @@ def make_question(query_id='q1', **changes):
     name.
     """
     question = Question(
-        question_id=query_id, trial_id='trial', container_path='PICK_AND_PLACE',
+        question_id=query_id,
+        trial_id='trial',
+        container_path='PICK_AND_PLACE',
         failed_state='PICK',
-        failure_kind=FailureKind.FELL_THROUGH, outcome='aborted', text='no grasp found',
-        failure_class=3, rate=0.8, continuous=True, recoveries=2,
-        reason='the failure rate of PICK is HIGH', tried=('revisit PICK',),
-        history=(Visit('DETECT', 'succeeded',
-                       VisitResult.SUCCESS), Visit('PICK', 'aborted', VisitResult.FAILURE)),
-        choices=(StateChoice('DETECT', 0.9, 1, 2, (), ()),
-                 StateChoice('PICK', 0.2, 3, 1, ('grasp',), ('MOVE_ARMS_ASIDE', 'view_is_clear')),
-                 StateChoice('PLACE', 0.5, 2, 0, (), (), 'still running after an overrun')),
-        supersede_outcomes=(OutcomeChoice('succeeded', 'PLACE'),
-                            OutcomeChoice('aborted', 'aborted')), output_keys=('grasped',),
-        give_up_outcomes=('succeeded', 'aborted'), interfaces=(InterfaceOffer(
-            'assist', '/assist',
-            'do it by hand'),), userdata={'object': 'mug'}, input_userdata={'target': 'mug'},
-        deadline_s=0.0, fallback='PICK_AND_PLACE ends with aborted')
+        failure_kind=FailureKind.FELL_THROUGH,
+        outcome='aborted',
+        text='no grasp found',
+        failure_class=3,
+        rate=0.8,
+        continuous=True,
+        recoveries=2,
+        reason='the failure rate of PICK is HIGH',
+        tried=('revisit PICK',),
+        history=(
+            Visit('DETECT', 'succeeded', VisitResult.SUCCESS),
+            Visit('PICK', 'aborted', VisitResult.FAILURE),
+        ),
+        choices=(
+            StateChoice('DETECT', 0.9, 1, 2, (), ()),
+            StateChoice('PICK', 0.2, 3, 1, ('grasp',), ('MOVE_ARMS_ASIDE', 'view_is_clear')),
+            StateChoice('PLACE', 0.5, 2, 0, (), (), 'still running after an overrun'),
+        ),
+        supersede_outcomes=(
+            OutcomeChoice('succeeded', 'PLACE'),
+            OutcomeChoice('aborted', 'aborted'),
+        ),
+        output_keys=('grasped',),
+        give_up_outcomes=('succeeded', 'aborted'),
+        interfaces=(InterfaceOffer('assist', '/assist', 'do it by hand'),),
+        userdata={'object': 'mug'},
+        input_userdata={'target': 'mug'},
+        deadline_s=0.0,
+        fallback='PICK_AND_PLACE ends with aborted',
+    )
     return question._replace(**changes)
 
 
@@ -127,8 +146,9 @@ def main(role, server, query_id='q1'):
     """Roles: `ask` puts a question and waits; `hold` claims one and keeps the claim."""
     rospy.init_node('{}_{}'.format(role, os.getpid()))
     if role == 'ask':
-        answer = ExpertQueryClient(server).ask(make_question(query_id), threading.Event(),
-                                               lambda *_: None)
+        answer = ExpertQueryClient(server).ask(
+            make_question(query_id), threading.Event(), lambda *_: None
+        )
         sys.stdout.write('answer {}'.format(answer.state if answer else None))
     elif role == 'hold':
         front_end = FrontEnd('holder', [server], lease_s=1.5)

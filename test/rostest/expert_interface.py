@@ -2,6 +2,7 @@
 """Shared-autonomy interfaces that an expert starts: seen to run, superseding the state, failing,
 preempted.
 """
+
 import os
 import sys
 import threading
@@ -38,8 +39,9 @@ class FakeInterface:
     """A shared-autonomy interface whose person does what the test says."""
 
     def __init__(self, work):
-        self._server = actionlib.SimpleActionServer('/assist', SharedAutonomyAction, self._execute,
-                                                    auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            '/assist', SharedAutonomyAction, self._execute, auto_start=False
+        )
         self._work = work
         self.goals = []
         self._server.start()
@@ -54,7 +56,6 @@ class FakeInterface:
 
 
 class TestInterfaces(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.client = ExpertQueryClient(server_wait_s=20.0)
@@ -72,8 +73,9 @@ class TestInterfaces(unittest.TestCase):
         return interface
 
     def run_interface(self, client=None):
-        return (client or self.client).run_interface(self.offer, self.question, self.cancelled,
-                                         lambda *what: self.told.append(what))
+        return (client or self.client).run_interface(
+            self.offer, self.question, self.cancelled, lambda *what: self.told.append(what)
+        )
 
     def taken(self):
         """The answer of the interface as the oracle takes it; None where it does not."""
@@ -98,29 +100,39 @@ class TestInterfaces(unittest.TestCase):
         def work(server):
             seen.append(wait_for(self.statuses))
             server.set_succeeded(
-                SharedAutonomyResult('succeeded', encode_all({'grasped': 'mug'}), 'by hand'))
+                SharedAutonomyResult('succeeded', encode_all({'grasped': 'mug'}), 'by hand')
+            )
 
         interface = self.interface(work)
         asked = Asked(self.client, self.question)
-        listed, = wait_for(self.listed)
+        (listed,) = wait_for(self.listed)
         self.assertTrue(
-            self.ann.answer(listed, ExpertDecision(kind=ExpertDecision.INTERFACE,
-                                                   interface='assist')).ok)
+            self.ann.answer(
+                listed, ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist')
+            ).ok
+        )
         self.assertTrue(asked.wait())
-        self.assertEqual((asked.answer.kind, asked.answer.interface),
-                         (AnswerKind.INTERFACE, 'assist'))
+        self.assertEqual(
+            (asked.answer.kind, asked.answer.interface), (AnswerKind.INTERFACE, 'assist')
+        )
         self.assertTrue(wait_for(lambda: not self.statuses()))
         answer = self.run_interface()
-        self.assertEqual((answer.kind, answer.outcome, answer.outputs), (
-            AnswerKind.SUPERSEDE, 'succeeded', {'grasped': 'mug'}))
-        goal, = interface.goals
-        self.assertEqual((goal.state, goal.outcomes, decode_all(goal.userdata)), (
-            'PICK', ['succeeded', 'aborted'], {'target': 'mug'}))
+        self.assertEqual(
+            (answer.kind, answer.outcome, answer.outputs),
+            (AnswerKind.SUPERSEDE, 'succeeded', {'grasped': 'mug'}),
+        )
+        (goal,) = interface.goals
+        self.assertEqual(
+            (goal.state, goal.outcomes, decode_all(goal.userdata)),
+            ('PICK', ['succeeded', 'aborted'], {'target': 'mug'}),
+        )
         self.assertEqual(seen, [[(OpenQuery.INTERFACE_RUNNING, 'ann')]])
-        self.assertEqual(self.told, [('interface_start', 'assist', ''),
-                                     ('interface_end', 'assist', 'succeeded')])
-        self.assertTrue(wait_for(lambda: not self.statuses()),
-                        'it leaves the list when the interface ends')
+        self.assertEqual(
+            self.told, [('interface_start', 'assist', ''), ('interface_end', 'assist', 'succeeded')]
+        )
+        self.assertTrue(
+            wait_for(lambda: not self.statuses()), 'it leaves the list when the interface ends'
+        )
 
     def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
         impatient = ExpertQueryClient(SERVER, server_wait_s=2.0)
@@ -132,12 +144,15 @@ class TestInterfaces(unittest.TestCase):
         self.assertEqual(self.told[-1], ('interface_end', 'assist', ''))
 
     def test_an_interface_that_fails_or_answers_nonsense_supersedes_nothing(self):
-        results = [('aborted', SharedAutonomyResult('succeeded', [], 'the arm is stuck')),
-                   ('succeeded', SharedAutonomyResult('finished', [], '')),
-                   ('succeeded', SharedAutonomyResult('succeeded', encode_all({'other': 1}), '')),
-                   ('succeeded',
-                    SharedAutonomyResult('succeeded', [UserdataItem('grasped', 1, '', '', b'{')],
-                                         ''))]
+        results = [
+            ('aborted', SharedAutonomyResult('succeeded', [], 'the arm is stuck')),
+            ('succeeded', SharedAutonomyResult('finished', [], '')),
+            ('succeeded', SharedAutonomyResult('succeeded', encode_all({'other': 1}), '')),
+            (
+                'succeeded',
+                SharedAutonomyResult('succeeded', [UserdataItem('grasped', 1, '', '', b'{')], ''),
+            ),
+        ]
         self.interface(lambda server: getattr(server, 'set_' + results[0][0])(results.pop(0)[1]))
         for _ in range(4):
             self.assertIsNone(self.taken())

@@ -2,6 +2,7 @@
 """The master dies while a robot waits for an expert at a shared server. Masters and nodes of its
 own.
 """
+
 import os
 import subprocess
 import sys
@@ -22,7 +23,6 @@ RESTART_S = 8.0  # within which a master is back, also on a machine busy with ot
 
 
 class TestMasterRestart(unittest.TestCase):
-
     def setUp(self):
         self.port = free_port()
         self.environment = dict(os.environ, ROS_MASTER_URI='http://localhost:{}'.format(self.port))
@@ -48,8 +48,11 @@ class TestMasterRestart(unittest.TestCase):
         self.assertNotEqual(self.call('getPid'), before, 'the old master still answers')
 
     def start_expert(self, delay_s):
-        self.start(Process.installed, 'scripted_expert',
-                   '_rules:={{PICK: {{kind: goto, state: DETECT, delay_s: {}}}}}'.format(delay_s))
+        self.start(
+            Process.installed,
+            'scripted_expert',
+            '_rules:={{PICK: {{kind: goto, state: DETECT, delay_s: {}}}}}'.format(delay_s),
+        )
 
     def subscribed(self, node, topic):
         """Whether the node listens to the server; what it has to do then takes milliseconds."""
@@ -61,8 +64,9 @@ class TestMasterRestart(unittest.TestCase):
         time.sleep(1.0)  # a master does not know which of its nodes are connected
 
     def call(self, method):
-        return getattr(xmlrpc.client.ServerProxy(self.environment['ROS_MASTER_URI']),
-                       method)('/test')[2]
+        return getattr(xmlrpc.client.ServerProxy(self.environment['ROS_MASTER_URI']), method)(
+            '/test'
+        )[2]
 
     def test_a_front_end_started_after_the_restart_answers(self):
         self.assertTrue(wait_for(lambda: self.subscribed('/ask_', '/result'), 40.0))

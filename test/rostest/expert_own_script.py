@@ -3,6 +3,7 @@
 
 It passes, and fails where it should.
 """
+
 import os
 import re
 import shutil
@@ -44,19 +45,22 @@ sys.exit(machine.execute() != 'succeeded')
 
 def documented():
     """The files that the page has for `my_robot`, by name."""
-    with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc',
-                           'own_rostest.md'), encoding='utf-8') as page:
-        return dict(re.findall(r'^`(test/\S+)`[^\n]*\n\n```\w+\n(.*?)```', page.read(),
-                               re.M | re.S))
+    with open(
+        os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'own_rostest.md'),
+        encoding='utf-8',
+    ) as page:
+        return dict(
+            re.findall(r'^`(test/\S+)`[^\n]*\n\n```\w+\n(.*?)```', page.read(), re.M | re.S)
+        )
 
 
 class OwnScript(unittest.TestCase):
-
     def setUp(self):
         self.folder = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, self.folder)
-        for name, content in dict(documented(),
-                                  **{'package.xml': MANIFEST, 'scripts/task.py': TASK}).items():
+        for name, content in dict(
+            documented(), **{'package.xml': MANIFEST, 'scripts/task.py': TASK}
+        ).items():
             self.write(name, content)
 
     def write(self, name, content):
@@ -69,15 +73,20 @@ class OwnScript(unittest.TestCase):
     def rostest(self):
         """How rostest ends; it has a master of its own, on a free port."""
         environment = dict(
-            os.environ, ROS_HOME=self.folder, ROS_TEST_RESULTS_DIR=self.folder,
+            os.environ,
+            ROS_HOME=self.folder,
+            ROS_TEST_RESULTS_DIR=self.folder,
             ROS_LOG_DIR=self.folder,
-            ROS_PACKAGE_PATH=self.folder + os.pathsep + os.environ['ROS_PACKAGE_PATH'])
-        return subprocess.run(['rostest', 'my_robot', 'task.test'], env=environment,
-                              timeout=100).returncode
+            ROS_PACKAGE_PATH=self.folder + os.pathsep + os.environ['ROS_PACKAGE_PATH'],
+        )
+        return subprocess.run(
+            ['rostest', 'my_robot', 'task.test'], env=environment, timeout=100
+        ).returncode
 
     def test_it_passes_with_the_rule_and_fails_without(self):
-        self.assertEqual(set(documented()),
-                         {'test/task.test', 'test/task_rules.yaml', 'test/task_test.py'})
+        self.assertEqual(
+            set(documented()), {'test/task.test', 'test/task_rules.yaml', 'test/task_test.py'}
+        )
         self.assertEqual(self.rostest(), 0)
         self.write('test/task_rules.yaml', 'default: {kind: give_up}')
         self.assertNotEqual(self.rostest(), 0)

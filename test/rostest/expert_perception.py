@@ -2,6 +2,7 @@
 """The perception interface as a front end and the oracle see it: frames, marks, what accepting
 hands over, refusals.
 """
+
 import os
 import sys
 import unittest
@@ -40,9 +41,13 @@ CAN_INDEX = 1
 
 
 def goal_for(state, query='q', output_keys=('table', 'objects', 'sizes')):
-    return SharedAutonomyGoal(query_id=query, state=state, interface='perception',
-                              output_keys=list(output_keys),
-                              outcomes=['succeeded', 'aborted', 'preempted'])
+    return SharedAutonomyGoal(
+        query_id=query,
+        state=state,
+        interface='perception',
+        output_keys=list(output_keys),
+        outcomes=['succeeded', 'aborted', 'preempted'],
+    )
 
 
 class Interface:
@@ -52,9 +57,14 @@ class Interface:
         self.client = actionlib.ActionClient(name, SharedAutonomyAction)
         self.images = []
         self.segment, self.use_frame, self.finish, self.give_up = (
-            rospy.ServiceProxy('{}/{}'.format(name, each), spec) for each, spec in (
-                ('segment', SegmentObject), ('use_frame', UseFrame), ('finish', FinishInterface),
-                ('give_up', GiveUpInterface)))
+            rospy.ServiceProxy('{}/{}'.format(name, each), spec)
+            for each, spec in (
+                ('segment', SegmentObject),
+                ('use_frame', UseFrame),
+                ('finish', FinishInterface),
+                ('give_up', GiveUpInterface),
+            )
+        )
         for service in (self.segment, self.use_frame, self.finish, self.give_up):
             service.wait_for_service(30.0)
         rospy.Subscriber(name + '/image', Image, self.images.append)
@@ -79,7 +89,6 @@ class Interface:
 
 
 class PerceptionInterface(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.camera = PublishedCamera('head_camera', SCENE, streams=True)
@@ -101,9 +110,12 @@ class PerceptionInterface(unittest.TestCase):
 
     def around(self, index=CAN_INDEX, margin=6):
         rows, columns = np.nonzero(self.camera.pixels(index))
-        return RegionOfInterest(x_offset=columns.min() - margin, y_offset=rows.min() - margin,
-                                width=np.ptp(columns) + 2 * margin,
-                                height=np.ptp(rows) + 2 * margin)
+        return RegionOfInterest(
+            x_offset=columns.min() - margin,
+            y_offset=rows.min() - margin,
+            width=np.ptp(columns) + 2 * margin,
+            height=np.ptp(rows) + 2 * margin,
+        )
 
     def segment(self, **fields):
         return self.interface.segment(SegmentObjectRequest(**fields))
@@ -127,8 +139,9 @@ class PerceptionInterface(unittest.TestCase):
         self.assertEqual(self.interface.ended(self.handle), GoalStatus.SUCCEEDED)
         result = self.handle.get_result()
         outputs = decode_all(result.outputs)
-        self.assertEqual((result.outcome, sorted(outputs)),
-                         ('succeeded', ['objects', 'sizes', 'table']))
+        self.assertEqual(
+            (result.outcome, sorted(outputs)), ('succeeded', ['objects', 'sizes', 'table'])
+        )
         self.near(outputs['objects'][0], CAN)
         self.near(outputs['objects'][1], BOX)
         self.assertEqual(len(outputs['sizes']), 2)
@@ -139,7 +152,8 @@ class PerceptionInterface(unittest.TestCase):
     def test_another_state_gets_what_its_own_template_says(self):
         self.begin('DETECT_DRINK', output_keys=['drink', 'size'])
         self.assertTrue(
-            self.segment(polygon=Polygon([Point32(*corner) for corner in self.corners()])).ok)
+            self.segment(polygon=Polygon([Point32(*corner) for corner in self.corners()])).ok
+        )
         self.assertTrue(self.interface.finish(outcome='succeeded', text='').ok)
         self.interface.ended(self.handle)
         outputs = decode_all(self.handle.get_result().outputs)
@@ -157,7 +171,8 @@ class PerceptionInterface(unittest.TestCase):
         region = self.around()
         self.camera.show([TABLE, BOX])
         self.assertTrue(
-            self.segment(region=region).ok, 'in the image in which the state failed, it is there')
+            self.segment(region=region).ok, 'in the image in which the state failed, it is there'
+        )
         fresh = self.interface.use_frame(UseFrameRequest.FRESH)
         self.assertTrue(fresh.ok, fresh.message)
         self.assertGreater(fresh.stamp, first.header.stamp)
@@ -167,7 +182,8 @@ class PerceptionInterface(unittest.TestCase):
         self.assertIn('is in use', stale.message)
         self.assertFalse(
             self.interface.finish(outcome='succeeded', text='').ok,
-            'nothing is marked in this image')
+            'nothing is marked in this image',
+        )
         again = self.interface.use_frame(UseFrameRequest.AT_GOAL)
         self.assertEqual(again.stamp, first.header.stamp)
         self.assertTrue(self.segment(region=region, stamp=first.header.stamp).ok)
@@ -175,7 +191,8 @@ class PerceptionInterface(unittest.TestCase):
     def test_what_is_drawn_wrongly_is_answered_with_what_is_wrong(self):
         self.begin()
         outside = self.segment(
-            region=RegionOfInterest(x_offset=900, y_offset=10, width=50, height=50))
+            region=RegionOfInterest(x_offset=900, y_offset=10, width=50, height=50)
+        )
         self.assertIn('outside the image', outside.message)
         self.assertIn('no region', self.segment().message)
         row, column = np.argwhere(self.camera.pixels(CAN_INDEX)).mean(axis=0)
@@ -183,13 +200,15 @@ class PerceptionInterface(unittest.TestCase):
         self.assertIn('collapsed', self.segment(region=self.around(), strokes=[rubbed_out]).message)
         refused = self.interface.finish(outcome='succeeded', text='')
         self.assertFalse(refused.ok)
-        self.assertIn('no object is marked, so objects, sizes, table cannot be filled in',
-                      refused.message)
+        self.assertIn(
+            'no object is marked, so objects, sizes, table cannot be filled in', refused.message
+        )
         self.assertIn('allowed', self.interface.finish(outcome='shattered', text='').message)
         self.assertIn('unknown', self.interface.use_frame(7).message)
         self.assertTrue(
             self.interface.finish(outcome='aborted', text='there is none').ok,
-            'a failure needs no object')
+            'a failure needs no object',
+        )
         self.interface.ended(self.handle)
         self.assertEqual(self.handle.get_result().outcome, 'aborted')
 
@@ -210,11 +229,13 @@ class PerceptionInterface(unittest.TestCase):
         stamp = self.interface.shown().header.stamp
         self.assertTrue(wait_for(lambda: clouds and clouds[-1].header.stamp == stamp))
         subscriber.unregister()
-        points = np.frombuffer(clouds[-1].data, '<f4').reshape(-1,
-                                                               clouds[-1].point_step // 4)[:, :3]
+        points = np.frombuffer(clouds[-1].data, '<f4').reshape(-1, clouds[-1].point_step // 4)[
+            :, :3
+        ]
         self.assertEqual(clouds[-1].header.frame_id, 'base_footprint')
-        self.assertAlmostEqual(np.median(points[:, 2]), 0.72, delta=0.03,
-                               msg='the top of the table')
+        self.assertAlmostEqual(
+            np.median(points[:, 2]), 0.72, delta=0.03, msg='the top of the table'
+        )
 
     def test_one_goal_at_a_time_and_only_for_states_that_it_knows(self):
         self.begin()
@@ -231,10 +252,12 @@ class PerceptionInterface(unittest.TestCase):
         self.begin()
         self.handle.cancel()
         self.assertEqual(self.interface.ended(self.handle), GoalStatus.PREEMPTED)
-        for answer in (self.segment(region=self.around()),
-                       self.interface.use_frame(UseFrameRequest.FRESH),
-                       self.interface.finish(outcome='succeeded',
-                                             text=''), self.interface.give_up(text='')):
+        for answer in (
+            self.segment(region=self.around()),
+            self.interface.use_frame(UseFrameRequest.FRESH),
+            self.interface.finish(outcome='succeeded', text=''),
+            self.interface.give_up(text=''),
+        ):
             self.assertFalse(answer.ok)
             self.assertIn('no goal is active', answer.message)
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Questions and answers between an executive, its server and several experts, on a real master."""
+
 import os
 import subprocess
 import sys
@@ -34,7 +35,6 @@ def supersede(*outputs):
 
 
 class TestExpertProtocol(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.client = ExpertQueryClient()
@@ -51,19 +51,26 @@ class TestExpertProtocol(unittest.TestCase):
 
     def listed(self, front_end, query_id=None):
         return next(
-            (each
-             for each in front_end.questions() if each.goal.query_id == (query_id or self.id())),
-            None)
+            (
+                each
+                for each in front_end.questions()
+                if each.goal.query_id == (query_id or self.id())
+            ),
+            None,
+        )
 
     def test_an_answer_resumes_the_robot(self):
         asked, listed = self.ask(userdata={'object': 'mug', 'image': object()})
         self.assertEqual(listed.goal.robot, '/expert_protocol')
-        self.assertEqual({item.key: item.encoding for item in listed.goal.userdata},
-                         {'object': UserdataItem.JSON, 'image': UserdataItem.UNSENT})
+        self.assertEqual(
+            {item.key: item.encoding for item in listed.goal.userdata},
+            {'object': UserdataItem.JSON, 'image': UserdataItem.UNSENT},
+        )
         self.assertTrue(self.ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual(asked.answer,
-                         (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera', ''))
+        self.assertEqual(
+            asked.answer, (AnswerKind.GOTO, 'DETECT', '', '', None, 'ann', 'seen on the camera', '')
+        )
         self.assertTrue(wait_for(lambda: self.listed(self.ann) is None), 'it leaves the open list')
 
     def test_superseding_hands_over_the_output_userdata(self):
@@ -77,7 +84,9 @@ class TestExpertProtocol(unittest.TestCase):
         self.ann.answer(
             listed,
             supersede(
-                UserdataItem('grasped', UserdataItem.ROS_MESSAGE, 'no_such/Grasp', '0' * 32, b'')))
+                UserdataItem('grasped', UserdataItem.ROS_MESSAGE, 'no_such/Grasp', '0' * 32, b'')
+            ),
+        )
         self.assertTrue(asked.wait())
         self.assertIsInstance(asked.error, AnswerError)
         self.assertIn('no_such/Grasp is not installed here', str(asked.error))
@@ -101,15 +110,17 @@ class TestExpertProtocol(unittest.TestCase):
             responses[front_end.expert] = front_end.answer(listed, decision)
 
         self.assertTrue(wait_for(lambda: self.listed(self.bob)), 'bob has discovered the server')
-        threads = [threading.Thread(target=answer, args=arguments)
-                   for arguments in ((self.ann, goto('DETECT')), (self.bob, goto('PICK')))]
+        threads = [
+            threading.Thread(target=answer, args=arguments)
+            for arguments in ((self.ann, goto('DETECT')), (self.bob, goto('PICK')))
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join(30.0)
         self.assertTrue(asked.wait())
-        winner, = [name for name, response in responses.items() if response.ok]
-        loser, = [name for name, response in responses.items() if not response.ok]
+        (winner,) = [name for name, response in responses.items() if response.ok]
+        (loser,) = [name for name, response in responses.items() if not response.ok]
         self.assertEqual(asked.answer.by, winner)
         self.assertIn('{} was first'.format(winner), responses[loser].message)
         self.assertEqual(responses[loser].settled.by, winner)
@@ -124,10 +135,15 @@ class TestExpertProtocol(unittest.TestCase):
         self.assertTrue(self.ann.claim(listed, take_over=True).ok)
         self.assertTrue(self.ann.answer(listed, goto()).ok)
         self.assertTrue(asked.wait())
-        self.assertEqual(asked.progress, [('claimed', 'ann', 'claimed'),
-                                          ('released', 'ann', 'ann gave it back'),
-                                          ('claimed', 'bob', 'claimed'),
-                                          ('claimed', 'ann', 'taken over from bob')])
+        self.assertEqual(
+            asked.progress,
+            [
+                ('claimed', 'ann', 'claimed'),
+                ('released', 'ann', 'ann gave it back'),
+                ('claimed', 'bob', 'claimed'),
+                ('claimed', 'ann', 'taken over from bob'),
+            ],
+        )
 
     def bob_claims(self, listed):
         self.assertTrue(wait_for(lambda: self.bob.find(listed.key)))
@@ -194,8 +210,9 @@ class TestExpertProtocol(unittest.TestCase):
             self.assertGreater(version, before)
 
     def test_the_front_end_of_the_documentation_answers(self):
-        with open(os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc',
-                               'expert.md')) as page:
+        with open(
+            os.path.join(roslib.packages.get_pkg_dir('smach_oracle'), 'doc', 'expert.md')
+        ) as page:
             code = page.read().split('## A front end in')[1].split('```python\n')[1].split('```')[0]
         self.assertLessEqual(len(code.splitlines()), 20)
         asked, _ = self.ask()

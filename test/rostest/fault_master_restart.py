@@ -2,6 +2,7 @@
 """The ROS master is killed and restarted in mid-trial: the trial ends as it would have, and the
 node can be found.
 """
+
 import json
 import sys
 import time
@@ -11,7 +12,7 @@ from typing import Any
 from oracle_support import OwnMaster, Process, oracle_run, script
 from waiting import stays, wait_for
 
-TASK = '''
+TASK = """
 import sys, rospy, smach
 rospy.init_node('task')
 class Fails(smach.State):
@@ -26,10 +27,10 @@ with sm:
     smach.StateMachine.add('PICK', Fails())
 print('OUTCOME', sm.execute(), flush=True)
 sys.stdin.readline()
-'''
+"""
 # A front end that knows nothing of what was before: finds the server, waits for a question, answers
 # it.
-FRONT_END = '''
+FRONT_END = """
 import rospy
 from smach_oracle.msg import ExpertDecision, OpenQueries
 from smach_oracle.srv import AnswerQuery
@@ -44,8 +45,8 @@ while not rospy.is_shutdown():
         print('ANSWERED', reply.ok, reply.message, flush=True)
         break
     rospy.sleep(0.1)
-'''
-LISTENER = '''
+"""
+LISTENER = """
 import rospy
 from smach_oracle.msg import OracleEvent
 rospy.init_node('listener')
@@ -55,7 +56,7 @@ while not events.get_num_connections():
     rospy.sleep(0.05)
 print('LISTENING', flush=True)
 rospy.spin()
-'''
+"""
 
 
 class MasterRestartTest(unittest.TestCase):
@@ -79,12 +80,15 @@ class MasterRestartTest(unittest.TestCase):
 
     def registered(self) -> bool:
         system = self.master.system()
-        return ('/task/oracle/events' in system['publishers']
-                and '/task/expert_query/goal' in system['subscribers']
-                and '/task/expert_query/answer' in system['services'])
+        return (
+            '/task/oracle/events' in system['publishers']
+            and '/task/expert_query/goal' in system['subscribers']
+            and '/task/expert_query/answer' in system['services']
+        )
 
     def test_a_front_end_started_after_the_restart_can_answer_the_question_that_was_open(
-            self) -> None:
+        self,
+    ) -> None:
         task = self.ask_at_once()
         before = self.master.system()
         self.restart_master()
@@ -106,7 +110,8 @@ class MasterRestartTest(unittest.TestCase):
         self.assertEqual(task.wait(), 0)
 
     def test_a_trial_that_begins_to_ask_while_the_master_is_away_goes_on_when_it_is_back(
-            self) -> None:
+        self,
+    ) -> None:
         task = self.start_task('--config', self.asking())
         self.master.kill()
         task.go_on()  # the state fails now
@@ -154,4 +159,5 @@ class MasterRestartTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rostest.rosrun('smach_oracle', 'fault_master_restart', MasterRestartTest, sys.argv)

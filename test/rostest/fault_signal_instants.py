@@ -4,6 +4,7 @@
 In library use rospy itself may hang: where the signal meets the main thread within a line of the
 log. The stack of the main thread shows that. The bare script hangs there as well.
 """
+
 import sys
 import unittest
 from typing import List
@@ -33,5 +34,6 @@ class SignalInstantsTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('fault_signal_instants')
     rostest.rosrun('smach_oracle', 'fault_signal_instants', SignalInstantsTest, sys.argv)

@@ -2,6 +2,7 @@
 """SIGINT and SIGTERM at any time: the question is taken back, the bag closed, the process gone
 within two seconds.
 """
+
 import glob
 import json
 import os
@@ -29,7 +30,7 @@ from smach_oracle.msg import OracleEvent
 
 # a limit on time holds if it holds once: what else the machine does can only make a program slower
 ATTEMPTS = 3
-TASK = '''
+TASK = """
 import sys, time, rospy, smach, smach_ros
 rospy.init_node('task')
 place = sys.argv[1]
@@ -61,24 +62,24 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('PICK', Pick())
     smach.StateMachine.add('PREPARE', Prepare(), {'succeeded': 'PICK'})
-'''
-RUN = '''
+"""
+RUN = """
 note('OUTCOME %s' % sm.execute())
 if place == 'between_trials':
     note('THERE')
     time.sleep(60)
-'''
-IN_A_THREAD = '''
+"""
+IN_A_THREAD = """
 import threading
 runner = threading.Thread(target=lambda: note('OUTCOME %s' % sm.execute()))
 runner.start()
 rospy.spin()
 runner.join()
-'''
-LIBRARY = '''
+"""
+LIBRARY = """
 from smach_oracle import OracleContainer
 sm = OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'deadline_s': 0}, name='TASK')
-'''
+"""
 
 
 class TooSlow(AssertionError):
@@ -91,12 +92,15 @@ class SignalsTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
 
-    def start(self, place: str, text: str = TASK + RUN,
-              settings: Optional[Dict[str, object]] = None) -> Process:
-        config = script(self, json.dumps(dict({'deadline_s': 0}, **(settings or {}))),
-                        'oracle.yaml')
-        task = oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
-                          place)
+    def start(
+        self, place: str, text: str = TASK + RUN, settings: Optional[Dict[str, object]] = None
+    ) -> Process:
+        config = script(
+            self, json.dumps(dict({'deadline_s': 0}, **(settings or {}))), 'oracle.yaml'
+        )
+        task = oracle_run(
+            self, '--config', config, '--record', self.bags, script(self, text), place
+        )
         if place == 'query':
             self.assertIsNotNone(FrontEnd(self, '/task/expert_query').question(), task.output())
         else:
@@ -132,7 +136,7 @@ class SignalsTest(unittest.TestCase):
         """
         code = self.signalled(task, number)
         self.assertEqual(glob.glob(os.path.join(self.bags, '*.active')), [], task.output())
-        events, = recorded_events(self.bags)
+        (events,) = recorded_events(self.bags)
         return code, events
 
     def with_each_signal(self, case: Callable[[int], None]) -> None:
@@ -140,17 +144,20 @@ class SignalsTest(unittest.TestCase):
             with self.subTest(signal=signal.Signals(number).name):
                 self.in_time(partial(case, number))
 
-    def check_preempted(self, place: str, text: str = TASK + RUN, expected: Optional[int] = None,
-                        **settings: object) -> None:
+    def check_preempted(
+        self, place: str, text: str = TASK + RUN, expected: Optional[int] = None, **settings: object
+    ) -> None:
         def case(number: int) -> None:
             task = self.start(place, text, settings)
             code, events = self.end(task, number)
             self.assertIn('OUTCOME preempted', task.output())
             self.assertEqual(code, 0, task.output())
-            self.assertEqual((events[-1].kind, events[-1].outcome),
-                             (OracleEvent.TRIAL_END, 'preempted'))
+            self.assertEqual(
+                (events[-1].kind, events[-1].outcome), (OracleEvent.TRIAL_END, 'preempted')
+            )
             if expected is not None:
                 self.assertIn(expected, [event.kind for event in events])
+
         self.with_each_signal(case)
 
     def test_in_a_state(self) -> None:
@@ -160,8 +167,11 @@ class SignalsTest(unittest.TestCase):
         self.check_preempted('state', TASK + IN_A_THREAD)
 
     def test_in_a_precondition(self) -> None:
-        self.check_preempted('precondition', expected=OracleEvent.PRECONDITION_START,
-                             states={'PICK': {'preconditions': ['PREPARE']}})
+        self.check_preempted(
+            'precondition',
+            expected=OracleEvent.PRECONDITION_START,
+            states={'PICK': {'preconditions': ['PREPARE']}},
+        )
 
     def test_in_a_question(self) -> None:
         self.check_preempted('query', expected=OracleEvent.QUERY_CANCELLED, max_recoveries=0)
@@ -171,6 +181,7 @@ class SignalsTest(unittest.TestCase):
             code, events = self.end(self.start('state_that_never_returns'), number)
             self.assertEqual(code, 128 + number)
             self.assertEqual(events[-1].kind, OracleEvent.STATE_START)
+
         self.with_each_signal(case)
 
     def test_between_trials(self) -> None:
@@ -178,6 +189,7 @@ class SignalsTest(unittest.TestCase):
             code, events = self.end(self.start('between_trials'), number)
             self.assertEqual(code, 128 + number)
             self.assertEqual(events[-1].kind, OracleEvent.TRIAL_END)
+
         self.with_each_signal(case)
 
     def test_in_a_program_that_uses_the_library_itself(self) -> None:
@@ -186,7 +198,8 @@ class SignalsTest(unittest.TestCase):
     def library_case(self) -> None:
         rospy.set_param('/task/record', self.bags)
         self.addCleanup(
-            lambda: rospy.has_param('/task/record') and rospy.delete_param('/task/record'))
+            lambda: rospy.has_param('/task/record') and rospy.delete_param('/task/record')
+        )
         program = Process([sys.executable, script(self, TASK + LIBRARY + RUN), 'query'])
         self.addCleanup(program.stop)
         front_end = FrontEnd(self, '/task/expert_query')
@@ -201,8 +214,9 @@ class SignalsTest(unittest.TestCase):
 
     def hanging_master_case(self) -> None:
         master = OwnMaster(self)
-        task = oracle_run(self, '--record', self.bags, script(self, TASK + RUN), 'state',
-                          env=master.env)
+        task = oracle_run(
+            self, '--record', self.bags, script(self, TASK + RUN), 'state', env=master.env
+        )
         self.assertTrue(task.says('THERE'), task.output())
         master.hang()
         _, events = self.end(task, signal.SIGINT)
@@ -211,13 +225,16 @@ class SignalsTest(unittest.TestCase):
     def test_before_the_script_has_a_node(self) -> None:
         def case() -> None:
             task = oracle_run(
-                self, script(self, "import time; print('THERE', flush=True); time.sleep(60)"))
+                self, script(self, "import time; print('THERE', flush=True); time.sleep(60)")
+            )
             self.assertTrue(task.says('THERE'), task.output())
             self.assertEqual(self.signalled(task, signal.SIGTERM), 128 + signal.SIGTERM)
+
         self.in_time(case)
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('fault_signals')
     rostest.rosrun('smach_oracle', 'fault_signals', SignalsTest, sys.argv)

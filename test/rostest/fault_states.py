@@ -2,6 +2,7 @@
 """States and action servers that misbehave, in a script under oracle_run with a real expert: the
 robot goes on.
 """
+
 import json
 import sys
 import tempfile
@@ -48,7 +49,7 @@ print('OUTCOME', sm.execute(), flush=True)
 if sys.argv[2:] == ['stay']:
     sys.stdin.readline()
 '''
-ACTION = '''
+ACTION = """
 import sys, time, rospy, smach, smach_ros
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
@@ -68,9 +69,9 @@ while not ready():
 print('WAITS', flush=True)
 sys.stdin.readline()
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 # Takes each goal and does nothing with it, unless told to succeed.
-SILENT_SERVER = '''
+SILENT_SERVER = """
 import sys, time, rospy, actionlib
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('server', anonymous=True)
@@ -83,7 +84,7 @@ server = actionlib.SimpleActionServer('move', MoveArmsAsideAction, execute, auto
 server.start()
 print('READY', flush=True)
 rospy.spin()
-'''
+"""
 
 
 START_S = 60.0
@@ -97,8 +98,9 @@ class FaultyStatesTest(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
         self.expert = FrontEnd(self, '/task/expert_query')
-        task = oracle_run(self, '--config', config, '--record', self.bags, script(self, text),
-                          *args)
+        task = oracle_run(
+            self, '--config', config, '--record', self.bags, script(self, text), *args
+        )
         # the first program of a machine that has just begun reads all from the disk: no test is
         # about that time
         self.assertTrue(task.says('WAITS', START_S), task.output())
@@ -109,12 +111,16 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         self.assertEqual(task.wait(), 0)
-        events, = recorded_events(self.bags)
-        failures = [(event.state, event.failure_kind) for event in events
-                    if event.kind == OracleEvent.FAILURE]
+        (events,) = recorded_events(self.bags)
+        failures = [
+            (event.state, event.failure_kind)
+            for event in events
+            if event.kind == OracleEvent.FAILURE
+        ]
         self.assertEqual(failures, [('PICK', kind)])
-        self.assertEqual([event.target for event in events if event.kind == OracleEvent.JUMP],
-                         ['PICK'])
+        self.assertEqual(
+            [event.target for event in events if event.kind == OracleEvent.JUMP], ['PICK']
+        )
 
     def test_a_state_that_raises_is_recovered_from(self) -> None:
         task = self.start(STATES, 'raises')
@@ -125,9 +131,12 @@ class FaultyStatesTest(unittest.TestCase):
         self.check_recovered(self.start(STATES, 'returns_none'), OracleEvent.UNREGISTERED_OUTCOME)
 
     def test_a_state_that_never_returns_is_left_behind_and_the_expert_is_told(self) -> None:
-        task = self.start(STATES, 'hangs',
-                          states={'PICK': {'time_limit_s': 0.5,
-                                           'grace_period_s': 0.2}}, max_recoveries=0)
+        task = self.start(
+            STATES,
+            'hangs',
+            states={'PICK': {'time_limit_s': 0.5, 'grace_period_s': 0.2}},
+            max_recoveries=0,
+        )
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
@@ -169,8 +178,9 @@ class FaultyStatesTest(unittest.TestCase):
         task.go_on()
         question = self.expert.question(state='PICK')
         self.assertIsNotNone(question, task.output())
-        reply = self.expert.answer(self.request(question, kind=ExpertDecision.GOTO,
-                                                state='NOWHERE'))
+        reply = self.expert.answer(
+            self.request(question, kind=ExpertDecision.GOTO, state='NOWHERE')
+        )
         self.assertFalse(reply.ok)
         for part in ('NOWHERE', 'PICK', 'PLACE'):  # what was wrong, what is allowed
             self.assertIn(part, reply.message)
@@ -185,13 +195,16 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertIsNotNone(question, task.output())
         requests = {
             'Ann': self.request(question, 'Ann', kind=ExpertDecision.GOTO, state='PICK'),
-            'Bob': self.request(question, 'Bob', kind=ExpertDecision.SUPERSEDE, outcome='succeeded')
+            'Bob': self.request(
+                question, 'Bob', kind=ExpertDecision.SUPERSEDE, outcome='succeeded'
+            ),
         }
         at_once = threading.Barrier(2)
 
         def answer(name: str) -> AnswerQueryResponse:
             at_once.wait()
             return self.expert.answer(requests[name])
+
         with ThreadPoolExecutor(2) as experts:
             replies = dict(zip(requests, experts.map(answer, requests)))
         heard, told = sorted(replies, key=lambda name: not replies[name].ok)
@@ -213,7 +226,8 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertTrue(gone.ok, gone.message)
         self.assertFalse(self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok)
         self.assertTrue(
-            wait_for(lambda: self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok))
+            wait_for(lambda: self.expert.claim(1, question.query.query_id, 'Ann', 10.0).ok)
+        )
         self.answer(question, kind=ExpertDecision.GOTO, state='PICK')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
 
@@ -232,14 +246,16 @@ class FaultyStatesTest(unittest.TestCase):
         self.server('succeed')
         self.assertTrue(task.says('OUTCOME succeeded', 40.0), task.output())
         self.assertEqual(task.wait(), 0)
-        events, = recorded_events(self.bags)
-        self.assertIn('MOVE',
-                      [event.state for event in events if event.kind == OracleEvent.FAILURE])
+        (events,) = recorded_events(self.bags)
+        self.assertIn(
+            'MOVE', [event.state for event in events if event.kind == OracleEvent.FAILURE]
+        )
 
     def test_an_action_server_that_never_answers_runs_into_the_time_limit(self) -> None:
         server = self.server()
-        task = self.start(ACTION, states={'MOVE': {'time_limit_s': 1.0, 'grace_period_s': 0.5}},
-                          max_recoveries=0)
+        task = self.start(
+            ACTION, states={'MOVE': {'time_limit_s': 1.0, 'grace_period_s': 0.5}}, max_recoveries=0
+        )
         task.go_on()
         self.assertTrue(server.says('GOAL'), server.output() + task.output())
         question = self.expert.question(state='MOVE')
@@ -265,5 +281,6 @@ class FaultyStatesTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('fault_states')
     rostest.rosrun('smach_oracle', 'fault_states', FaultyStatesTest, sys.argv)

@@ -2,6 +2,7 @@
 """A node under oracle_run stays what it is, however its forked children end: registered, connected
 and heard.
 """
+
 import sys
 import tempfile
 import unittest
@@ -15,7 +16,7 @@ from waiting import wait_for
 
 from smach_oracle.msg import OracleEvent
 
-TASK = '''
+TASK = """
 import multiprocessing, os, signal, sys, time, rospy, smach
 from std_msgs.msg import String
 rospy.init_node('task')
@@ -62,7 +63,7 @@ with sm:
     smach.StateMachine.add('PLAN', Plan(), {'succeeded': 'DRIVE'})
     smach.StateMachine.add('DRIVE', Drive())
 print('OUT', sm.execute(), flush=True)
-'''
+"""
 # how a child ends, and the status that its parent gets
 ENDS = {'exits': 'CHILD 768', 'terminated': 'CHILD 0', 'killed': 'CHILD -9'}
 
@@ -77,13 +78,14 @@ class ForkedChildrenTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         heard: List[str] = []
-        subscriber = rospy.Subscriber('/task/said', String,
-                                      lambda message: heard.append(message.data))
+        subscriber = rospy.Subscriber(
+            '/task/said', String, lambda message: heard.append(message.data)
+        )
         self.addCleanup(subscriber.unregister)
         log = EventLog(self, 'task')
         task = oracle_run(self, '--record', folder.name, script(self, TASK), how)
         self.assertTrue(wait_for(lambda: 'before' in heard and log.connected()), task.output())
-        connection, = subscriber.impl.connections
+        (connection,) = subscriber.impl.connections
         topics = self.topics()
         task.go_on()
         self.assertTrue(task.says(ENDS[how]), task.output())
@@ -94,11 +96,12 @@ class ForkedChildrenTest(unittest.TestCase):
         self.assertEqual(task.wait(), 0, task.output())
         self.assertIn('OUT succeeded', task.output())
         self.assertEqual(task.output().count('registered'), 0, task.output())
-        events, = recorded_events(folder.name)
+        (events,) = recorded_events(folder.name)
         self.assertEqual([event.seq for event in events], list(range(len(events))))
         self.assertEqual(events[-1].kind, OracleEvent.TRIAL_END)
-        self.assertEqual([event.seq for event in log.events],
-                         [event.seq for event in events][-len(log.events):])
+        self.assertEqual(
+            [event.seq for event in log.events], [event.seq for event in events][-len(log.events) :]
+        )
 
     def test_a_child_that_exits(self) -> None:
         self.check('exits')
@@ -112,5 +115,6 @@ class ForkedChildrenTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('forked_children')
     rostest.rosrun('smach_oracle', 'forked_children', ForkedChildrenTest, sys.argv)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Each how-to does as its page shows: its files, its commands in order, and what they print."""
+
 import unittest
 
 import rostest
@@ -7,7 +8,6 @@ from shown_page import ShownPage
 
 
 class HowTo(unittest.TestCase):
-
     def do(self, name):
         page = ShownPage(name)
         self.addCleanup(page.close)

@@ -2,6 +2,7 @@
 """Interfaces that are started when an expert chooses them: the documentation's own example, and
 starts that fail.
 """
+
 import os
 import re
 import shutil
@@ -28,8 +29,9 @@ from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import FinishInterface, FinishInterfaceRequest
 
 PAGE = os.path.join(rospkg.RosPack().get_path('smach_oracle'), 'doc', 'own_interface.md')
-LAUNCH = ('<launch><node pkg="my_robot" type="my_interface.py" name="by_hand" output="screen"/>'
-          '</launch>')
+LAUNCH = (
+    '<launch><node pkg="my_robot" type="my_interface.py" name="by_hand" output="screen"/></launch>'
+)
 BROKEN = '#!/bin/sh\necho it has no camera >&2\nexit 5\n'
 IDLE = '#!/bin/sh\nexec sleep 600\n'
 
@@ -41,7 +43,6 @@ def blocks(language):
 
 
 class InterfaceOnDemand(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.folder = tempfile.mkdtemp()
@@ -51,8 +52,10 @@ class InterfaceOnDemand(unittest.TestCase):
             'package.xml': '<package><name>my_robot</name><version>1.0.0</version>'
             '<description>x</description>'
             '<maintainer email="a@b.c">a</maintainer><license>BSD</license></package>',
-            'my_interface.py': blocks('python')[0], 'by_hand.launch': LAUNCH, 'broken': BROKEN,
-            'idle': IDLE
+            'my_interface.py': blocks('python')[0],
+            'by_hand.launch': LAUNCH,
+            'broken': BROKEN,
+            'idle': IDLE,
         }
         for name, text in files.items():
             with open(os.path.join(package, name), 'w') as file:
@@ -82,9 +85,9 @@ class InterfaceOnDemand(unittest.TestCase):
         thread = threading.Thread(target=self.at_work, args=(work, gone))
         thread.start()
         try:
-            return self.client.run_interface(offer,
-                                             make_question(self.id(), output_keys=('cup',)),
-                                             gone, lambda *what: None)
+            return self.client.run_interface(
+                offer, make_question(self.id(), output_keys=('cup',)), gone, lambda *what: None
+            )
         finally:
             thread.join()
 
@@ -95,18 +98,22 @@ class InterfaceOnDemand(unittest.TestCase):
 
     def said(self, text):
         return wait_for(
-            lambda: any(text in line for told in list(self.told) for line in told.lines), 60.0)
+            lambda: any(text in line for told in list(self.told) for line in told.lines), 60.0
+        )
 
     def finish(self):
         """What a front end does: as soon as the interface has said that it is ready. Whether it has
         done so.
         """
+
         def finished():
             try:
-                return call_service('/by_hand/finish', FinishInterface,
-                                    FinishInterfaceRequest(outcome='succeeded')).ok
+                return call_service(
+                    '/by_hand/finish', FinishInterface, FinishInterfaceRequest(outcome='succeeded')
+                ).ok
             except ServerGoneError:
                 return False
+
         self.seen = bool(self.said('Now do the work of PICK'))
         return self.seen and bool(wait_for(finished, 30.0))
 
@@ -124,8 +131,11 @@ class InterfaceOnDemand(unittest.TestCase):
     def test_the_example_of_the_documentation_does_the_work_and_is_gone_afterwards(self):
         self.assert_works(self.offer())
         self.assertTrue(
-            wait_for(lambda: '/by_hand/status' not in dict(
-                rosgraph.Master('/t').getPublishedTopics(''))), 'it ended in order')
+            wait_for(
+                lambda: '/by_hand/status' not in dict(rosgraph.Master('/t').getPublishedTopics(''))
+            ),
+            'it ended in order',
+        )
 
     def test_so_does_a_launch_file(self):
         self.assert_works(self.offer(node=None, launch='my_robot/by_hand.launch'))
@@ -136,18 +146,22 @@ class InterfaceOnDemand(unittest.TestCase):
         for text in texts:
             self.assertIn(text, str(raised.exception))
         self.assertTrue(
-            wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED))
+            wait_for(lambda: self.told and self.told[-1].status == InterfaceOutput.FAILED)
+        )
         self.assertEqual(self.told[-1].text, str(raised.exception))
 
     def test_a_start_that_fails_is_said_with_its_last_words(self):
         self.assert_fails(self.offer(node='my_robot broken'), 'exit code 5', 'it has no camera')
-        self.assert_fails(self.offer(node='my_robot nothing'),
-                          'there is no node nothing in package my_robot')
+        self.assert_fails(
+            self.offer(node='my_robot nothing'), 'there is no node nothing in package my_robot'
+        )
         self.assert_fails(self.offer(node='no_robot nothing'), 'there is no package no_robot')
 
     def test_what_never_brings_up_its_server_is_ended(self):
-        self.assert_fails(self.offer(node='my_robot idle', start_limit_s=1.5),
-                          'no action server /by_hand within 1.5 s')
+        self.assert_fails(
+            self.offer(node='my_robot idle', start_limit_s=1.5),
+            'no action server /by_hand within 1.5 s',
+        )
         self.assert_gone()
 
     def test_one_that_nobody_can_start_is_waited_for_only_so_long(self):

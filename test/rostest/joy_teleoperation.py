@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A joystick drives the manipulation interface: held it moves, let go or silent it stands."""
+
 import os
 import sys
 import time
@@ -20,7 +21,6 @@ SILENCE_S = 0.3  # as launch/joy_teleoperation.yaml has it
 
 
 class JoyTeleoperation(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.arm, cls.lag = FakeArm(), MachineLag()
@@ -49,6 +49,7 @@ class JoyTeleoperation(unittest.TestCase):
             # two processes have a part in it, and this one, each of which a busy machine keeps
             # waiting
             return self.arm.stands_after(let_go, within_s + 0.5), 3 * self.lag.most_s(begun_s - 0.1)
+
         assert_soon(measure, within_s)
 
     def let_go(self, *axes):
@@ -56,8 +57,9 @@ class JoyTeleoperation(unittest.TestCase):
 
     def test_it_moves_while_the_button_is_held_and_stops_when_it_is_let_go(self):
         before = self.ann.tool()
-        self.assert_stops(STOPS_WITHIN_S, ([0, 0, 1, 0, 0, 0], [1, 0]),
-                          lambda: self.let_go(0, 0, 1, 0, 0, 0))
+        self.assert_stops(
+            STOPS_WITHIN_S, ([0, 0, 1, 0, 0, 0], [1, 0]), lambda: self.let_go(0, 0, 1, 0, 0, 0)
+        )
         way = self.ann.tool() - before
         self.assertGreater(way[2], 0.02)
         self.assertLess(abs(way[0]) + abs(way[1]), 0.1 * way[2])
@@ -79,15 +81,22 @@ class JoyTeleoperation(unittest.TestCase):
 
     def test_without_the_button_nothing_moves(self):
         before_s = self.arm.moved_s
-        self.assertTrue(stays(lambda: self.push([1, 1, 1, 1, 1, 1], [0, 1])
-                              or self.arm.moved_s == before_s, 0.4))
+        self.assertTrue(
+            stays(
+                lambda: self.push([1, 1, 1, 1, 1, 1], [0, 1]) or self.arm.moved_s == before_s, 0.4
+            )
+        )
 
     def test_the_second_button_closes_the_gripper_and_opens_it_again(self):
         self.push_until_it_moves([0, 0, 1, 0, 0, 0], [1, 0])
         for stalled in (True, False):
-            self.assertTrue(self.push_until(
-                [0] * 6, [1, 1],
-                lambda stalled=stalled: self.ann.states[-1].gripper_stalled == stalled))
+            self.assertTrue(
+                self.push_until(
+                    [0] * 6,
+                    [1, 1],
+                    lambda stalled=stalled: self.ann.states[-1].gripper_stalled == stalled,
+                )
+            )
             self.assertTrue(stays(lambda: self.push([0] * 6, [1, 0]) or True, 0.4), 'let go')
         self.assertGreater(self.ann.states[-1].gripper, 0.08)
 

@@ -4,6 +4,7 @@
 Run as ``oracle_run killed_pr2_robot.py TASK JOURNAL``. The journal gets ``begun`` before the
 machine begins, and ``ended OUTCOME`` after it.
 """
+
 import importlib
 import os
 import sys

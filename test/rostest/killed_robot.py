@@ -5,6 +5,7 @@ where an expert sends it, and tells a journal so.
 Run as ``oracle_run killed_robot.py FOLDER NUMBER``. The states bear the robot's number, so that an
 answer for another robot cannot be followed.
 """
+
 import json
 import os
 import sys
@@ -34,8 +35,11 @@ def rounds():
     if not os.path.exists(JOURNAL):
         return set()
     with open(JOURNAL) as stream:
-        return {line['round'] for line in map(json.loads, stream)
-                if line['robot'] == NUMBER and line['what'] == 'round'}
+        return {
+            line['round']
+            for line in map(json.loads, stream)
+            if line['robot'] == NUMBER and line['what'] == 'round'
+        }
 
 
 class Work(smach.State):
@@ -63,8 +67,11 @@ class Tell(smach.State):
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 sm.userdata.round = len(rounds())  # where a new trial begins
 with sm:
-    smach.StateMachine.add('MOVE_' + NUMBER, smach_ros.SimpleActionState(
-        '/arm', TestAction, goal=TestGoal(SUCCEED)), {'succeeded': 'WORK_' + NUMBER})
+    smach.StateMachine.add(
+        'MOVE_' + NUMBER,
+        smach_ros.SimpleActionState('/arm', TestAction, goal=TestGoal(SUCCEED)),
+        {'succeeded': 'WORK_' + NUMBER},
+    )
     smach.StateMachine.add('WORK_' + NUMBER, Work(), {'succeeded': 'aborted'})
     smach.StateMachine.add('TELL_' + NUMBER, Tell(), {'again': 'MOVE_' + NUMBER})
 tell(what='begins')

@@ -2,6 +2,7 @@
 """Continuous operation with the real nodes: a trial finds what the one before it has left, tidied,
 and a run goes on from its rows alone.
 """
+
 import csv
 import json
 import shutil
@@ -20,11 +21,31 @@ STAYED_M = 0.01
 
 def run(output: Path) -> str:
     """Run the bare script in one lab; returns what run_trials printed."""
-    done = subprocess.run([
-        sys.executable, '-c', RUN_TRIALS, '--task', 'pick_and_place', '--benign', '--variants',
-        'bare', '--trials', str(TRIALS), '--hours', str(HOURS), '--seed', str(SEED), '--output',
-        str(output)], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True,
-                          timeout=LIMIT_S, check=False)
+    done = subprocess.run(
+        [
+            sys.executable,
+            '-c',
+            RUN_TRIALS,
+            '--task',
+            'pick_and_place',
+            '--benign',
+            '--variants',
+            'bare',
+            '--trials',
+            str(TRIALS),
+            '--hours',
+            str(HOURS),
+            '--seed',
+            str(SEED),
+            '--output',
+            str(output),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        universal_newlines=True,
+        timeout=LIMIT_S,
+        check=False,
+    )
     if done.returncode:
         raise AssertionError(done.stdout)
     return done.stdout
@@ -46,12 +67,15 @@ class LabThatGoesOn(unittest.TestCase):
         run(whole)
         told = rows(whole)
         self.assertEqual([row['true_success'] for row in told], ['yes'] * TRIALS, told)
-        self.assertEqual([round(float(row['hour']), 3) for row in told],
-                         [round(number * HOURS / TRIALS, 3) for number in range(TRIALS)])
+        self.assertEqual(
+            [round(float(row['hour']), 3) for row in told],
+            [round(number * HOURS / TRIALS, 3) for number in range(TRIALS)],
+        )
         left = [json.loads(row['left']) for row in told]
         for state in left:
-            self.assertEqual(sorted(state['joints']),
-                             ['head_pan_joint', 'head_tilt_joint', 'torso_lift_joint'])
+            self.assertEqual(
+                sorted(state['joints']), ['head_pan_joint', 'head_tilt_joint', 'torso_lift_joint']
+            )
             self.assertGreater(state['ended'], state['began'])
         for before, after in zip(left, left[1:]):
             self.stays(before['things'], after['things'])
@@ -79,4 +103,5 @@ class LabThatGoesOn(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rostest.rosrun('smach_oracle', 'lab_that_goes_on', LabThatGoesOn)

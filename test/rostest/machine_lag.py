@@ -1,6 +1,7 @@
 """How busy the machine is with others: what that adds to delays that a test measures by the
 clock.
 """
+
 import threading
 import time
 from collections import deque

@@ -2,6 +2,7 @@
 """The scripted operator in the simulated kitchen: it takes the drink and hands it over by hand, or
 sends to a state.
 """
+
 import os
 import sys
 import threading
@@ -20,12 +21,13 @@ from smach_oracle.ros.expert.client import ExpertQueryClient
 from smach_oracle.srv import Judge, ResetWorld, Reveal
 from smach_oracle.tasks import drink_retrieval
 
-OFFERS = (InterfaceOffer('perception', '/perception_interface'),
-          InterfaceOffer('manipulation', '/manipulation_interface'))
+OFFERS = (
+    InterfaceOffer('perception', '/perception_interface'),
+    InterfaceOffer('manipulation', '/manipulation_interface'),
+)
 
 
 class InKitchen(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         rospy.wait_for_service('world/reset', 60.0)
@@ -40,10 +42,15 @@ class InKitchen(unittest.TestCase):
     def ask(self, state, outputs=()):
         """Ask about a state; the question and its answer."""
         question = make_question(
-            'q-{}-{}'.format(state, rospy.get_time()), failed_state=state, interfaces=OFFERS,
-            output_keys=tuple(outputs), userdata={}, input_userdata={},
+            'q-{}-{}'.format(state, rospy.get_time()),
+            failed_state=state,
+            interfaces=OFFERS,
+            output_keys=tuple(outputs),
+            userdata={},
+            input_userdata={},
             choices=tuple(StateChoice(label, 0.1, 1, 1, (), ()) for label in self.states),
-            supersede_outcomes=(OutcomeChoice('succeeded', 'NEXT'),))
+            supersede_outcomes=(OutcomeChoice('succeeded', 'NEXT'),),
+        )
         asked = Asked(self.client, question)
         self.assertTrue(asked.wait(60.0), 'nobody answered')
         return question, asked.answer
@@ -62,7 +69,8 @@ class InKitchen(unittest.TestCase):
             self.run_state(label)
         self.by_hand('PICK_DRINK', ('grasp',))
         held = [
-            body.name for body in rospy.ServiceProxy('world/reveal', Reveal)([]).bodies
+            body.name
+            for body in rospy.ServiceProxy('world/reveal', Reveal)([]).bodies
             if body.held == 'right'
         ]
         self.assertEqual(len(held), 1)
@@ -74,11 +82,14 @@ class InKitchen(unittest.TestCase):
 
     def test_where_nothing_can_be_driven_it_sends_the_machine_to_a_state(self):
         answers = [self.ask('CLOSE_FRIDGE')[1] for _ in range(2)]
-        self.assertEqual([(answer.kind, answer.state) for answer in answers],
-                         [(AnswerKind.GOTO, 'MOVE_OUT'), (AnswerKind.GOTO, 'CLOSE_FRIDGE')])
+        self.assertEqual(
+            [(answer.kind, answer.state) for answer in answers],
+            [(AnswerKind.GOTO, 'MOVE_OUT'), (AnswerKind.GOTO, 'CLOSE_FRIDGE')],
+        )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('operator_in_kitchen')
     rostest.rosrun('smach_oracle', 'operator_in_kitchen', InKitchen)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A script with an Iterator and a Concurrence: an expert is asked about the item, the branch."""
+
 import json
 import sys
 import unittest
@@ -41,8 +42,11 @@ with sm:
     smach.StateMachine.add('BOTH', both)
 print('OUTCOME', sm.execute(), flush=True)
 '''
-SETTINGS = {'states': {'ALL/*': {'max_recoveries': 0}, 'BOTH/LIFT': {'max_recoveries': 0}},
-            'escalate': False, 'deadline_s': 50}
+SETTINGS = {
+    'states': {'ALL/*': {'max_recoveries': 0}, 'BOTH/LIFT': {'max_recoveries': 0}},
+    'escalate': False,
+    'deadline_s': 50,
+}
 
 
 class BranchesTest(unittest.TestCase):
@@ -54,27 +58,34 @@ class BranchesTest(unittest.TestCase):
         self.assertIsNotNone(question, task.output())
         self.assertEqual(question.query.text, 'item 2 of 4')
         self.assertTrue(question.query.container_path.endswith('/ALL'))
-        self.assertEqual({choice.outcome: choice.target
-                          for choice in question.query.supersede_outcomes}['succeeded'],
-                         'the next item')
+        self.assertEqual(
+            {choice.outcome: choice.target for choice in question.query.supersede_outcomes}[
+                'succeeded'
+            ],
+            'the next item',
+        )
         self._answer(expert, question, kind=ExpertDecision.SUPERSEDE, outcome='succeeded')
         question = expert.question(state='LIFT')
         self.assertIsNotNone(question, task.output())
         self._answer(expert, question, kind=ExpertDecision.GOTO, state='LIFT')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         done = [line for line in task.output().splitlines() if line.startswith('DOES')]
-        self.assertEqual([line.split()[1:] for line in done if 'POLISH' in line],
-                         [['POLISH', part] for part in 'abcd'])
+        self.assertEqual(
+            [line.split()[1:] for line in done if 'POLISH' in line],
+            [['POLISH', part] for part in 'abcd'],
+        )
         self.assertEqual(sum('LIFT' in line for line in done), 2)
         self.assertEqual(sum('LOOK' in line for line in done), 1)
 
     def _answer(self, expert: FrontEnd, question: object, **decision: object) -> None:
-        reply = expert.answer(AnswerQueryRequest(
-            question.query.query_id, ExpertDecision(by='Ann', **decision)))
+        reply = expert.answer(
+            AnswerQueryRequest(question.query.query_id, ExpertDecision(by='Ann', **decision))
+        )
         self.assertTrue(reply.ok, reply.message)
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_branches')
     rostest.rosrun('smach_oracle', 'oracle_branches', BranchesTest, sys.argv)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Operators hold a script under oracle_run: by services, typed commands, and a viewer."""
+
 import os
 import signal
 import sys
@@ -16,7 +17,7 @@ from smach_oracle.expert.terminal.operator_commands import OperatorCommands
 from smach_oracle.msg import ControlStatus, MachineControl, OracleEvent
 from smach_oracle.srv import CommandMachine, SendMachine, SetAutonomy, SetBreakpoint
 
-SCRIPT = '''
+SCRIPT = """
 import sys, rospy, smach, smach_ros
 rospy.init_node('task')
 class Work(smach.State):
@@ -37,16 +38,16 @@ with sm:
     smach.StateMachine.add('FIRST', Work('FIRST', True), {'succeeded': 'INNER'})
     smach.StateMachine.add('INNER', inner, {'succeeded': 'LAST'})
     smach.StateMachine.add('LAST', Work('LAST'))
-'''
-EXECUTE = '''
+"""
+EXECUTE = """
 print('OUTCOME', sm.execute(), flush=True)
-'''
-OWN_SERVER = '''
+"""
+OWN_SERVER = """
 sis = smach_ros.IntrospectionServer('viewed', sm, '/SHOWN')
 sis.start()
 print('OUTCOME', sm.execute(), flush=True)
 sis.stop()
-'''
+"""
 GUARDED = '{states: {FIRST: {on_retry: confirm}}}'
 CONFIRMED = '{states: {INNER/Y: {autonomy: confirm}, LAST: {autonomy: announce}}}'
 
@@ -69,8 +70,11 @@ class OracleControlTest(unittest.TestCase):
         task = oracle_run(self, '--config', config, '--record', self.folder, script(self, text))
         self.assertTrue(task.says('RUNS FIRST'), task.output())
         rospy.wait_for_service('/task/oracle/pause', 20.0)
-        self.assertTrue(wait_for(lambda: self.status is not None and self.status.running
-                                 and self.log.connected()))
+        self.assertTrue(
+            wait_for(
+                lambda: self.status is not None and self.status.running and self.log.connected()
+            )
+        )
         return task
 
     def take(self, message: ControlStatus) -> None:
@@ -84,8 +88,9 @@ class OracleControlTest(unittest.TestCase):
         return str(response.message)
 
     def held(self) -> List[str]:
-        return ['{}/{}'.format(each.path, each.state) for each in self.status.active
-                if each.held_by]
+        return [
+            '{}/{}'.format(each.path, each.state) for each in self.status.active if each.held_by
+        ]
 
     def assert_waits_before(self, place: str) -> None:
         self.assertTrue(wait_for(lambda: self.held() == [place]), str(self.status))
@@ -94,7 +99,7 @@ class OracleControlTest(unittest.TestCase):
         """Wait for the end; the events of the bag."""
         self.assertEqual(task.wait(), 0 if outcome == 'succeeded' else task.wait(), task.output())
         self.assertIn('OUTCOME ' + outcome, task.output())
-        events, = recorded_events(self.folder)
+        (events,) = recorded_events(self.folder)
         self.assertEqual([event.seq for event in events], list(range(len(events))))
         return events
 
@@ -110,28 +115,37 @@ class OracleControlTest(unittest.TestCase):
         self.assertEqual(self.call('resume', path='task'), 'runs now: X in task/INNER')
         events = self.assert_ends(task, 'succeeded')
         me = rospy.get_name()
-        self.assertEqual([(event.outcome, event.by) for event in events
-                          if event.kind == OracleEvent.OPERATOR_COMMAND],
-                         [('pause', me), ('step', 'eva'), ('resume', me)])
-        self.assertEqual([(event.path, event.state, event.outcome) for event in events
-                          if event.kind == OracleEvent.HOLD_END],
-                         [('task', 'INNER', 'stepped'), ('task/INNER', 'X', 'resumed')])
+        self.assertEqual(
+            [
+                (event.outcome, event.by)
+                for event in events
+                if event.kind == OracleEvent.OPERATOR_COMMAND
+            ],
+            [('pause', me), ('step', 'eva'), ('resume', me)],
+        )
+        self.assertEqual(
+            [
+                (event.path, event.state, event.outcome)
+                for event in events
+                if event.kind == OracleEvent.HOLD_END
+            ],
+            [('task', 'INNER', 'stepped'), ('task/INNER', 'X', 'resumed')],
+        )
 
     def test_what_waits_for_a_confirmation_shows_so(self) -> None:
         task = self.run_task(settings=CONFIRMED)
         task.go_on()
         self.assert_waits_before('task/INNER/Y')
-        waiting, = [each for each in self.status.active if each.held_by]
+        (waiting,) = [each for each in self.status.active if each.held_by]
         self.assertEqual((waiting.held_by, waiting.waits_for_confirmation), ('confirm', True))
         self.assertFalse(self.status.paused)
         self.assertEqual(self.call('confirm', path='task/INNER'), 'runs now: Y in task/INNER')
         events = self.assert_ends(task, 'succeeded')
-        announced, = [event for event in events if event.kind == OracleEvent.ANNOUNCE]
+        (announced,) = [event for event in events if event.kind == OracleEvent.ANNOUNCE]
         self.assertEqual(announced.state, 'LAST')
 
     def test_a_preempt_or_a_signal_ends_a_pause_at_once(self) -> None:
-        for end in (lambda task: self.call('preempt'),
-                    lambda task: task.signal(signal.SIGINT)):
+        for end in (lambda task: self.call('preempt'), lambda task: task.signal(signal.SIGINT)):
             with self.subTest(), tempfile.TemporaryDirectory() as self.folder:
                 task = self.run_task()
                 self.call('breakpoint', SetBreakpoint, pattern='INNER/X')
@@ -141,8 +155,10 @@ class OracleControlTest(unittest.TestCase):
                 end(task)
                 events = self.assert_ends(task, 'preempted')
                 self.assertNotIn('RUNS X', task.output())
-                self.assertEqual([event.outcome for event in events
-                                  if event.kind == OracleEvent.HOLD_END], ['preempted'])
+                self.assertEqual(
+                    [event.outcome for event in events if event.kind == OracleEvent.HOLD_END],
+                    ['preempted'],
+                )
 
     def test_going_elsewhere_is_checked(self) -> None:
         task = self.run_task(settings=GUARDED)
@@ -152,33 +168,52 @@ class OracleControlTest(unittest.TestCase):
         task.go_on()
         self.assert_waits_before('task/INNER')
         refused = go_to(path='task', state='FIRST')
-        self.assertEqual((refused.ok, refused.message),
-                         (False, 'going to FIRST may repeat FIRST: confirm that it may'))
+        self.assertEqual(
+            (refused.ok, refused.message),
+            (False, 'going to FIRST may repeat FIRST: confirm that it may'),
+        )
         self.assertTrue(go_to('task', 'FIRST', True, '').ok)
         self.assertTrue(wait_for(lambda: task.output().count('RUNS FIRST') == 2))
         self.assertTrue(go_to('', 'LAST', False, '').ok)
         task.go_on()
         events = self.assert_ends(task, 'succeeded')
-        self.assertEqual([event.target for event in events if event.kind == OracleEvent.SENT],
-                         ['FIRST', 'LAST'])
+        self.assertEqual(
+            [event.target for event in events if event.kind == OracleEvent.SENT], ['FIRST', 'LAST']
+        )
         self.assertNotIn('RUNS X', task.output())
 
     def check_a_viewer(self, task: Process, server: str, path: str) -> None:
-        topic = rospy.Publisher(server + '/smach/container_init', SmachContainerInitialStatusCmd,
-                                queue_size=10)
+        topic = rospy.Publisher(
+            server + '/smach/container_init', SmachContainerInitialStatusCmd, queue_size=10
+        )
         self.addCleanup(topic.unregister)
         self.assertTrue(wait_for(topic.get_num_connections))
         nothing = 'gAN9cQAu'  # no userdata
         command = SmachContainerInitialStatusCmd(path, ['FIRST'], nothing)
-        self.assertTrue(wait_for(lambda: topic.publish(command) or 'may repeat FIRST' in ''.join(
-            event.text for event in self.log.of(OracleEvent.WARNING))), task.output())
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    topic.publish(command)
+                    or 'may repeat FIRST'
+                    in ''.join(event.text for event in self.log.of(OracleEvent.WARNING))
+                )
+            ),
+            task.output(),
+        )
         command.initial_states = ['LAST']
-        self.assertTrue(wait_for(lambda: topic.publish(command) or self.status.jump_states ==
-                                 ['LAST']))
+        self.assertTrue(
+            wait_for(lambda: topic.publish(command) or self.status.jump_states == ['LAST'])
+        )
         task.go_on()
         events = self.assert_ends(task, 'succeeded')
-        self.assertEqual([(event.state, event.target, event.by) for event in events
-                          if event.kind == OracleEvent.SENT], [('INNER', 'LAST', rospy.get_name())])
+        self.assertEqual(
+            [
+                (event.state, event.target, event.by)
+                for event in events
+                if event.kind == OracleEvent.SENT
+            ],
+            [('INNER', 'LAST', rospy.get_name())],
+        )
 
     def test_a_viewer_sends_a_machine_that_runs(self) -> None:
         self.check_a_viewer(self.run_task(settings=GUARDED), '/task', '/task')
@@ -189,12 +224,23 @@ class OracleControlTest(unittest.TestCase):
     def test_typed_commands_find_the_robot(self) -> None:
         task = self.run_task()
         operator = OperatorCommands('ann')
-        self.assertEqual(operator.carry_out('pause'), [
-            ('  /task: task is paused; runs to its end: FIRST in task', 'green')])
+        self.assertEqual(
+            operator.carry_out('pause'),
+            [('  /task: task is paused; runs to its end: FIRST in task', 'green')],
+        )
         task.go_on()
         self.assert_waits_before('task/INNER')
-        self.assertTrue(wait_for(lambda: operator.carry_out('status') == [
-            ('  /task task: paused by ann', 'bold'), ('    task/INNER waits (paused)', 'yellow')]))
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    operator.carry_out('status')
+                    == [
+                        ('  /task task: paused by ann', 'bold'),
+                        ('    task/INNER waits (paused)', 'yellow'),
+                    ]
+                )
+            )
+        )
         operator.carry_out('goto task LAST')
         operator.carry_out('resume')
         self.assert_ends(task, 'succeeded')
@@ -203,5 +249,6 @@ class OracleControlTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_control')
     rostest.rosrun('smach_oracle', 'oracle_control', OracleControlTest, sys.argv)

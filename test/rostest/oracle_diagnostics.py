@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
-"""/diagnostics, roswtf and the loggers of a node whose machine asks its expert, over a real master.
+"""/diagnostics, roswtf and the loggers of a node whose machine asks its expert, over a real
+master.
 """
+
 import logging
 import subprocess
 import sys
@@ -19,16 +21,15 @@ from smach_oracle import OracleContainer
 
 # roswtf asks rosdep which packages depend on it, and this machine may have no database of rosdep.
 # All the rest is roswtf's own: it reads the package's export, and loads and runs the plugin.
-ROSWTF = '''
+ROSWTF = """
 import rospkg
 rospkg.RosPack.get_depends_on = lambda rospack, name, implicit=True: ['smach_oracle']
 import roswtf
 roswtf.roswtf_main()
-'''
+"""
 
 
 class Fails(smach.State):
-
     def __init__(self):
         smach.State.__init__(self, outcomes=['succeeded', 'failed'])
 
@@ -42,12 +43,14 @@ def level_of(logger):
 
 
 class DiagnosticsTest(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.told, cls.logged = {}, []
-        rospy.Subscriber('/diagnostics', DiagnosticArray, lambda message: cls.told.update(
-            {each.name: each for each in message.status}))
+        rospy.Subscriber(
+            '/diagnostics',
+            DiagnosticArray,
+            lambda message: cls.told.update({each.name: each for each in message.status}),
+        )
         rospy.Subscriber('/rosout', Log, lambda message: cls.logged.append(message))
         cls.machine = smach.StateMachine(outcomes=['succeeded', 'failed'])
         with cls.machine:
@@ -79,16 +82,22 @@ class DiagnosticsTest(unittest.TestCase):
 
     def test_roswtf_loads_the_plugin_and_names_the_question(self):
         self.assertTrue(wait_for(self.asks, 40.0), self.told)
-        told = subprocess.run([sys.executable, '-c', ROSWTF], stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, timeout=100, check=False).stdout.decode()
+        told = subprocess.run(
+            [sys.executable, '-c', ROSWTF],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=100,
+            check=False,
+        ).stdout.decode()
         self.assertIn('Loaded plugin smach_oracle.ros.diagnostics.roswtf_plugin', told)
         self.assertIn('oracles need a person', told)
         self.assertIn('1 open question', told)
 
     def test_the_levels_of_the_standard_services_apply_to_what_the_executive_logs(self):
         self.assertTrue(wait_for(self.asks, 40.0), self.told)
-        self.assertTrue(wait_for(lambda: any('PICK failed' in each.msg for each in self.logged),
-                                 10.0))
+        self.assertTrue(
+            wait_for(lambda: any('PICK failed' in each.msg for each in self.logged), 10.0)
+        )
         set_level = rospy.ServiceProxy('~set_logger_level', SetLoggerLevel)
         set_level('rosout', 'error')
         self.addCleanup(set_level, 'rosout', 'info')

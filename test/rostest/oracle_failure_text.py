@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The expert reads why an action was aborted, in the action server's own words."""
+
 import json
 import sys
 import unittest
@@ -12,7 +13,7 @@ from smach_oracle.msg import ExpertDecision, MoveArmsAsideAction
 from smach_oracle.srv import AnswerQueryRequest
 
 REASON = 'the left arm is blocked by the shelf'
-SCRIPT = '''
+SCRIPT = """
 import rospy, smach, smach_ros
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
@@ -20,14 +21,17 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('MOVE', smach_ros.SimpleActionState('move', MoveArmsAsideAction))
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 
 
 class FailureTextTest(unittest.TestCase):
     def test_the_words_of_the_action_server_reach_the_expert(self) -> None:
         server = actionlib.SimpleActionServer(
-            'move', MoveArmsAsideAction, auto_start=False,
-            execute_cb=lambda goal: server.set_aborted(text=REASON))
+            'move',
+            MoveArmsAsideAction,
+            auto_start=False,
+            execute_cb=lambda goal: server.set_aborted(text=REASON),
+        )
         server.start()
         config = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 30}), 'oracle.yaml')
         expert = FrontEnd(self, '/task/expert_query')
@@ -37,13 +41,17 @@ class FailureTextTest(unittest.TestCase):
         self.assertEqual(question.query.outcome, 'aborted')
         self.assertIn(REASON, question.query.text)
         self.assertIn(REASON, task.output())
-        reply = expert.answer(AnswerQueryRequest(question.query.query_id, ExpertDecision(
-            kind=ExpertDecision.GIVE_UP, by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                question.query.query_id, ExpertDecision(kind=ExpertDecision.GIVE_UP, by='Ann')
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(task.says('OUTCOME aborted'), task.output())
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_failure_text')
     rostest.rosrun('smach_oracle', 'oracle_failure_text', FailureTextTest, sys.argv)

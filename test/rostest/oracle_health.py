@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A script under oracle_run while its robot is not well, by a topic and by the diagnostics."""
+
 import os
 import signal
 import sys
@@ -18,7 +19,7 @@ from smach_msgs.msg import SmachContainerStatus
 from smach_oracle.analysis.trials import TrialEnding, load_trials
 from smach_oracle.msg import MoveArmsAsideAction, OracleEvent
 
-SCRIPT = '''
+SCRIPT = """
 import sys, rospy, smach, smach_ros
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
@@ -26,9 +27,9 @@ sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('DRIVE', smach_ros.SimpleActionState('drive', MoveArmsAsideAction))
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 # of diagnostic_msgs, which need not be installed: then the task reads it by this definition
-DEFINITION = '''Header header
+DEFINITION = """Header header
 DiagnosticStatus[] status
 {0}
 MSG: std_msgs/Header
@@ -50,7 +51,7 @@ KeyValue[] values
 MSG: diagnostic_msgs/KeyValue
 string key
 string value
-'''.format('=' * 80)
+""".format('=' * 80)
 MD5 = '60810da900de1dd6ddd437c3503511da'
 TOPIC = '{healthy: {topic: /motors_on, name: motors}, max_recoveries: 0}'
 DIAGNOSTICS = '{healthy: [{diagnostics: Power System}], max_recoveries: 0}'
@@ -69,8 +70,9 @@ class Motors:
         self.array = classes['diagnostic_msgs/DiagnosticArray']
         self._status = classes['diagnostic_msgs/DiagnosticStatus']
         self._diagnostics = rospy.Publisher('/diagnostics', self.array, queue_size=10)
-        self._server = actionlib.SimpleActionServer('drive', MoveArmsAsideAction, self._execute,
-                                                    auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            'drive', MoveArmsAsideAction, self._execute, auto_start=False
+        )
         self._server.start()
         self._timer = rospy.Timer(rospy.Duration(0.1), self._tell)
 
@@ -106,13 +108,16 @@ class OracleHealthTest(unittest.TestCase):
             file.write(settings)
         self.log = EventLog(self, 'task')
         self.active: List[List[str]] = []
-        subscriber = rospy.Subscriber('/task/smach/container_status', SmachContainerStatus,
-                                      lambda message: self.active.append(message.active_states))
+        subscriber = rospy.Subscriber(
+            '/task/smach/container_status',
+            SmachContainerStatus,
+            lambda message: self.active.append(message.active_states),
+        )
         self.addCleanup(subscriber.unregister)
-        task = oracle_run(self, '--config', config, '--record', self.folder,
-                          script(self, SCRIPT))
-        self.assertTrue(wait_for(lambda: 'while the robot is not well' in task.output()),
-                        task.output())
+        task = oracle_run(self, '--config', config, '--record', self.folder, script(self, SCRIPT))
+        self.assertTrue(
+            wait_for(lambda: 'while the robot is not well' in task.output()), task.output()
+        )
         return task
 
     def check_it_waits_and_goes_on(self, settings: str, why: str) -> None:
@@ -123,18 +128,26 @@ class OracleHealthTest(unittest.TestCase):
         self.motors.on = True
         self.assertEqual(task.wait(), 0, task.output())
         self.assertIn('OUTCOME succeeded', task.output())
-        self.assertIn('task/DRIVE failed while the robot is not well ({}): waiting; no failure is '
-                      'counted'.format(why), task.output())
+        self.assertIn(
+            'task/DRIVE failed while the robot is not well ({}): waiting; no failure is '
+            'counted'.format(why),
+            task.output(),
+        )
         self.assertEqual(self.motors.goals, 2)
-        events, = recorded_events(self.folder)
+        (events,) = recorded_events(self.folder)
         self.assertEqual([event.seq for event in events], list(range(len(events))))
-        start, end = [event for event in events if event.kind in (
-            OracleEvent.HEALTH_WAIT_START, OracleEvent.HEALTH_WAIT_END)]
+        start, end = [
+            event
+            for event in events
+            if event.kind in (OracleEvent.HEALTH_WAIT_START, OracleEvent.HEALTH_WAIT_END)
+        ]
         self.assertEqual((start.path, start.state, start.text), ('task', 'DRIVE', why))
         self.assertEqual((end.outcome, '"states": ["task/DRIVE"]' in end.data), ('well', True))
-        trial, = load_trials([self.folder]).trials
-        self.assertEqual((trial.failures, trial.recoveries, trial.questions, trial.ending),
-                         (0, 0, 0, TrialEnding.SUCCESS))
+        (trial,) = load_trials([self.folder]).trials
+        self.assertEqual(
+            (trial.failures, trial.recoveries, trial.questions, trial.ending),
+            (0, 0, 0, TrialEnding.SUCCESS),
+        )
         self.assertAlmostEqual(trial.unwell_s, end.wall_time - start.wall_time, 3)
         self.assertGreater(trial.unwell_s, 1.0)
 
@@ -150,11 +163,11 @@ class OracleHealthTest(unittest.TestCase):
         task.signal(signal.SIGINT)
         task.wait()
         self.assertIn('OUTCOME preempted', task.output())
-        events, = recorded_events(self.folder)
+        (events,) = recorded_events(self.folder)
         kinds = [event.kind for event in events]
         self.assertIn(OracleEvent.HEALTH_WAIT_START, kinds)
         self.assertEqual(kinds[-1], OracleEvent.TRIAL_END)
-        end, = [event for event in events if event.kind == OracleEvent.HEALTH_WAIT_END]
+        (end,) = [event for event in events if event.kind == OracleEvent.HEALTH_WAIT_END]
         self.assertEqual(end.outcome, 'stopped')
         self.assertNotIn(OracleEvent.FAILURE, kinds)
         self.assertEqual(self.motors.goals, 1)
@@ -166,11 +179,13 @@ class OracleHealthTest(unittest.TestCase):
         task = oracle_run(self, '--config', config, script(self, SCRIPT))
         self.assertEqual(task.wait(), 0, task.output())
         self.assertIn('OUTCOME succeeded', task.output())
-        self.assertEqual(task.output().count(
-            'topic /motors_no has not published yet, so its condition holds'), 1)
+        self.assertEqual(
+            task.output().count('topic /motors_no has not published yet, so its condition holds'), 1
+        )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_health')
     rostest.rosrun('smach_oracle', 'oracle_health', OracleHealthTest, sys.argv)

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """What viewers see of wrapped machines, of either engine, beside what else a script has made."""
+
 import sys
 import unittest
 
@@ -16,7 +17,7 @@ from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.msg import MoveArmsAsideAction, MoveArmsAsideGoal
 
 STRUCTURE = '/task/smach/container_structure'
-PRELUDE = '''
+PRELUDE = """
 import sys, threading, rospy, smach, smach_ros
 from smach_oracle import OracleContainer
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
@@ -30,31 +31,42 @@ def chain(*states):
 def step():
     return smach.CBState(lambda ud: 'succeeded', outcomes=['succeeded', 'aborted'])
 rospy.init_node('task')
-'''
-A_TREE = PRELUDE + '''
+"""
+A_TREE = (
+    PRELUDE
+    + """
 sm = OracleContainer.wrap(chain(*[chain(step()) for _ in range(30)]), name='TREE')
 print('OUTCOME', sm.execute(), flush=True)
 names = [thread.name for thread in threading.enumerate()]
 print('INTROSPECTION', sum('introspection' in name for name in names),
       'PUBLISHERS', sum('_publisher' in name for name in names), flush=True)
 sys.stdin.readline()
-'''
-STOPPED_BEFORE = PRELUDE + '''
+"""
+)
+STOPPED_BEFORE = (
+    PRELUDE
+    + """
 sm = chain(step())
 viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')
 viewer.start()
 viewer.stop()
 print('OUTCOME', OracleContainer.wrap(sm, name='TREE').execute(), flush=True)
 sys.stdin.readline()
-'''
-BEHIND_AN_ACTION_SERVER = PRELUDE + '''
+"""
+)
+BEHIND_AN_ACTION_SERVER = (
+    PRELUDE
+    + """
 from smach_oracle.msg import MoveArmsAsideAction
 sm = OracleContainer.wrap(chain(step()), name='TREE')
 smach_ros.ActionServerWrapper('task_server', MoveArmsAsideAction, sm, ['succeeded'], ['aborted'],
                               ['preempted']).run_server()
 rospy.spin()
-'''
-IN_A_VIEWED_MACHINE = PRELUDE + '''
+"""
+)
+IN_A_VIEWED_MACHINE = (
+    PRELUDE
+    + """
 inner = OracleContainer.wrap(chain(step(), step()), name='INNER')
 sm = chain(inner)
 viewer = smach_ros.IntrospectionServer('task', sm, '/OUTER')
@@ -62,8 +74,11 @@ viewer.start()
 print('OUTCOME', sm.execute(), flush=True)
 sys.stdin.readline()
 viewer.stop()
-'''
-OWN_SERVER = PRELUDE + '''
+"""
+)
+OWN_SERVER = (
+    PRELUDE
+    + """
 sm = chain(step(), chain(step(), step()), step())
 viewer = smach_ros.IntrospectionServer('mine', sm, '/SM_ROOT')
 if WHEN == 'before':
@@ -76,7 +91,8 @@ sys.stdin.readline()
 print('AGAIN', sm.execute(), flush=True)
 sys.stdin.readline()
 viewer.stop()
-'''
+"""
+)
 
 
 class Console:
@@ -98,8 +114,9 @@ class Console:
         """Whether the script's own server has told of its machine, and so has the oracle."""
         self.listed()
         known = self._robots._robots
-        return all(name in known and known[name].source(frozenset()).states
-                   for name in ('/mine', '/task'))
+        return all(
+            name in known and known[name].source(frozenset()).states for name in ('/mine', '/task')
+        )
 
     def close(self):
         for subscribers in self._robots._subscribers.values():
@@ -112,8 +129,11 @@ class ShownTest(unittest.TestCase):
         program = Process([sys.executable, script(self, text)])
         self.addCleanup(program.stop)
         self.shown = {}
-        viewer = rospy.Subscriber(STRUCTURE, SmachContainerStructure,
-                                  lambda message: self.shown.update({message.path: message}))
+        viewer = rospy.Subscriber(
+            STRUCTURE,
+            SmachContainerStructure,
+            lambda message: self.shown.update({message.path: message}),
+        )
         self.addCleanup(viewer.unregister)
         return program
 
@@ -144,11 +164,13 @@ class ShownTest(unittest.TestCase):
     def test_a_wrapped_machine_in_one_that_is_viewed_is_shown_there_alone(self) -> None:
         program = self.start(IN_A_VIEWED_MACHINE)
         self.assertTrue(program.says('OUTCOME succeeded'), program.output())
-        self.assertTrue(wait_for(lambda: set(self.shown) == {'/OUTER', '/OUTER/S0'}),
-                        sorted(self.shown))
+        self.assertTrue(
+            wait_for(lambda: set(self.shown) == {'/OUTER', '/OUTER/S0'}), sorted(self.shown)
+        )
         publishers = dict(rosgraph.Master('/test').getSystemState()[0])
-        self.assertEqual([topic for topic in publishers if topic.endswith('container_structure')],
-                         [STRUCTURE])
+        self.assertEqual(
+            [topic for topic in publishers if topic.endswith('container_structure')], [STRUCTURE]
+        )
         program.go_on()
         self.assertEqual(program.wait(), 0, program.output())
 
@@ -176,5 +198,6 @@ class ShownTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_introspection')
     rostest.rosrun('smach_oracle', 'oracle_introspection', ShownTest, sys.argv)

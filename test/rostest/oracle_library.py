@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Programs that use OracleContainer themselves, configured by the parameters of their node."""
+
 import sys
 import tempfile
 import unittest
@@ -23,7 +24,7 @@ from smach_oracle.msg import (
 )
 from smach_oracle.srv import AnswerQueryRequest, CommandMachine
 
-PRELUDE = '''
+PRELUDE = """
 import sys, rospy, smach, smach_ros
 from smach_oracle import OracleContainer
 from smach_oracle.oracle import Settings
@@ -37,8 +38,10 @@ OUTCOMES = ['succeeded', 'aborted', 'preempted']
 def run(sm):
     print('OUTCOME', sm.execute(), flush=True)
     sys.stdin.readline()
-'''
-WRAPPED_BEFORE_THE_NODE = PRELUDE + '''
+"""
+WRAPPED_BEFORE_THE_NODE = (
+    PRELUDE
+    + """
 sm = smach.StateMachine(outcomes=OUTCOMES)
 with sm:
     smach.StateMachine.add('PICK', Turn('aborted'))
@@ -46,8 +49,11 @@ settings = {'max_recoveries': 3, 'deadline_s': 30.0}
 assert OracleContainer.wrap(sm, settings=settings, name='ROBOT') is sm
 rospy.init_node('task')
 run(sm)
-'''
-BUILT_BY_HAND = PRELUDE + '''
+"""
+)
+BUILT_BY_HAND = (
+    PRELUDE
+    + """
 rospy.init_node('task')
 view = []
 sm = OracleContainer(OUTCOMES, name='HAND_MADE')
@@ -56,15 +62,19 @@ with sm:
                         preconditions=[lambda userdata: not view.append('looked')])
 run(sm)
 print('LOOKED', len(view), flush=True)
-'''
-FIXED_SETTINGS = PRELUDE + '''
+"""
+)
+FIXED_SETTINGS = (
+    PRELUDE
+    + """
 rospy.init_node('task')
 sm = OracleContainer(OUTCOMES, settings=Settings.from_dict({'max_recoveries': 3}))
 with sm:
     OracleContainer.add('PICK', Turn('aborted'))
 run(sm)
-'''
-OWN_LOGGERS = '''
+"""
+)
+OWN_LOGGERS = """
 import sys, rospy, smach
 from smach_oracle import OracleContainer
 rospy.init_node('task')
@@ -76,8 +86,10 @@ with sm:
                                                  outcomes=['succeeded']))
 OracleContainer.wrap(sm).execute()
 print('HEARD', any('terminating' in text for text in heard), flush=True)
-'''
-A_NEW_MACHINE_EACH_TRIAL = PRELUDE + '''
+"""
+A_NEW_MACHINE_EACH_TRIAL = (
+    PRELUDE
+    + """
 rospy.init_node('task')
 for trial in range(30):
     sm = smach.StateMachine(outcomes=OUTCOMES)
@@ -88,8 +100,11 @@ import gc, threading
 gc.collect()
 machines = [each for each in gc.get_objects() if isinstance(each, OracleContainer)]
 print('LEFT', len(machines), threading.active_count(), flush=True)
-'''
-TRIES_AGAIN = PRELUDE + '''
+"""
+)
+TRIES_AGAIN = (
+    PRELUDE
+    + """
 rospy.init_node('task')
 sm = smach.StateMachine(outcomes=OUTCOMES)
 with sm:
@@ -100,8 +115,11 @@ for attempt in range(3):
         sm.execute()
     except (ValueError, OSError) as err:
         print('ATTEMPT', attempt, err, flush=True)
-'''
-TWO_MACHINES = PRELUDE + '''
+"""
+)
+TWO_MACHINES = (
+    PRELUDE
+    + """
 rospy.init_node('task')
 machines = []
 for labels in ['PICK'], ['PLACE'], ['PICK']:
@@ -117,8 +135,11 @@ for sm in machines:
 print('PATHS', [sm.path for sm in machines], flush=True)
 sys.stdin.readline()
 viewer.stop()
-'''
-EQUAL_MACHINES = PRELUDE + '''
+"""
+)
+EQUAL_MACHINES = (
+    PRELUDE
+    + """
 import dataclasses
 from geometry_msgs.msg import PoseStamped
 class Hostile:
@@ -159,8 +180,11 @@ if 'bare' not in sys.argv:
     for sm in machines:
         assert type(unwrap(sm)) in (Task, HostileTask)
     print('UNWRAPPED', flush=True)
-'''
-ACTION_SERVER = PRELUDE + '''
+"""
+)
+ACTION_SERVER = (
+    PRELUDE
+    + """
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
 sm = smach.StateMachine(outcomes=OUTCOMES)
@@ -172,7 +196,8 @@ wrapper = smach_ros.ActionServerWrapper('task_server', MoveArmsAsideAction, wrap
                                         preempted_outcomes=['preempted'])
 wrapper.run_server()
 rospy.spin()
-'''
+"""
+)
 
 
 class LibraryTest(unittest.TestCase):
@@ -191,18 +216,24 @@ class LibraryTest(unittest.TestCase):
         self.assertEqual(program.wait(), 0, program.output())
 
     def answer(self, expert: FrontEnd, question: Any) -> None:
-        reply = expert.answer(AnswerQueryRequest(question.query.query_id, ExpertDecision(
-            kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                question.query.query_id,
+                ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann'),
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
 
     def test_machines_without_a_name_have_their_nodes_and_viewers_keep_theirs(self) -> None:
         program = self.start(TWO_MACHINES)
         self.assertTrue(program.says("PATHS ['task', 'task_2', 'task']"), program.output())
-        theirs = rospy.wait_for_message('/mine/smach/container_structure', SmachContainerStructure,
-                                        20.0)
+        theirs = rospy.wait_for_message(
+            '/mine/smach/container_structure', SmachContainerStructure, 20.0
+        )
         self.assertEqual(theirs.path, '/SM_PLACE')
-        ours = rospy.wait_for_message('/task/smach/container_structure', SmachContainerStructure,
-                                      20.0)
+        ours = rospy.wait_for_message(
+            '/task/smach/container_structure', SmachContainerStructure, 20.0
+        )
         self.assertEqual(ours.path, '/task')
         program.go_on()
         self.assertEqual(program.wait(), 0, program.output())
@@ -214,8 +245,9 @@ class LibraryTest(unittest.TestCase):
         program = self.start(WRAPPED_BEFORE_THE_NODE)
         self.assertTrue(program.says('OUTCOME succeeded'), program.output())
         rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)
-        self.assertEqual([(row.path, row.state, row.failures) for row in rates.states],
-                         [('ROBOT', 'PICK', 1)])
+        self.assertEqual(
+            [(row.path, row.state, row.failures) for row in rates.states], [('ROBOT', 'PICK', 1)]
+        )
         self.assertTrue(self.published('/task/smach/container_status'))
         self.finish(program)
 
@@ -228,8 +260,12 @@ class LibraryTest(unittest.TestCase):
         self.assertAlmostEqual(question.query.deadline, 30.0, delta=5.0)  # as in the code
         self.answer(expert, question)
         self.finish(program)
-        self.assertEqual(program.output().count(
-            'ROBOT: the parameter /task/oracle overrides max_recoveries: 3, now 0'), 1)
+        self.assertEqual(
+            program.output().count(
+                'ROBOT: the parameter /task/oracle overrides max_recoveries: 3, now 0'
+            ),
+            1,
+        )
 
     def test_a_settings_object_is_taken_as_it_is(self) -> None:
         self.set_param('oracle', {'max_recoveries': 0})
@@ -241,10 +277,15 @@ class LibraryTest(unittest.TestCase):
         self.assertIn('LOOKED 1', program.output())
 
     def test_many_robots_may_share_one_server(self) -> None:
-        server = Process([
-            sys.executable, '-c', 'import rospy; from smach_oracle.ros.expert.server import '
-            'ExpertQueryServer; rospy.init_node("desk"); ExpertQueryServer("/desk"); rospy.spin()'
-        ])
+        server = Process(
+            [
+                sys.executable,
+                '-c',
+                'import rospy; from smach_oracle.ros.expert.server import '
+                'ExpertQueryServer; rospy.init_node("desk"); '
+                'ExpertQueryServer("/desk"); rospy.spin()',
+            ]
+        )
         self.addCleanup(server.stop)
         self.set_param('expert_query_server', '/desk')
         self.set_param('oracle', {'max_recoveries': 0})
@@ -285,7 +326,8 @@ class LibraryTest(unittest.TestCase):
                 rospy.delete_param('/task/' + name)
                 self.assertEqual(program.output().count('ATTEMPT'), 3, program.output())
                 self.assertEqual(
-                    program.output().count('memory: ' if name == 'oracle' else '/proc/nowhere'), 3)
+                    program.output().count('memory: ' if name == 'oracle' else '/proc/nowhere'), 3
+                )
 
     def test_machines_that_are_gone_leave_nothing_behind(self) -> None:
         program = self.start(A_NEW_MACHINE_EACH_TRIAL)
@@ -310,15 +352,24 @@ class LibraryTest(unittest.TestCase):
         self.assertEqual([machine.path for machine in told[-1].machines], names)
         pause = rospy.ServiceProxy('/task/oracle/pause', CommandMachine)
         self.assertTrue(pause('task_3', 'Ann').ok)
-        self.assertTrue(wait_for(lambda: [each.path for each in told[-1].machines
-                                          if each.paused] == ['task_3']))
+        self.assertTrue(
+            wait_for(lambda: [each.path for each in told[-1].machines if each.paused] == ['task_3'])
+        )
         program.go_on()
         self.assertEqual(program.wait(), 0, program.output())
         trials = recorded_events(folder)
         self.assertEqual(sorted(events[0].path for events in trials), names)
-        self.assertEqual(sorted({event.state for events in trials for event in events
-                                 if event.kind == OracleEvent.FAILURE}),
-                         ['PICK_0', 'PICK_1', 'PICK_2', 'PICK_3'])
+        self.assertEqual(
+            sorted(
+                {
+                    event.state
+                    for events in trials
+                    for event in events
+                    if event.kind == OracleEvent.FAILURE
+                }
+            ),
+            ['PICK_0', 'PICK_1', 'PICK_2', 'PICK_3'],
+        )
 
     def test_machines_that_compare_equal_or_raise_when_compared_are_told_apart(self) -> None:
         folder = self.folder()
@@ -337,7 +388,8 @@ class LibraryTest(unittest.TestCase):
     def test_machines_that_compare_equal_run_unmodified_under_oracle_run(self) -> None:
         folder = self.folder()
         self.check_four_machines(
-            oracle_run(self, '--record', folder, script(self, EQUAL_MACHINES), 'bare'), folder)
+            oracle_run(self, '--record', folder, script(self, EQUAL_MACHINES), 'bare'), folder
+        )
 
     def test_a_machine_behind_an_action_server_recovers(self) -> None:
         task = oracle_run(self, script(self, ACTION_SERVER))
@@ -354,5 +406,6 @@ class LibraryTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_library')
     rostest.rosrun('smach_oracle', 'oracle_library', LibraryTest, sys.argv)

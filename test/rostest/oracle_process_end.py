@@ -3,6 +3,7 @@
 
 In library use and under oracle_run; after success, failure, exception, preempt and SIGINT.
 """
+
 import json
 import signal
 import sys
@@ -15,7 +16,7 @@ from oracle_support import Process, oracle_run, recorded_events, script
 
 from smach_oracle.msg import OracleEvent
 
-TASK = '''
+TASK = """
 import sys, threading, time, rospy, smach, smach_ros
 rospy.init_node('task')
 how = sys.argv[1]
@@ -43,26 +44,34 @@ def outer():
 sm = outer()
 if how == 'preempted':
     threading.Timer(1.0, sm.request_preempt).start()
-'''
-LIBRARY = '''
+"""
+LIBRARY = """
 from smach_oracle import OracleContainer
 OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'deadline_s': 1.0}, name='TASK')
-'''
-SLOW_OBSERVER = '''
+"""
+SLOW_OBSERVER = """
 from smach_oracle.oracle import oracle_of
 oracle_of(sm).events.observers.append(lambda event: time.sleep(0.5))
-'''
-RUN = '''
+"""
+RUN = """
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 # rospy has closed the topics by then, and rospy.is_shutdown does not say so yet
-LATE_TRIAL = RUN + '''
+LATE_TRIAL = (
+    RUN
+    + """
 rospy.core.add_preshutdown_hook(lambda reason: print('LATE', sm.execute(), flush=True))
 rospy.signal_shutdown('the end')
-'''
+"""
+)
 # kind of end: exit code, outcome; the exception surfaces as InvalidUserCodeError
-ENDS = {'succeeds': (0, 'succeeded'), 'fails': (0, 'aborted'), 'raises': (1, ''),
-        'preempted': (0, 'preempted'), 'signalled': (0, 'preempted')}
+ENDS = {
+    'succeeds': (0, 'succeeded'),
+    'fails': (0, 'aborted'),
+    'raises': (1, ''),
+    'preempted': (0, 'preempted'),
+    'signalled': (0, 'preempted'),
+}
 EXIT_LIMIT_S = 30.0  # of a machine that is busy with other things: for good is what is not allowed
 
 
@@ -84,14 +93,23 @@ class ProcessEndTest(unittest.TestCase):
     def check(self, how: str, task: Process) -> None:
         code, events = self.ended(task, how)
         expected_code, outcome = ENDS[how]
-        self.assertEqual((code, events[-1].kind, events[-1].outcome),
-                         (expected_code, OracleEvent.TRIAL_END, outcome), task.output())
+        self.assertEqual(
+            (code, events[-1].kind, events[-1].outcome),
+            (expected_code, OracleEvent.TRIAL_END, outcome),
+            task.output(),
+        )
         if outcome:
             self.assertIn('OUTCOME ' + outcome, task.output())
 
     def library(self, how: str, more: str = '') -> Process:
-        program = Process([sys.executable, script(self, TASK + LIBRARY + more + RUN), how,
-                           '_record:=' + self.bags])
+        program = Process(
+            [
+                sys.executable,
+                script(self, TASK + LIBRARY + more + RUN),
+                how,
+                '_record:=' + self.bags,
+            ]
+        )
         self.addCleanup(program.stop)
         return program
 
@@ -100,8 +118,12 @@ class ProcessEndTest(unittest.TestCase):
 
     def check_oracle_run(self, how: str) -> None:
         settings = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 1.0}), 'oracle.yaml')
-        self.check(how, oracle_run(self, '--config', settings, '--record', self.bags,
-                                   script(self, TASK + RUN), how))
+        self.check(
+            how,
+            oracle_run(
+                self, '--config', settings, '--record', self.bags, script(self, TASK + RUN), how
+            ),
+        )
 
     def test_a_program_that_uses_the_library_and_succeeds(self) -> None:
         self.check_library('succeeds')
@@ -147,5 +169,6 @@ class ProcessEndTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_process_end')
     rostest.rosrun('smach_oracle', 'oracle_process_end', ProcessEndTest, sys.argv)

@@ -4,6 +4,7 @@
 A program is a kind of script and its ending. Where nothing fails, all three say the same, to the
 last transition. Where something fails, the oracle helps; where it cannot, all three end alike.
 """
+
 import re
 import signal
 import sys
@@ -15,12 +16,24 @@ from program_runs import BARE, LIBRARY, ORACLE_RUN, Ending, Programs
 
 # by rostest, so that none of them takes long
 KINDS = {
-    'built': ('star_import', 'self_building', 'nested_functions', 'imported_machine', 'relay',
-              'never_executed'),
-    'nested': ('callbacks', 'top_concurrence', 'top_iterator', 'no_node', 'again_and_again',
-               'one_after_the_other'),
+    'built': (
+        'star_import',
+        'self_building',
+        'nested_functions',
+        'imported_machine',
+        'relay',
+        'never_executed',
+    ),
+    'nested': (
+        'callbacks',
+        'top_concurrence',
+        'top_iterator',
+        'no_node',
+        'again_and_again',
+        'one_after_the_other',
+    ),
     'served': ('action_server', 'actions', 'services', 'viewed', 'arguments'),
-    'threads': ('in_threads', 'in_a_timer', 'shutdown_hooks', 'preempt_handler', 'no_machine')
+    'threads': ('in_threads', 'in_a_timer', 'shutdown_hooks', 'preempt_handler', 'no_machine'),
 }
 SILENT = ('never_executed', 'no_machine')  # no machine runs, so that an oracle has nothing to do
 UNORDERED = ('in_threads',)
@@ -87,7 +100,7 @@ class ProgramsTest(unittest.TestCase):
     def check_same(self, kind: str, ending: Ending, bare: Ending) -> None:
         said, expected = ending.said, bare.said
         if kind == BY_SIGNAL and ending.code == FORCED:
-            self.assertEqual(said, expected[:len(said)])
+            self.assertEqual(said, expected[: len(said)])
             return
         if kind in UNORDERED:
             said, expected = sorted(said), sorted(expected)
@@ -119,14 +132,22 @@ def make_test(kind: str, how: str) -> Callable[[ProgramsTest], None]:
 
 def tests_of(kinds: tuple) -> type:
     """A case for each program of these kinds."""
-    tests = {'test_{}_{}'.format(kind, how): make_test(kind, how)
-             for kind in kinds for how in ORDERLY + FAILING}
+    tests = {
+        'test_{}_{}'.format(kind, how): make_test(kind, how)
+        for kind in kinds
+        for how in ORDERLY + FAILING
+    }
     return type('ProgramsTest', (ProgramsTest,), dict(tests, kinds=kinds))
 
 
 if __name__ == '__main__':
     import rostest
+
     group = sys.argv[1]
     rospy.init_node('oracle_programs')
-    rostest.rosrun('smach_oracle', 'oracle_programs_' + group, tests_of(KINDS[group]),
-                   sys.argv[:1] + sys.argv[2:])
+    rostest.rosrun(
+        'smach_oracle',
+        'oracle_programs_' + group,
+        tests_of(KINDS[group]),
+        sys.argv[:1] + sys.argv[2:],
+    )

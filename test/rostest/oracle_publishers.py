@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """What a subscriber of ~oracle/events and ~oracle/rates sees, over a real master."""
+
 import sys
 import threading
 import time
@@ -76,6 +77,7 @@ class PublishersTest(unittest.TestCase):
         def slow(event: OracleEvent) -> None:
             go_on.wait(20.0)
             received.append(event)
+
         subscriber = rospy.Subscriber('~oracle/narrow', OracleEvent, slow, buff_size=1024)
         self.addCleanup(subscriber.unregister)
         self.assertTrue(wait_for(lambda: publisher._publisher.get_num_connections() == 1))
@@ -117,7 +119,8 @@ class PublishersTest(unittest.TestCase):
         self.machine.step()
         self.machine.events.emit(EventKind.TRIAL_END, 'TOP', outcome='succeeded')
         self.assertTrue(
-            wait_for(lambda: len(received) == 1 and received[0].states[0].successes == 1))
+            wait_for(lambda: len(received) == 1 and received[0].states[0].successes == 1)
+        )
 
     def test_a_machine_that_is_gone_is_forgotten(self) -> None:
         publisher = RatesPublisher('~oracle/rates_of_nobody', period_s=0.01)
@@ -138,5 +141,6 @@ def _end_event() -> object:
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_publishers')
     rostest.rosrun('smach_oracle', 'oracle_publishers', PublishersTest, sys.argv)

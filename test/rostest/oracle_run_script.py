@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """An unmodified script under oracle_run, as its author, an operator and a viewer see it."""
+
 import glob
 import os
 import sys
@@ -18,7 +19,7 @@ from smach_msgs.msg import SmachContainerStructure
 from smach_oracle.msg import ExpertDecision, MoveArmsAsideAction, OracleEvent, OracleRates
 from smach_oracle.srv import AnswerQueryRequest
 
-SCRIPT = '''
+SCRIPT = """
 import sys, rospy, smach, smach_ros
 from smach_oracle.msg import MoveArmsAsideAction
 rospy.init_node('task')
@@ -30,7 +31,7 @@ with sm:
 for name in sys.argv[1:]:
     print('OUTCOME', sm.execute(), flush=True)
     sys.stdin.readline()
-'''
+"""
 TWO_TRIALS = ('one', 'two')
 
 
@@ -41,8 +42,9 @@ class MoveServer:
 
     def __init__(self) -> None:
         self.results: List[str] = []
-        self._server = actionlib.SimpleActionServer('move', MoveArmsAsideAction, self._execute,
-                                                    auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            'move', MoveArmsAsideAction, self._execute, auto_start=False
+        )
         self._server.start()
 
     def _execute(self, goal: object) -> None:
@@ -73,8 +75,9 @@ class OracleRunTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         self.assertTrue(wait_for(log.connected))
         task.go_on()
-        self.assertTrue(wait_for(lambda: task.output().count('OUTCOME succeeded') == 2),
-                        task.output())
+        self.assertTrue(
+            wait_for(lambda: task.output().count('OUTCOME succeeded') == 2), task.output()
+        )
         task.go_on()
         self.assertEqual(task.wait(), 0, task.output())
         end = log.wait_for(OracleEvent.TRIAL_END)[-1]
@@ -82,8 +85,10 @@ class OracleRunTest(unittest.TestCase):
         self.assertEqual([event.seq for event in events], list(range(len(events))))
         self.assertEqual(events[0].kind, OracleEvent.TRIAL_START)
         failure = log.of(OracleEvent.FAILURE)[-1]
-        self.assertEqual((failure.state, failure.outcome, failure.failure_kind),
-                         ('MOVE', 'aborted', OracleEvent.FELL_THROUGH))
+        self.assertEqual(
+            (failure.state, failure.outcome, failure.failure_kind),
+            ('MOVE', 'aborted', OracleEvent.FELL_THROUGH),
+        )
         self.assertEqual(log.of(OracleEvent.JUMP)[-1].target, 'MOVE')
         self.assertEqual(end.outcome, 'succeeded')
 
@@ -105,7 +110,7 @@ class OracleRunTest(unittest.TestCase):
             '/task/expert_query/open': 'smach_oracle/OpenQueries',
             '/task/expert_query/result': 'smach_oracle/ExpertQueryActionResult',
             '/task/smach/container_structure': 'smach_msgs/SmachContainerStructure',
-            '/task/smach/container_status': 'smach_msgs/SmachContainerStatus'
+            '/task/smach/container_status': 'smach_msgs/SmachContainerStatus',
         }
         self.assertEqual({name: types.get(name) for name in expected}, expected)
         services = [name for name, _ in master.getSystemState()[2]]
@@ -113,13 +118,17 @@ class OracleRunTest(unittest.TestCase):
         self.assertIn('/task/expert_query/answer', services)
         # latched: nothing moves any more
         rates = rospy.wait_for_message('/task/oracle/rates', OracleRates, 10.0)
-        self.assertEqual({(row.path, row.state, row.successes) for row in rates.states},
-                         {('task', 'MOVE', 1), ('task', 'AGAIN', 1)})
+        self.assertEqual(
+            {(row.path, row.state, row.successes) for row in rates.states},
+            {('task', 'MOVE', 1), ('task', 'AGAIN', 1)},
+        )
         self.assertIn(
             ('MOVE', 'succeeded', 'AGAIN', 1),
-            [(edge.state, edge.outcome, edge.target, edge.count) for edge in rates.transitions])
-        structure = rospy.wait_for_message('/task/smach/container_structure',
-                                           SmachContainerStructure, 10.0)
+            [(edge.state, edge.outcome, edge.target, edge.count) for edge in rates.transitions],
+        )
+        structure = rospy.wait_for_message(
+            '/task/smach/container_structure', SmachContainerStructure, 10.0
+        )
         edges = set(zip(structure.outcomes_from, structure.outcomes_to))
         self.assertEqual(structure.path, '/task')
         self.assertIn(('MOVE', 'ORACLE'), edges)
@@ -128,13 +137,19 @@ class OracleRunTest(unittest.TestCase):
         self.assertEqual(task.wait(), 0)
 
     def test_an_introspection_server_of_the_scripts_own_is_not_doubled(self) -> None:
-        own = SCRIPT.replace(
-            'for name in', "viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')\n"
-            'viewer.start()\nfor name in') + '\nviewer.stop()\n'  # its threads may be no daemons
+        own = (
+            SCRIPT.replace(
+                'for name in',
+                "viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')\n"
+                'viewer.start()\nfor name in',
+            )
+            + '\nviewer.stop()\n'
+        )  # its threads may be no daemons
         task = oracle_run(self, script(self, own), 'one')
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
-        structure = rospy.wait_for_message('/mine/smach/container_structure',
-                                           SmachContainerStructure, 10.0)
+        structure = rospy.wait_for_message(
+            '/mine/smach/container_structure', SmachContainerStructure, 10.0
+        )
         self.assertIn('ORACLE', structure.children)
         published = [topic for topic, _ in rosgraph.Master('/test').getPublishedTopics('')]
         self.assertNotIn('/task/smach/container_structure', published)
@@ -146,8 +161,15 @@ class OracleRunTest(unittest.TestCase):
         self.addCleanup(rospy.delete_param, '/task/oracle')
         before = rosgraph.Master('/test').getSystemState()
         task = self.run_task('--check')
-        self.assertTrue(wait_for(lambda: not task.running() or self.assertEqual(
-            rosgraph.Master('/test').getSystemState(), before)), task.output())
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    not task.running()
+                    or self.assertEqual(rosgraph.Master('/test').getSystemState(), before)
+                )
+            ),
+            task.output(),
+        )
         self.assertEqual(task.wait(), 0, task.output())
         self.assertIn('max_recoveries 2', task.output())
         self.assertIn('no error in the settings for 1 machine', task.output())
@@ -166,8 +188,12 @@ class OracleRunTest(unittest.TestCase):
         self.assertEqual(question.query.deadline, 0.0)
         self.assertAlmostEqual(question.query.rate, (3 * 0.1 + 1) / 4)
         self.assertEqual(question.query.robot, '/task')
-        reply = expert.answer(AnswerQueryRequest(question.query.query_id, ExpertDecision(
-            kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                question.query.query_id,
+                ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='succeeded', by='Ann'),
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
         task.go_on()
@@ -184,8 +210,9 @@ class OracleRunTest(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.server.results = ['abort', 'take long', 'take long', 'take long', 'take long']
-        task = self.run_task('--record', folder.name, '--record-topic', '/move/goal',
-                             trials=TWO_TRIALS)
+        task = self.run_task(
+            '--record', folder.name, '--record-topic', '/move/goal', trials=TWO_TRIALS
+        )
         for _ in TWO_TRIALS:
             task.go_on()
         self.assertEqual(task.wait(), 0, task.output())
@@ -193,13 +220,16 @@ class OracleRunTest(unittest.TestCase):
         self.assertEqual(len(bags), 2, os.listdir(folder.name))
         for path in bags:
             with rosbag.Bag(path) as bag:
-                seen = {topic: [message for _, message, _ in bag.read_messages(topic)] for topic in
-                        ('/task/oracle/events', '/task/oracle/rates')}
+                seen = {
+                    topic: [message for _, message, _ in bag.read_messages(topic)]
+                    for topic in ('/task/oracle/events', '/task/oracle/rates')
+                }
                 topics = bag.get_type_and_topic_info()[1]
             events = seen['/task/oracle/events']
             self.assertEqual([event.seq for event in events], list(range(len(events))))
-            self.assertEqual((events[0].kind, events[-1].kind),
-                             (OracleEvent.TRIAL_START, OracleEvent.TRIAL_END))
+            self.assertEqual(
+                (events[0].kind, events[-1].kind), (OracleEvent.TRIAL_START, OracleEvent.TRIAL_END)
+            )
             self.assertTrue(seen['/task/oracle/rates'])
             self.assertIn('/move/goal', topics)
             self.assertIn('/task/smach/container_status', topics)
@@ -207,5 +237,6 @@ class OracleRunTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_run_script')
     rostest.rosrun('smach_oracle', 'oracle_run_script', OracleRunTest, sys.argv)

@@ -1,6 +1,7 @@
 """What the rostests of the ROS side share: scripts under oracle_run as real processes, masters of
 their own.
 """
+
 import glob
 import os
 import signal
@@ -28,10 +29,13 @@ class Process:
 
     def __init__(self, command: List[str], env: Optional[Dict[str, str]] = None) -> None:
         self._output = tempfile.TemporaryFile()
-        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=self._output,
-                                        stderr=subprocess.STDOUT,
-                                        env=dict(os.environ, PYTHONUNBUFFERED='1',
-                                                 PYTHONFAULTHANDLER='1', **(env or {})))
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=self._output,
+            stderr=subprocess.STDOUT,
+            env=dict(os.environ, PYTHONUNBUFFERED='1', PYTHONFAULTHANDLER='1', **(env or {})),
+        )
 
     def output(self) -> str:
         """What it has said so far."""
@@ -39,8 +43,10 @@ class Process:
 
     def says(self, text: str, limit_s: float = 20.0) -> bool:
         """Wait until it has said this."""
-        return bool(wait_for(lambda: text in self.output() or not self.running(),
-                             limit_s)) and text in self.output()
+        return (
+            bool(wait_for(lambda: text in self.output() or not self.running(), limit_s))
+            and text in self.output()
+        )
 
     def go_on(self) -> None:
         """Let it go on that waits for a line of input."""
@@ -119,8 +125,10 @@ class OwnMaster:
         """Publishers, subscribers and services, each by name."""
         with xmlrpc.client.ServerProxy(self.uri) as master:
             state = master.getSystemState('/test')[2]
-        return {kind: [name for name, _ in entries]
-                for kind, entries in zip(('publishers', 'subscribers', 'services'), state)}
+        return {
+            kind: [name for name, _ in entries]
+            for kind, entries in zip(('publishers', 'subscribers', 'services'), state)
+        }
 
 
 def recorded_events(folder: str, node: str = 'task') -> List[List[OracleEvent]]:
@@ -131,7 +139,8 @@ def recorded_events(folder: str, node: str = 'task') -> List[List[OracleEvent]]:
     for path in sorted(glob.glob(os.path.join(folder, '*.bag'))):
         with rosbag.Bag(path) as bag:
             trials.append(
-                [event for _, event, _ in bag.read_messages('/{}/oracle/events'.format(node))])
+                [event for _, event, _ in bag.read_messages('/{}/oracle/events'.format(node))]
+            )
     return trials
 
 
@@ -140,8 +149,9 @@ class EventLog:
 
     def __init__(self, test: Any, node: str) -> None:
         self.events: List[OracleEvent] = []
-        self._subscriber = rospy.Subscriber('/{}/oracle/events'.format(node), OracleEvent,
-                                            self.events.append)
+        self._subscriber = rospy.Subscriber(
+            '/{}/oracle/events'.format(node), OracleEvent, self.events.append
+        )
         test.addCleanup(self._subscriber.unregister)
 
     def connected(self) -> bool:
@@ -174,11 +184,13 @@ class FrontEnd:
 
     def question(self, limit_s: float = 20.0, state: str = '', other_than: str = '') -> Any:
         """Wait for an open question (of a state); None where there is none in time."""
+
         def find() -> Any:
             for entry in self._open:
                 if state in ('', entry.query.failed_state) and entry.query.query_id != other_than:
                     return entry
             return None
+
         return wait_for(find, limit_s)
 
 

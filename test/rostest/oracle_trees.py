@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A failure three levels down: asked about once, and answered with a state of another container."""
+
 import json
 import sys
 import unittest
@@ -10,7 +11,7 @@ from oracle_support import FrontEnd, oracle_run, script
 from smach_oracle.msg import ExpertDecision
 from smach_oracle.srv import AnswerQueryRequest
 
-SCRIPT = '''
+SCRIPT = """
 import rospy, smach
 from smach_ros import IntrospectionServer
 rospy.init_node('task')
@@ -43,7 +44,7 @@ outcome = sm.execute()
 print('VISITS', ' '.join(visits), flush=True)
 print('OUTCOME', outcome, flush=True)
 server.stop()
-'''
+"""
 
 
 class TreesTest(unittest.TestCase):
@@ -55,8 +56,9 @@ class TreesTest(unittest.TestCase):
     def answer(self, other_than='', **decision):
         question = self.expert.question(state='GRASP', other_than=other_than)
         self.assertIsNotNone(question, self.task.output())
-        reply = self.expert.answer(AnswerQueryRequest(
-            question.query.query_id, ExpertDecision(by='Ann', **decision)))
+        reply = self.expert.answer(
+            AnswerQueryRequest(question.query.query_id, ExpertDecision(by='Ann', **decision))
+        )
         return question.query, reply
 
     def test_the_machine_goes_where_it_is_sent(self) -> None:
@@ -64,20 +66,32 @@ class TreesTest(unittest.TestCase):
         self.assertFalse(reply.ok)
         self.assertIn('has no state', reply.message)
         self.assertEqual(query.container_path, 'task/PICK/ARM')
-        self.assertEqual([(choice.container, choice.state) for choice in query.choices], [
-            ('', 'REACH'), ('', 'GRASP'), ('task/PICK', 'ARM'), ('task', 'FIND'),
-            ('task', 'PICK'), ('task', 'PLACE'), ('task/FIND', 'LOOK'), ('task/FIND', 'AIM')])
+        self.assertEqual(
+            [(choice.container, choice.state) for choice in query.choices],
+            [
+                ('', 'REACH'),
+                ('', 'GRASP'),
+                ('task/PICK', 'ARM'),
+                ('task', 'FIND'),
+                ('task', 'PICK'),
+                ('task', 'PLACE'),
+                ('task/FIND', 'LOOK'),
+                ('task/FIND', 'AIM'),
+            ],
+        )
         _, reply = self.answer(kind=ExpertDecision.GOTO, container='task/FIND', state='AIM')
         self.assertTrue(reply.ok, reply.message)
-        query, reply = self.answer(other_than=query.query_id, kind=ExpertDecision.SUPERSEDE,
-                                   outcome='succeeded')
+        query, reply = self.answer(
+            other_than=query.query_id, kind=ExpertDecision.SUPERSEDE, outcome='succeeded'
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(self.task.says('OUTCOME succeeded'), self.task.output())
         self.assertIn('VISITS LOOK AIM REACH GRASP AIM REACH GRASP PLACE', self.task.output())
 
     def test_a_container_above_is_given_up_and_nobody_is_asked_again(self) -> None:
-        _, reply = self.answer(kind=ExpertDecision.GIVE_UP, container='task/PICK',
-                               outcome='succeeded')
+        _, reply = self.answer(
+            kind=ExpertDecision.GIVE_UP, container='task/PICK', outcome='succeeded'
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(self.task.says('OUTCOME succeeded'), self.task.output())
         self.assertIn('VISITS LOOK AIM REACH GRASP PLACE', self.task.output())
@@ -85,5 +99,6 @@ class TreesTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('oracle_trees')
     rostest.rosrun('smach_oracle', 'oracle_trees', TreesTest, sys.argv)

@@ -1,4 +1,5 @@
 """A ROS master for one test."""
+
 import xmlrpc.client
 
 from waiting import wait_for

@@ -1,6 +1,7 @@
 """Whether a page grows with the questions that a person opens and leaves: nodes, event listeners
 and heap of the browser, by its DevTools protocol. For a test and a benchmark.
 """
+
 import itertools
 import statistics
 import time
@@ -8,7 +9,7 @@ import time
 METRICS = {'nodes': 'Nodes', 'listeners': 'JSEventListeners', 'heap bytes': 'JSHeapUsedSize'}
 READINGS, PAUSE_S = 3, 0.4
 # by keys: open the oldest question, until it is taken and drawn; leave it, until it waits again
-OPEN_AND_LEAVE = '''
+OPEN_AND_LEAVE = """
 const [times, done] = arguments;
 if (!window.realNow) { // what the page holds back for 0.7 s need not be waited for
   window.realNow = performance.now.bind(performance);
@@ -35,7 +36,7 @@ const until = (selector) => new Promise((resolve) => {
   }
   await until(".question-row.pending");
   done();
-})();'''
+})();"""
 
 
 def samples(driver, warm_up, questions, every):
@@ -58,10 +59,12 @@ def numbers_of(driver):
         time.sleep(PAUSE_S if number else 0.0)  # what is held for a moment is let go meanwhile
         for _ in range(2):
             driver.execute_cdp_cmd('HeapProfiler.collectGarbage', {})
-        readings.append({
-            metric['name']: metric['value']
-            for metric in driver.execute_cdp_cmd('Performance.getMetrics', {})['metrics']
-        })
+        readings.append(
+            {
+                metric['name']: metric['value']
+                for metric in driver.execute_cdp_cmd('Performance.getMetrics', {})['metrics']
+            }
+        )
     return {name: min(each[metric] for each in readings) for name, metric in METRICS.items()}
 
 
@@ -69,10 +72,13 @@ def slopes_of(taken):
     """Growth a question by name, from samples: the median of the slopes between any two of them. A
     sample among them that is off changes it little.
     """
-    pairs = [(later[0] - earlier[0], earlier[1], later[1])
-             for earlier, later in itertools.combinations(taken, 2)]
+    pairs = [
+        (later[0] - earlier[0], earlier[1], later[1])
+        for earlier, later in itertools.combinations(taken, 2)
+    ]
     return {
-        name: statistics.median((later[name] - earlier[name]) / more
-                                for more, earlier, later in pairs)
+        name: statistics.median(
+            (later[name] - earlier[name]) / more for more, earlier, later in pairs
+        )
         for name in METRICS
     }

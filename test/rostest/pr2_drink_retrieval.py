@@ -2,6 +2,7 @@
 """The second use case on the simulated PR2, over its nodes: the script as it is, and under an
 oracle; bad goals.
 """
+
 import math
 import subprocess
 import tempfile
@@ -38,25 +39,34 @@ from smach_oracle.srv import Judge, ResetWorld
 from smach_oracle.tasks import drink_retrieval
 
 STATES = [
-    'RAISE_TORSO', 'LOCALISE', 'OPEN_FRIDGE', 'MOVE_IN', 'DETECT_DRINK', 'PICK_DRINK', 'MOVE_OUT',
-    'CLOSE_FRIDGE', 'MOVE_HOME', 'HAND_OVER'
+    'RAISE_TORSO',
+    'LOCALISE',
+    'OPEN_FRIDGE',
+    'MOVE_IN',
+    'DETECT_DRINK',
+    'PICK_DRINK',
+    'MOVE_OUT',
+    'CLOSE_FRIDGE',
+    'MOVE_HOME',
+    'HAND_OVER',
 ]
 TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle' / 'tasks'
 SETTINGS = TASKS / 'drink_retrieval.yaml'
 PEACEFUL = (0, 2, 9)  # the first seeds without a cause
 LIMIT = rospy.Duration(900.0)  # of ROS time, which runs fast while nothing moves
-NOWHERE = PoseStamped(Header(frame_id='odom_combined'),
-                      Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1)))
+NOWHERE = PoseStamped(
+    Header(frame_id='odom_combined'), Pose(Point(math.nan, 0, 0), Quaternion(0, 0, 0, 1))
+)
 
 
 def seed_with(kind):
     """The first seed of which this is the only cause to fail."""
-    return next(seed for seed in range(10000)
-                if [cause.kind for cause in draw(seed).causes] == [kind])
+    return next(
+        seed for seed in range(10000) if [cause.kind for cause in draw(seed).causes] == [kind]
+    )
 
 
 class DrinkRetrievalTest(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         rospy.wait_for_service('world/reset', 60.0)
@@ -71,33 +81,70 @@ class DrinkRetrievalTest(unittest.TestCase):
         label, passed = machine.get_initial_states()[0], []
         while label in machine.get_children():
             passed.append(label)
-            label = next(edge[2] for edge in machine.get_internal_edges()
-                         if edge[0] == 'succeeded' and edge[1] == label)
+            label = next(
+                edge[2]
+                for edge in machine.get_internal_edges()
+                if edge[0] == 'succeeded' and edge[1] == label
+            )
         self.assertEqual((passed, label), (STATES, None))  # None: the machine's own outcome
 
     def test_2_every_setting_of_its_oracle_is_about_a_state_that_it_has(self):
         settings = yaml.safe_load(SETTINGS.read_text())
         self.assertLessEqual(set(settings['states']), set(STATES))
-        oracle = OracleContainer.wrap(drink_retrieval.make_machine(), preconditions={
-            state: values['preconditions'] for state, values in settings['states'].items()})
+        oracle = OracleContainer.wrap(
+            drink_retrieval.make_machine(),
+            preconditions={
+                state: values['preconditions'] for state, values in settings['states'].items()
+            },
+        )
         self.assertLessEqual(set(STATES), set(oracle.get_children()))
 
     def test_3_bad_goals_end_with_the_reason(self):
         self.assertTrue(self.reset(seed=PEACEFUL[0]).ok)
         for name, spec, goal, status, text in [
-            ('open_door', OpenDoorAction, OpenDoorGoal('third'), GoalStatus.ABORTED,
-             "unknown arm 'third'"),
-            ('close_door', CloseDoorAction, CloseDoorGoal(''), GoalStatus.ABORTED,
-             "unknown arm ''"),
-            ('hand_over', HandOverAction, HandOverGoal('right',
-                                                       NOWHERE), GoalStatus.ABORTED, 'not finite'),
-            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(min_height=math.nan),
-             GoalStatus.ABORTED, 'min_height is nan'),
-            ('detect_drink', DetectDrinkAction, DetectDrinkGoal(min_height=0.05),
-             GoalStatus.ABORTED, 'the door hides'),
+            (
+                'open_door',
+                OpenDoorAction,
+                OpenDoorGoal('third'),
+                GoalStatus.ABORTED,
+                "unknown arm 'third'",
+            ),
+            (
+                'close_door',
+                CloseDoorAction,
+                CloseDoorGoal(''),
+                GoalStatus.ABORTED,
+                "unknown arm ''",
+            ),
+            (
+                'hand_over',
+                HandOverAction,
+                HandOverGoal('right', NOWHERE),
+                GoalStatus.ABORTED,
+                'not finite',
+            ),
+            (
+                'detect_drink',
+                DetectDrinkAction,
+                DetectDrinkGoal(min_height=math.nan),
+                GoalStatus.ABORTED,
+                'min_height is nan',
+            ),
+            (
+                'detect_drink',
+                DetectDrinkAction,
+                DetectDrinkGoal(min_height=0.05),
+                GoalStatus.ABORTED,
+                'the door hides',
+            ),
             ('move_base', MoveBaseAction, MoveBaseGoal(NOWHERE), GoalStatus.REJECTED, 'finite'),
-            ('torso_controller/position_joint_action', SingleJointPositionAction,
-             SingleJointPositionGoal(position=math.nan), GoalStatus.REJECTED, 'nan')
+            (
+                'torso_controller/position_joint_action',
+                SingleJointPositionAction,
+                SingleJointPositionGoal(position=math.nan),
+                GoalStatus.REJECTED,
+                'nan',
+            ),
         ]:
             client = actionlib.SimpleActionClient(name, spec)
             self.assertTrue(client.wait_for_server(LIMIT), name)
@@ -125,13 +172,21 @@ class DrinkRetrievalTest(unittest.TestCase):
 
     def test_5_with_the_oracle_a_drink_that_was_moved_is_picked_where_it_is(self):
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([
-                find_node('smach_oracle', 'oracle_run')[0], '--config',
-                str(SETTINGS), '--record', folder,
-                str(TASKS / 'drink_retrieval.py'), '--seed',
-                str(seed_with('drink_moved'))
-            ], check=True, timeout=140)
-            trial, = load_trials([folder]).trials
+            subprocess.run(
+                [
+                    find_node('smach_oracle', 'oracle_run')[0],
+                    '--config',
+                    str(SETTINGS),
+                    '--record',
+                    folder,
+                    str(TASKS / 'drink_retrieval.py'),
+                    '--seed',
+                    str(seed_with('drink_moved')),
+                ],
+                check=True,
+                timeout=140,
+            )
+            (trial,) = load_trials([folder]).trials
         self.assertEqual((trial.outcome, trial.questions), ('succeeded', 0))
         self.assertIn('drink_retrieval/PICK_DRINK', dict(trial.failures_by_state))
         self.assertGreater(trial.recoveries, 0)

@@ -2,6 +2,7 @@
 """The simulated PR2's eyes over ROS, and an expert's in their place, against where things truly
 are.
 """
+
 import unittest
 from typing import Any
 
@@ -43,7 +44,6 @@ def place(pose: Any) -> np.ndarray:
 
 
 class Eyes(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls) -> None:
         cls.robot = RosRobot()
@@ -59,7 +59,8 @@ class Eyes(unittest.TestCase):
         self.assertTrue(wait_for(client.wait_for_server, LIMIT_S))
         handle = client.send_goal(goal)
         self.assertTrue(
-            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S)
+        )
         return handle
 
     def off_by(self, pose: Any) -> float:
@@ -68,8 +69,9 @@ class Eyes(unittest.TestCase):
         return min(float(np.linalg.norm(place(pose) - place(body.pose))) for body in self.things)
 
     def test_the_table_s_objects_are_where_they_are(self) -> None:
-        handle = self.ended('detect_tabletop', DetectTabletopAction,
-                                DetectTabletopGoal(min_height=0.02))
+        handle = self.ended(
+            'detect_tabletop', DetectTabletopAction, DetectTabletopGoal(min_height=0.02)
+        )
         result = handle.get_result()
         self.assertEqual(handle.get_goal_status(), GoalStatus.SUCCEEDED, result.reason)
         self.assertEqual(len(result.objects), len(result.sizes))
@@ -80,18 +82,21 @@ class Eyes(unittest.TestCase):
 
     def test_a_height_that_is_none_aborts_with_what_is_allowed(self) -> None:
         for height in (float('nan'), -1.0, 7.0):
-            handle = self.ended('detect_tabletop', DetectTabletopAction,
-                                DetectTabletopGoal(min_height=height))
+            handle = self.ended(
+                'detect_tabletop', DetectTabletopAction, DetectTabletopGoal(min_height=height)
+            )
             self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
             self.assertIn('allowed: 0 to 0.3', handle.get_result().reason)
 
     def test_an_empty_scene_aborts_and_says_what_is_missing(self) -> None:
-        for target, height, words in (((0.75, 0.0, 0.75), 0.3,
-                                       'there is nothing on the table that stands higher than'),
-                                      ((0.5, -1.5, 1.6), 0.02, 'no table in view')):
+        for target, height, words in (
+            ((0.75, 0.0, 0.75), 0.3, 'there is nothing on the table that stands higher than'),
+            ((0.5, -1.5, 1.6), 0.02, 'no table in view'),
+        ):
             self.robot.look_at(target)
-            handle = self.ended('detect_tabletop', DetectTabletopAction,
-                                DetectTabletopGoal(min_height=height))
+            handle = self.ended(
+                'detect_tabletop', DetectTabletopAction, DetectTabletopGoal(min_height=height)
+            )
             self.assertEqual(handle.get_goal_status(), GoalStatus.ABORTED)
             self.assertIn(words, handle.get_result().reason)
             self.assertEqual(handle.get_goal_status_text(), handle.get_result().reason)
@@ -105,26 +110,36 @@ class Eyes(unittest.TestCase):
     def test_an_expert_marks_what_the_detection_would_have_found(self) -> None:
         client = actionlib.ActionClient('perception_interface', SharedAutonomyAction)
         self.assertTrue(wait_for(client.wait_for_server, LIMIT_S))
-        handle = client.send_goal(SharedAutonomyGoal(
-            query_id='q', state='DETECT_TABLETOP', outcomes=['succeeded', 'aborted'],
-            output_keys=['table', 'objects', 'sizes']))
+        handle = client.send_goal(
+            SharedAutonomyGoal(
+                query_id='q',
+                state='DETECT_TABLETOP',
+                outcomes=['succeeded', 'aborted'],
+                output_keys=['table', 'objects', 'sizes'],
+            )
+        )
         self.assertTrue(wait_for(lambda: handle.get_goal_status() == GoalStatus.ACTIVE, LIMIT_S))
         seen = max(self.things, key=lambda body: body.region.width * body.region.height)
-        answer = call('perception_interface/segment', SegmentObject,
-                      SegmentObjectRequest(region=seen.region))
+        answer = call(
+            'perception_interface/segment', SegmentObject, SegmentObjectRequest(region=seen.region)
+        )
         self.assertTrue(answer.ok, answer.message)
         self.assertLess(float(np.linalg.norm(place(answer.object) - place(seen.pose))), 2 * NEAR_M)
         self.assertTrue(
-            call('perception_interface/finish', FinishInterface, 'succeeded', [], '', '').ok)
+            call('perception_interface/finish', FinishInterface, 'succeeded', [], '', '').ok
+        )
         self.assertTrue(
-            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S))
+            wait_for(lambda: handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S)
+        )
         outputs = decode_all(handle.get_result().outputs)
         self.assertEqual(sorted(outputs), ['objects', 'sizes', 'table'])
-        self.assertLess(float(np.linalg.norm(place(outputs['objects'][0]) - place(seen.pose))),
-                        2 * NEAR_M)
+        self.assertLess(
+            float(np.linalg.norm(place(outputs['objects'][0]) - place(seen.pose))), 2 * NEAR_M
+        )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('pr2_perception_test')
     rostest.rosrun('smach_oracle', 'pr2_perception', Eyes)

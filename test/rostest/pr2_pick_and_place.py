@@ -2,6 +2,7 @@
 """The first use case on the simulated PR2, over its nodes: as the task does it, and with goals that
 cannot be.
 """
+
 import math
 import threading
 import unittest
@@ -47,7 +48,6 @@ def placing(place, grasp, arm='right'):
 
 
 class PickAndPlaceTest(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         rospy.wait_for_service('world/reset', 60.0)
@@ -74,17 +74,24 @@ class PickAndPlaceTest(unittest.TestCase):
         self.assertTrue(self.reset(seed=3).ok)
         good = pose(0.6, -0.1, 0.78)
         for name, spec, goal, text in [
-            ('move_arms_aside', MoveArmsAsideAction, MoveArmsAsideGoal(['third']),
-             "unknown arm 'third'"),
-            ('point_head', PointHeadAction,
-             PointHeadGoal(PointStamped(Header(frame_id='moon'),
-                                        Point(1, 0, 1))), "frame 'moon'; allowed"),
+            (
+                'move_arms_aside',
+                MoveArmsAsideAction,
+                MoveArmsAsideGoal(['third']),
+                "unknown arm 'third'",
+            ),
+            (
+                'point_head',
+                PointHeadAction,
+                PointHeadGoal(PointStamped(Header(frame_id='moon'), Point(1, 0, 1))),
+                "frame 'moon'; allowed",
+            ),
             ('pick', PickAction, picking(pose(math.nan, 0, 0)), 'not finite'),
             ('pick', PickAction, picking(good, 'map of the moon'), 'no collision map'),
             ('pick', PickAction, picking(pose(2.5, 0.0, 0.8)), 'out of reach'),
             ('place', PlaceAction, placing(good, good), 'there is nothing to stand on'),
             ('place', PlaceAction, placing(pose(math.inf, 0, 0), good), 'pose: '),
-            ('place', PlaceAction, placing(good, good, 'up'), "unknown arm 'up'")
+            ('place', PlaceAction, placing(good, good, 'up'), "unknown arm 'up'"),
         ]:
             status, result = self.ended(self.sent(name, spec, goal))
             self.assertEqual((name, status), (name, GoalStatus.ABORTED))
@@ -93,8 +100,12 @@ class PickAndPlaceTest(unittest.TestCase):
     def test_2_what_is_cancelled_stops_and_what_comes_next_is_done(self):
         self.assertTrue(self.reset(seed=3).ok)
         begun = threading.Event()
-        client = self.sent('pick', PickAction, picking(pose(0.6, -0.1, 0.78)),
-                            feedback_cb=lambda feedback: begun.set())
+        client = self.sent(
+            'pick',
+            PickAction,
+            picking(pose(0.6, -0.1, 0.78)),
+            feedback_cb=lambda feedback: begun.set(),
+        )
         self.assertTrue(begun.wait(60.0))
         client.cancel_goal()
         status, result = self.ended(client)
@@ -118,12 +129,17 @@ class PickAndPlaceTest(unittest.TestCase):
         gone, *cubes = rospy.wait_for_message('collision_map_markers', MarkerArray, 60.0).markers
         self.assertEqual(gone.action, Marker.DELETEALL)
         self.assertIn('table', boxes.names)
-        self.assertEqual([(cube.text, cube.pose, cube.scale, cube.header.frame_id)
-                          for cube in cubes],
-                         [(name, where, size, 'base_footprint')
-                          for name, where, size in zip(boxes.names, boxes.poses, boxes.sizes)])
-        self.assertEqual({(cube.type, cube.action, cube.ns) for cube in cubes},
-                         {(Marker.CUBE, Marker.ADD, 'collision_map')})
+        self.assertEqual(
+            [(cube.text, cube.pose, cube.scale, cube.header.frame_id) for cube in cubes],
+            [
+                (name, where, size, 'base_footprint')
+                for name, where, size in zip(boxes.names, boxes.poses, boxes.sizes)
+            ],
+        )
+        self.assertEqual(
+            {(cube.type, cube.action, cube.ns) for cube in cubes},
+            {(Marker.CUBE, Marker.ADD, 'collision_map')},
+        )
         self.assertEqual(len({cube.id for cube in cubes}), len(cubes))
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The simulated PR2 in lock-step, as its users meet it: actions, topics, transforms, snapshots."""
+
 import unittest
 import xml.etree.ElementTree as ElementTree
 from typing import Any, Dict, List
@@ -53,7 +54,8 @@ class Heard:
     def stamped(self, stamp: rospy.Time) -> Any:
         return wait_for(
             lambda: next((each for each in self.messages if each.header.stamp == stamp), None),
-            LIMIT_S)
+            LIMIT_S,
+        )
 
 
 class Goal:
@@ -67,7 +69,8 @@ class Goal:
             assert wait_for(self.clients[name].wait_for_server, LIMIT_S)
         self.feedback: List[Any] = []
         self.handle = self.clients[name].send_goal(
-            goal, feedback_cb=lambda _, feedback: self.feedback.append(feedback))
+            goal, feedback_cb=lambda _, feedback: self.feedback.append(feedback)
+        )
 
     def status(self) -> int:
         assert wait_for(lambda: self.handle.get_comm_state() == actionlib.CommState.DONE, LIMIT_S)
@@ -78,12 +81,16 @@ class Goal:
         return self.handle.get_goal_status_text()
 
 
-def arm_goal(positions: List[List[float]], times: List[float],
-             joints: Any = None) -> FollowJointTrajectoryGoal:
-    points = [JointTrajectoryPoint(positions=position, time_from_start=rospy.Duration(moment))
-              for position, moment in zip(positions, times)]
+def arm_goal(
+    positions: List[List[float]], times: List[float], joints: Any = None
+) -> FollowJointTrajectoryGoal:
+    points = [
+        JointTrajectoryPoint(positions=position, time_from_start=rospy.Duration(moment))
+        for position, moment in zip(positions, times)
+    ]
     return FollowJointTrajectoryGoal(
-        trajectory=JointTrajectory(joint_names=RIGHT if joints is None else joints, points=points))
+        trajectory=JointTrajectory(joint_names=RIGHT if joints is None else joints, points=points)
+    )
 
 
 def send_arm(goal: FollowJointTrajectoryGoal) -> Goal:
@@ -108,6 +115,7 @@ class Pr2World(unittest.TestCase):
 
         def feel() -> None:
             felt.append(repr(sorted(self.robot.joints().items())).encode())
+
         feel()
         self.robot.look_at((0.8, 0.0, 0.7))
         image = self.robot.see()
@@ -152,13 +160,17 @@ class Pr2World(unittest.TestCase):
     def test_a_snapshot_is_of_one_moment_and_no_two_have_the_same(self) -> None:
         topics = [
             Heard(name, kind)
-            for name, kind in (('joint_states', JointState), ('head_camera/rgb/image_raw', Image),
-                               ('head_camera/rgb/camera_info',
-                                CameraInfo), ('head_camera/depth_registered/image_raw', Image),
-                               ('head_camera/depth_registered/points', PointCloud2))
+            for name, kind in (
+                ('joint_states', JointState),
+                ('head_camera/rgb/image_raw', Image),
+                ('head_camera/rgb/camera_info', CameraInfo),
+                ('head_camera/depth_registered/image_raw', Image),
+                ('head_camera/depth_registered/points', PointCloud2),
+            )
         ]
         self.assertTrue(
-            wait_for(lambda: all(topic.subscriber.get_num_connections() for topic in topics)))
+            wait_for(lambda: all(topic.subscriber.get_num_connections() for topic in topics))
+        )
         first, second = (call('world/snapshot', Snapshot, camera) for camera in (False, True))
         self.assertTrue(first.ok and second.ok)
         self.assertLess(first.stamp, second.stamp)
@@ -178,7 +190,9 @@ class Pr2World(unittest.TestCase):
         self.assertTrue(
             wait_for(
                 lambda: buffer.can_transform('odom_combined', 'r_gripper_tool_frame', rospy.Time()),
-                LIMIT_S))
+                LIMIT_S,
+            )
+        )
         place = odometry.messages[-1].pose.pose.position
         self.assertTrue(np.allclose((place.x, place.y), self.robot.odom_from_base()[:2, 3]))
         states.subscriber.unregister()
@@ -196,8 +210,14 @@ class Pr2World(unittest.TestCase):
 
         def missing() -> List[str]:
             stamp = call('world/snapshot', Snapshot, False).stamp
-            return [link for link in links if not wait_for(
-                lambda link=link: buffer.can_transform('odom_combined', link, stamp), 0.5)][:3]
+            return [
+                link
+                for link in links
+                if not wait_for(
+                    lambda link=link: buffer.can_transform('odom_combined', link, stamp), 0.5
+                )
+            ][:3]
+
         self.assertTrue(wait_for(lambda: not missing(), LIMIT_S), missing())
         listener.unregister()
 
@@ -205,6 +225,7 @@ class Pr2World(unittest.TestCase):
         def things() -> Any:
             bodies = call('world/reveal', Reveal, []).bodies
             return self.robot.joints(), [body.pose.pose for body in bodies]
+
         before, time = things(), rospy.get_time()
         self.assertTrue(wait_for(lambda: rospy.get_time() > time + 3.0, LIMIT_S))
         self.assertEqual(things(), before)
@@ -225,12 +246,22 @@ class Pr2World(unittest.TestCase):
 
     def test_bad_goals_are_rejected_in_words(self) -> None:
         here = [0.0] * 7
-        bad = [(arm_goal([here], [1.0], ['elbow'] + RIGHT[1:]), "unknown joint 'elbow'"),
-               (arm_goal([], []), 'no points'),
-               (arm_goal([[float('nan')] * 7], [1.0]), 'cannot be at nan'),
-               (arm_goal([here[:3]], [1.0]), '3 positions'),
-               (arm_goal([[-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0],
-                          [0.5, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]], [0.1, 0.2]), 'its limit is')]
+        bad = [
+            (arm_goal([here], [1.0], ['elbow'] + RIGHT[1:]), "unknown joint 'elbow'"),
+            (arm_goal([], []), 'no points'),
+            (arm_goal([[float('nan')] * 7], [1.0]), 'cannot be at nan'),
+            (arm_goal([here[:3]], [1.0]), '3 positions'),
+            (
+                arm_goal(
+                    [
+                        [-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0],
+                        [0.5, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0],
+                    ],
+                    [0.1, 0.2],
+                ),
+                'its limit is',
+            ),
+        ]
         for goal, words in bad:
             sent = send_arm(goal)
             self.assertEqual(sent.status(), GoalStatus.REJECTED)
@@ -239,16 +270,24 @@ class Pr2World(unittest.TestCase):
         others = [
             Goal('r_gripper_controller/gripper_action', GripperCommandAction, GripperCommandGoal()),
             Goal('head_traj_controller/point_head_action', PointHeadAction, PointHeadGoal()),
-            Goal('torso_controller/position_joint_action', SingleJointPositionAction,
-                 SingleJointPositionGoal(position=3.0)),
             Goal(
-                'move_base', MoveBaseAction,
+                'torso_controller/position_joint_action',
+                SingleJointPositionAction,
+                SingleJointPositionGoal(position=3.0),
+            ),
+            Goal(
+                'move_base',
+                MoveBaseAction,
                 MoveBaseGoal(
-                    PoseStamped(Header(frame_id='map'), Pose(Point(),
-                                                             Quaternion(0.0, 0.0, 0.0, 1.0)))))
+                    PoseStamped(
+                        Header(frame_id='map'), Pose(Point(), Quaternion(0.0, 0.0, 0.0, 1.0))
+                    )
+                ),
+            ),
         ]
-        self.assertEqual([goal.status() for goal in others],
-                         [GoalStatus.SUCCEEDED] + [GoalStatus.REJECTED] * 3)
+        self.assertEqual(
+            [goal.status() for goal in others], [GoalStatus.SUCCEEDED] + [GoalStatus.REJECTED] * 3
+        )
         self.assertIn('allowed: 0', others[2].text)
         self.assertIn("unknown frame 'map'", others[3].text)
         with self.assertRaisesRegex(RobotError, 'head: rejected: target'):
@@ -273,11 +312,13 @@ class Pr2World(unittest.TestCase):
     def test_of_two_who_command_an_arm_the_newer_wins(self) -> None:
         older = self.moving()
         newer = send_arm(arm_goal([[-1.55]], [0.5], RIGHT[:1]))
-        self.assertEqual((older.status(), newer.status()),
-                         (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED))
+        self.assertEqual(
+            (older.status(), newer.status()), (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED)
+        )
         self.assertIn('newer', older.text)
-        self.assertEqual(newer.handle.get_result().error_code,
-                         FollowJointTrajectoryResult.SUCCESSFUL)
+        self.assertEqual(
+            newer.handle.get_result().error_code, FollowJointTrajectoryResult.SUCCESSFUL
+        )
 
     def test_a_reset_aborts_what_moves_and_tells_the_cause(self) -> None:
         sent = self.moving()
@@ -293,13 +334,23 @@ class Pr2World(unittest.TestCase):
         stream = rospy.Publisher('r_arm_controller/command', JointTrajectory, queue_size=1)
         self.assertTrue(
             wait_for(
-                lambda: stream.get_num_connections() and states.subscriber.get_num_connections()))
+                lambda: stream.get_num_connections() and states.subscriber.get_num_connections()
+            )
+        )
         position = self.robot.joints()[RIGHT[0]]
         for _ in range(5):
             position += 0.01
             said = len(states.messages)
-            stream.publish(JointTrajectory(joint_names=RIGHT[:1], points=[JointTrajectoryPoint(
-                positions=[position], time_from_start=rospy.Duration(2 / 60))]))
+            stream.publish(
+                JointTrajectory(
+                    joint_names=RIGHT[:1],
+                    points=[
+                        JointTrajectoryPoint(
+                            positions=[position], time_from_start=rospy.Duration(2 / 60)
+                        )
+                    ],
+                )
+            )
             self.assertTrue(wait_for(lambda before=said: len(states.messages) > before, LIMIT_S))
             self.assertEqual(len(states.messages), said + 1)
             found = dict(zip(states.messages[-1].name, states.messages[-1].position))
@@ -316,5 +367,6 @@ class Pr2World(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('pr2_world_lock_step')
     rostest.rosrun('smach_oracle', 'pr2_world_lock_step', Pr2World)

@@ -2,6 +2,7 @@
 """The simulated PR2 as a process: how it begins, keeps the wall's time, and ends with its last
 words written.
 """
+
 import json
 import os
 import signal
@@ -79,14 +80,17 @@ class Pr2WorldProcess(unittest.TestCase):
                 robot.drive(from_rpy((-5.0, 0.0, 0.0)))  # 20 s
             except RobotError as err:
                 refused.append(str(err))
+
         driver = threading.Thread(target=drive)
         driver.start()
         self.assertTrue(wait_for(lambda: robot.odom_from_base()[0, 3] < -0.02, LIMIT_S))
         self.ends(process, signal.SIGTERM)
         driver.join(LIMIT_S)
         self.assertEqual(len(refused), 1)
-        self.assertEqual([(line['seed'], line['task'], line['success']) for line in self.lines()],
-                         [(1, 'pick_and_place', False), (2, 'pick_and_place', False)])
+        self.assertEqual(
+            [(line['seed'], line['task'], line['success']) for line in self.lines()],
+            [(1, 'pick_and_place', False), (2, 'pick_and_place', False)],
+        )
         self.assertEqual(self.lines()[0]['sim_s'], 0.0)
         self.assertTrue(0.3 < self.lines()[1]['sim_s'] < 20.0)
 
@@ -119,11 +123,14 @@ class Pr2WorldProcess(unittest.TestCase):
     def test_a_bad_parameter_ends_it_in_words(self) -> None:
         process = self.world(task='dance')
         self.assertEqual(process.wait(LIMIT_S), 2)
-        self.assertIn("~task: 'dance' is not allowed; allowed: pick_and_place, drink_retrieval",
-                      process.output())
+        self.assertIn(
+            "~task: 'dance' is not allowed; allowed: pick_and_place, drink_retrieval",
+            process.output(),
+        )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('pr2_world_process')
     rostest.rosrun('smach_oracle', 'pr2_world_process', Pr2WorldProcess)

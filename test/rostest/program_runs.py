@@ -3,6 +3,7 @@
 A script knows nothing of the oracle. Where it says `# built: MACHINE`, the copy for library use has
 `OracleContainer.wrap(MACHINE)`, as the documentation shows it.
 """
+
 import json
 import os
 import re
@@ -28,8 +29,9 @@ HELPLESS = {'deadline_s': 0.3, 'max_recoveries': 1}
 ARGUMENTS = {'arguments': ['--config', 'x', '--record', '_speed:=5', 'arm:=left_arm']}
 _MARKER = re.compile(r'^( *)# built: (.+)$', re.MULTILINE)
 _SAID = re.compile(r'[A-Z_]{3,}\b|\w+ (?:is|ends) in ')  # all else is its log
-_IN_THREAD = re.compile(r'^Exception in thread .*?^\S*(?:Error|Exception)\b.*?$',
-                        re.MULTILINE | re.DOTALL)
+_IN_THREAD = re.compile(
+    r'^Exception in thread .*?^\S*(?:Error|Exception)\b.*?$', re.MULTILINE | re.DOTALL
+)
 _ERROR = re.compile(r'^(?:\w+\.)*(\w+(?:Error|Exception|Interrupt)\b)', re.MULTILINE)
 
 
@@ -61,8 +63,9 @@ class Programs:
             _copy_wrapped(self._folder / name, settings)
             (self._folder / (name + '.yaml')).write_text(json.dumps(settings))
 
-    def begin(self, way: str, program: str, how: str, settings: str = 'recovering'
-              ) -> 'Future[Ending]':
+    def begin(
+        self, way: str, program: str, how: str, settings: str = 'recovering'
+    ) -> 'Future[Ending]':
         """Have a program run; the same run is made once."""
         key = (way, program, how, settings if way != BARE else '')
         if key not in self._runs:
@@ -90,17 +93,25 @@ class Programs:
 
 def _copy_wrapped(folder: Path, settings: Dict[str, Any]) -> None:
     folder.mkdir()
-    wrapping = (r'\1from smach_oracle import OracleContainer' + '\n'
-                r'\1OracleContainer.wrap(\2, settings={!r})'.format(settings))
+    wrapping = (
+        r'\1from smach_oracle import OracleContainer'
+        + '\n'
+        r'\1OracleContainer.wrap(\2, settings={!r})'.format(settings)
+    )
     for path in PROGRAMS.glob('*.py'):
         (folder / path.name).write_text(_MARKER.sub(wrapping, path.read_text()))
 
 
 def _run(command: List[str], program: str, node: str) -> Ending:
     command = command + ARGUMENTS.get(program, []) + ['__name:=' + node]
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, universal_newlines=True,
-                               env=dict(os.environ, PYTHONDONTWRITEBYTECODE='1'))
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+        env=dict(os.environ, PYTHONDONTWRITEBYTECODE='1'),
+    )
     code = None
     try:
         output, errors = process.communicate(timeout=HUNG_AFTER_S)

@@ -1,6 +1,7 @@
 """A camera on real topics whose frames are cast from a scene: it streams, and it answers
 snapshots.
 """
+
 import os
 import sys
 import threading
@@ -12,8 +13,9 @@ from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'unit',
-                                'support'))
+sys.path.insert(
+    0, os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', 'unit', 'support')
+)
 from ray_camera import INTRINSICS, camera_at, see
 
 from smach_oracle.geometry.transforms import quaternion
@@ -45,10 +47,12 @@ class PublishedCamera:
     def tell_place(self, *more) -> None:
         """Where its frame is, and that these are there, too."""
         place = Transform(Vector3(*POSE[:3, 3]), Quaternion(*quaternion(POSE)))
-        self._transforms.sendTransform([
-            TransformStamped(Header(frame_id='base_footprint'), frame, place)
-            for frame in (OPTICAL,) + more
-        ])
+        self._transforms.sendTransform(
+            [
+                TransformStamped(Header(frame_id='base_footprint'), frame, place)
+                for frame in (OPTICAL,) + more
+            ]
+        )
 
     def show(self, bodies) -> None:
         self._seen = see(bodies, POSE, np.random.default_rng(5))
@@ -79,6 +83,7 @@ class PublishedCamera:
                 return
             header = Header(stamp=stamp, frame_id=OPTICAL)
             self._info.publish(
-                CameraInfo(header=header, height=480, width=640, K=list(INTRINSICS.ravel())))
+                CameraInfo(header=header, height=480, width=640, K=list(INTRINSICS.ravel()))
+            )
             self._depth.publish(depth_image(self._seen.image.depth, header))
             self._rgb.publish(colour_image(self._seen.image.colour, header))

@@ -2,6 +2,7 @@
 """A recorder under simulated time: its bags bear it, and a paused simulation does not stop them
 from being written.
 """
+
 import glob
 import os
 import shutil
@@ -38,8 +39,15 @@ class RecordSimTime(unittest.TestCase):
         self.source.begin_trial('t')
 
     def set_clock(self, seconds: int) -> None:
-        self.assertTrue(wait_for(lambda: self.clock.publish(rospy.Time(seconds))
-                                 or rospy.get_rostime() == rospy.Time(seconds), WAIT_S))
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    self.clock.publish(rospy.Time(seconds))
+                    or rospy.get_rostime() == rospy.Time(seconds)
+                ),
+                WAIT_S,
+            )
+        )
 
     def bag_files(self, pattern: str) -> List[str]:
         return glob.glob(os.path.join(self.folder, pattern))
@@ -65,8 +73,12 @@ class RecordSimTime(unittest.TestCase):
         self.assertTrue(all(abs(stamp - time.time()) < 60 for stamp in self.stamps()))
 
     def test_2_a_bag_has_simulated_time_also_when_it_jumps_back(self) -> None:
-        for seconds, kind in ((100, EventKind.TRIAL_START), (130, EventKind.STATE_START),
-                              (120, EventKind.STATE_START), (140, EventKind.TRIAL_END)):
+        for seconds, kind in (
+            (100, EventKind.TRIAL_START),
+            (130, EventKind.STATE_START),
+            (120, EventKind.STATE_START),
+            (140, EventKind.TRIAL_END),
+        ):
             self.set_clock(seconds)
             self.source.emit(kind, 'TOP')
         # rosbag reads by stamp within a chunk, and chunks as they were written
@@ -83,5 +95,6 @@ class RecordSimTime(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('record_sim_time')
     rostest.rosrun('smach_oracle', 'record_sim_time', RecordSimTime, sys.argv)

@@ -2,6 +2,7 @@
 """A recorder in a node: other topics, names, status; and the bags in the hands of rosbag's own
 tools.
 """
+
 import glob
 import os
 import shutil
@@ -54,8 +55,10 @@ class RecordTopics(unittest.TestCase):
     def wait_until_written(self, text: bytes) -> None:
         """Until the bag that is being written has this text in it."""
         pattern = os.path.join(self.folder, '*.bag.active')
-        wait_for(lambda: any(text in Path(path).read_bytes() for path in glob.glob(pattern)),
-                 '{!r} in the bag'.format(text))
+        wait_for(
+            lambda: any(text in Path(path).read_bytes() for path in glob.glob(pattern)),
+            '{!r} in the bag'.format(text),
+        )
 
     def read(self, path: str, topic: str) -> List[Any]:
         with rosbag.Bag(path) as bag:
@@ -78,10 +81,11 @@ class RecordTopics(unittest.TestCase):
         self.begin()
         for number in range(5):
             publisher.publish('hello {}'.format(number))
-        wait_for(lambda: len(received) == 5, 'the robot\'s own callback')
+        wait_for(lambda: len(received) == 5, "the robot's own callback")
         self.wait_until_written(b'hello 4')
-        self.assertEqual([message.data for message in self.read(self.end(recorder), topic)],
-                         received)
+        self.assertEqual(
+            [message.data for message in self.read(self.end(recorder), topic)], received
+        )
 
     def test_a_topic_that_the_node_subscribes_to_already(self) -> None:
         self.check_with_own_subscriber('/subscribed_before', True)
@@ -123,8 +127,9 @@ class RecordTopics(unittest.TestCase):
         bags = glob.glob(os.path.join(self.folder, '*.bag'))
         self.assertEqual(len(bags), 3)
         for path in bags:
-            self.assertEqual([message.data for message in self.read(path, '/map_name')],
-                             ['kitchen'])
+            self.assertEqual(
+                [message.data for message in self.read(path, '/map_name')], ['kitchen']
+            )
 
     def test_a_message_on_its_way_at_the_end_is_in_the_bag(self) -> None:
         report = rospy.Publisher('/report', String, queue_size=10)
@@ -137,7 +142,7 @@ class RecordTopics(unittest.TestCase):
         report.publish('on its way')
         mood.publish('of the next trial')
         recorder.close(WAIT_S)
-        path, = glob.glob(os.path.join(self.folder, '*.bag'))
+        (path,) = glob.glob(os.path.join(self.folder, '*.bag'))
         self.assertEqual([message.data for message in self.read(path, '/report')], ['on its way'])
         self.assertEqual(self.read(path, '/mood'), [])
 
@@ -153,8 +158,9 @@ class RecordTopics(unittest.TestCase):
         self.source.emit(EventKind.TRIAL_END, 'TOP')
         recorder.close(WAIT_S)
         first, second = sorted(glob.glob(os.path.join(self.folder, '*.bag')))
-        self.assertEqual([message.data for message in self.read(second, '/reports')],
-                         ['of the second'])
+        self.assertEqual(
+            [message.data for message in self.read(second, '/reports')], ['of the second']
+        )
         self.assertEqual(self.read(first, '/reports'), [])
 
     def test_the_recorders_own_topics_are_relative_to_the_node(self) -> None:
@@ -163,13 +169,16 @@ class RecordTopics(unittest.TestCase):
         path = self.end(recorder)
         with rosbag.Bag(path) as bag:
             topics = {
-                name: info.msg_type
-                for name, info in bag.get_type_and_topic_info().topics.items()
+                name: info.msg_type for name, info in bag.get_type_and_topic_info().topics.items()
             }
-        self.assertEqual(topics, {
-            '/record_topics/oracle/events': 'smach_oracle/OracleEvent',
-            '/record_topics/oracle/rates': 'smach_oracle/OracleRates',
-            '/record_topics/record/status': 'smach_oracle/RecorderStatus'})
+        self.assertEqual(
+            topics,
+            {
+                '/record_topics/oracle/events': 'smach_oracle/OracleEvent',
+                '/record_topics/oracle/rates': 'smach_oracle/OracleRates',
+                '/record_topics/record/status': 'smach_oracle/RecorderStatus',
+            },
+        )
 
     def test_events_bear_the_time_of_their_step(self) -> None:
         recorder = self.start()
@@ -185,8 +194,11 @@ class RecordTopics(unittest.TestCase):
     def test_the_operator_is_told_of_a_failing_disk(self) -> None:
         told: List[int] = []
         recorder = self.start()
-        rospy.Subscriber('/record_topics/record/status', RecorderStatus,
-                         lambda message: told.append(message.state))
+        rospy.Subscriber(
+            '/record_topics/record/status',
+            RecorderStatus,
+            lambda message: told.append(message.state),
+        )
         self.begin()
         wait_for(lambda: RecorderStatus.RECORDING in told, 'the status of recording')
         shutil.rmtree(self.folder)
@@ -205,8 +217,9 @@ class RecordTopics(unittest.TestCase):
         for number in range(20):
             self.source.emit(EventKind.STATE_START, 'TOP', state='S{}'.format(number))
         path = self.end(recorder)
-        info = subprocess.run(['rosbag', 'info', path], check=True, stdout=subprocess.PIPE,
-                              universal_newlines=True)
+        info = subprocess.run(
+            ['rosbag', 'info', path], check=True, stdout=subprocess.PIPE, universal_newlines=True
+        )
         self.assertIn('22 msgs', info.stdout)
         played: List[int] = []
         done = threading.Event()
@@ -217,13 +230,25 @@ class RecordTopics(unittest.TestCase):
                 done.set()
 
         rospy.Subscriber('/record_topics/oracle/events', OracleEvent, receive)
-        subprocess.run(['rosbag', 'play', '-q', '--wait-for-subscribers', path, '--topics',
-                        '/record_topics/oracle/events'], check=True, timeout=WAIT_S)
+        subprocess.run(
+            [
+                'rosbag',
+                'play',
+                '-q',
+                '--wait-for-subscribers',
+                path,
+                '--topics',
+                '/record_topics/oracle/events',
+            ],
+            check=True,
+            timeout=WAIT_S,
+        )
         self.assertTrue(done.wait(WAIT_S))
         self.assertEqual(played, list(range(22)))
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('record_topics')
     rostest.rosrun('smach_oracle', 'record_topics', RecordTopics, sys.argv)

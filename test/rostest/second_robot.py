@@ -2,6 +2,7 @@
 """The wheeled robot without arms, by its launch file: a wet floor ends its tour, unless there is an
 oracle; a person reads the gauge from the picture on the console.
 """
+
 import json
 import shutil
 import signal
@@ -49,11 +50,19 @@ class SecondRobot(unittest.TestCase):
 
     def launch(self, *arguments: str) -> 'subprocess.Popen[bytes]':
         """Start the launch file on a wet floor, four times as fast as real time."""
-        process = subprocess.Popen([
-            'roslaunch', 'smach_oracle', 'inspection.launch', 'speed:=4', 'causes:=wet_floor',
-            'seed:={}'.format(wet_seed()), 'record:={}'.format(self.folder),
-            'truth:={}'.format(self.folder / 'truth.jsonl'), *arguments
-        ])
+        process = subprocess.Popen(
+            [
+                'roslaunch',
+                'smach_oracle',
+                'inspection.launch',
+                'speed:=4',
+                'causes:=wet_floor',
+                'seed:={}'.format(wet_seed()),
+                'record:={}'.format(self.folder),
+                'truth:={}'.format(self.folder / 'truth.jsonl'),
+                *arguments,
+            ]
+        )
         self.addCleanup(self.stop, process)
         return process
 
@@ -66,16 +75,16 @@ class SecondRobot(unittest.TestCase):
     def told(self, process: 'subprocess.Popen[bytes]') -> Any:
         """What the world says of the trial, once it is over: success, causes."""
         process.wait(120)
-        line, = (self.folder / 'truth.jsonl').read_text(encoding='utf-8').splitlines()
+        (line,) = (self.folder / 'truth.jsonl').read_text(encoding='utf-8').splitlines()
         return json.loads(line)
 
     def trial(self) -> TrialSummary:
-        summary, = load_trials([str(self.folder)]).trials
+        (summary,) = load_trials([str(self.folder)]).trials
         self.assertEqual(summary.lost_events, 0)
         return summary
 
     def bag(self) -> rosbag.Bag:
-        path, = self.folder.glob('*.bag')
+        (path,) = self.folder.glob('*.bag')
         bag = rosbag.Bag(str(path))
         self.addCleanup(bag.close)
         return bag
@@ -93,8 +102,9 @@ class SecondRobot(unittest.TestCase):
         trial = self.trial()
         self.assertEqual((trial.outcome, trial.questions), ('succeeded', 0))
         self.assertGreater(trial.recoveries, 0)
-        reports = [message.data[:8]
-                   for _, message, _ in self.bag().read_messages('/inspection/report')]
+        reports = [
+            message.data[:8] for _, message, _ in self.bag().read_messages('/inspection/report')
+        ]
         self.assertEqual(reports, ['panel 1:', 'panel 2:', 'panel 3:'])
 
     def test_a_person_sees_the_camera_and_gives_the_reading(self) -> None:
@@ -103,19 +113,25 @@ class SecondRobot(unittest.TestCase):
         frames: List[FailureFrames] = []
         rospy.Subscriber('/inspection/expert_query/open', OpenQueries, asked.append)
         rospy.Subscriber('/inspection/failure_frames', FailureFrames, frames.append)
-        process = self.launch('console:=true', 'console_port:={}'.format(port),
-                              'oracle:={max_recoveries: 0}')
+        process = self.launch(
+            'console:=true', 'console_port:={}'.format(port), 'oracle:={max_recoveries: 0}'
+        )
         self.assertTrue(wait_for(lambda: asked and asked[-1].queries, 90.0), 'nobody is asked')
         self.assertTrue(wait_for(lambda: frames), 'no picture comes with the question')
         self.assertEqual((frames[-1].topics, len(frames[-1].images)), ([CAMERA], 1))
-        self.assertEqual(tornado.ioloop.IOLoop().run_sync(lambda: kind_of(CAMERA, port), 60.0),
-                         'image')
+        self.assertEqual(
+            tornado.ioloop.IOLoop().run_sync(lambda: kind_of(CAMERA, port), 60.0), 'image'
+        )
         query = asked[-1].queries[0].query
         self.assertEqual((query.failed_state, query.container_path + '/'), ('INSPECT', AT_PLACE))
         answer = rospy.ServiceProxy('/inspection/expert_query/answer', AnswerQuery)
         reading = UserdataItem(key='reading', encoding=UserdataItem.JSON, value=b'4.25')
-        response = answer(query.query_id, ExpertDecision(
-            kind=ExpertDecision.SUPERSEDE, outcome='succeeded', outputs=[reading], by='ann'))
+        response = answer(
+            query.query_id,
+            ExpertDecision(
+                kind=ExpertDecision.SUPERSEDE, outcome='succeeded', outputs=[reading], by='ann'
+            ),
+        )
         self.assertTrue(response.ok, response.message)
         self.assertIn('panel 2 was reported as 4.25', self.told(process)['why'])
         self.assertEqual((self.trial().outcome, self.trial().answered), ('succeeded', 1))
@@ -126,8 +142,12 @@ async def kind_of(topic: str, port: int) -> str:
     origin = 'http://localhost:{}'.format(port)
     session = await tornado.httpclient.AsyncHTTPClient().fetch(origin + '/session')
     cookie = session.headers['Set-Cookie'].split(';')[0]
-    page = await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(
-        origin.replace('http', 'ws', 1) + '/socket', headers={'Origin': origin, 'Cookie': cookie}))
+    page = await tornado.websocket.websocket_connect(
+        tornado.httpclient.HTTPRequest(
+            origin.replace('http', 'ws', 1) + '/socket',
+            headers={'Origin': origin, 'Cookie': cookie},
+        )
+    )
     hello = {'do': 'hello', 'xsrf': json.loads(session.body)['xsrf'], 'expert': 'ann', 'id': 1}
     await page.write_message(json.dumps(hello))
     while True:
@@ -148,5 +168,6 @@ def found_in(message: Any, name: str) -> List[Any]:
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('second_robot')
     rostest.rosrun('smach_oracle', 'second_robot', SecondRobot, sys.argv)

@@ -11,6 +11,7 @@ and some of the lines that they print. A comment above a block says what is spec
   prompt, at a later one, when any command has printed TEXT, and after what the next block shows.
 * `test: put above the last line of FILE`.
 """
+
 import os
 import pty
 import re
@@ -31,8 +32,7 @@ BLOCK = re.compile(r'(?:`(\S+)`:\n\n|<!-- test: (.*?) -->\n\n)?^```(\w+)\n(.*?)^
 TYPED = re.compile(r'(?:(at|after) "(.*?)" )?"(.*?)"')
 CONTROL = re.compile(r'\x1b\[[0-9;?]*[A-Za-z]|[\r╭╮╰╯│─█░]')
 # times, ids, names of people, and which of several robots is the first
-CHANGING = re.compile(
-    r'\d{9,}\.\d+|[0-9a-f]{12}|\d{8}T\d{6}\.\d{3}Z|\(\w+\)$|(?<=/robot)\d')
+CHANGING = re.compile(r'\d{9,}\.\d+|[0-9a-f]{12}|\d{8}T\d{6}\.\d{3}Z|\(\w+\)$|(?<=/robot)\d')
 
 
 def plain(text):
@@ -44,7 +44,7 @@ def pattern(line):
     """What a line of the page stands for: times, ids and names are others in each run."""
     parts, at = [], 0
     for match in CHANGING.finditer(line):
-        parts += [re.escape(line[at:match.start()]), r'[\w.()]+']
+        parts += [re.escape(line[at : match.start()]), r'[\w.()]+']
         at = match.end()
     return ''.join(parts) + re.escape(line[at:])
 
@@ -56,8 +56,14 @@ class Program:
         self.command, self.text = command, ''
         self.master, slave = pty.openpty()
         self.process = subprocess.Popen(
-            ['bash', '-c', command], cwd=folder, stdin=slave, stdout=slave, stderr=slave,
-            start_new_session=True, env=dict(os.environ, COLUMNS='120', TERM='xterm'))
+            ['bash', '-c', command],
+            cwd=folder,
+            stdin=slave,
+            stdout=slave,
+            stderr=slave,
+            start_new_session=True,
+            env=dict(os.environ, COLUMNS='120', TERM='xterm'),
+        )
         os.close(slave)
 
     def read(self):
@@ -75,13 +81,15 @@ class Program:
 
     def wait_for(self, lines):
         """Wait until it has printed these lines, in this order, others between them."""
-        wanted = re.compile('.*?'.join(pattern(line) for line in plain(lines).splitlines() if line),
-                            re.S)
+        wanted = re.compile(
+            '.*?'.join(pattern(line) for line in plain(lines).splitlines() if line), re.S
+        )
         deadline, goes_on = time.monotonic() + LIMIT_S, True
         while not wanted.search(plain(self.text)):
             if not goes_on or time.monotonic() > deadline:
-                raise AssertionError('{}: expected:\n{}\nprinted:\n{}'.format(
-                    self.command, lines, plain(self.text)))
+                raise AssertionError(
+                    '{}: expected:\n{}\nprinted:\n{}'.format(self.command, lines, plain(self.text))
+                )
             goes_on = self.read()
 
     def type(self, line):
@@ -96,8 +104,9 @@ class Program:
 
     def end_with(self, wanted=0):
         code = self.end()
-        assert code == wanted, '{}: exit code {}, printed:\n{}'.format(self.command, code,
-                                                                      plain(self.text))
+        assert code == wanted, '{}: exit code {}, printed:\n{}'.format(
+            self.command, code, plain(self.text)
+        )
 
     def stop(self):
         """End it as Ctrl-C does, and if it does not end, by force."""
@@ -165,7 +174,7 @@ class ShownPage:
             self.latest, self.typed = program, TYPED.findall(note)
             before, prompt = shown.rstrip().rsplit('\n', 1)
             program.wait_for(before)
-            program.wait_for(prompt[:prompt.rindex(':') + 1])
+            program.wait_for(prompt[: prompt.rindex(':') + 1])
             return
         program.wait_for(shown)
         if note.startswith('this command goes on while'):

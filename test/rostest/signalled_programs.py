@@ -2,6 +2,7 @@
 
 Shared by the rostest and the benchmark of signals.
 """
+
 import glob
 import json
 import os
@@ -20,7 +21,7 @@ from oracle_support import RUNNER, Process
 KINDS = ('bare', 'library', 'oracle_run')
 LONGEST_DELAY_S = 1.0  # what the first execute sets up takes less on a machine that is not busy
 HUNG_AFTER_S = 20.0
-TASK = '''
+TASK = """
 import faulthandler, signal, sys, time, rospy, smach, smach_ros
 faulthandler.register(signal.SIGUSR1)
 rospy.init_node('task')
@@ -39,18 +40,18 @@ class Work(smach.State):
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('WORK', Work(), {'succeeded': 'WORK', 'aborted': 'WORK'})
-'''
+"""
 # the oracle takes the failures for which the script has a transition
 SETTINGS = {'author_recoveries': 'override', 'max_recoveries': 1000}
-LIBRARY = '''
+LIBRARY = """
 SETTINGS = {!r}
 from smach_oracle import OracleContainer
 OracleContainer.wrap(sm, settings=SETTINGS, name='TASK')
-'''.format(SETTINGS)
-RUN = '''
+""".format(SETTINGS)
+RUN = """
 print('READY', flush=True)
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 
 
 class Ending(NamedTuple):
@@ -65,13 +66,25 @@ class Ending(NamedTuple):
     output: str
 
 
-def signal_many(count: int, seed: int, kinds: Sequence[str] = KINDS, at_once: int = 4,
-                told: Callable[[Ending], Any] = lambda ending: None) -> List[Ending]:
+def signal_many(
+    count: int,
+    seed: int,
+    kinds: Sequence[str] = KINDS,
+    at_once: int = 4,
+    told: Callable[[Ending], Any] = lambda ending: None,
+) -> List[Ending]:
     """Send `count` signals to processes of each kind, at instants drawn from a seed."""
     draw = random.Random(seed)
-    cases = [(kind, number % 2 and signal.SIGTERM or signal.SIGINT,
-              draw.uniform(0.0, LONGEST_DELAY_S), '{}_{}'.format(kind, number))
-             for number in range(count) for kind in kinds]
+    cases = [
+        (
+            kind,
+            number % 2 and signal.SIGTERM or signal.SIGINT,
+            draw.uniform(0.0, LONGEST_DELAY_S),
+            '{}_{}'.format(kind, number),
+        )
+        for number in range(count)
+        for kind in kinds
+    ]
     endings = []
     with ThreadPoolExecutor(at_once) as pool:
         for ending in pool.map(lambda case: _signalled(*case), cases):
@@ -93,8 +106,15 @@ def _signalled(kind: str, number: int, delay_s: float, node: str) -> Ending:
             code = _code(program)
             if code is None:
                 _say_where(program)
-            return Ending(kind, number, delay_s, code, time.monotonic() - begun_s, _broken(bags),
-                          program.output())
+            return Ending(
+                kind,
+                number,
+                delay_s,
+                code,
+                time.monotonic() - begun_s,
+                _broken(bags),
+                program.output(),
+            )
         finally:
             program.stop()
 
@@ -126,8 +146,9 @@ def _say_where(program: Process) -> None:
 
 
 def _broken(folder: str) -> List[str]:
-    wrong = ['{} is not closed'.format(path)
-             for path in glob.glob(os.path.join(folder, '*.active'))]
+    wrong = [
+        '{} is not closed'.format(path) for path in glob.glob(os.path.join(folder, '*.active'))
+    ]
     for path in glob.glob(os.path.join(folder, '*.bag')):
         try:
             with rosbag.Bag(path) as bag:

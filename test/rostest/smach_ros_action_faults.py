@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """SimpleActionState against servers that die, freeze, vanish or ignore what they are told."""
+
 import time
 import unittest
 
@@ -41,8 +42,9 @@ class ActionFaultsTest(unittest.TestCase):
     def test_killed_server_is_noticed_and_its_successor_is_used(self):
         self.start_server()
         results = []
-        state = self.state(Behaviour.DIE, result_cb=lambda ud, status, result: results.append(
-            (status, result)))
+        state = self.state(
+            Behaviour.DIE, result_cb=lambda ud, status, result: results.append((status, result))
+        )
         with LogWatch() as log:
             run = InBackground(state, userdata())
             self.server.process.wait(30)
@@ -62,10 +64,12 @@ class ActionFaultsTest(unittest.TestCase):
         self.server.start()
         machine = smach.StateMachine(outcomes=['done', 'recovered', 'preempted'])
         with machine:
-            smach.StateMachine.add('WORK', self.state(Behaviour.DIE),
-                                   {'succeeded': 'done', 'aborted': 'RECOVER'})
-            smach.StateMachine.add('RECOVER',
-                                   smach.CBState(lambda ud: 'recovered', outcomes=['recovered']))
+            smach.StateMachine.add(
+                'WORK', self.state(Behaviour.DIE), {'succeeded': 'done', 'aborted': 'RECOVER'}
+            )
+            smach.StateMachine.add(
+                'RECOVER', smach.CBState(lambda ud: 'recovered', outcomes=['recovered'])
+            )
         self.assertEqual(InBackground(machine).outcome(), 'recovered')
 
     def test_frozen_server_is_given_up_after_its_time(self):
@@ -83,7 +87,8 @@ class ActionFaultsTest(unittest.TestCase):
         self.server.start()
         with LogWatch() as log:
             self.assertEqual(
-                InBackground(self.state(Behaviour.CLOSE), userdata()).outcome(), 'aborted')
+                InBackground(self.state(Behaviour.CLOSE), userdata()).outcome(), 'aborted'
+            )
         self.assertIn('no longer serves the action', log.text())
 
     def test_goal_the_server_never_acknowledges_is_given_up(self):
@@ -91,7 +96,8 @@ class ActionFaultsTest(unittest.TestCase):
         self.server.start()
         with LogWatch() as log:
             self.assertEqual(
-                InBackground(self.state(Behaviour.UNSEEN), userdata()).outcome(), 'aborted')
+                InBackground(self.state(Behaviour.UNSEEN), userdata()).outcome(), 'aborted'
+            )
         self.assertIn('no notice', log.text())
         self.assertEqual(self.state(150).execute(userdata()), 'succeeded')
 
@@ -110,8 +116,11 @@ class ActionFaultsTest(unittest.TestCase):
 
     def test_both_timeouts_apply_to_a_server_that_never_answers(self):
         self.start_server()
-        state = self.state(Behaviour.IGNORE_CANCEL, exec_timeout=rospy.Duration(0.5),
-                           preempt_timeout=rospy.Duration(0.5))
+        state = self.state(
+            Behaviour.IGNORE_CANCEL,
+            exec_timeout=rospy.Duration(0.5),
+            preempt_timeout=rospy.Duration(0.5),
+        )
         run = InBackground(state, userdata())
         self.assertEqual(run.outcome(), 'aborted')
         self.assertGreater(run.took_s(), 1.0)

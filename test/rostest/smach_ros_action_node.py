@@ -5,6 +5,7 @@ smach_ros tests.
 Run as ``smach_ros_action_node.py ACTION_NAME``. The number of the goal chooses the behaviour (see
 ``Behaviour``); a goal of 100 or more succeeds at once, with a result one greater.
 """
+
 import os
 import signal
 import sys
@@ -17,16 +18,17 @@ from actionlib.msg import TestAction, TestFeedback, TestResult
 
 class Behaviour:
     """Numbers a goal may carry."""
+
     ABORT = 1
-    HANG = 2               # runs until cancelled, then reports PREEMPTED
-    IGNORE_CANCEL = 3      # runs forever, whatever the client says
+    HANG = 2  # runs until cancelled, then reports PREEMPTED
+    IGNORE_CANCEL = 3  # runs forever, whatever the client says
     SUCCEED_ON_CANCEL = 4  # runs until cancelled, then reports SUCCEEDED
-    FEEDBACK = 5           # three pieces of feedback, then SUCCEEDED
+    FEEDBACK = 5  # three pieces of feedback, then SUCCEEDED
     REJECT = 6
-    DIE = 7                # accepts, then the process kills itself with SIGKILL
-    FREEZE = 8             # accepts, then the process stops itself with SIGSTOP
-    CLOSE = 9              # accepts, then withdraws its action topics while the process lives
-    UNSEEN = 10            # never acknowledged in any way
+    DIE = 7  # accepts, then the process kills itself with SIGKILL
+    FREEZE = 8  # accepts, then the process stops itself with SIGSTOP
+    CLOSE = 9  # accepts, then withdraws its action topics while the process lives
+    UNSEEN = 10  # never acknowledged in any way
 
 
 class ActionNode(object):
@@ -35,8 +37,9 @@ class ActionNode(object):
     def __init__(self, name):
         self.running = {}
         self.lock = threading.Lock()
-        self.server = actionlib.ActionServer(name, TestAction, self.on_goal, self.on_cancel,
-                                             auto_start=False)
+        self.server = actionlib.ActionServer(
+            name, TestAction, self.on_goal, self.on_cancel, auto_start=False
+        )
         self.accept_goal = self.server.internal_goal_callback
         self.server.internal_goal_callback = self.on_raw_goal
         self.server.start()

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """SimpleActionState against real action servers: what a script sees in good times."""
+
 import statistics
 import subprocess
 import sys
@@ -67,14 +68,25 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertIs(smach.is_shutdown, rospy.is_shutdown)
 
     def test_names_that_scripts_import(self):
-        for name in ('simple_action_state', 'service_state', 'monitor_state', 'condition_state',
-                     'action_server_wrapper', 'introspection', 'util'):
+        for name in (
+            'simple_action_state',
+            'service_state',
+            'monitor_state',
+            'condition_state',
+            'action_server_wrapper',
+            'introspection',
+            'util',
+        ):
             self.assertTrue(hasattr(smach_ros, name), name)
         self.assertIs(smach_ros.simple_action_state.SimpleActionState, SimpleActionState)
 
     def test_outcome_follows_the_goal(self):
-        for number, outcome in ((150, 'succeeded'), (Behaviour.ABORT, 'aborted'),
-                                (Behaviour.REJECT, 'aborted'), (Behaviour.FEEDBACK, 'succeeded')):
+        for number, outcome in (
+            (150, 'succeeded'),
+            (Behaviour.ABORT, 'aborted'),
+            (Behaviour.REJECT, 'aborted'),
+            (Behaviour.FEEDBACK, 'succeeded'),
+        ):
             self.assertEqual(action_state(number).execute(userdata()), outcome)
 
     def test_a_round_trip_costs_milliseconds(self):
@@ -83,8 +95,10 @@ class SimpleActionStateTest(unittest.TestCase):
             begin = time.monotonic()
             self.assertEqual(state.execute(nothing), 'succeeded')
             times.append(time.monotonic() - begin)
-        print('goal round trip: median %.2f ms, max %.2f ms' %
-              (1e3 * statistics.median(times), 1e3 * max(times)))
+        print(
+            'goal round trip: median %.2f ms, max %.2f ms'
+            % (1e3 * statistics.median(times), 1e3 * max(times))
+        )
         quick = statistics.quantiles(times)[0]  # what else the machine does can only make it slower
         self.assertLess(quick, 0.025)
 
@@ -99,7 +113,8 @@ class SimpleActionStateTest(unittest.TestCase):
     def test_goal_and_result_go_through_userdata(self):
         data = userdata(goal=200)
         self.assertEqual(
-            action_state(goal_slots=['goal'], result_slots=['result']).execute(data), 'succeeded')
+            action_state(goal_slots=['goal'], result_slots=['result']).execute(data), 'succeeded'
+        )
         self.assertEqual(data.result, 201)
         data = userdata(g=TestGoal(300))
         self.assertEqual(action_state(goal_key='g', result_key='r').execute(data), 'succeeded')
@@ -108,7 +123,8 @@ class SimpleActionStateTest(unittest.TestCase):
     def test_a_result_comes_with_a_failure_too(self):
         data = userdata()
         self.assertEqual(
-            action_state(Behaviour.ABORT, result_slots=['result']).execute(data), 'aborted')
+            action_state(Behaviour.ABORT, result_slots=['result']).execute(data), 'aborted'
+        )
         self.assertEqual(data.result, -1)
 
     @improvement
@@ -117,15 +133,25 @@ class SimpleActionStateTest(unittest.TestCase):
             goal.goal += step * times
 
         goal, data = TestGoal(100), userdata()
-        state = SimpleActionState('work', TestAction, goal=goal, goal_cb=fill, goal_cb_args=[10],
-                                  goal_cb_kwargs={'times': 2}, result_slots=['result'])
+        state = SimpleActionState(
+            'work',
+            TestAction,
+            goal=goal,
+            goal_cb=fill,
+            goal_cb_args=[10],
+            goal_cb_kwargs={'times': 2},
+            result_slots=['result'],
+        )
         for _ in range(2):
             self.assertEqual(state.execute(data), 'succeeded')
             self.assertEqual(data.result, 121)
         self.assertEqual(goal.goal, 100)
         self.assertEqual(
-            action_state(goal_cb=lambda ud, g: TestGoal(400),
-                         result_slots=['result']).execute(data), 'succeeded')
+            action_state(goal_cb=lambda ud, g: TestGoal(400), result_slots=['result']).execute(
+                data
+            ),
+            'succeeded',
+        )
         self.assertEqual(data.result, 401)
 
     def test_callbacks_bring_their_keys_and_outcomes(self):
@@ -147,8 +173,9 @@ class SimpleActionStateTest(unittest.TestCase):
             goal.goal = ud.number
 
         state = action_state(goal_cb=fill)
-        self.assertEqual(set(state.get_registered_outcomes()),
-                         {'succeeded', 'aborted', 'preempted'})
+        self.assertEqual(
+            set(state.get_registered_outcomes()), {'succeeded', 'aborted', 'preempted'}
+        )
         self.assertEqual(state.execute(userdata(number=100)), 'succeeded')
 
     def test_a_subclass_finds_a_simple_action_client_for_the_states_goal(self):
@@ -159,8 +186,9 @@ class SimpleActionStateTest(unittest.TestCase):
         self.assertEqual(client.get_result().result, 151)
         self.assertTrue(client.wait_for_result(rospy.Duration(5.0)))
         self.assertTrue(client.wait_for_server(rospy.Duration(5.0)))
-        self.assertEqual(client.send_goal_and_wait(TestGoal(100), rospy.Duration(5.0)),
-                         GoalStatus.SUCCEEDED)
+        self.assertEqual(
+            client.send_goal_and_wait(TestGoal(100), rospy.Duration(5.0)), GoalStatus.SUCCEEDED
+        )
         self.assertEqual(client.get_result().result, 101)
 
     def test_a_subclass_may_cancel_the_states_goal_through_that_client(self):
@@ -178,27 +206,36 @@ class SimpleActionStateTest(unittest.TestCase):
 
         data = userdata()
         self.assertEqual(
-            action_state(150, result_cb=judge, result_slots=['result'],
-                         output_keys=['result']).execute(data), 'succeeded')
+            action_state(
+                150, result_cb=judge, result_slots=['result'], output_keys=['result']
+            ).execute(data),
+            'succeeded',
+        )
         self.assertEqual(data.result, 151)
 
     @improvement
     def test_a_callback_that_raises_or_invents_an_outcome_aborts_and_says_so(self):
         with LogWatch() as log:
             self.assertEqual(
-                action_state(goal_cb=lambda ud, goal: 1 / 0).execute(userdata()), 'aborted')
+                action_state(goal_cb=lambda ud, goal: 1 / 0).execute(userdata()), 'aborted'
+            )
             self.assertEqual(
-                action_state(150, result_cb=lambda *_: 1 / 0).execute(userdata()), 'aborted')
+                action_state(150, result_cb=lambda *_: 1 / 0).execute(userdata()), 'aborted'
+            )
             self.assertEqual(
-                action_state(150, result_cb=lambda *_: 'invented').execute(userdata()), 'aborted')
+                action_state(150, result_cb=lambda *_: 'invented').execute(userdata()), 'aborted'
+            )
         self.assertEqual(log.text().count('ZeroDivisionError: division by zero'), 2)
         self.assertIn("'invented'", log.text())
 
     @improvement
     def test_wrong_arguments_are_named(self):
-        for wrong, name in (({'goal_slots': ['gaol']}, 'gaol'), ({'result_slots': ['rusult']},
-                                                                 'rusult'),
-                            ({'goal_cb': 5}, 'goal_cb'), ({'goal': lambda ud: None}, 'goal_cb')):
+        for wrong, name in (
+            ({'goal_slots': ['gaol']}, 'gaol'),
+            ({'result_slots': ['rusult']}, 'rusult'),
+            ({'goal_cb': 5}, 'goal_cb'),
+            ({'goal': lambda ud: None}, 'goal_cb'),
+        ):
             with self.assertRaisesRegex(smach.InvalidStateError, name):
                 action_state(**wrong)
 
@@ -283,13 +320,20 @@ class SimpleActionStateTest(unittest.TestCase):
     @improvement
     def test_ctrl_c_ends_the_state_and_cancels_the_goal(self):
         statuses = {}
-        rospy.Subscriber('work/status', GoalStatusArray, lambda message: statuses.update(
-            {status.goal_id.id: status.status for status in message.status_list}))
-        script = subprocess.Popen([sys.executable, HERE + '/smach_ros_hanging_script.py'],
-                                  stdout=subprocess.PIPE)
+        rospy.Subscriber(
+            'work/status',
+            GoalStatusArray,
+            lambda message: statuses.update(
+                {status.goal_id.id: status.status for status in message.status_list}
+            ),
+        )
+        script = subprocess.Popen(
+            [sys.executable, HERE + '/smach_ros_hanging_script.py'], stdout=subprocess.PIPE
+        )
         goals = lambda: [goal for goal in statuses if 'hanging_script' in goal]  # noqa: E731
         self.assertTrue(
-            wait_for(lambda: any(statuses[goal] == GoalStatus.ACTIVE for goal in goals())))
+            wait_for(lambda: any(statuses[goal] == GoalStatus.ACTIVE for goal in goals()))
+        )
         begin = time.monotonic()
         script.send_signal(2)
         said, _ = script.communicate(timeout=20)

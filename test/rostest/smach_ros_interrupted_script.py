@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A script that waits for a message that never comes, for tests that press Ctrl-C."""
+
 import sys
 import threading
 
@@ -17,13 +18,15 @@ def main(where, handler):
 
     def tell_when_it_waits(ud, states):
         threading.Timer(  # nothing shows that the subscriber is registered
-            0.5, print, ['waiting'], {'flush': True}).start()
+            0.5, print, ['waiting'], {'flush': True}
+        ).start()
 
     with machine:
         smach.StateMachine.add('WAIT', MonitorState('never', Empty, lambda ud, message: True))
     machine.register_start_cb(tell_when_it_waits, [])
-    machine.register_termination_cb(lambda ud, states, outcome: up.append(not rospy.is_shutdown()),
-                                    [])
+    machine.register_termination_cb(
+        lambda ud, states, outcome: up.append(not rospy.is_shutdown()), []
+    )
     if handler != 'none':
         set_preempt_handler(machine)
     outcomes = []

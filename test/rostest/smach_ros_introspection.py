@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Our introspection server over real topics, as a viewer and smach_ros's client see it."""
+
 import base64
 import pickle
 import subprocess
@@ -23,9 +24,11 @@ from smach_oracle.ros.introspection.introspection_server import IntrospectionSer
 from smach_oracle.ros.introspection.plain_pickle import decode_userdata
 from smach_ros import IntrospectionClient
 
-MD5 = {SmachContainerStatus: '5ba2bb79ac19e3842d562a191f2a675b',
-       SmachContainerStructure: '3d3d1e0d0f99779ee9e58101a5dcf7ea',
-       SmachContainerInitialStatusCmd: '45f8cf31fc29b829db77f23001f788d6'}
+MD5 = {
+    SmachContainerStatus: '5ba2bb79ac19e3842d562a191f2a675b',
+    SmachContainerStructure: '3d3d1e0d0f99779ee9e58101a5dcf7ea',
+    SmachContainerInitialStatusCmd: '45f8cf31fc29b829db77f23001f788d6',
+}
 
 
 class Touched(object):
@@ -79,10 +82,14 @@ class IntrospectionTest(unittest.TestCase):
 
     def listen(self):
         subscribers = [
-            rospy.Subscriber(self.name + '/smach/container_status', SmachContainerStatus,
-                             self.statuses.append),
-            rospy.Subscriber(self.name + '/smach/container_structure', SmachContainerStructure,
-                             self.structures.append)
+            rospy.Subscriber(
+                self.name + '/smach/container_status', SmachContainerStatus, self.statuses.append
+            ),
+            rospy.Subscriber(
+                self.name + '/smach/container_structure',
+                SmachContainerStructure,
+                self.structures.append,
+            ),
         ]
         for subscriber in subscribers:
             self.addCleanup(subscriber.unregister)
@@ -90,12 +97,16 @@ class IntrospectionTest(unittest.TestCase):
         return subscribers
 
     def active_states_of(self, path):
-        return [tuple(status.active_states) for status in list(self.statuses)
-                if status.path == path and status.info not in ('HEARTBEAT', 'REMOTE_INIT')]
+        return [
+            tuple(status.active_states)
+            for status in list(self.statuses)
+            if status.path == path and status.info not in ('HEARTBEAT', 'REMOTE_INIT')
+        ]
 
     def command(self, path, labels, local_data=''):
-        publisher = rospy.Publisher(self.name + '/smach/container_init',
-                                    SmachContainerInitialStatusCmd, queue_size=5)
+        publisher = rospy.Publisher(
+            self.name + '/smach/container_init', SmachContainerInitialStatusCmd, queue_size=5
+        )
         self.addCleanup(publisher.unregister)
         self.assertTrue(wait_for(publisher.get_num_connections))
         publisher.publish(path, labels, local_data)
@@ -108,6 +119,7 @@ class IntrospectionTest(unittest.TestCase):
     def test_new_viewer_is_told_the_whole_tree_at_once(self):
         def knows_the_tree():
             return {message.path for message in self.structures} == {'/ROOT', '/ROOT/IN'}
+
         self.serve(machine_with_inner()[0])
         first = self.listen()
         self.assertTrue(wait_for(knows_the_tree), 'what is told of at the start')
@@ -127,15 +139,18 @@ class IntrospectionTest(unittest.TestCase):
         machine.userdata.image = b'x' * 300000
         with machine:
             for number in range(60):
-                smach.StateMachine.add(str(number), Step(),
-                                       {'next': str(number + 1) if number < 59 else 'done'})
+                smach.StateMachine.add(
+                    str(number), Step(), {'next': str(number + 1) if number < 59 else 'done'}
+                )
         read = threading.Event()
-        with mock.patch.object(introspection_server, 'BACKLOG_BYTES',
-                               3000000), LogWatch() as log:
+        with mock.patch.object(introspection_server, 'BACKLOG_BYTES', 3000000), LogWatch() as log:
             server = self.serve(machine)
             viewer = rospy.Subscriber(
-                self.name + '/smach/container_status', SmachContainerStatus, lambda message:
-                (read.wait(30), self.statuses.append(message)), buff_size=1000)
+                self.name + '/smach/container_status',
+                SmachContainerStatus,
+                lambda message: (read.wait(30), self.statuses.append(message)),
+                buff_size=1000,
+            )
             self.addCleanup(viewer.unregister)
             self.assertTrue(wait_for(server._status_pub.is_heard))
             machine.execute()
@@ -144,7 +159,8 @@ class IntrospectionTest(unittest.TestCase):
         self.assertIn('does not keep up', log.text())
         read.set()
         self.assertTrue(
-            wait_for(lambda: any(status.info.startswith('TERM') for status in self.statuses)))
+            wait_for(lambda: any(status.info.startswith('TERM') for status in self.statuses))
+        )
         labels = [
             status.active_states[0] for status in self.statuses if status.info == 'TRANSITION'
         ]
@@ -165,6 +181,7 @@ class IntrospectionTest(unittest.TestCase):
     def test_heartbeat_comes_every_two_seconds(self):
         self.serve(machine_with_inner()[0])
         self.listen()
+
         def heartbeats():
             return [status for status in self.statuses if status.path == '/ROOT']
 
@@ -182,7 +199,8 @@ class IntrospectionTest(unittest.TestCase):
         with machine:
             smach.StateMachine.add('LATE', late, {'next': 'done'})
         self.assertTrue(
-            wait_for(lambda: any(message.path == '/ROOT/LATE' for message in self.structures)))
+            wait_for(lambda: any(message.path == '/ROOT/LATE' for message in self.structures))
+        )
 
     def test_userdata_that_cannot_be_pickled_is_left_out_and_named_once(self):
         machine, _ = machine_with_inner()
@@ -208,9 +226,9 @@ class IntrospectionTest(unittest.TestCase):
                     smach.StateMachine.add('X', Step(), {'next': 'done'})
                 smach.StateMachine.add('IN%d' % i, inner)
         server = IntrospectionServer(self.name, machine, '/ROOT')
+
         def ours():
-            return [t for t in threading.enumerate()
-                    if t.name == 'introspection ' + self.name]
+            return [t for t in threading.enumerate() if t.name == 'introspection ' + self.name]
 
         server.start()
         server.start()
@@ -231,21 +249,34 @@ class IntrospectionTest(unittest.TestCase):
         client = IntrospectionClient()
         self.assertIn('/' + self.name, client.get_servers())
         self.assertTrue(
-            client.set_initial_state(self.name, '/ROOT', ['B'], userdata(x=b'5'),
-                                     rospy.Duration(30.0)))
+            client.set_initial_state(
+                self.name, '/ROOT', ['B'], userdata(x=b'5'), rospy.Duration(30.0)
+            )
+        )
         machine.execute()
         self.assertEqual((visits, machine.userdata.x), (['B'], b'5'))
-        self.assertTrue(client.set_initial_state(self.name, '/ROOT/IN', ['Y'],
-                                                 timeout=rospy.Duration(30.0)))
+        self.assertTrue(
+            client.set_initial_state(self.name, '/ROOT/IN', ['Y'], timeout=rospy.Duration(30.0))
+        )
         self.assertEqual(inner.get_initial_states(), ['Y'])
         confirmed = []
         with LogWatch() as log:
-            self.assertTrue(wait_for(lambda: confirmed.append(client.set_initial_state(
-                self.name, '/ROOT', ['NOWHERE'],
-                timeout=rospy.Duration(1.0))) or 'NOWHERE' in log.text()))
+            self.assertTrue(
+                wait_for(
+                    lambda: (
+                        confirmed.append(
+                            client.set_initial_state(
+                                self.name, '/ROOT', ['NOWHERE'], timeout=rospy.Duration(1.0)
+                            )
+                        )
+                        or 'NOWHERE' in log.text()
+                    )
+                )
+            )
         self.assertFalse(any(confirmed))
-        self.assertFalse(client.set_initial_state(self.name, '/ELSEWHERE', ['A'],
-                                                  timeout=rospy.Duration(0.3)))
+        self.assertFalse(
+            client.set_initial_state(self.name, '/ELSEWHERE', ['A'], timeout=rospy.Duration(0.3))
+        )
 
     def test_running_machine_goes_there_at_its_next_transition(self):
         gate, visits = threading.Semaphore(0), []
@@ -253,9 +284,11 @@ class IntrospectionTest(unittest.TestCase):
         self.serve(machine)
         run = InBackground(machine)
         self.assertTrue(wait_for(lambda: visits == ['A']))
-        self.assertTrue(IntrospectionClient().set_initial_state(self.name, '/ROOT', ['B'],
-                                                                userdata(y=1),
-                                                                rospy.Duration(30.0)))
+        self.assertTrue(
+            IntrospectionClient().set_initial_state(
+                self.name, '/ROOT', ['B'], userdata(y=1), rospy.Duration(30.0)
+            )
+        )
         gate.release(5)
         self.assertEqual(run.outcome(), 'done')
         self.assertEqual((visits, machine.userdata.y), (['A', 'B'], 1))
@@ -272,14 +305,18 @@ class IntrospectionTest(unittest.TestCase):
         self.assertEqual(machine.get_initial_states(), ['A'])
 
     def test_command_line_tools_show_the_messages(self):
-        self.assertIn('string local_data', subprocess.check_output(
-            ['rosmsg', 'show', 'smach_msgs/SmachContainerStatus']).decode())
+        self.assertIn(
+            'string local_data',
+            subprocess.check_output(['rosmsg', 'show', 'smach_msgs/SmachContainerStatus']).decode(),
+        )
         self.serve(machine_with_inner()[0])
         self.assertIn(
             'path: "/ROOT',
             subprocess.check_output(
-                ['rostopic', 'echo', '-n', '1',
-                 '/%s/smach/container_structure' % self.name], timeout=20).decode())
+                ['rostopic', 'echo', '-n', '1', '/%s/smach/container_structure' % self.name],
+                timeout=20,
+            ).decode(),
+        )
 
     def test_machine_with_a_server_can_still_be_pickled(self):
         machine = smach.StateMachine(outcomes=['next'])

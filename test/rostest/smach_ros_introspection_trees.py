@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Our introspection server over large and broken trees, through starts and stops, beside others."""
+
 import threading
 import time
 import unittest
@@ -26,9 +27,11 @@ def steps(count):
     with machine:
         for number in range(count):
             following = 'S{}'.format(number + 1) if number + 1 < count else 'done'
-            smach.StateMachine.add('S{}'.format(number),
-                                   smach.CBState(lambda ud: 'next', outcomes=['next']),
-                                   {'next': following})
+            smach.StateMachine.add(
+                'S{}'.format(number),
+                smach.CBState(lambda ud: 'next', outcomes=['next']),
+                {'next': following},
+            )
     return machine
 
 
@@ -44,9 +47,11 @@ def around(children):
 
 def raising(error):
     """An object that cannot be pickled: that raises this."""
+
     class Raises(object):
         def __reduce__(self):
             raise error
+
     return Raises()
 
 
@@ -71,8 +76,11 @@ class DrawingViewer:
         self._paths = set(), set()
         self._subscribers = [
             rospy.Subscriber(name + topic, kind, self._draw, paths, queue_size=VIEWER_QUEUE)
-            for topic, kind, paths in ((STATUS, SmachContainerStatus, self._paths[0]),
-                                       (STRUCTURE, SmachContainerStructure, self._paths[1]))]
+            for topic, kind, paths in (
+                (STATUS, SmachContainerStatus, self._paths[0]),
+                (STRUCTURE, SmachContainerStructure, self._paths[1]),
+            )
+        ]
 
     def _draw(self, message, paths):
         time.sleep(0.001)  # so long it draws
@@ -111,10 +119,15 @@ class TreesTest(unittest.TestCase):
     def listen(self, name=''):
         name = name or self.name
         subscribers = [
-            rospy.Subscriber(name + STATUS, SmachContainerStatus, self.statuses.append,
-                             queue_size=VIEWER_QUEUE),
-            rospy.Subscriber(name + STRUCTURE, SmachContainerStructure, self.structures.append,
-                             queue_size=VIEWER_QUEUE)
+            rospy.Subscriber(
+                name + STATUS, SmachContainerStatus, self.statuses.append, queue_size=VIEWER_QUEUE
+            ),
+            rospy.Subscriber(
+                name + STRUCTURE,
+                SmachContainerStructure,
+                self.structures.append,
+                queue_size=VIEWER_QUEUE,
+            ),
         ]
         for subscriber in subscribers:
             self.addCleanup(subscriber.unregister)
@@ -127,13 +140,17 @@ class TreesTest(unittest.TestCase):
 
     def told(self, path):
         """What was told of a container, but heartbeats."""
-        return [status.info for status in list(self.statuses)
-                if status.path == path and status.info != 'HEARTBEAT']
+        return [
+            status.info
+            for status in list(self.statuses)
+            if status.path == path and status.info != 'HEARTBEAT'
+        ]
 
     def test_a_viewer_that_draws_each_message_sees_all_of_a_large_tree(self):
-        groups = {'GROUP{}'.format(number): around({'IN{}'.format(each): steps(3)
-                                                    for each in range(19)})
-                  for number in range(20)}
+        groups = {
+            'GROUP{}'.format(number): around({'IN{}'.format(each): steps(3) for each in range(19)})
+            for number in range(20)
+        }
         self.serve(around(groups))
         drawn = DrawingViewer(self.name)
         self.addCleanup(drawn.leave)
@@ -153,17 +170,26 @@ class TreesTest(unittest.TestCase):
             self.listen()
             for _ in range(2):  # at the start, and with the heartbeat
                 del self.structures[:]
-                self.assertTrue(wait_for(lambda: {
-                    '/ROOT', '/ROOT/MUTE/X', '/ROOT/ODD', '/ROOT/FINE'} <= {
-                        each.path for each in self.structures}))
+                self.assertTrue(
+                    wait_for(
+                        lambda: (
+                            {'/ROOT', '/ROOT/MUTE/X', '/ROOT/ODD', '/ROOT/FINE'}
+                            <= {each.path for each in self.structures}
+                        )
+                    )
+                )
         self.assertIn('/ROOT/MUTE', [each.path for each in self.statuses], 'its status is fine')
         self.assertEqual(log.text().count("cannot show '/ROOT/MUTE'"), 1)
 
     def test_nothing_in_userdata_silences_the_status(self):
         machine = steps(2)
         machine.userdata.count = 3
-        for key, error in (('exits', SystemExit(1)), ('ends', GeneratorExit()),
-                           ('textless', SilentError()), ('fails', ValueError('no'))):
+        for key, error in (
+            ('exits', SystemExit(1)),
+            ('ends', GeneratorExit()),
+            ('textless', SilentError()),
+            ('fails', ValueError('no')),
+        ):
             machine.userdata[key] = raising(error)
         with LogWatch() as log:
             self.serve(machine)
@@ -196,8 +222,13 @@ class TreesTest(unittest.TestCase):
             self.assertEqual([list(getattr(machine, name)) for name in CALLBACKS], callbacks)
         self.assertEqual(len(own), 4)
         self.assertTrue(wait_for(lambda: published() == topics), published() - topics)
-        self.assertTrue(wait_for(lambda: not {
-            each for each in set(threading.enumerate()) - threads if each.is_alive()}))
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    not {each for each in set(threading.enumerate()) - threads if each.is_alive()}
+                )
+            )
+        )
 
     def test_the_end_is_told_where_the_server_is_stopped_right_after(self):
         for attempt in range(5):
@@ -206,8 +237,9 @@ class TreesTest(unittest.TestCase):
             self.listen(self.name + str(attempt))
             machine.execute()
             server.stop()
-            self.assertTrue(wait_for(lambda: 'TERMINATION done' in self.told('/ROOT'), 10.0),
-                            self.told('/ROOT'))
+            self.assertTrue(
+                wait_for(lambda: 'TERMINATION done' in self.told('/ROOT'), 10.0), self.told('/ROOT')
+            )
             self.leave()
 
     def test_two_servers_on_one_machine_both_tell_and_one_may_go(self):
@@ -235,6 +267,7 @@ class TreesTest(unittest.TestCase):
             entered.set()
             go_on.wait(40.0)
             return 'next'
+
         machine = smach.StateMachine(outcomes=['done'])
         with machine:
             smach.StateMachine.add('A', smach.CBState(wait, outcomes=['next']), {'next': 'B'})
@@ -244,8 +277,9 @@ class TreesTest(unittest.TestCase):
         self.assertTrue(entered.wait(40.0))
         self.serve(machine)
         self.listen()
-        self.assertTrue(wait_for(lambda: any(
-            list(each.active_states) == ['A'] for each in self.statuses)))
+        self.assertTrue(
+            wait_for(lambda: any(list(each.active_states) == ['A'] for each in self.statuses))
+        )
         go_on.set()
         run.join(40.0)
         self.assertTrue(wait_for(lambda: self.told('/ROOT') == ['TRANSITION', 'TERMINATION done']))
@@ -256,12 +290,15 @@ class TreesTest(unittest.TestCase):
         self.serve(machine)
         self.listen()
         with machine:
-            smach.StateMachine.add('LATE', smach.CBState(lambda ud: 'next', outcomes=['next']),
-                                   {'next': 'S0'})
+            smach.StateMachine.add(
+                'LATE', smach.CBState(lambda ud: 'next', outcomes=['next']), {'next': 'S0'}
+            )
         self.assertTrue(wait_for(lambda: 'LATE' in self.structures[-1].children))
         latest = self.structures[-1]
-        self.assertIn(('next', 'LATE', 'S0'), zip(latest.internal_outcomes, latest.outcomes_from,
-                                                  latest.outcomes_to))
+        self.assertIn(
+            ('next', 'LATE', 'S0'),
+            zip(latest.internal_outcomes, latest.outcomes_from, latest.outcomes_to),
+        )
 
     def test_topics_are_remapped_as_any(self):
         self.serve(steps(1), 'remapped')

@@ -2,6 +2,7 @@
 """Executes a MonitorState, and an action state, that begin while the master (a child process) is
 away, until Ctrl-C.
 """
+
 import os
 import signal
 import sys
@@ -21,8 +22,12 @@ if __name__ == '__main__':
     action = SimpleActionState('absent', TestAction)
     aside = threading.Thread(target=action.execute, args=(smach.UserData(),), daemon=True)
     aside.start()
-    Once(lambda: waits(aside) and waits(threading.main_thread()),
-         lambda: print('waiting', flush=True))
-    print('ended:',
-          MonitorState('numbers', Int32, lambda ud, message: True).execute(smach.UserData()),
-          flush=True)
+    Once(
+        lambda: waits(aside) and waits(threading.main_thread()),
+        lambda: print('waiting', flush=True),
+    )
+    print(
+        'ended:',
+        MonitorState('numbers', Int32, lambda ud, message: True).execute(smach.UserData()),
+        flush=True,
+    )

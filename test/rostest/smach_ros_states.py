@@ -2,6 +2,7 @@
 """ServiceState, MonitorState and ConditionState against real services and topics; the Ctrl-C
 handler.
 """
+
 import os
 import subprocess
 import sys
@@ -43,8 +44,13 @@ class ServiceStateTest(unittest.TestCase):
 
     def test_answer_goes_to_userdata(self):
         data = userdata(data=True)
-        state = ServiceState('switch', SetBool, request_slots=['data'], response_key='whole',
-                             response_slots=['message'])
+        state = ServiceState(
+            'switch',
+            SetBool,
+            request_slots=['data'],
+            response_key='whole',
+            response_slots=['message'],
+        )
         self.assertEqual(state.execute(data), 'succeeded')
         self.assertEqual((data.message, data.whole.success), ('done', True))
 
@@ -60,8 +66,14 @@ class ServiceStateTest(unittest.TestCase):
             return 'well'
 
         data = userdata(wish=True, whole=SetBoolRequest(False))
-        state = ServiceState('switch', SetBool, request_key='whole', request_cb=ask,
-                             request_cb_args=[False], response_cb=hear)
+        state = ServiceState(
+            'switch',
+            SetBool,
+            request_key='whole',
+            request_cb=ask,
+            request_cb_args=[False],
+            response_cb=hear,
+        )
         self.assertEqual(state.execute(data), 'well')
         self.assertEqual(data.said, 'done')
         self.assertFalse(data.whole.data)
@@ -72,8 +84,14 @@ class ServiceStateTest(unittest.TestCase):
             ud.message = 'from the callback'
 
         data = userdata()
-        state = ServiceState('switch', SetBool, SetBoolRequest(True), response_cb=hear,
-                             response_slots=['message'], output_keys=['message'])
+        state = ServiceState(
+            'switch',
+            SetBool,
+            SetBoolRequest(True),
+            response_cb=hear,
+            response_slots=['message'],
+            output_keys=['message'],
+        )
         self.assertEqual(state.execute(data), 'succeeded')
         self.assertEqual(data.message, 'done')
 
@@ -93,15 +111,16 @@ class ServiceStateTest(unittest.TestCase):
     @improvement
     def test_what_goes_wrong_aborts_and_is_logged(self):
         request = SetBoolRequest(True)
-        for state, words in ((ServiceState('switch', SetBool, SetBoolRequest(False)), 'will not'),
-                             (ServiceState('switch', SetBool, request,
-                                           request_cb=lambda *_: 1 / 0), 'ZeroDivision'),
-                             (ServiceState('switch', SetBool, request,
-                                           response_cb=lambda *_: 1 / 0), 'ZeroDivision'),
-                             (ServiceState('switch', SetBool, request,
-                                           response_cb=lambda *_: 'odd'),
-                              "'odd'"), (ServiceState('switch', SetBool,
-                                                      request_slots=['data']), 'data')):
+        for state, words in (
+            (ServiceState('switch', SetBool, SetBoolRequest(False)), 'will not'),
+            (ServiceState('switch', SetBool, request, request_cb=lambda *_: 1 / 0), 'ZeroDivision'),
+            (
+                ServiceState('switch', SetBool, request, response_cb=lambda *_: 1 / 0),
+                'ZeroDivision',
+            ),
+            (ServiceState('switch', SetBool, request, response_cb=lambda *_: 'odd'), "'odd'"),
+            (ServiceState('switch', SetBool, request_slots=['data']), 'data'),
+        ):
             with LogWatch() as log:
                 self.assertEqual(state.execute(userdata()), 'aborted')
             self.assertIn(words, log.text())
@@ -138,8 +157,13 @@ class ServiceStateTest(unittest.TestCase):
 
         rospy.Service('until_preempted', SetBool, until_preempted)
         data = userdata()
-        state = ServiceState('until_preempted', SetBool, SetBoolRequest(True),
-                             response_slots=['message'], preempt_timeout=30.0)
+        state = ServiceState(
+            'until_preempted',
+            SetBool,
+            SetBoolRequest(True),
+            response_slots=['message'],
+            preempt_timeout=30.0,
+        )
         run = InBackground(state, data)
         self.assertTrue(called.wait(30))
         state.request_preempt()
@@ -166,8 +190,9 @@ class MonitorStateTest(unittest.TestCase):
     @improvement
     def test_first_false_message_is_invalid(self):
         seen = []
-        state = MonitorState(self.topic, Int32,
-                             lambda ud, message: seen.append(message.data) or message.data > 0)
+        state = MonitorState(
+            self.topic, Int32, lambda ud, message: seen.append(message.data) or message.data > 0
+        )
         for _ in range(2):
             del seen[:]
             self.assertEqual(self.watch(state, userdata(), [1, 2, 0, 3]).outcome(), 'invalid')
@@ -222,8 +247,11 @@ class MonitorStateTest(unittest.TestCase):
 class ConditionStateTest(unittest.TestCase):
     def count(self, true_at, **arguments):
         calls = []
-        state = ConditionState(lambda ud: calls.append(1) or len(calls) == true_at,
-                               poll_rate=rospy.Duration(0.01), **arguments)
+        state = ConditionState(
+            lambda ud: calls.append(1) or len(calls) == true_at,
+            poll_rate=rospy.Duration(0.01),
+            **arguments,
+        )
         return state.execute(userdata()), len(calls)
 
     def test_true_at_once_or_within_its_checks(self):
@@ -256,8 +284,9 @@ class ConditionStateTest(unittest.TestCase):
     @improvement
     def test_preempt_ends_a_long_pause(self):
         looked = threading.Event()
-        state = ConditionState(lambda ud: looked.set(), poll_rate=rospy.Duration(60.0),
-                               max_checks=-1)
+        state = ConditionState(
+            lambda ud: looked.set(), poll_rate=rospy.Duration(60.0), max_checks=-1
+        )
         run = InBackground(state, userdata())
         self.assertTrue(looked.wait(30) and run.waits())
         state.request_preempt()
@@ -271,9 +300,10 @@ class ConditionStateTest(unittest.TestCase):
 class CtrlCTest(unittest.TestCase):
     def press(self, where, handler):
         script = subprocess.Popen(
-            [sys.executable,
-             os.path.join(HERE, 'smach_ros_interrupted_script.py'), where, handler],
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+            [sys.executable, os.path.join(HERE, 'smach_ros_interrupted_script.py'), where, handler],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
         said = b''
         while b'waiting' not in said:
             line = script.stdout.readline()
@@ -308,14 +338,16 @@ class NoMasterTest(unittest.TestCase):
     def test_ctrl_c_ends_states_that_began_while_the_master_was_away(self):
         port = free_port()
         master = subprocess.Popen(
-            ['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL)
+            ['rosmaster', '--core', '-p', str(port)], stdout=subprocess.DEVNULL
+        )
         self.addCleanup(master.kill)
         uri = 'http://localhost:%d' % port
         self.assertTrue(wait_for(lambda: rosgraph.is_master_online(uri)))
         script = subprocess.Popen(
-            [sys.executable,
-             os.path.join(HERE, 'smach_ros_masterless_script.py'),
-             str(master.pid)], stdout=subprocess.PIPE, env=dict(os.environ, ROS_MASTER_URI=uri))
+            [sys.executable, os.path.join(HERE, 'smach_ros_masterless_script.py'), str(master.pid)],
+            stdout=subprocess.PIPE,
+            env=dict(os.environ, ROS_MASTER_URI=uri),
+        )
         self.addCleanup(script.kill)
         self.assertEqual(script.stdout.readline(), b'waiting\n')
         begin = time.monotonic()

@@ -1,4 +1,5 @@
 """What the smach_ros tests share: server processes, userdata, machines that run beside the test."""
+
 import os
 import signal
 import subprocess
@@ -27,9 +28,14 @@ class ActionNodeProcess(object):
         self.process = None
 
     def start(self):
-        command = [sys.executable, '-X', 'faulthandler',
-                   os.path.join(HERE, 'smach_ros_action_node.py'), self.action_name,
-                   '__name:=serves_' + self.action_name]
+        command = [
+            sys.executable,
+            '-X',
+            'faulthandler',
+            os.path.join(HERE, 'smach_ros_action_node.py'),
+            self.action_name,
+            '__name:=serves_' + self.action_name,
+        ]
         self.process = subprocess.Popen(command)
         return self
 
@@ -67,8 +73,9 @@ class InBackground(object):
 
     def __init__(self, state, *args):
         self._outcome = []
-        self._thread = threading.Thread(target=lambda: self._outcome.append(state.execute(*args)),
-                                        daemon=True)
+        self._thread = threading.Thread(
+            target=lambda: self._outcome.append(state.execute(*args)), daemon=True
+        )
         self.started_at = time.monotonic()
         self._thread.start()
 
@@ -91,8 +98,12 @@ class LogWatch(object):
         self.lines = []
         self._loggers = (smach.loginfo, smach.logwarn, smach.logdebug, smach.logerr)
         info, warn, debug, error = self._loggers
-        smach.set_loggers(info, lambda text: (self.lines.append(str(text)), warn(text)), debug,
-                          lambda text: (self.lines.append(str(text)), error(text)))
+        smach.set_loggers(
+            info,
+            lambda text: (self.lines.append(str(text)), warn(text)),
+            debug,
+            lambda text: (self.lines.append(str(text)), error(text)),
+        )
         return self
 
     def __exit__(self, *exc_info):

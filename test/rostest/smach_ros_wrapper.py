@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """ActionServerWrapper as its action clients see it."""
+
 import threading
 import unittest
 
@@ -15,8 +16,14 @@ import smach
 from smach_ros import ActionServerWrapper
 
 KEYS = [
-    'action_goal', 'action_feedback', 'action_result', 'goal', 'result', 'order', 'answer',
-    'progress'
+    'action_goal',
+    'action_feedback',
+    'action_result',
+    'goal',
+    'result',
+    'order',
+    'answer',
+    'progress',
 ]
 OUTCOMES = ['good', 'bad', 'stopped', 'odd']
 
@@ -47,8 +54,9 @@ class WrapperTest(unittest.TestCase):
                 follower = 'S%d' % (i + 1) if i + 1 < len(works) else 'good'
                 smach.StateMachine.add('S%d' % i, Work(work), {'next': follower})
         self.name = self._testMethodName[5:]
-        self.wrapper = ActionServerWrapper(self.name, TestAction, machine, ['good'], ['bad'],
-                                           ['stopped'], **arguments)
+        self.wrapper = ActionServerWrapper(
+            self.name, TestAction, machine, ['good'], ['bad'], ['stopped'], **arguments
+        )
         self.wrapper.run_server()
         self.client = actionlib.SimpleActionClient(self.name, TestAction)
         self.assertTrue(self.client.wait_for_server(rospy.Duration(30)))
@@ -61,8 +69,9 @@ class WrapperTest(unittest.TestCase):
 
     def ask(self, number, wait_s=30.0):
         self.feedback = []
-        self.client.send_goal(TestGoal(number),
-                              feedback_cb=lambda message: self.feedback.append(message.feedback))
+        self.client.send_goal(
+            TestGoal(number), feedback_cb=lambda message: self.feedback.append(message.feedback)
+        )
         self.assertTrue(not wait_s or self.client.wait_for_result(rospy.Duration(wait_s)))
         return self.client.get_state()
 
@@ -91,9 +100,13 @@ class WrapperTest(unittest.TestCase):
             ud.answer = ud.order * 2
             return 'good'
 
-        self.serve(start, end, goal_slots_map={'goal': 'order'},
-                   feedback_slots_map={'feedback': 'progress'},
-                   result_slots_map={'result': 'answer'})
+        self.serve(
+            start,
+            end,
+            goal_slots_map={'goal': 'order'},
+            feedback_slots_map={'feedback': 'progress'},
+            result_slots_map={'result': 'answer'},
+        )
         self.assertEqual(self.ask(21), GoalStatus.SUCCEEDED)
         self.assertEqual((self.client.get_result().result, self.feedback), (42, [30]))
 
@@ -113,7 +126,8 @@ class WrapperTest(unittest.TestCase):
             ends = [self.ask(i) for i in range(4)]
         self.assertEqual(
             ends,
-            [GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED, GoalStatus.ABORTED])
+            [GoalStatus.SUCCEEDED, GoalStatus.ABORTED, GoalStatus.PREEMPTED, GoalStatus.ABORTED],
+        )
         self.assertIn("outcome 'odd'", log.text())
 
     @improvement
@@ -138,8 +152,9 @@ class WrapperTest(unittest.TestCase):
             self.assertEqual(self.client.get_state(), GoalStatus.PREEMPTED)
 
     def test_newer_goal_preempts_the_one_under_way(self):
-        self.serve(lambda state, ud: until_preempted(state, ud)
-                   if ud.action_goal.goal == 1 else 'good')
+        self.serve(
+            lambda state, ud: until_preempted(state, ud) if ud.action_goal.goal == 1 else 'good'
+        )
         self.begin(1)
         other = actionlib.SimpleActionClient(self.name, TestAction)
         self.assertTrue(other.wait_for_server(rospy.Duration(30)))
@@ -159,8 +174,9 @@ class WrapperTest(unittest.TestCase):
         def check(state, ud):
             return 'stopped' if state.preempt_requested() else 'good'
 
-        machine = self.serve(lambda state, ud: (stubborn
-                                                if ud.action_goal.goal == 1 else check)(state, ud))
+        machine = self.serve(
+            lambda state, ud: (stubborn if ud.action_goal.goal == 1 else check)(state, ud)
+        )
         self.begin(1)
         self.client.cancel_goal()
         self.assertTrue(wait_for(machine['S0'].preempt_requested))
@@ -173,8 +189,9 @@ class WrapperTest(unittest.TestCase):
     def test_mistakes_are_logged_when_the_wrapper_is_made(self):
         machine = smach.StateMachine(outcomes=['good'])
         with LogWatch() as log:
-            ActionServerWrapper('mistaken', TestAction, machine, ['good'], ['good'],
-                                goal_slots_map={'gaol': 'x'})
+            ActionServerWrapper(
+                'mistaken', TestAction, machine, ['good'], ['good'], goal_slots_map={'gaol': 'x'}
+            )
         self.assertIn('more than one', log.text())
         self.assertIn('gaol', log.text())
 

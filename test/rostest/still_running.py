@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Action states that never end after a recovery: a person is asked while they run."""
+
 import json
 import signal
 import sys
@@ -18,7 +19,7 @@ from smach_oracle.expert.terminal.options import choose, options
 from smach_oracle.msg import ExpertQueryGoal, OracleEvent, PointHeadAction
 from smach_oracle.srv import AnswerQueryRequest
 
-PRELUDE = '''
+PRELUDE = """
 import sys, rospy, smach, smach_ros
 from smach_oracle.msg import PointHeadAction, PointHeadGoal
 rospy.init_node('task')
@@ -31,12 +32,17 @@ def machine(label, state):
     with sm:
         smach.StateMachine.add(label, state, {'succeeded': 'succeeded'})
     return sm
-'''
-ONE_ACTION = PRELUDE + '''
+"""
+ONE_ACTION = (
+    PRELUDE
+    + """
 sm = machine('LOOK', look('look'))
 print('OUTCOME', sm.execute(), flush=True)
-'''
-TWO_ACTIONS = PRELUDE + '''
+"""
+)
+TWO_ACTIONS = (
+    PRELUDE
+    + """
 both = smach.Concurrence(outcomes=['succeeded', 'aborted'], default_outcome='aborted',
                          outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
 with both:
@@ -44,9 +50,12 @@ with both:
     smach.Concurrence.add('RIGHT', machine('LOOK_RIGHT', look('look_right')))
 sm = machine('BOTH', both)
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
+)
 # rospy cannot serialise the first goal
-POISONED = PRELUDE + '''
+POISONED = (
+    PRELUDE
+    + """
 goals = []
 def goal_cb(userdata, goal):
     goals.append(PointHeadGoal())
@@ -55,7 +64,8 @@ def goal_cb(userdata, goal):
     return goals[-1]
 sm = machine('LOOK', look('look', goal_cb=goal_cb))
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
+)
 
 
 class HangingServer:
@@ -63,8 +73,9 @@ class HangingServer:
 
     def __init__(self, name: str) -> None:
         self.begin()
-        self._server = actionlib.SimpleActionServer(name, PointHeadAction, self._execute,
-                                                    auto_start=False)
+        self._server = actionlib.SimpleActionServer(
+            name, PointHeadAction, self._execute, auto_start=False
+        )
         self._server.start()
 
     def begin(self) -> None:
@@ -77,8 +88,9 @@ class HangingServer:
         if self.goals == 1:
             self._server.set_aborted()
             return
-        while not (self.go.wait(0.02) or self._server.is_preempt_requested()
-                   or rospy.is_shutdown()):
+        while not (
+            self.go.wait(0.02) or self._server.is_preempt_requested() or rospy.is_shutdown()
+        ):
             pass
         if self.go.is_set():
             self._server.set_succeeded()
@@ -110,8 +122,11 @@ class StillRunningTest(unittest.TestCase):
         question = self.expert.question(state=state, other_than=other_than)
         self.assertIsNotNone(question, task.output())
         self.assertEqual(question.query.failure_kind, ExpertQueryGoal.STILL_RUNNING)
-        self.assertRegex(question.query.text, state + r' still runs after .* s; its longest so far '
-                         r'was .* s\. It has no time limit, so it is not abandoned\.')
+        self.assertRegex(
+            question.query.text,
+            state + r' still runs after .* s; its longest so far '
+            r'was .* s\. It has no time limit, so it is not abandoned\.',
+        )
         return question
 
     def answer(self, question: Any, typed: str) -> None:
@@ -124,7 +139,7 @@ class StillRunningTest(unittest.TestCase):
         """It succeeds, with its first failure alone; the events of its bag."""
         self.assertTrue(task.says('OUTCOME succeeded', 40.0), task.output())
         self.assertEqual(task.wait(), 0, task.output())
-        events, = recorded_events(self.bags)
+        (events,) = recorded_events(self.bags)
         return events
 
     def test_a_person_waits_on_and_then_does_it_himself(self) -> None:
@@ -134,12 +149,20 @@ class StillRunningTest(unittest.TestCase):
         second = self.question(task, other_than=first.query.query_id)
         self.answer(second, 'supersede succeeded')
         events = self.ends(task)
-        told = [(event.kind, event.query_id) for event in events
-                if OracleEvent.QUERY_OPENED <= event.kind <= OracleEvent.QUERY_CANCELLED]
-        self.assertEqual(told, [(kind, question.query.query_id) for question in (first, second)
-                                for kind in (OracleEvent.QUERY_OPENED,
-                                             OracleEvent.QUERY_ANSWERED)])
-        trial, = load_trials([self.bags]).trials
+        told = [
+            (event.kind, event.query_id)
+            for event in events
+            if OracleEvent.QUERY_OPENED <= event.kind <= OracleEvent.QUERY_CANCELLED
+        ]
+        self.assertEqual(
+            told,
+            [
+                (kind, question.query.query_id)
+                for question in (first, second)
+                for kind in (OracleEvent.QUERY_OPENED, OracleEvent.QUERY_ANSWERED)
+            ],
+        )
+        (trial,) = load_trials([self.bags]).trials
         self.assertEqual(trial.failures_by_state, (('task/LOOK', 1),))
         self.assertEqual((trial.outcome, trial.questions, trial.recoveries), ('succeeded', 2, 1))
 
@@ -148,9 +171,15 @@ class StillRunningTest(unittest.TestCase):
         question = self.question(task)
         self.servers[0].go.set()
         events = self.ends(task)
-        self.assertEqual([event.text for event in events if event.query_id
-                          == question.query.query_id and event.kind
-                          == OracleEvent.QUERY_CANCELLED], ['LOOK has ended'])
+        self.assertEqual(
+            [
+                event.text
+                for event in events
+                if event.query_id == question.query.query_id
+                and event.kind == OracleEvent.QUERY_CANCELLED
+            ],
+            ['LOOK has ended'],
+        )
 
     def test_two_states_at_once_have_a_question_each(self) -> None:
         task = self.start(TWO_ACTIONS)
@@ -165,26 +194,33 @@ class StillRunningTest(unittest.TestCase):
         question = self.question(task)
         task.signal(signal.SIGINT)
         task.wait()
-        events, = recorded_events(self.bags)
-        self.assertIn((OracleEvent.QUERY_CANCELLED, question.query.query_id),
-                      [(event.kind, event.query_id) for event in events])
+        (events,) = recorded_events(self.bags)
+        self.assertIn(
+            (OracleEvent.QUERY_CANCELLED, question.query.query_id),
+            [(event.kind, event.query_id) for event in events],
+        )
 
     def test_a_goal_that_cannot_be_sent_keeps_nobody_for_good(self) -> None:
         """Upstream's state waits for an answer to its next goal, which never left."""
         self.servers[0].goals = 1
         self.servers[0].go.set()
         task = self.start(POISONED)
-        self.assertTrue(wait_for(lambda: 'OUTCOME' in task.output() or self.expert.question(
-            limit_s=0.0)), task.output())
+        self.assertTrue(
+            wait_for(lambda: 'OUTCOME' in task.output() or self.expert.question(limit_s=0.0)),
+            task.output(),
+        )
         question = self.expert.question(limit_s=0.0)
         if question is not None:
             self.answer(self.question(task), 'supersede succeeded')
         events = self.ends(task)
-        self.assertEqual([event.failure_kind for event in events
-                          if event.kind == OracleEvent.FAILURE], [OracleEvent.EXCEPTION])
+        self.assertEqual(
+            [event.failure_kind for event in events if event.kind == OracleEvent.FAILURE],
+            [OracleEvent.EXCEPTION],
+        )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('still_running')
     rostest.rosrun('smach_oracle', 'still_running', StillRunningTest, sys.argv)

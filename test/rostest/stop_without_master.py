@@ -2,6 +2,7 @@
 """A stop reaches the robot while the ROS master is dead, hangs or is another one: from the console
 and from the terminal. A master and nodes of its own. No browser.
 """
+
 import json
 import os
 import socket
@@ -37,21 +38,31 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 class StopWithoutMaster(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.master_port, cls.port = free_port(), free_port()
         os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(cls.master_port)
         cls.master = start_master(cls.master_port)
-        cls.console = Process.installed('expert_console', '_port:={}'.format(cls.port),
-                                        '__name:=expert_console')
-        cls.robot = Process(sys.executable, os.path.join(HERE, 'console_robot.py'), 'PICK', '0.1',
-                            '0', '9', '__name:=alpha')
+        cls.console = Process.installed(
+            'expert_console', '_port:={}'.format(cls.port), '__name:=expert_console'
+        )
+        cls.robot = Process(
+            sys.executable,
+            os.path.join(HERE, 'console_robot.py'),
+            'PICK',
+            '0.1',
+            '0',
+            '9',
+            '__name:=alpha',
+        )
         rospy.init_node('stop_without_master', disable_signals=True)
         start_master_watch()  # as the terminal does
         cls.machines = []
-        rospy.Subscriber(ROBOT + '/oracle/control', ControlStatus,
-                         lambda message: setattr(cls, 'machines', message.machines))
+        rospy.Subscriber(
+            ROBOT + '/oracle/control',
+            ControlStatus,
+            lambda message: setattr(cls, 'machines', message.machines),
+        )
         cls.stop_calls = StopCalls()
         cls.terminal = OperatorCommands('ann', stop_calls=cls.stop_calls)
         repeat(cls.terminal.look_up, 0.5)
@@ -82,18 +93,27 @@ class StopWithoutMaster(unittest.TestCase):
         with urllib.request.urlopen(page + 'session', timeout=20) as reply:
             session = json.loads(reply.read().decode())
             cookie = reply.headers['Set-Cookie'].split(';')[0]
-        page_socket = await tornado.websocket.websocket_connect(tornado.httpclient.HTTPRequest(
-            page.replace('http', 'ws', 1) + 'socket',
-            headers={'Origin': page.rstrip('/'), 'Cookie': cookie}))
+        page_socket = await tornado.websocket.websocket_connect(
+            tornado.httpclient.HTTPRequest(
+                page.replace('http', 'ws', 1) + 'socket',
+                headers={'Origin': page.rstrip('/'), 'Cookie': cookie},
+            )
+        )
         beat, message = None, {}
-        await page_socket.write_message(json.dumps(
-            {'do': 'hello', 'xsrf': session['xsrf'], 'expert': 'bob', 'id': 1}))
+        await page_socket.write_message(
+            json.dumps({'do': 'hello', 'xsrf': session['xsrf'], 'expert': 'bob', 'id': 1})
+        )
         while beat is None:
             message = json.loads(await page_socket.read_message())
             beat = message.get('sections', {}).get('heard', {}).get('beat')
-        await page_socket.write_message(json.dumps(dict(
-            {'do': command, 'robot': ROBOT, 'path': MACHINE, 'id': 2},
-            **({'seen': beat} if command == 'resume_machine' else {}))))
+        await page_socket.write_message(
+            json.dumps(
+                dict(
+                    {'do': command, 'robot': ROBOT, 'path': MACHINE, 'id': 2},
+                    **({'seen': beat} if command == 'resume_machine' else {}),
+                )
+            )
+        )
         while message.get('re') != 2:
             message = json.loads(await page_socket.read_message())
         page_socket.close()
@@ -106,12 +126,12 @@ class StopWithoutMaster(unittest.TestCase):
         self.assertIn(MACHINE + ' is paused', reply['message'])
         self.assertTrue(wait_for(lambda: self.machines[0].paused_by == 'bob'), 'the robot says so')
         asked_s = time.monotonic()
-        (text, style), = self.terminal.carry_out('preempt')
+        ((text, style),) = self.terminal.carry_out('preempt')
         self.assertEqual(style, 'green', text)
         self.assertIn(MACHINE + ' is asked to stop', text)
         self.assertLess(time.monotonic() - asked_s, PROMPT_S)
         self.assertTrue(wait_for(lambda: not self.machines[0].paused), 'a preempt ends the pause')
-        (text, style), = self.terminal.carry_out('pause ' + ROBOT)
+        ((text, style),) = self.terminal.carry_out('pause ' + ROBOT)
         self.assertEqual(style, 'green', text)
         self.assertTrue(wait_for(lambda: self.machines[0].paused_by == 'ann'))
 
@@ -120,9 +140,12 @@ class StopWithoutMaster(unittest.TestCase):
         try:
             self.assertTrue(stays(lambda: self.machines, NOTICED_S))
             self.check_that_both_stop_it()
-            (text, style), = self.terminal.carry_out('resume')
-            self.assertEqual((style, text.startswith('resume: the master does not answer')),
-                             ('red', True), 'what lets go is refused')
+            ((text, style),) = self.terminal.carry_out('resume')
+            self.assertEqual(
+                (style, text.startswith('resume: the master does not answer')),
+                ('red', True),
+                'what lets go is refused',
+            )
         finally:
             type(self).master = start_master(self.master_port)
         # the robot may not be known there yet

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Goals of a killed program: their action server refuses to cancel them, or is gone."""
+
 import rospy
 import rostest
 from actionlib.msg import TestActionGoal

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A script under oracle_run is killed with SIGKILL, and run again: it goes on where it stood."""
+
 import os
 import signal
 
@@ -24,8 +25,10 @@ class KilledTest(SurvivingCase):
         self.assertEqual(again.wait(), 0, again.output())
         self.assertTrue(wait_for(lambda: len(traffic.results) == 2), traffic.results)
         first, second = traffic.results
-        self.assertEqual((first.status.status, second.status.status),
-                         (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED))
+        self.assertEqual(
+            (first.status.status, second.status.status),
+            (GoalStatus.PREEMPTED, GoalStatus.SUCCEEDED),
+        )
         self.assertGreater(second.status.goal_id.stamp, first.header.stamp)
         self.assertNotIn('LOOKS', again.output())
         self.assertIn('SEEN 1.5 [[0, 1, 2], [3, 4, 5]]', again.output())
@@ -43,16 +46,22 @@ class KilledTest(SurvivingCase):
         self.assertTrue(wait_for(log.connected))
         found = expert.question(30.0, 'TELL')
         self.assertEqual(found.query.query_id, entry.query.query_id)
-        reply = expert.answer(AnswerQueryRequest(
-            query_id=entry.query.query_id,
-            decision=ExpertDecision(kind=ExpertDecision.GOTO, state='TELL', by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                query_id=entry.query.query_id,
+                decision=ExpertDecision(kind=ExpertDecision.GOTO, state='TELL', by='Ann'),
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(again.says('OUTCOME succeeded', 30.0), again.output())
         self.assertEqual(len(log.wait_for(OracleEvent.QUERY_ANSWERED)), 1)
         self.assertEqual(again.output().count('SEEN'), 1)
-        later = expert.answer(AnswerQueryRequest(
-            query_id=entry.query.query_id,
-            decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Bob')))
+        later = expert.answer(
+            AnswerQueryRequest(
+                query_id=entry.query.query_id,
+                decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Bob'),
+            )
+        )
         self.assertFalse(later.ok)
 
     def test_a_signal_while_a_question_is_open_leaves_the_trial_to_go_on(self):
@@ -69,9 +78,12 @@ class KilledTest(SurvivingCase):
             self.assertTrue(task.says('goes on', 40.0), task.output())
             ids.append(expert.question(40.0, 'TELL').query.query_id)
         self.assertEqual(len(set(ids)), 1)
-        reply = expert.answer(AnswerQueryRequest(
-            query_id=ids[0],
-            decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                query_id=ids[0],
+                decision=ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='Ann'),
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(task.says('OUTCOME aborted', 40.0), task.output())
 
@@ -96,8 +108,9 @@ class KilledTest(SurvivingCase):
         self.assertIn('LOOKS', task.output())
 
     def test_the_private_parameter_names_the_store(self):
-        task = oracle_run(self, self.script, str(SUCCEED), 'succeeded',
-                          '_checkpoint:=' + self.store)
+        task = oracle_run(
+            self, self.script, str(SUCCEED), 'succeeded', '_checkpoint:=' + self.store
+        )
         self.assertTrue(task.says('OUTCOME succeeded', 40.0), task.output())
         self.assertTrue(os.path.exists(self.store))
 

@@ -2,6 +2,7 @@
 """A robot goes on while its expert server, itself and everything at once are killed; on a master of
 its own. Many more in benchmarks/killed_nodes.py.
 """
+
 import os
 import sys
 import tempfile
@@ -16,7 +17,6 @@ KILLED = ['server', 'robot', 'all']
 
 
 class KilledNodesTest(unittest.TestCase):
-
     def test_each_round_is_told_and_each_question_is_closed_once(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)

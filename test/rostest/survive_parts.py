@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A killed and resumed program: its bags are one trial, an earlier moment, roslaunch's respawn."""
+
 import glob
 import json
 import os
@@ -23,14 +24,14 @@ from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.srv import AnswerQueryRequest
 from smach_oracle.store.store_file import StoreFile
 
-LAUNCH = '''
+LAUNCH = """
 <launch>
   <node pkg="smach_oracle" type="oracle_run" name="task" respawn="true" output="screen"
         args="--checkpoint {store} {script} {goal} succeeded">
     <param name="expert_query_server" value="{experts}"/>
   </node>
 </launch>
-'''
+"""
 
 
 class PartsTest(SurvivingCase):
@@ -45,14 +46,19 @@ class PartsTest(SurvivingCase):
         self.assertEqual(again.wait(), 0, again.output())
         done = subprocess.run(
             ['rosrun', 'smach_oracle', 'bag_statistics', folder.name, '--json', 'out.json'],
-            cwd=folder.name, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60,
-            universal_newlines=True)
+            cwd=folder.name,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=60,
+            universal_newlines=True,
+        )
         self.assertEqual(done.returncode, 0, done.stdout)
         with open(os.path.join(folder.name, 'out.json')) as stream:
             told = json.load(stream)
-        trial, = told['trials']
-        self.assertEqual((trial['resumed'], trial['lost_events'], trial['ending']),
-                         (1, 0, 'success'))
+        (trial,) = told['trials']
+        self.assertEqual(
+            (trial['resumed'], trial['lost_events'], trial['ending']), (1, 0, 'success')
+        )
         self.assertEqual(len(trial['bags']), 2)
         self.assertTrue(0 < trial['down_s'] < trial['duration_s'])
         self.assertIn('1 trials were resumed after their program was stopped', done.stdout)
@@ -61,8 +67,11 @@ class PartsTest(SurvivingCase):
         task, _ = self.run_until_it_moves()
         self.kill(task)
         store = StoreFile(self.store, read_only=True)
-        moment = next(each.number for each in store.moments(1)
-                      if (each.kind, each.label) == ('STATE_START', 'LOOK'))
+        moment = next(
+            each.number
+            for each in store.moments(1)
+            if (each.kind, each.label) == ('STATE_START', 'LOOK')
+        )
         again = self.run_task('--from', str(moment))
         self.assertTrue(again.says('OUTCOME succeeded', 60.0), again.output())
         self.assertIn('from moment {}'.format(moment), again.output())
@@ -73,8 +82,13 @@ class PartsTest(SurvivingCase):
 
     def test_a_program_that_roslaunch_begins_again_asks_before_it_moves(self):
         expert, traffic = FrontEnd(self, EXPERTS), Traffic(self)
-        launch = script(self, LAUNCH.format(store=self.store, script=self.script,
-                                            goal=Behaviour.HANG, experts=EXPERTS), 'task.launch')
+        launch = script(
+            self,
+            LAUNCH.format(
+                store=self.store, script=self.script, goal=Behaviour.HANG, experts=EXPERTS
+            ),
+            'task.launch',
+        )
         roslaunch = Process(['roslaunch', '--wait', launch])
         self.addCleanup(roslaunch.stop)
         self.addCleanup(end, roslaunch)
@@ -86,9 +100,12 @@ class PartsTest(SurvivingCase):
         self.assertIn('the program was stopped', str(entry.query))
         self.assertEqual(traffic.active, before)
         self.assertEqual(roslaunch.output().count('LOOKS'), 1)
-        reply = expert.answer(AnswerQueryRequest(
-            query_id=entry.query.query_id,
-            decision=ExpertDecision(kind=ExpertDecision.GOTO, state='TELL', by='Ann')))
+        reply = expert.answer(
+            AnswerQueryRequest(
+                query_id=entry.query.query_id,
+                decision=ExpertDecision(kind=ExpertDecision.GOTO, state='TELL', by='Ann'),
+            )
+        )
         self.assertTrue(reply.ok, reply.message)
         self.assertTrue(roslaunch.says('OUTCOME succeeded', 40.0), roslaunch.output())
         self.assertEqual(traffic.active, before)
@@ -102,8 +119,11 @@ def entered(folder):
         found = []
         for path in recover_folder(copies, lambda text: None, lambda text: None):
             with rosbag.Bag(path) as bag:
-                found += [event.state for _, event, _ in bag.read_messages('/task/oracle/events')
-                          if event.kind == OracleEvent.STATE_START]
+                found += [
+                    event.state
+                    for _, event, _ in bag.read_messages('/task/oracle/events')
+                    if event.kind == OracleEvent.STATE_START
+                ]
         return found
 
 

@@ -1,4 +1,5 @@
 """What the rostests of killed programs share: a task, and what its action server says."""
+
 import os
 import signal
 import tempfile
@@ -15,7 +16,7 @@ from waiting import wait_for
 
 from smach_oracle.ros.expert.server import ExpertQueryServer
 
-SCRIPT = '''
+SCRIPT = """
 import sys, numpy, rospy, smach, smach_ros
 from actionlib.msg import TestAction, TestGoal
 from geometry_msgs.msg import PointStamped
@@ -43,7 +44,7 @@ with sm:
         'arm', TestAction, goal=TestGoal(int(sys.argv[1]))), {'succeeded': 'TELL'})
     smach.StateMachine.add('TELL', Tell())
 print('OUTCOME', sm.execute(), flush=True)
-'''
+"""
 SUCCEED = 150  # number of a goal
 EXPERTS = '/experts'
 ASKS = 'max_recoveries: 0\npolicy: prose\n'
@@ -71,8 +72,9 @@ class Traffic:
 
     def _status(self, message):
         self.statuses += 1
-        self.active.update(each.goal_id.id for each in message.status_list
-                           if each.status == GoalStatus.ACTIVE)
+        self.active.update(
+            each.goal_id.id for each in message.status_list if each.status == GoalStatus.ACTIVE
+        )
 
 
 class SurvivingCase(unittest.TestCase):
@@ -99,8 +101,16 @@ class SurvivingCase(unittest.TestCase):
         self.settings = script(self, ASKS, 'oracle.yaml')
 
     def run_task(self, *words, goal=SUCCEED, told='succeeded'):
-        return oracle_run(self, '--checkpoint', self.store, *words, self.script, str(goal), told,
-                          '_expert_query_server:=' + EXPERTS)
+        return oracle_run(
+            self,
+            '--checkpoint',
+            self.store,
+            *words,
+            self.script,
+            str(goal),
+            told,
+            '_expert_query_server:=' + EXPERTS,
+        )
 
     def run_until_it_moves(self, *words, goal=Behaviour.HANG):
         """Return the task once its goal is under way, and what the server says."""
@@ -114,10 +124,13 @@ class SurvivingCase(unittest.TestCase):
     def _where_it_hangs(self, task, traffic):
         """Say of both ends of the action what they do. Both processes end."""
         yield '{} messages of status; the server {}; this node {}'.format(
-            traffic.statuses, 'runs' if self.server.process.poll() is None else 'is gone',
-            'is shut down' if rospy.is_shutdown() else 'runs')
-        for kind, topics in zip(('publishers', 'subscribers'),
-                                rosgraph.Master(rospy.get_name()).getSystemState()):
+            traffic.statuses,
+            'runs' if self.server.process.poll() is None else 'is gone',
+            'is shut down' if rospy.is_shutdown() else 'runs',
+        )
+        for kind, topics in zip(
+            ('publishers', 'subscribers'), rosgraph.Master(rospy.get_name()).getSystemState()
+        ):
             yield '{}: {}'.format(kind, [each for each in topics if each[0].startswith('/arm/')])
         self.server.process.send_signal(signal.SIGABRT)  # its threads go to the log of the test
         yield task.threads()

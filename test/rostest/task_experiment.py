@@ -2,6 +2,7 @@
 """Whole experiments with run_trials, which starts masters of its own: to the end, stopped, killed,
 and gone on with.
 """
+
 import io
 import os
 import signal
@@ -24,11 +25,21 @@ RUN_TRIALS = 'import sys; from smach_oracle.experiment.command import main; sys.
 
 def start(output: Path, trials: int, *options: str) -> 'subprocess.Popen[str]':
     """Run run_trials as from a shell of its own, with the Python that has rosbags."""
-    return subprocess.Popen([
-        sys.executable, '-c', RUN_TRIALS, '--trials',
-        str(trials), '--output',
-        str(output), *options
-    ], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True)
+    return subprocess.Popen(
+        [
+            sys.executable,
+            '-c',
+            RUN_TRIALS,
+            '--trials',
+            str(trials),
+            '--output',
+            str(output),
+            *options,
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        universal_newlines=True,
+    )
 
 
 def processes_of(output: Path) -> List[int]:
@@ -57,15 +68,17 @@ class Experiment(unittest.TestCase):
         return text
 
     def some_trials(self, count: int) -> None:
-        self.assertTrue(wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 240.0),
-                        'no trials')
+        self.assertTrue(
+            wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 240.0), 'no trials'
+        )
 
     def test_killed_in_the_middle_it_goes_on_as_if_nothing_had_happened(self) -> None:
         whole = Path(str(self.output) + ' of another run')
         text = self.finish(start(whole, 2))
         self.assertRegex(text, 'PICK_AND_PLACE  without oracle +2 ')
-        self.assertTrue((whole / 'time_series.png').is_file()
-                        and (whole / 'time_series.svg').is_file())
+        self.assertTrue(
+            (whole / 'time_series.png').is_file() and (whole / 'time_series.svg').is_file()
+        )
         killed = start(self.output, 2)
         self.some_trials(0)
         killed.kill()
@@ -76,20 +89,25 @@ class Experiment(unittest.TestCase):
         self.assertTrue(all(trial.truth is not None for trial in trials))
         # the same seeds: the same states, outcomes and decisions
         with redirect_stdout(io.StringIO()) as told:
-            self.assertEqual(trial_steps.main([str(self.output), str(whole)]), trial_steps.SAME,
-                             told.getvalue())
+            self.assertEqual(
+                trial_steps.main([str(self.output), str(whole)]), trial_steps.SAME, told.getvalue()
+            )
         self.assertIn('4 trials in both', told.getvalue())
         refused = start(self.output, 9)
         self.assertIn('trials: there 2, now 9', refused.communicate(timeout=60)[0])
         self.assertEqual(refused.returncode, 1)
 
     def test_ctrl_c_pressed_twice_stops_everything_even_a_frozen_node_and_keeps_the_bags(
-            self) -> None:
+        self,
+    ) -> None:
         process = start(self.output, 10000, '--variants', 'with')
         try:
             self.some_trials(1)  # the world tells how a trial ended when the next one begins
-            frozen = next(pid for pid in processes_of(self.output)
-                          if b'pr2_world' in Path('/proc/{}/cmdline'.format(pid)).read_bytes())
+            frozen = next(
+                pid
+                for pid in processes_of(self.output)
+                if b'pr2_world' in Path('/proc/{}/cmdline'.format(pid)).read_bytes()
+            )
             os.kill(frozen, signal.SIGSTOP)
             for _ in range(2):
                 process.send_signal(signal.SIGINT)
@@ -106,4 +124,5 @@ class Experiment(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rostest.rosrun('smach_oracle', 'task_experiment', Experiment)

@@ -2,6 +2,7 @@
 """The unmodified pick and place script on the simulated PR2, under oracle_run: what fails is
 recovered, or asked.
 """
+
 import json
 import subprocess
 import tempfile
@@ -21,8 +22,9 @@ TASKS = Path(rospkg.RosPack().get_path('smach_oracle')) / 'src' / 'smach_oracle'
 
 def seed_with(kind: str) -> int:
     """The first seed of which this is the only cause to fail."""
-    return next(seed for seed in range(10000)
-                if [cause.kind for cause in draw(seed).causes] == [kind])
+    return next(
+        seed for seed in range(10000) if [cause.kind for cause in draw(seed).causes] == [kind]
+    )
 
 
 class Recoveries(unittest.TestCase):
@@ -35,14 +37,24 @@ class Recoveries(unittest.TestCase):
         """Run one trial of the script as a user would, and read its bag."""
         rospy.set_param('/pick_and_place/oracle', settings or {'memory': 10})
         with tempfile.TemporaryDirectory() as folder:
-            subprocess.run([
-                find_node('smach_oracle', 'oracle_run')[0], '--config',
-                str(TASKS / 'pick_and_place.yaml'), '--record', folder, '--record-topic',
-                '/world/cause', *options,
-                str(TASKS / 'pick_and_place.py'), '--seed',
-                str(seed_with('arm_in_view'))
-            ], check=True, timeout=100)
-            trial, = load_trials([folder]).trials
+            subprocess.run(
+                [
+                    find_node('smach_oracle', 'oracle_run')[0],
+                    '--config',
+                    str(TASKS / 'pick_and_place.yaml'),
+                    '--record',
+                    folder,
+                    '--record-topic',
+                    '/world/cause',
+                    *options,
+                    str(TASKS / 'pick_and_place.py'),
+                    '--seed',
+                    str(seed_with('arm_in_view')),
+                ],
+                check=True,
+                timeout=100,
+            )
+            (trial,) = load_trials([folder]).trials
         self.assertEqual((trial.cause.kinds, trial.lost_events), (('arm_in_view',), 0))
         return trial
 
@@ -73,5 +85,6 @@ class Recoveries(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('task_recoveries')
     rostest.rosrun('smach_oracle', 'task_recoveries', Recoveries)

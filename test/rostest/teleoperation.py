@@ -2,6 +2,7 @@
 """The manipulation interface against an arm on ROS: distances, directions, stops, refusals,
 results.
 """
+
 import os
 import subprocess
 import sys
@@ -28,7 +29,6 @@ STOPS_WITHIN_S = 0.1
 
 
 class Teleoperation(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
         cls.ann = Person(SERVER)
@@ -68,8 +68,9 @@ class Teleoperation(unittest.TestCase):
         for _ in range(3):
             way, seconds = self.moved(**command)
             found.append((way @ axis, speed * seconds))
-            self.assertLess(np.linalg.norm(way - axis * (way @ axis)),
-                            0.05 * np.linalg.norm(way) + 1e-4)
+            self.assertLess(
+                np.linalg.norm(way - axis * (way @ axis)), 0.05 * np.linalg.norm(way) + 1e-4
+            )
             if 0.75 * speed * seconds < way @ axis < speed * (seconds + 0.15):
                 return
         self.fail('went so far (m), and was to go so far: {}'.format(found))
@@ -78,13 +79,17 @@ class Teleoperation(unittest.TestCase):
         self.check_moves_along(np.array([0.0, 0.0, 1.0]), 0.1, linear=(0.0, 0.0, 0.1))
         self.assertEqual(self.ann.states[-1].refused, '')
         # y points down
-        self.check_moves_along(np.array([0.0, 0.0, -1.0]), 0.1, linear=(0.0, 0.1, 0.0),
-                               frame='camera')
+        self.check_moves_along(
+            np.array([0.0, 0.0, -1.0]), 0.1, linear=(0.0, 0.1, 0.0), frame='camera'
+        )
         turn = self.ann.states[-1].tool_pose.orientation
-        forward = np.array([
-            1 - 2 * (turn.y**2 + turn.z**2), 2 * (turn.x * turn.y + turn.z * turn.w),
-            2 * (turn.x * turn.z - turn.y * turn.w)
-        ])
+        forward = np.array(
+            [
+                1 - 2 * (turn.y**2 + turn.z**2),
+                2 * (turn.x * turn.y + turn.z * turn.w),
+                2 * (turn.x * turn.z - turn.y * turn.w),
+            ]
+        )
         self.check_moves_along(-forward, 0.1, linear=(-0.1, 0.0, 0.0), frame='tool')
 
     def time_to_stop(self, stop):
@@ -120,12 +125,15 @@ class Teleoperation(unittest.TestCase):
         self.assertLess(ROBOT.stands_after(lambda: None, 0.1), 0.05)
 
     def test_bad_commands_are_refused_with_what_is_allowed(self):
-        for says, command in (('not finite', {'linear': (float('nan'), 0, 0)}), ('not finite', {
-                'angular': (0, float('inf'), 0)
-        }), ("frame 'moon'", {'frame': 'moon'}), ("allowed: tool, base_footprint", {'frame': ''}),
-                              ("unknown arm 'middle'; allowed: right", {'arm': 'middle'}),
-                              ('gripper nan m', {'move_gripper': True, 'gripper': float('nan')}),
-                              ('gripper -0.1 m', {'move_gripper': True, 'gripper': -0.1})):
+        for says, command in (
+            ('not finite', {'linear': (float('nan'), 0, 0)}),
+            ('not finite', {'angular': (0, float('inf'), 0)}),
+            ("frame 'moon'", {'frame': 'moon'}),
+            ('allowed: tool, base_footprint', {'frame': ''}),
+            ("unknown arm 'middle'; allowed: right", {'arm': 'middle'}),
+            ('gripper nan m', {'move_gripper': True, 'gripper': float('nan')}),
+            ('gripper -0.1 m', {'move_gripper': True, 'gripper': -0.1}),
+        ):
             before_s = ROBOT.moved_s
             state = self.ann.answer(self.ann.send(**command))
             self.assertIn(says, state.refused)
@@ -140,11 +148,19 @@ class Teleoperation(unittest.TestCase):
             with rosbag.Bag(file.name, 'w') as bag:
                 for number in range(30):
                     command.seq += 1
-                    bag.write('/' + SERVER + '/command', command,
-                              rospy.Time.from_sec(1000.0 + number / 30.0))
+                    bag.write(
+                        '/' + SERVER + '/command',
+                        command,
+                        rospy.Time.from_sec(1000.0 + number / 30.0),
+                    )
             before_s = ROBOT.moved_s
-            subprocess.run(['rosbag', 'play', '--quiet', file.name], check=True, timeout=60,
-                           stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+            subprocess.run(
+                ['rosbag', 'play', '--quiet', file.name],
+                check=True,
+                timeout=60,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+            )
         self.assertEqual(ROBOT.moved_s, before_s)
         self.assertEqual(self.ann.states[-1].operator, '')
 
@@ -183,7 +199,8 @@ class Teleoperation(unittest.TestCase):
     def test_an_arm_that_could_not_follow_pushes_no_more_once_the_dead_man_is_let_go(self):
         ROBOT.blocked = True
         self.assertTrue(
-            wait_for(lambda: self.ann.hold(0.1, linear=(0.0, 0.0, 0.2)) and max(ROBOT.leads) > 0.1))
+            wait_for(lambda: self.ann.hold(0.1, linear=(0.0, 0.0, 0.2)) and max(ROBOT.leads) > 0.1)
+        )
         self.assertLess(max(ROBOT.leads), 0.16)
         self.assertTrue(wait_for(lambda: ROBOT.leads[-1] < 0.051))
         self.ann.hold(0.5, linear=(0.0, 0.0, 0.2))
@@ -198,10 +215,16 @@ class Teleoperation(unittest.TestCase):
         self.assertTrue(wait_for(lambda: not self.ann.states[-1].gripper_moving))
         self.assertTrue(wait_for(lambda: self.close() and self.ann.states[-1].gripper_moving))
         ROBOT.grip_s = 0.05
-        self.assertTrue(wait_for(lambda: self.ann.send(move_gripper=True, gripper=0.08)
-                                 and (0.08, True) in ROBOT.grips))
-        turned = next(number for number, (position, _) in enumerate(ROBOT.grips)
-                      if position == 0.08)
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    self.ann.send(move_gripper=True, gripper=0.08) and (0.08, True) in ROBOT.grips
+                )
+            )
+        )
+        turned = next(
+            number for number, (position, _) in enumerate(ROBOT.grips) if position == 0.08
+        )
         self.assertEqual(ROBOT.grips[turned - 1], (0.0, False))
 
     def test_a_gripper_that_is_told_the_same_again_and_again_moves_once(self):
@@ -221,15 +244,18 @@ class Teleoperation(unittest.TestCase):
         self.assertTrue(wait_for(lambda: ROBOT.grips and ROBOT.grips[0] == (0.0, False)))
 
     def test_joints_that_are_silent_or_no_numbers_move_nothing_and_the_hand_obeys_again_afterwards(
-            self):
+        self,
+    ):
         for fault, says in (('silent', 'no joint_states for '), ('odd', 'finite')):
             setattr(ROBOT, fault, True)
             self.assertTrue(
-                wait_for(lambda: self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused, 20.0))
+                wait_for(lambda: self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused, 20.0)
+            )
             self.assertIn(says, self.ann.states[-1].refused)
             setattr(ROBOT, fault, False)
             self.assertTrue(
-                wait_for(lambda: not self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused))
+                wait_for(lambda: not self.ann.answer(self.ann.send(linear=(0, 0, 0.05))).refused)
+            )
         self.assertTrue(np.isfinite(ROBOT.leads).all(), 'the arm was never told what is no number')
 
     def test_a_hand_that_is_still_held_does_not_drive_the_next_goal(self):
@@ -240,7 +266,8 @@ class Teleoperation(unittest.TestCase):
             self.assertTrue(wait_for(lambda: 'no goal' in self.ann.states[-1].refused))
             self.sent = self.ann.start(query_id='q3')
             self.assertTrue(
-                wait_for(lambda: 'let go of the dead-man first' in self.ann.states[-1].refused))
+                wait_for(lambda: 'let go of the dead-man first' in self.ann.states[-1].refused)
+            )
         self.ann.send(held=False)
         with self.ann.pressing(linear=(0.0, 0.0, 0.05)):
             self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
@@ -254,7 +281,8 @@ class Teleoperation(unittest.TestCase):
                 self.assertTrue(wait_for(lambda: self.ann.states[-1].moving))
                 asker.kill()
                 self.assertTrue(
-                    wait_for(lambda: 'no goal is active' in self.ann.states[-1].refused, 20.0))
+                    wait_for(lambda: 'no goal is active' in self.ann.states[-1].refused, 20.0)
+                )
 
     def test_the_end_of_a_goal_is_told_to_who_comes_later(self):
         self.sent.cancel()
@@ -271,22 +299,32 @@ class Teleoperation(unittest.TestCase):
 
     def test_the_person_finishes_and_the_grasp_is_known(self):
         self.ann.hold(0.3, linear=(0.0, 0.0, 0.1))
-        self.assertTrue(wait_for(lambda: self.ann.send(move_gripper=True, gripper=0.0)
-                                 and self.ann.states[-1].gripper_stalled))
+        self.assertTrue(
+            wait_for(
+                lambda: (
+                    self.ann.send(move_gripper=True, gripper=0.0)
+                    and self.ann.states[-1].gripper_stalled
+                )
+            )
+        )
         grasp = self.robot_tool()
         self.ann.hold(0.3, linear=(0.0, 0.0, 0.1))
         refused = self.ann.finish(outcome='finished', outputs=[], text='')
         self.assertEqual(
             (refused.ok, refused.message),
-            (False, "PICK has no outcome 'finished' to supersede it with; allowed: aborted, "
-             "succeeded"))
+            (
+                False,
+                "PICK has no outcome 'finished' to supersede it with; allowed: aborted, succeeded",
+            ),
+        )
         refused = self.ann.finish(outcome='succeeded', outputs=encode_all({'other': 1}), text='')
-        self.assertIn("PICK has no output keys other; allowed: grasp, note", refused.message)
+        self.assertIn('PICK has no output keys other; allowed: grasp, note', refused.message)
         outputs = encode_all({'note': 'by the lid'})
         self.assertTrue(self.ann.finish(outcome='succeeded', outputs=outputs, text='done').ok)
         status, result = result_of(self.sent)
-        self.assertEqual((status, result.outcome, result.text),
-                         (GoalStatus.SUCCEEDED, 'succeeded', 'done'))
+        self.assertEqual(
+            (status, result.outcome, result.text), (GoalStatus.SUCCEEDED, 'succeeded', 'done')
+        )
         outputs = decode_all(result.outputs)
         self.assertEqual(outputs['note'], 'by the lid')
         at = outputs['grasp'].pose.position
@@ -304,11 +342,17 @@ class Teleoperation(unittest.TestCase):
     def test_the_hand_slows_near_the_collision_map(self):
         below = self.robot_tool() - [0.0, 0.0, 0.12]
         self.boxes.publish(
-            CollisionBoxes(Header(frame_id='base_footprint'), 'table', ['table'],
-                           [Pose(Point(*below), Quaternion(0, 0, 0, 1))],
-                           [Vector3(0.5, 0.5, 0.05)]))
-        self.addCleanup(self.boxes.publish,
-                        CollisionBoxes(Header(frame_id='base_footprint'), '', [], [], []))
+            CollisionBoxes(
+                Header(frame_id='base_footprint'),
+                'table',
+                ['table'],
+                [Pose(Point(*below), Quaternion(0, 0, 0, 1))],
+                [Vector3(0.5, 0.5, 0.05)],
+            )
+        )
+        self.addCleanup(
+            self.boxes.publish, CollisionBoxes(Header(frame_id='base_footprint'), '', [], [], [])
+        )
         self.assertTrue(wait_for(lambda: self.slowed(), 20.0))
         self.assertLess(self.ann.states[-1].speed, 0.9)
 
@@ -318,7 +362,6 @@ class Teleoperation(unittest.TestCase):
 
 
 class InLockStep(unittest.TestCase):
-
     def test_each_command_moves_the_tool_by_exactly_one_period_however_long_the_sender_thinks(self):
         ann = Person('manipulation_in_steps')
         sent = ann.start()
@@ -341,8 +384,9 @@ class InLockStep(unittest.TestCase):
         with driver_of_its_own('manipulation_in_steps', 'dead') as dead:
             bob = Person('manipulation_in_steps', 'bob')
             sent = bob.start()
-            self.assertTrue(wait_for(lambda: bob.states and bob.states[-1].operator == 'dead',
-                                     30.0))
+            self.assertTrue(
+                wait_for(lambda: bob.states and bob.states[-1].operator == 'dead', 30.0)
+            )
             self.assertEqual(bob.answer(bob.send()).refused, 'dead drives; one at a time')
             dead.kill()
             killed_s = time.monotonic()
@@ -361,6 +405,7 @@ def all_tests():
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('teleoperation')
     ROBOT = FakeArm()
     rostest.rosrun('smach_oracle', 'teleoperation', '__main__.all_tests')

@@ -1,6 +1,7 @@
 """An arm that goes at once where it is told, and a person's front end, to test the manipulation
 interface.
 """
+
 import contextlib
 import os
 import subprocess
@@ -44,11 +45,13 @@ class FakeArm:
         self.grip_s = 0.05  # that a motion of the gripper takes
         self.grips = []  # of the gripper's motions: where to, and whether it came to its end
         self._states = rospy.Publisher('joint_states', JointState, queue_size=10, tcp_nodelay=True)
-        self._gripper = actionlib.SimpleActionServer('gripper', GripperCommandAction, self._grip,
-                                                     auto_start=False)
+        self._gripper = actionlib.SimpleActionServer(
+            'gripper', GripperCommandAction, self._grip, auto_start=False
+        )
         self._gripper.start()
-        self._commands = rospy.Subscriber('arm/command', JointTrajectory, self._move, queue_size=10,
-                                          tcp_nodelay=True)
+        self._commands = rospy.Subscriber(
+            'arm/command', JointTrajectory, self._move, queue_size=10, tcp_nodelay=True
+        )
         threading.Thread(target=self._tell_on, daemon=True).start()
 
     def reset(self):
@@ -65,8 +68,9 @@ class FakeArm:
         """
         let_go()
         begun_s = time.monotonic()
-        assert wait_for(
-            lambda: time.monotonic() - max(self.moved_s, begun_s) > rest_s), 'it does not stand'
+        assert wait_for(lambda: time.monotonic() - max(self.moved_s, begun_s) > rest_s), (
+            'it does not stand'
+        )
         return self.moved_s - begun_s
 
     def tell(self):
@@ -88,7 +92,8 @@ class FakeArm:
         now_s = time.monotonic() + message.points[-1].time_from_start.to_sec()
         with self._lock:
             self.leads.append(
-                np.abs(np.array(message.points[-1].positions) - self._positions).max())
+                np.abs(np.array(message.points[-1].positions) - self._positions).max()
+            )
             if not self.blocked:
                 self._positions = np.array(message.points[-1].positions)
         self.moved_s = now_s
@@ -102,7 +107,8 @@ class FakeArm:
             self._gripper.set_preempted(GripperCommandResult(0.07, 0.0, False, False))
             return
         self._gripper.set_succeeded(
-            GripperCommandResult(max(0.05, goal.command.position), 10.0, met, not met))
+            GripperCommandResult(max(0.05, goal.command.position), 10.0, met, not met)
+        )
 
 
 class Person:
@@ -113,10 +119,12 @@ class Person:
         self.operator = operator
         self.states = []
         self._seq = 0
-        self._publisher = rospy.Publisher(server + '/command', TeleopCommand, queue_size=10,
-                                          tcp_nodelay=True)
-        rospy.Subscriber(server + '/state', TeleopState, self.states.append, queue_size=100,
-                         tcp_nodelay=True)
+        self._publisher = rospy.Publisher(
+            server + '/command', TeleopCommand, queue_size=10, tcp_nodelay=True
+        )
+        rospy.Subscriber(
+            server + '/state', TeleopState, self.states.append, queue_size=100, tcp_nodelay=True
+        )
         self._link = GoalLink(rospy.resolve_name(server), SharedAutonomyAction)
         self.finish = rospy.ServiceProxy(server + '/finish', FinishInterface)
         self.give_up = rospy.ServiceProxy(server + '/give_up', GiveUpInterface)
@@ -125,28 +133,57 @@ class Person:
     def start(self, state='PICK', query_id='q1', userdata=None):
         """Send a goal; the sent goal."""
         return self._link.send(
-            SharedAutonomyGoal(query_id=query_id, container_path='SM', state=state,
-                               interface='manipulation', userdata=encode_all(userdata or {}),
-                               outcomes=['succeeded', 'aborted'], output_keys=['grasp', 'note']),
-            time.monotonic())
+            SharedAutonomyGoal(
+                query_id=query_id,
+                container_path='SM',
+                state=state,
+                interface='manipulation',
+                userdata=encode_all(userdata or {}),
+                outcomes=['succeeded', 'aborted'],
+                output_keys=['grasp', 'note'],
+            ),
+            time.monotonic(),
+        )
 
     def active(self, query_id='q1'):
         return wait_for(lambda: self.states and self.states[-1].query_id == query_id)
 
-    def send(self, linear=(0, 0, 0), angular=(0, 0, 0), frame='base_footprint', arm='right',
-             held=True, **more):
+    def send(
+        self,
+        linear=(0, 0, 0),
+        angular=(0, 0, 0),
+        frame='base_footprint',
+        arm='right',
+        held=True,
+        **more,
+    ):
         """Send one command; its seq."""
         self._seq += 1
         self._publisher.publish(
-            TeleopCommand(header=Header(frame_id=frame), operator=self.operator, seq=self._seq,
-                          arm=arm, dead_man=held, twist=Twist(Vector3(*linear),
-                                                              Vector3(*angular)), **more))
+            TeleopCommand(
+                header=Header(frame_id=frame),
+                operator=self.operator,
+                seq=self._seq,
+                arm=arm,
+                dead_man=held,
+                twist=Twist(Vector3(*linear), Vector3(*angular)),
+                **more,
+            )
+        )
         return self._seq
 
     def answer(self, seq):
         """The first state that shows a command."""
-        return wait_for(lambda: next((state for state in list(self.states)
-                                      if (state.sender, state.seq) == (self.operator, seq)), None))
+        return wait_for(
+            lambda: next(
+                (
+                    state
+                    for state in list(self.states)
+                    if (state.sender, state.seq) == (self.operator, seq)
+                ),
+                None,
+            )
+        )
 
     def hold(self, seconds, rate_hz=30.0, **command):
         """Send a command again and again; monotonic times of the first and the last."""
@@ -165,6 +202,7 @@ class Person:
         def press():
             while not over.wait(1.0 / 30.0):
                 self.send(**command)
+
         thread = threading.Thread(target=press, daemon=True)
         thread.start()
         try:

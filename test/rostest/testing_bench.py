@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Machines on the bench in a node: what a robot's tools see of them, and that it goes away."""
+
 import sys
 import tempfile
 import unittest
@@ -20,7 +21,7 @@ from smach_oracle.testing.recorded import recorded_trials
 
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
 
-FAILS_ONCE = '''
+FAILS_ONCE = """
 import rospy, smach
 
 class Works(smach.State):
@@ -40,17 +41,19 @@ with machine:
     smach.StateMachine.add('PLACE', Works())
 for trial in range(2):
     print(machine.execute())
-'''
+"""
 
 
 def build_machine() -> smach.StateMachine:
     """CALL, a service, and DONE."""
     machine = smach.StateMachine(OUTCOMES)
     with machine:
-        smach.StateMachine.add('CALL', smach_ros.ServiceState('/lamp', Trigger),
-                               {'succeeded': 'DONE'})
-        smach.StateMachine.add('DONE', smach.CBState(lambda userdata: 'succeeded',
-                                                     outcomes=OUTCOMES))
+        smach.StateMachine.add(
+            'CALL', smach_ros.ServiceState('/lamp', Trigger), {'succeeded': 'DONE'}
+        )
+        smach.StateMachine.add(
+            'DONE', smach.CBState(lambda userdata: 'succeeded', outcomes=OUTCOMES)
+        )
     return machine
 
 
@@ -80,15 +83,25 @@ class BenchTest(unittest.TestCase):
                 bench.run()  # makes the topic
                 self.assertTrue(wait_for(subscriber.get_num_connections))
                 trial = bench.run().assert_recovered('CALL')
-                structure = rospy.wait_for_message('~smach/container_structure',
-                                                   SmachContainerStructure, 20.0)
+                structure = rospy.wait_for_message(
+                    '~smach/container_structure', SmachContainerStructure, 20.0
+                )
                 self.assertIn('ORACLE', structure.children)
                 end = [event for event in trial.events if event.kind is EventKind.TRIAL_END][0]
-                self.assertTrue(wait_for(lambda: (end.trial_id, end.seq) in [  # noqa: B023
-                    (event.trial_id, event.seq) for event in events]))
+                self.assertTrue(
+                    wait_for(
+                        lambda: (
+                            (end.trial_id, end.seq)  # noqa: B023
+                            in [(event.trial_id, event.seq) for event in events]
+                        )
+                    )
+                )
             self.assertIs(type(machine), smach.StateMachine)
-            self.assertTrue(wait_for(lambda: rospy.resolve_name('~smach/container_structure')
-                                     not in self.topics()))
+            self.assertTrue(
+                wait_for(
+                    lambda: rospy.resolve_name('~smach/container_structure') not in self.topics()
+                )
+            )
         rates = rospy.wait_for_message('~oracle/rates', OracleRates, 20.0)
         self.assertEqual({row.state for row in rates.states}, {'CALL', 'DONE'})
 
@@ -96,14 +109,22 @@ class BenchTest(unittest.TestCase):
         return {name for name, _ in rosgraph.Master('/test').getPublishedTopics('')}
 
     def test_an_expert_by_script_answers_in_the_process(self) -> None:
-        with Bench(build_machine(), [fail('CALL')], ros=True, expert=expert(goto('DONE')),
-                   settings={'max_recoveries': 0}) as bench:
+        with Bench(
+            build_machine(),
+            [fail('CALL')],
+            ros=True,
+            expert=expert(goto('DONE')),
+            settings={'max_recoveries': 0},
+        ) as bench:
             for _ in range(2):
                 bench.run().assert_asked_about('CALL', times=1).assert_recovered('CALL')
 
     def test_a_service_that_takes_too_long_overruns(self) -> None:
-        with Bench(build_machine(), [overrun('CALL', 600, visit=1)],
-                   settings={'states': {'CALL': {'time_limit_s': 2.0}}}) as bench:
+        with Bench(
+            build_machine(),
+            [overrun('CALL', 600, visit=1)],
+            settings={'states': {'CALL': {'time_limit_s': 2.0}}},
+        ) as bench:
             bench.run().assert_recovered('CALL')
 
     def test_the_trials_of_a_script_under_oracle_run_are_read_from_their_bags(self) -> None:
@@ -118,10 +139,15 @@ class BenchTest(unittest.TestCase):
 
     def test_what_ended_a_recorded_trial_is_known(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            task = oracle_run(self, '--without-oracle', '--record', folder,
-                              script(self, FAILS_ONCE.replace("'aborted' if", '1 / 0 if')))
+            task = oracle_run(
+                self,
+                '--without-oracle',
+                '--record',
+                folder,
+                script(self, FAILS_ONCE.replace("'aborted' if", '1 / 0 if')),
+            )
             self.assertNotEqual(task.wait(60), 0)
-            trial, = recorded_trials(folder)
+            (trial,) = recorded_trials(folder)
         self.assertIn('ZeroDivisionError', str(trial.assert_raised(RuntimeError)))
 
     def test_a_soak_runs_in_a_node(self) -> None:
@@ -131,5 +157,6 @@ class BenchTest(unittest.TestCase):
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('testing_bench')
     rostest.rosrun('smach_oracle', 'testing_bench', BenchTest, sys.argv)

@@ -1,4 +1,5 @@
 """A line between a browser and a server that can be held up, or cut."""
+
 import contextlib
 import socket
 import struct

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """In the graph of an experiment nobody can ask for the truth: neither operator nor robot."""
+
 import unittest
 
 import rosgraph
@@ -13,11 +14,14 @@ OPERATOR = '/scripted_operator'
 
 
 class TruthKept(unittest.TestCase):
-
     @classmethod
     def setUpClass(cls):
-        for name in ('world/reset', 'world/recognise', 'perception_interface/segment',
-                     'manipulation_interface/finish'):
+        for name in (
+            'world/reset',
+            'world/recognise',
+            'perception_interface/segment',
+            'manipulation_interface/finish',
+        ):
             rospy.wait_for_service(name, 60.0)
         cls.master = rosgraph.Master('/truth_kept')
         rospy.wait_for_service(OPERATOR + '/get_loggers', 60.0)
@@ -45,13 +49,16 @@ class TruthKept(unittest.TestCase):
         self.assertTrue(answer.ok, answer.message)
         self.assertEqual(answer.chance, unknown.chance)
         for thing in answer.things:
-            self.assertEqual(sorted(thing.__slots__),
-                             ['mask', 'movable', 'name', 'region', 'wanted'])
-            self.assertEqual((thing.mask.width, thing.mask.height),
-                             (thing.region.width, thing.region.height))
+            self.assertEqual(
+                sorted(thing.__slots__), ['mask', 'movable', 'name', 'region', 'wanted']
+            )
+            self.assertEqual(
+                (thing.mask.width, thing.mask.height), (thing.region.width, thing.region.height)
+            )
 
 
 if __name__ == '__main__':
     import rostest
+
     rospy.init_node('truth_kept')
     rostest.rosrun('smach_oracle', 'truth_kept', TruthKept)

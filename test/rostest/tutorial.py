@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The tutorial does as its page shows: its files, its commands in order, and what they print."""
+
 import os
 import unittest
 
@@ -8,7 +9,6 @@ from shown_page import ShownPage
 
 
 class Tutorial(unittest.TestCase):
-
     def test_it_does_as_the_page_shows(self):
         page = ShownPage('tutorial')
         self.addCleanup(page.close)

@@ -1,4 +1,5 @@
 """Waiting for what another process or thread will bring about."""
+
 import asyncio
 import sys
 import threading
@@ -79,8 +80,9 @@ def asleep(pid: int) -> bool:
     return stat.rpartition(')')[2].split()[0] == 'S'
 
 
-def assert_soon(measure: Callable[[], Tuple[float, float]], within_s: float,
-                worst_s: float = 2.0) -> None:
+def assert_soon(
+    measure: Callable[[], Tuple[float, float]], within_s: float, worst_s: float = 2.0
+) -> None:
     """Most of five delays must be in time, and not one may be beyond `worst_s`; ends when that is
     settled.
 

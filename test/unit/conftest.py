@@ -1,6 +1,7 @@
 """Which smach the unit tests run on, that of $SMACH_UPSTREAM or that of src/; and the folders of
 shared helpers.
 """
+
 import os
 import re
 import subprocess
@@ -65,5 +66,6 @@ def leave_out(report, path, told):
 def pytest_sessionfinish(session, exitstatus):
     """A folder of which all was left out has not failed."""
     if os.environ.get('SMACH_ORACLE_MAY_LACK') and (
-            exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED):
+        exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED
+    ):
         session.exitstatus = pytest.ExitCode.OK

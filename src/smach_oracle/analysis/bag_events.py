@@ -1,4 +1,5 @@
 """Finds bags, and reads the executive's events and the worlds' causes with rosbags, without ROS."""
+
 import contextlib
 import json
 import math
@@ -13,9 +14,12 @@ EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/Or
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
 UNFINISHED = (  # why a bag is not used
     'still being recorded, or its recorder died: start the recorder again in this folder, or run '
-    '`rosbag reindex` on it and take the .active off its name')
-MENDING = ('`rosbag reindex` on it keeps what lies before the damage; named .bag.active, the next '
-           'recorder in this folder saves what can be read behind it, too')
+    '`rosbag reindex` on it and take the .active off its name'
+)
+MENDING = (
+    '`rosbag reindex` on it keeps what lies before the damage; named .bag.active, the next '
+    'recorder in this folder saves what can be read behind it, too'
+)
 _MAGIC = b'#ROSBAG V2.0'
 _EVENTS = '/oracle/events'
 _KINDS = {int(kind): kind for kind in EventKind}
@@ -73,7 +77,7 @@ def walk_bags(folder: str) -> Iterator[str]:
     """Yield the paths with the name of a bag in a folder and below. Links are left out."""
     for parent, _, names in os.walk(folder):
         for name in names:
-            backup_of = name[:-len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
+            backup_of = name[: -len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
             if name.endswith(('.bag', '.bag.active')) and backup_of not in names:
                 yield os.path.join(parent, name)
 
@@ -86,6 +90,7 @@ class MessageStores:
         from rosbags import (
             typesys,  # only where bags are read: a command shows its options without it
         )
+
         self._typesys = typesys
         # by message definition: another release's events may have other fields
         self._stores: Dict[str, Any] = {}
@@ -110,6 +115,7 @@ class EventReader:
         :raises ImportError: where rosbags is missing.
         """
         from rosbags.rosbag1 import Reader
+
         self._open = Reader
         self._stores = MessageStores()
         self._most_events = most_events
@@ -155,18 +161,22 @@ class EventReader:
                     ends[message.trial_id] = stamp
                     told = message.header.stamp
                     stamps.append(told.sec + told.nanosec / 1e9)
-                    nodes[message.trial_id] = item.topic[:-len(_EVENTS)] if item.topic.endswith(
-                        _EVENTS) else ''
+                    nodes[message.trial_id] = (
+                        item.topic[: -len(_EVENTS)] if item.topic.endswith(_EVENTS) else ''
+                    )
                 if len(events) > self._most_events:
                     raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own
-            ends[max(ends,
-                     key=lambda trial_id: ends[trial_id])] = max([stamp for stamp, _ in causes],
-                                                                 default=0)
+            ends[max(ends, key=lambda trial_id: ends[trial_id])] = max(
+                [stamp for stamp, _ in causes], default=0
+            )
         found = {trial_id: _latest(causes, end) for trial_id, end in ends.items()}
         return BagContent(
-            events, {trial_id: cause
-                     for trial_id, cause in found.items() if cause is not None}, nodes, stamps)
+            events,
+            {trial_id: cause for trial_id, cause in found.items() if cause is not None},
+            nodes,
+            stamps,
+        )
 
 
 def why_unreadable(path: str, why: str) -> str:
@@ -182,17 +192,31 @@ def _latest(causes: Sequence[Tuple[int, RecordedCause]], end: int) -> Optional[R
 
 
 def _recorded_cause(message: Any) -> RecordedCause:
-    return RecordedCause(int(message.seed), message.task, tuple(message.kinds),
-                         tuple(message.details))
+    return RecordedCause(
+        int(message.seed), message.task, tuple(message.kinds), tuple(message.details)
+    )
 
 
 def _event(message: Any) -> Event:
     kind = _KINDS.get(message.kind, message.kind)  # a later release may know more kinds
-    return Event(kind, message.trial_id, message.seq, message.wall_time, message.path,
-                 message.state, message.outcome, message.target, message.failure_kind,
-                 message.failure_class, message.rate, message.continuous, message.query_id,
-                 message.by, message.text,
-                 json.loads(message.data) if message.data else None)
+    return Event(
+        kind,
+        message.trial_id,
+        message.seq,
+        message.wall_time,
+        message.path,
+        message.state,
+        message.outcome,
+        message.target,
+        message.failure_kind,
+        message.failure_class,
+        message.rate,
+        message.continuous,
+        message.query_id,
+        message.by,
+        message.text,
+        json.loads(message.data) if message.data else None,
+    )
 
 
 def _words(err: Exception) -> str:

@@ -1,4 +1,5 @@
 """Structures of machines, and images of failures, read from bags without ROS."""
+
 from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
 
 from .bag_events import MessageStores
@@ -39,6 +40,7 @@ def read_machines(path: str) -> RecordedMachines:
     frames: List[FailureImage] = []
     stores = MessageStores()
     from rosbags.rosbag1 import Reader  # only where bags are read
+
     with Reader(path) as reader:
         connections = [
             item for item in reader.connections if item.msgtype in (STRUCTURE_TYPE, FRAMES_TYPE)
@@ -46,7 +48,7 @@ def read_machines(path: str) -> RecordedMachines:
         for item, _, data in reader.messages(connections) if connections else ():
             message = stores.read(item, data)
             if item.msgtype == FRAMES_TYPE:
-                frames += list(_frames(message))[:MOST_FRAMES - len(frames)]
+                frames += list(_frames(message))[: MOST_FRAMES - len(frames)]
             elif len(containers) < MOST_CONTAINERS:
                 containers[message.path.lstrip('/')] = _container(message)
     return RecordedMachines(containers, frames)
@@ -54,8 +56,9 @@ def read_machines(path: str) -> RecordedMachines:
 
 def _container(message: Any) -> RecordedContainer:
     edges = zip(message.outcomes_from, message.internal_outcomes, message.outcomes_to)
-    return RecordedContainer(tuple(message.children), tuple(edges),
-                             tuple(message.container_outcomes))
+    return RecordedContainer(
+        tuple(message.children), tuple(edges), tuple(message.container_outcomes)
+    )
 
 
 def _frames(message: Any) -> Iterator[FailureImage]:

@@ -3,6 +3,7 @@
 Exit code: 0, all bags were read; 1, some were skipped; 2, there was nothing to count or an output
 cannot be written.
 """
+
 import argparse
 import os
 import re
@@ -34,25 +35,50 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
 
 
 def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog='bag_statistics', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
-                        help='with bags in it or below it; or a bag')
-    parser.add_argument('--figure', metavar='OUT', type=path_of,
-                        help='write the time series to OUT.svg and OUT.png')
+    parser = argparse.ArgumentParser(
+        prog='bag_statistics',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument(
-        '--columns', type=int, choices=(1, 2), default=1,
-        help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)')
+        'folders',
+        nargs='+',
+        metavar='FOLDER',
+        type=path_of,
+        help='with bags in it or below it; or a bag',
+    )
     parser.add_argument(
-        '--x-axis', choices=('trials', 'time'), default='trials',
-        help='of the figure: number of the trial, or time since the first (default: trials)')
-    parser.add_argument('--json', metavar='OUT', type=path_of,
-                        help='write the table, all trials and the skipped bags as JSON')
+        '--figure', metavar='OUT', type=path_of, help='write the time series to OUT.svg and OUT.png'
+    )
+    parser.add_argument(
+        '--columns',
+        type=int,
+        choices=(1, 2),
+        default=1,
+        help='width of the figure: one (3.5 in) or two (7.16 in) columns of a paper (default: 1)',
+    )
+    parser.add_argument(
+        '--x-axis',
+        choices=('trials', 'time'),
+        default='trials',
+        help='of the figure: number of the trial, or time since the first (default: trials)',
+    )
+    parser.add_argument(
+        '--json',
+        metavar='OUT',
+        type=path_of,
+        help='write the table, all trials and the skipped bags as JSON',
+    )
     parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
     parser.add_argument(
-        '--failing-outcomes', nargs='+', metavar='NAME', default=list(DEFAULT_FAILING_OUTCOMES),
+        '--failing-outcomes',
+        nargs='+',
+        metavar='NAME',
+        default=list(DEFAULT_FAILING_OUTCOMES),
         help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
-            ' '.join(DEFAULT_FAILING_OUTCOMES)))
+            ' '.join(DEFAULT_FAILING_OUTCOMES)
+        ),
+    )
     return parser.parse_args(argv)
 
 
@@ -69,10 +95,14 @@ def _write_files(args: argparse.Namespace, found: Trials, variants: List[Variant
 
 def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> None:
     from .figure import save_time_series  # matplotlib takes a second: only where it is wanted
+
     stem = re.sub(r'\.(svg|png)$', '', args.figure)
     series = time_series(trials)
     for words, chosen in series:
-        suffix = '' if len(series) == 1 else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_',
-                                                          '_'.join(words)).strip('_')
+        suffix = (
+            ''
+            if len(series) == 1
+            else '_' + re.sub(r'[^A-Za-z0-9._-]+', '_', '_'.join(words)).strip('_')
+        )
         for path in save_time_series(chosen, stem + suffix, args.columns, args.x_axis):
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))

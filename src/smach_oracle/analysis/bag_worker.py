@@ -3,6 +3,7 @@
 A bag may come from anywhere: a small one can unpack to gigabytes, or keep its reader busy for good.
 The request comes on standard input, the reply goes to standard output, both as JSON.
 """
+
 import base64
 import json
 import math
@@ -34,9 +35,9 @@ class BagRequest(NamedTuple):
     trials: List[str]  # ids. Empty means every trial
     shown_events: int = 0  # of the one trial that is to be replayed. 0 means summaries alone
     most_events: int = 200000  # of a bag
-    memory_bytes: int = 2 ** 29  # beyond what the process has when it begins
+    memory_bytes: int = 2**29  # beyond what the process has when it begins
     cpu_s: int = 60
-    reply_bytes: int = 10 ** 6
+    reply_bytes: int = 10**6
 
 
 class ReadTrial(NamedTuple):
@@ -75,21 +76,34 @@ def reply_of(text: bytes) -> BagReply:
     data = json.loads(text)
     if 'error' in data:
         raise BagReadError(data['error'], data['position'])
-    containers = {path: RecordedContainer(tuple(children), tuple((a, b, c) for a, b, c in edges),
-                                          tuple(outcomes))
-                  for path, (children, edges, outcomes) in data['containers'].items()}
-    frames = [FailureImage(query_id, topic, image_format, base64.b64decode(image))
-              for query_id, topic, image_format, image in data['frames']]
-    return BagReply([ReadTrial(node, _summary(fields)) for node, fields in data['trials']],
-                    [Event(_KINDS.get(kind, kind), *others) for kind, *others in data['events']],
-                    RecordedMachines(containers, frames), data['problem'])
+    containers = {
+        path: RecordedContainer(
+            tuple(children), tuple((a, b, c) for a, b, c in edges), tuple(outcomes)
+        )
+        for path, (children, edges, outcomes) in data['containers'].items()
+    }
+    frames = [
+        FailureImage(query_id, topic, image_format, base64.b64decode(image))
+        for query_id, topic, image_format, image in data['frames']
+    ]
+    return BagReply(
+        [ReadTrial(node, _summary(fields)) for node, fields in data['trials']],
+        [Event(_KINDS.get(kind, kind), *others) for kind, *others in data['events']],
+        RecordedMachines(containers, frames),
+        data['problem'],
+    )
 
 
 def _summary(fields: Dict[str, Any]) -> TrialSummary:
-    return TrialSummary(**dict(
-        fields, ending=TrialEnding(fields['ending']), bags=(),
-        failures_by_state=tuple((name, count) for name, count in fields['failures_by_state']),
-        settings=tuple((name, value) for name, value in fields['settings'])))
+    return TrialSummary(
+        **dict(
+            fields,
+            ending=TrialEnding(fields['ending']),
+            bags=(),
+            failures_by_state=tuple((name, count) for name, count in fields['failures_by_state']),
+            settings=tuple((name, value) for name, value in fields['settings']),
+        )
+    )
 
 
 def read(request: BagRequest) -> Dict[str, Any]:
@@ -113,9 +127,16 @@ def read(request: BagRequest) -> Dict[str, Any]:
         nodes.update(content.nodes)
     if len(by_trial) > MOST_TRIALS:
         raise BagReadError('it has more than {} trials'.format(MOST_TRIALS))
-    reply = {'trials': [[nodes.get(trial_id, ''), _fields(list(events.values()))]
-                        for trial_id, events in by_trial.items()],
-             'events': [], 'containers': {}, 'frames': [], 'problem': ''}
+    reply = {
+        'trials': [
+            [nodes.get(trial_id, ''), _fields(list(events.values()))]
+            for trial_id, events in by_trial.items()
+        ],
+        'events': [],
+        'containers': {},
+        'frames': [],
+        'problem': '',
+    }
     if request.shown_events:
         reply.update(_replayed(request, by_trial))
     return reply
@@ -133,13 +154,16 @@ def _fields(events: Sequence[Event]) -> Dict[str, Any]:
 
 def _replayed(request: BagRequest, by_trial: Dict[str, Dict[int, Event]]) -> Dict[str, Any]:
     by_number = by_trial.get(request.trials[0], {})
-    events = [by_number[seq] for seq in sorted(by_number)][:request.shown_events]
+    events = [by_number[seq] for seq in sorted(by_number)][: request.shown_events]
     machines, problem = _machines(request.paths)
     return {
-        'events': [_event(event) for event in _shortened(events)], 'problem': problem,
+        'events': [_event(event) for event in _shortened(events)],
+        'problem': problem,
         'containers': machines.containers,
-        'frames': [[*image[:3], base64.b64encode(image.data).decode()]
-                   for image in _bounded(machines.frames)]
+        'frames': [
+            [*image[:3], base64.b64encode(image.data).decode()]
+            for image in _bounded(machines.frames)
+        ],
     }
 
 
@@ -152,8 +176,10 @@ def _event(event: Event) -> List[Any]:
 def _shortened(events: Sequence[Event]) -> List[Event]:
     """With long texts without their middle, the longer the fewer events there are."""
     longest = max(200, MOST_TEXT // max(1, len(events)))
-    return [event if len(event.text) <= longest
-            else event._replace(text=shortened(event.text, longest)) for event in events]
+    return [
+        event if len(event.text) <= longest else event._replace(text=shortened(event.text, longest))
+        for event in events
+    ]
 
 
 def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
@@ -199,14 +225,18 @@ def _reply(request: BagRequest) -> str:
     try:
         text = json.dumps(read(request))
         if len(text) > request.reply_bytes:
-            raise BagReadError('its trials have more than {:.0f} MB'.format(
-                request.reply_bytes / 1e6))
+            raise BagReadError(
+                'its trials have more than {:.0f} MB'.format(request.reply_bytes / 1e6)
+            )
         return text
     except BagReadError as err:
         return _refusal(str(err), err.position)
     except MemoryError:
-        return _refusal('damaged, or too large: it takes more than {:.0f} MiB of memory'.format(
-            request.memory_bytes / 2**20))
+        return _refusal(
+            'damaged, or too large: it takes more than {:.0f} MiB of memory'.format(
+                request.memory_bytes / 2**20
+            )
+        )
     except Exception as err:  # a damaged file can make rosbags raise anything
         return _refusal('damaged, or no bag: {!r}'.format(err))
 

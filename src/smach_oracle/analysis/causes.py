@@ -1,4 +1,5 @@
 """Tables of how trials went by the cause that a simulated world was given to fail with."""
+
 from typing import Dict, List, NamedTuple, Sequence
 
 from .trials import TrialSummary
@@ -33,17 +34,24 @@ def cause_rows(trials: Sequence[TrialSummary]) -> List[CauseRow]:
             if trial.cause is not None:
                 for kind in set(trial.cause.kinds) or {NO_CAUSE}:
                     by_kind.setdefault(kind, []).append(trial)
-        rows += [_row(variant.experiment, variant.name, kind, by_kind[kind])
-                 for kind in sorted(by_kind)]
+        rows += [
+            _row(variant.experiment, variant.name, kind, by_kind[kind]) for kind in sorted(by_kind)
+        ]
     return rows
 
 
 def _row(experiment: str, variant: str, kind: str, trials: Sequence[TrialSummary]) -> CauseRow:
     return CauseRow(
-        experiment, variant, kind, len(trials), sum(trial.failures > 0 for trial in trials),
-        sum(trial.recoveries > 0 for trial in trials), sum(trial.questions > 0 for trial in trials),
+        experiment,
+        variant,
+        kind,
+        len(trials),
+        sum(trial.failures > 0 for trial in trials),
+        sum(trial.recoveries > 0 for trial in trials),
+        sum(trial.questions > 0 for trial in trials),
         sum(trial.succeeded for trial in trials),
-        sum(trial.truth is not None and trial.truth.success for trial in trials))
+        sum(trial.truth is not None and trial.truth.success for trial in trials),
+    )
 
 
 def format_causes(rows: Sequence[CauseRow]) -> str:
@@ -51,16 +59,27 @@ def format_causes(rows: Sequence[CauseRow]) -> str:
     lines: List[str] = []
     width = max([len(row.kind) for row in rows] + [5])
     heading = '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
-        'cause', width, 'trials', 'failed', 'recovered', 'asked', 'succeeded', 'true success')
+        'cause', width, 'trials', 'failed', 'recovered', 'asked', 'succeeded', 'true success'
+    )
     variant = ('', '')
     for row in rows:
         if (row.experiment, row.variant) != variant:
             variant = (row.experiment, row.variant)
             lines += [
-                '', '{}, {}: trials by what the world was given to fail with'.format(*variant),
-                heading
+                '',
+                '{}, {}: trials by what the world was given to fail with'.format(*variant),
+                heading,
             ]
-        lines.append('  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
-            row.kind, width, row.trials, row.failed, row.recovered, row.asked, row.ended_in_success,
-            row.true_success))
+        lines.append(
+            '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
+                row.kind,
+                width,
+                row.trials,
+                row.failed,
+                row.recovered,
+                row.asked,
+                row.ended_in_success,
+                row.true_success,
+            )
+        )
     return '\n'.join(lines + ['']) if lines else ''

@@ -6,6 +6,7 @@ ran (hindsight), beside what each did there. Prints McNemar's exact test of the 
 `default` against each other variant, or of each two. Exit code: 0, or 2 if there was nothing to
 read.
 """
+
 import argparse
 import statistics
 import sys
@@ -82,13 +83,19 @@ def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
     return [_share(name, happened, rows, list(parts.values())) for name, happened in SHARES]
 
 
-def _share(name: str, happened: Happened, rows: Sequence[TrialRow],
-           parts: Sequence[Sequence[TrialRow]]) -> Share:
+def _share(
+    name: str, happened: Happened, rows: Sequence[TrialRow], parts: Sequence[Sequence[TrialRow]]
+) -> Share:
     number = sum(map(happened, rows))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
-    return Share(name, number, len(rows), wilson_interval(number, len(rows)),
-                 (min(shares), max(shares)) if len(shares) > 1 else None,
-                 replicate_interval(shares))
+    return Share(
+        name,
+        number,
+        len(rows),
+        wilson_interval(number, len(rows)),
+        (min(shares), max(shares)) if len(shares) > 1 else None,
+        replicate_interval(shares),
+    )
 
 
 def costs_of(rows: Sequence[TrialRow]) -> Costs:
@@ -105,17 +112,21 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
     times = [row.sim_s for row in done if row.sim_s is not None]
     wrong = [row.wrong_object for row in ended]
     return Costs(
-        sum(row.attempts for row in rows) / len(rows), asked / len(rows), _ratio(asked, hours),
-        _ratio(expert_s, len(ended)), _ratio(expert_s, hours),
+        sum(row.attempts for row in rows) / len(rows),
+        asked / len(rows),
+        _ratio(asked, hours),
+        _ratio(expert_s, len(ended)),
+        _ratio(expert_s, hours),
         None if None in wrong else sum(map(bool, wrong)),
         _ratio(_total(ended, lambda row: row.damage), len(done)),
         _ratio(_total(done, lambda row: row.damage), len(done)),
-        statistics.median(times) if times else None, _ratio(len(rows), interventions),
-        _ratio(hours, interventions))
+        statistics.median(times) if times else None,
+        _ratio(len(rows), interventions),
+        _ratio(hours, interventions),
+    )
 
 
-def common_completion(variants: Mapping[str, Sequence[TrialRow]]
-                      ) -> Tuple[int, Dict[str, float]]:
+def common_completion(variants: Mapping[str, Sequence[TrialRow]]) -> Tuple[int, Dict[str, float]]:
     """Return the median times (s) of the variants that are compared, on seeds that all completed.
 
     Each variant completes other trials: the fewer it completes, the easier they are.
@@ -124,13 +135,18 @@ def common_completion(variants: Mapping[str, Sequence[TrialRow]]
     """
     if any(name not in variants for name in COMPARED):
         return 0, {}
-    times = {name: {row.pair: row.sim_s for row in variants[name]
-                    if row.succeeded and row.sim_s is not None} for name in COMPARED}
+    times = {
+        name: {
+            row.pair: row.sim_s for row in variants[name] if row.succeeded and row.sim_s is not None
+        }
+        for name in COMPARED
+    }
     seeds = set.intersection(*(set(each) for each in times.values()))
     if not seeds:
         return 0, {}
-    return len(seeds), {name: statistics.median(each[pair] for pair in seeds)
-                        for name, each in times.items()}
+    return len(seeds), {
+        name: statistics.median(each[pair] for pair in seeds) for name, each in times.items()
+    }
 
 
 def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:
@@ -142,14 +158,16 @@ def robot_hours(rows: Sequence[TrialRow]) -> Optional[float]:
     for row in rows:
         if row.hour is not None and row.sim_s is not None:
             by_replicate.setdefault(row.replicate, []).extend(
-                (row.hour, row.hour + row.sim_s / SECONDS_PER_HOUR))
+                (row.hour, row.hour + row.sim_s / SECONDS_PER_HOUR)
+            )
     if rows and sum(map(len, by_replicate.values())) == 2 * len(rows):
         return sum(max(each) - min(each) for each in by_replicate.values())
     return _total(rows, lambda row: row.sim_s, SECONDS_PER_HOUR)
 
 
-def _total(rows: Sequence[TrialRow], value: Callable[[TrialRow], Optional[float]],
-           unit: float = 1.0) -> Optional[float]:
+def _total(
+    rows: Sequence[TrialRow], value: Callable[[TrialRow], Optional[float]], unit: float = 1.0
+) -> Optional[float]:
     values = [value(row) for row in rows]
     known = [each for each in values if each is not None]
     return sum(known) / unit if len(known) == len(values) and values else None
@@ -197,8 +215,11 @@ def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
     lines = ['  on the {} seeds that all variants ran:'.format(len(found[HINDSIGHT]))]
     for name, mine in found.items():
         true, needed = shares_of(mine)[:2]
-        lines.append('    {:<24}{:>7.1%} true success {:>7.1%} interventions'.format(
-            name, true.share, needed.share))
+        lines.append(
+            '    {:<24}{:>7.1%} true success {:>7.1%} interventions'.format(
+                name, true.share, needed.share
+            )
+        )
     return ['\n'.join(lines) + '\n']
 
 
@@ -211,22 +232,43 @@ def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
 
 
 def _variant(name: str, rows: Sequence[TrialRow]) -> str:
-    lines = ['  {} ({} trials, {} replicates)'.format(
-        name, len(rows), len({row.replicate for row in rows}))]
+    lines = [
+        '  {} ({} trials, {} replicates)'.format(
+            name, len(rows), len({row.replicate for row in rows})
+        )
+    ]
     for share in shares_of(rows):
         over = share.over_replicates
-        lines.append('    {:<18}{:>5} {:>7.1%} ({:.1%} to {:.1%}){}'.format(
-            share.name, share.trials, share.share, share.interval[0], share.interval[1],
-            '' if over is None else '; replicates {:.1%} to {:.1%}'.format(*over)))
-    lines += ['    {:<42}{}'.format(told.replace('_', ' '), _number(value))
-              for told, value in zip(_COSTS, costs_of(rows))]
+        lines.append(
+            '    {:<18}{:>5} {:>7.1%} ({:.1%} to {:.1%}){}'.format(
+                share.name,
+                share.trials,
+                share.share,
+                share.interval[0],
+                share.interval[1],
+                '' if over is None else '; replicates {:.1%} to {:.1%}'.format(*over),
+            )
+        )
+    lines += [
+        '    {:<42}{}'.format(told.replace('_', ' '), _number(value))
+        for told, value in zip(_COSTS, costs_of(rows))
+    ]
     return '\n'.join(lines) + '\n'
 
 
-_COSTS = ('attempts a trial', 'questions a trial', 'questions a robot hour', 'expert s a trial',
-          'expert s a robot hour', 'trials with a wrong object', 'damage for each completed task',
-          'damage in a completed task', 's to completion, median', 'trials between interventions',
-          'robot hours between interventions')
+_COSTS = (
+    'attempts a trial',
+    'questions a trial',
+    'questions a robot hour',
+    'expert s a trial',
+    'expert s a robot hour',
+    'trials with a wrong object',
+    'damage for each completed task',
+    'damage in a completed task',
+    's to completion, median',
+    'trials between interventions',
+    'robot hours between interventions',
+)
 
 
 def _number(value: Optional[float]) -> str:
@@ -241,17 +283,29 @@ def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
             lines.append(
                 '  interventions, {} against {}: {} trials under {} alone, {} under {} alone, '
                 'of {} that both ran; McNemar p = {:.3g}'.format(
-                    first, second, counts.first_alone, first, counts.second_alone, second,
-                    sum(counts), counts.p_value))
+                    first,
+                    second,
+                    counts.first_alone,
+                    first,
+                    counts.second_alone,
+                    second,
+                    sum(counts),
+                    counts.p_value,
+                )
+            )
     return ['\n'.join(lines) + '\n'] if lines else []
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
-    parser = argparse.ArgumentParser(prog='compare_variants', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('files', nargs='+', metavar='FILE', type=path_of,
-                        help='results.csv of an experiment')
+    parser = argparse.ArgumentParser(
+        prog='compare_variants',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        'files', nargs='+', metavar='FILE', type=path_of, help='results.csv of an experiment'
+    )
     args = parser.parse_args(argv)
     try:
         rows = [row for name in args.files for row in read_rows(Path(name))]

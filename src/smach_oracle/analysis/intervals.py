@@ -1,12 +1,42 @@
 """Confidence intervals of shares: over trials, over replicates, and of a paired difference."""
+
 import math
 from typing import Optional, Sequence, Tuple
 
 Z_95 = 1.959963984540054  # two-sided 95% quantile of the normal distribution
 # The same of Student's t distribution, for 1, 2, ... degrees of freedom.
-T_95 = (12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228, 2.201, 2.179, 2.160,
-        2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086, 2.080, 2.074, 2.069, 2.064, 2.060, 2.056,
-        2.052, 2.048, 2.045, 2.042)
+T_95 = (
+    12.706,
+    4.303,
+    3.182,
+    2.776,
+    2.571,
+    2.447,
+    2.365,
+    2.306,
+    2.262,
+    2.228,
+    2.201,
+    2.179,
+    2.160,
+    2.145,
+    2.131,
+    2.120,
+    2.110,
+    2.101,
+    2.093,
+    2.086,
+    2.080,
+    2.074,
+    2.069,
+    2.064,
+    2.060,
+    2.056,
+    2.052,
+    2.048,
+    2.045,
+    2.042,
+)
 
 Interval = Tuple[float, float]
 
@@ -38,8 +68,11 @@ def t_quantile(freedom: int) -> float:
     if freedom <= len(T_95):
         return T_95[freedom - 1]
     # the first three terms of its expansion: within 0.0001
-    return (Z_95 + (Z_95 ** 3 + Z_95) / (4 * freedom)
-            + (5 * Z_95 ** 5 + 16 * Z_95 ** 3 + 3 * Z_95) / (96 * freedom ** 2))
+    return (
+        Z_95
+        + (Z_95**3 + Z_95) / (4 * freedom)
+        + (5 * Z_95**5 + 16 * Z_95**3 + 3 * Z_95) / (96 * freedom**2)
+    )
 
 
 def replicate_interval(shares: Sequence[float]) -> Optional[Interval]:
@@ -70,14 +103,17 @@ def paired_difference(both: int, first_alone: int, second_alone: int, none: int)
     other_low, other_high = wilson_interval(both + second_alone, pairs)
     phi = _phi(both, first_alone, second_alone, none)
     difference = first - second
-    return (difference - _joined(first - low, other_high - second, phi),
-            difference + _joined(high - first, second - other_low, phi))
+    return (
+        difference - _joined(first - low, other_high - second, phi),
+        difference + _joined(high - first, second - other_low, phi),
+    )
 
 
 def _phi(both: int, first_alone: int, second_alone: int, none: int) -> float:
     """Return how much two paired shares go with each other, -1 to 1, corrected for few pairs."""
-    spread = ((both + first_alone) * (second_alone + none)
-              * (both + second_alone) * (first_alone + none))
+    spread = (
+        (both + first_alone) * (second_alone + none) * (both + second_alone) * (first_alone + none)
+    )
     if not spread:
         return 0.0
     product = both * none - first_alone * second_alone

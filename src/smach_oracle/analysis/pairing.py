@@ -1,4 +1,5 @@
 """Variants that ran the same trials, compared trial by trial."""
+
 import itertools
 import math
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
@@ -33,21 +34,28 @@ def mcnemar_exact(first_alone: int, second_alone: int) -> float:
     :raises ValueError: for a number below 0.
     """
     if min(first_alone, second_alone) < 0:
-        raise ValueError('numbers of trials: {} is not allowed; allowed: 0 and more'.format(
-            (first_alone, second_alone)))
+        raise ValueError(
+            'numbers of trials: {} is not allowed; allowed: 0 and more'.format(
+                (first_alone, second_alone)
+            )
+        )
     differing = first_alone + second_alone
-    tail = sum(math.comb(differing, count)
-               for count in range(min(first_alone, second_alone) + 1))
-    return float(min(1.0, 2 * tail / 2 ** differing))
+    tail = sum(math.comb(differing, count) for count in range(min(first_alone, second_alone) + 1))
+    return float(min(1.0, 2 * tail / 2**differing))
 
 
-def paired_counts(first: Sequence[TrialRow], second: Sequence[TrialRow],
-                  happened: Happened) -> PairedCounts:
+def paired_counts(
+    first: Sequence[TrialRow], second: Sequence[TrialRow], happened: Happened
+) -> PairedCounts:
     """Compare two variants over the trials that both ran."""
     others = {row.pair: happened(row) for row in second}
     pairs = [(happened(row), others[row.pair]) for row in first if row.pair in others]
-    return PairedCounts(*(pairs.count(each) for each in (
-        (True, True), (True, False), (False, True), (False, False))))
+    return PairedCounts(
+        *(
+            pairs.count(each)
+            for each in ((True, True), (True, False), (False, True), (False, False))
+        )
+    )
 
 
 class Trend(NamedTuple):
@@ -57,8 +65,9 @@ class Trend(NamedTuple):
     p_value: float  # two-sided
 
 
-def trend_of(rows: Sequence[TrialRow], number_of: Callable[[TrialRow], float],
-             happened: Happened) -> Optional[Trend]:
+def trend_of(
+    rows: Sequence[TrialRow], number_of: Callable[[TrialRow], float], happened: Happened
+) -> Optional[Trend]:
     """Test whether something happens the oftener, the larger a number is.
 
     It is Mantel's extension test (N. Mantel, J. Am. Stat. Assoc. 58, 1963) with a stratum for each
@@ -71,11 +80,12 @@ def trend_of(rows: Sequence[TrialRow], number_of: Callable[[TrialRow], float],
     total = variance = 0.0
     for each in by_pair.values():
         if len(each) > 1:
-            numbers, events = [number_of(row) for row in each], [float(happened(row))
-                                                                 for row in each]
+            numbers, events = (
+                [number_of(row) for row in each],
+                [float(happened(row)) for row in each],
+            )
             total += _products(numbers, events)
-            variance += (_products(numbers, numbers) * _products(events, events)
-                         / (len(each) - 1))
+            variance += _products(numbers, numbers) * _products(events, events) / (len(each) - 1)
     if not variance:
         return None
     z = total / math.sqrt(variance)
@@ -120,10 +130,17 @@ def hindsight(rows: Sequence[TrialRow]) -> List[TrialRow]:
     by_pair: Dict[Pair, List[TrialRow]] = {}
     for row in on_common_seeds(rows):
         by_pair.setdefault(row.pair, []).append(row)
-    return [min(each, key=_badness)._replace(variant=HINDSIGHT, learned='')
-            for each in by_pair.values()]
+    return [
+        min(each, key=_badness)._replace(variant=HINDSIGHT, learned='') for each in by_pair.values()
+    ]
 
 
 def _badness(row: TrialRow) -> Tuple[bool, bool, int, int, float, str]:
-    return (row.intervened, not row.succeeded, row.questions, row.damage or 0,
-            math.inf if row.sim_s is None else row.sim_s, row.variant)
+    return (
+        row.intervened,
+        not row.succeeded,
+        row.questions,
+        row.damage or 0,
+        math.inf if row.sim_s is None else row.sim_s,
+        row.variant,
+    )

@@ -2,6 +2,7 @@
 
 A bag that cannot be used is skipped and named, and the exit code is 1.
 """
+
 import json
 import sys
 from typing import Dict, Iterator, List, Mapping, Sequence, Tuple, Union

@@ -6,6 +6,7 @@ replicates. Draws interventions as a function of the memory N (paper, section IV
 memory is a tunable parameter, the frequency of expert intervention can be set"). Exit code: 0, all
 bags were read; 1, some were skipped; 2, there was nothing to count.
 """
+
 import argparse
 import os
 import sys
@@ -52,20 +53,34 @@ def find_points(variants: Sequence[VariantTrials]) -> List[SweepPoint]:
         memory = variant.settings.get('memory')
         truth = counts.of(TRUE_SUCCESS) if counts.truth_known else None
         points.append(
-            SweepPoint(variant.experiment, _label(variant, variants),
-                       memory if isinstance(memory, int) else None, counts.trials,
-                       counts.replicates, counts.of(QUESTIONS), counts.of(RECOVERIES),
-                       counts.of(ENDED_IN_FAILURE), truth))
+            SweepPoint(
+                variant.experiment,
+                _label(variant, variants),
+                memory if isinstance(memory, int) else None,
+                counts.trials,
+                counts.replicates,
+                counts.of(QUESTIONS),
+                counts.of(RECOVERIES),
+                counts.of(ENDED_IN_FAILURE),
+                truth,
+            )
+        )
     return sorted(points, key=lambda point: (point.experiment, point.label, point.memory or 0))
 
 
 def _label(variant: VariantTrials, variants: Sequence[VariantTrials]) -> str:
     """E.g. "prose", or "algorithm1, high_from 0.8" where other variants have another."""
     others = [other.settings for other in variants if other.experiment == variant.experiment]
-    differing = [key for key in sorted(variant.settings) if key not in ('memory', 'policy')
-                 and any(other.get(key) != variant.settings[key] for other in others)]
-    return ', '.join([str(variant.settings.get('policy', 'policy unknown'))]
-                     + ['{} {}'.format(key, variant.settings[key]) for key in differing])
+    differing = [
+        key
+        for key in sorted(variant.settings)
+        if key not in ('memory', 'policy')
+        and any(other.get(key) != variant.settings[key] for other in others)
+    ]
+    return ', '.join(
+        [str(variant.settings.get('policy', 'policy unknown'))]
+        + ['{} {}'.format(key, variant.settings[key]) for key in differing]
+    )
 
 
 def format_points(points: Sequence[SweepPoint]) -> str:
@@ -76,12 +91,17 @@ def format_points(points: Sequence[SweepPoint]) -> str:
             point for point in points if (point.experiment, point.label) == (experiment, label)
         ]
         lines += [
-            '', '{}, {}'.format(experiment, label),
-            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format('memory N', 'trials',
-                                                               'expert asked (95% interval)',
-                                                               'over replicates',
-                                                               'oracle recovered', 'failed',
-                                                               'true success')
+            '',
+            '{}, {}'.format(experiment, label),
+            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format(
+                'memory N',
+                'trials',
+                'expert asked (95% interval)',
+                'over replicates',
+                'oracle recovered',
+                'failed',
+                'true success',
+            ),
         ]
         lines += [_line(point) for point in chosen]
     return '\n'.join(lines[1:]) + '\n'
@@ -93,10 +113,14 @@ def _parts(points: Sequence[SweepPoint]) -> List[Tuple[str, str]]:
 
 def _line(point: SweepPoint) -> str:
     return '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format(
-        '?' if point.memory is None else point.memory, point.trials, _with_interval(point.asked),
-        over_replicates(point.asked).strip(), _with_interval(point.recovered),
+        '?' if point.memory is None else point.memory,
+        point.trials,
+        _with_interval(point.asked),
+        over_replicates(point.asked).strip(),
+        _with_interval(point.recovered),
         '{:.1f}%'.format(100 * point.failed.share),
-        'unknown' if point.true_success is None else _with_interval(point.true_success)).rstrip()
+        'unknown' if point.true_success is None else _with_interval(point.true_success),
+    ).rstrip()
 
 
 def _with_interval(count: Count) -> str:
@@ -109,6 +133,7 @@ def save_figure(points: Sequence[SweepPoint], stem: str) -> List[str]:
     :raises OSError: where a file cannot be written.
     """
     from .sweep_figure import save  # matplotlib takes a second: only where it is wanted
+
     return save(by_label(points), stem)
 
 
@@ -125,12 +150,21 @@ def by_label(points: Sequence[SweepPoint]) -> Dict[str, List[SweepPoint]]:
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
-    parser = argparse.ArgumentParser(prog='compare_oracles', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
-                        help='with bags in it or below it; or a bag')
-    parser.add_argument('--figure', metavar='OUT', type=path_of,
-                        help='write the figure to OUT.svg and OUT.png')
+    parser = argparse.ArgumentParser(
+        prog='compare_oracles',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        'folders',
+        nargs='+',
+        metavar='FOLDER',
+        type=path_of,
+        help='with bags in it or below it; or a bag',
+    )
+    parser.add_argument(
+        '--figure', metavar='OUT', type=path_of, help='write the figure to OUT.svg and OUT.png'
+    )
     args = parser.parse_args(argv)
     try:
         found = load_trials(args.folders)

@@ -1,4 +1,5 @@
 """The figure of a memory sweep: share of trials with a question over the oracle's memory."""
+
 from typing import Any, List, Mapping, Sequence
 
 from matplotlib import rc_context
@@ -39,11 +40,24 @@ def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
         colour, marker, dashes = LOOKS[number % len(LOOKS)]
         shift = 1.03 ** (number - (len(series) - 1) / 2)
         shares = [100 * point.asked.share for point in points]
-        reach = [[share - 100 * point.asked.interval[0] for share, point in zip(shares, points)],
-                 [100 * point.asked.interval[1] - share for share, point in zip(shares, points)]]
-        axes.errorbar([shift * point.memory for point in points], shares, yerr=reach, color=colour,
-                      marker=marker, linestyle=dashes, markersize=3.5, linewidth=1.2,
-                      elinewidth=0.8, capsize=2, label=label, clip_on=False)
+        reach = [
+            [share - 100 * point.asked.interval[0] for share, point in zip(shares, points)],
+            [100 * point.asked.interval[1] - share for share, point in zip(shares, points)],
+        ]
+        axes.errorbar(
+            [shift * point.memory for point in points],
+            shares,
+            yerr=reach,
+            color=colour,
+            marker=marker,
+            linestyle=dashes,
+            markersize=3.5,
+            linewidth=1.2,
+            elinewidth=0.8,
+            capsize=2,
+            label=label,
+            clip_on=False,
+        )
     memories = sorted({point.memory for points in series.values() for point in points})
     axes.set_xscale('log')
     axes.xaxis.set_major_locator(FixedLocator(memories))
@@ -52,6 +66,12 @@ def draw(series: Mapping[str, Sequence[Any]]) -> Figure:
     axes.set_xlabel('Memory N (results of a state)')
     axes.set_ylabel('Trials with a question (%)')
     axes.set_ylim(bottom=0)
-    axes.legend(loc='lower left', bbox_to_anchor=(0, 1.0), ncol=2, frameon=False, borderaxespad=0.0,
-                borderpad=0.2)
+    axes.legend(
+        loc='lower left',
+        bbox_to_anchor=(0, 1.0),
+        ncol=2,
+        frameon=False,
+        borderaxespad=0.0,
+        borderpad=0.2,
+    )
     return figure

@@ -2,6 +2,7 @@
 
 Definitions: doc/statistics.md.
 """
+
 import csv
 import json
 from typing import IO, Any, Dict, List, Optional, Sequence
@@ -36,8 +37,12 @@ def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary
 
 def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
     headings = [
-        'Experiment', 'Variant', 'Trials', 'Oracle recoveries', 'Expert interventions',
-        'Ended in failure'
+        'Experiment',
+        'Variant',
+        'Trials',
+        'Oracle recoveries',
+        'Expert interventions',
+        'Ended in failure',
     ]
     names = [RECOVERIES, ANSWERED, ENDED_IN_FAILURE]
     if any(variant.truth_known for variant in variants):
@@ -50,12 +55,18 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
     lines = [
         '  '.join(
             cell.ljust(width) if column < 2 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(row, widths))).rstrip() for row in rows
+            for column, (cell, width) in enumerate(zip(row, widths))
+        ).rstrip()
+        for row in rows
     ]
     rule = '-' * (sum(widths) + 2 * (len(widths) - 1))
     return [
-        'Shared autonomy statistics: trials in which each happened at least once', rule, lines[0],
-        rule, *lines[1:], rule
+        'Shared autonomy statistics: trials in which each happened at least once',
+        rule,
+        lines[0],
+        rule,
+        *lines[1:],
+        rule,
     ]
 
 
@@ -66,26 +77,36 @@ def _share(variant: VariantCounts, name: str) -> str:
 
 def _variant_lines(variant: VariantCounts) -> List[str]:
     several = variant.replicates > 1
-    heading = '  {:<26}{:>8}{:>9}   {:<16}{:>8}'.format('', 'trials', 'share', '95% interval',
-                                                        'events')
+    heading = '  {:<26}{:>8}{:>9}   {:<16}{:>8}'.format(
+        '', 'trials', 'share', '95% interval', 'events'
+    )
     lines = [
         '{}, {}: {} trials{}'.format(
-            variant.experiment, variant.name, variant.trials,
-            ' in {} replicates'.format(variant.replicates) if several else ''),
-        heading + ('   over replicates' if several else '')
+            variant.experiment,
+            variant.name,
+            variant.trials,
+            ' in {} replicates'.format(variant.replicates) if several else '',
+        ),
+        heading + ('   over replicates' if several else ''),
     ]
     lines += [_count_line(count) for count in variant.counts]
     if 0 < variant.truth_known < variant.trials:
-        lines.append('  how a trial truly ended is known of {} of {}'.format(
-            variant.truth_known, variant.trials))
+        lines.append(
+            '  how a trial truly ended is known of {} of {}'.format(
+                variant.truth_known, variant.trials
+            )
+        )
     if variant.resumed:
-        lines.append('  {} trials were resumed after their program was stopped; it was down for '
-                     '{:.0f} s in all'.format(variant.resumed, variant.down_s))
+        lines.append(
+            '  {} trials were resumed after their program was stopped; it was down for '
+            '{:.0f} s in all'.format(variant.resumed, variant.down_s)
+        )
     if variant.lost_events:
         lines.append(
             '  {} events are missing in {} trials (gaps in their numbering): these figures are '
             'lower '
-            'bounds'.format(variant.lost_events, variant.trials_with_gaps))
+            'bounds'.format(variant.lost_events, variant.trials_with_gaps)
+        )
     return lines
 
 
@@ -93,10 +114,9 @@ def _count_line(count: Count) -> str:
     indent = '  ' if count.name in _INDENTED else ''
     events = '' if count.events is None else str(count.events)
     over = over_replicates(count)
-    return '  {:<26}{:>8}{:>8.1f}%   {:<16}{:>8}   {}'.format(indent + count.name, count.trials,
-                                                              100 * count.share,
-                                                              percent(count.interval), events,
-                                                              over).rstrip()
+    return '  {:<26}{:>8}{:>8.1f}%   {:<16}{:>8}   {}'.format(
+        indent + count.name, count.trials, 100 * count.share, percent(count.interval), events, over
+    ).rstrip()
 
 
 def over_replicates(count: Count) -> str:
@@ -115,14 +135,15 @@ def percent(interval: Sequence[float]) -> str:
     return '{:5.1f} to {:5.1f}%'.format(*(100 * bound for bound in interval))
 
 
-def as_data(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary],
-            skipped: Sequence[SkippedBag]) -> Dict[str, Any]:
+def as_data(
+    variants: Sequence[VariantCounts], trials: Sequence[TrialSummary], skipped: Sequence[SkippedBag]
+) -> Dict[str, Any]:
     """Return all of it as plain data, for JSON."""
     return {
         'groups': [_variant_data(variant) for variant in variants],
         'causes': [dict(row._asdict(), arm=row.variant) for row in cause_rows(trials)],
         'trials': [_trial_data(trial) for trial in trials],
-        'skipped': [item._asdict() for item in skipped]
+        'skipped': [item._asdict() for item in skipped],
     }
 
 
@@ -134,14 +155,22 @@ def _variant_data(variant: VariantCounts) -> Dict[str, Any]:
 
 
 def _trial_data(trial: TrialSummary) -> Dict[str, Any]:
-    return dict(trial._asdict(), ending=trial.ending.value,
-                failures_by_state=dict(trial.failures_by_state), settings=dict(trial.settings),
-                cause=trial.cause._asdict() if trial.cause else None,
-                truth=trial.truth._asdict() if trial.truth else None)
+    return dict(
+        trial._asdict(),
+        ending=trial.ending.value,
+        failures_by_state=dict(trial.failures_by_state),
+        settings=dict(trial.settings),
+        cause=trial.cause._asdict() if trial.cause else None,
+        truth=trial.truth._asdict() if trial.truth else None,
+    )
 
 
-def write_json(target: IO[str], variants: Sequence[VariantCounts], trials: Sequence[TrialSummary],
-               skipped: Sequence[SkippedBag]) -> None:
+def write_json(
+    target: IO[str],
+    variants: Sequence[VariantCounts],
+    trials: Sequence[TrialSummary],
+    skipped: Sequence[SkippedBag],
+) -> None:
     """Write everything as one JSON object."""
     json.dump(as_data(variants, trials, skipped), target, indent=1, sort_keys=True)
     target.write('\n')
@@ -149,20 +178,49 @@ def write_json(target: IO[str], variants: Sequence[VariantCounts], trials: Seque
 
 def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
     """Write one line a trial, for a spreadsheet or for your own statistics."""
-    plain = [name for name in TrialSummary._fields
-             if name not in ('failures_by_state', 'bags', 'settings', 'cause', 'truth', 'unwell_s',
-                             'resumed', 'down_s')]
+    plain = [
+        name
+        for name in TrialSummary._fields
+        if name
+        not in (
+            'failures_by_state',
+            'bags',
+            'settings',
+            'cause',
+            'truth',
+            'unwell_s',
+            'resumed',
+            'down_s',
+        )
+    ]
     writer = csv.writer(target, lineterminator='\n')
-    writer.writerow(plain + ['seed', 'causes', 'true_success', 'why', 'sim_s', 'wall_s',
-                             'unwell_s', 'resumed', 'down_s', 'wrong_object', 'damage'])
+    writer.writerow(
+        plain
+        + [
+            'seed',
+            'causes',
+            'true_success',
+            'why',
+            'sim_s',
+            'wall_s',
+            'unwell_s',
+            'resumed',
+            'down_s',
+            'wrong_object',
+            'damage',
+        ]
+    )
     for trial in trials:
         data = _trial_data(trial)
         cause, truth = trial.cause, trial.truth
         world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
         world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
-        writer.writerow(['' if data[name] is None else data[name] for name in plain] + world
-                        + [trial.unwell_s, trial.resumed, trial.down_s]
-                        + _harm(truth))
+        writer.writerow(
+            ['' if data[name] is None else data[name] for name in plain]
+            + world
+            + [trial.unwell_s, trial.resumed, trial.down_s]
+            + _harm(truth)
+        )
 
 
 def _harm(truth: Optional[Truth]) -> List[Any]:

@@ -2,6 +2,7 @@
 
 The one definition for trials in bags and for trials that a console follows while they run.
 """
+
 from collections import Counter
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Set, Tuple

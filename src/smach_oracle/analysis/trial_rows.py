@@ -3,6 +3,7 @@
 Rows are kept in a CSV file that is appended to as trials end, so that figures can be made without
 the bags. An empty cell is what is not known. Definitions: doc/statistics.md.
 """
+
 import csv
 import io
 import json
@@ -59,8 +60,11 @@ class TrialRow(NamedTuple):
 
         Another object than the one that was meant is no success.
         """
-        return (self.ending == TrialEnding.SUCCESS.value and self.true_success is not False
-                and not self.wrong_object)
+        return (
+            self.ending == TrialEnding.SUCCESS.value
+            and self.true_success is not False
+            and not self.wrong_object
+        )
 
     @property
     def intervened(self) -> bool:
@@ -105,10 +109,18 @@ class TruthDetails(NamedTuple):
 NO_DETAILS = TruthDetails()
 
 
-def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed: int,
-           details: TruthDetails = NO_DETAILS, version: str = '',
-           learned: Optional[Mapping[str, Any]] = None,
-           lasting_share: Optional[float] = None, tries: Sequence[StateTry] = ()) -> TrialRow:
+def row_of(
+    summary: TrialSummary,
+    task: str,
+    variant: str,
+    replicate: int,
+    seed: int,
+    details: TruthDetails = NO_DETAILS,
+    version: str = '',
+    learned: Optional[Mapping[str, Any]] = None,
+    lasting_share: Optional[float] = None,
+    tries: Sequence[StateTry] = (),
+) -> TrialRow:
     """Return the row of a trial that has come to its end.
 
     :param tries: of the states that failed, in ROS time.
@@ -118,16 +130,34 @@ def row_of(summary: TrialSummary, task: str, variant: str, replicate: int, seed:
     if details.passed_s is not None:  # a world that was not told of the expert's time has no entry
         asked_s = details.passed_s.get('expert', None if summary.questions else 0.0)
     return TrialRow(
-        task, variant, replicate, seed, summary.ending.value,
-        None if truth is None else truth.success, details.wrong_object, details.damage,
-        summary.failures, summary.recoveries, summary.questions, summary.answered,
-        asked_s, None if truth is None else truth.sim_s,
-        ' '.join(cause.kinds) if cause is not None else '', details.lasting,
-        '' if truth is None else truth.why, version,
-        _as_json(learned), lasting_share, details.wall_s, details.hour, _as_json(details.left),
+        task,
+        variant,
+        replicate,
+        seed,
+        summary.ending.value,
+        None if truth is None else truth.success,
+        details.wrong_object,
+        details.damage,
+        summary.failures,
+        summary.recoveries,
+        summary.questions,
+        summary.answered,
+        asked_s,
+        None if truth is None else truth.sim_s,
+        ' '.join(cause.kinds) if cause is not None else '',
+        details.lasting,
+        '' if truth is None else truth.why,
+        version,
+        _as_json(learned),
+        lasting_share,
+        details.wall_s,
+        details.hour,
+        _as_json(details.left),
         '' if details.causes is None else causes_text(details.causes),
         '' if details.clock is None else tries_text(in_world_time(tries, details.clock)),
-        settings.get('memory'), settings.get('prior'))
+        settings.get('memory'),
+        settings.get('prior'),
+    )
 
 
 def _as_json(data: Optional[Mapping[str, Any]]) -> str:
@@ -192,7 +222,7 @@ def read_rows(path: Path) -> List[TrialRow]:
     :raises OSError: where the file cannot be read.
     """
     text = path.read_text(encoding='utf-8')
-    whole = text[:text.rfind('\n') + 1]
+    whole = text[: text.rfind('\n') + 1]
     lines = list(csv.reader(io.StringIO(whole)))
     if not lines:
         return []
@@ -212,7 +242,7 @@ def cut_torn_line(path: Path) -> None:
     :raises OSError: where the file cannot be changed.
     """
     content = path.read_bytes()
-    whole = content[:content.rfind(b'\n') + 1]
+    whole = content[: content.rfind(b'\n') + 1]
     if whole != content:
         with path.open('r+b') as target:
             target.truncate(len(whole))
@@ -223,13 +253,35 @@ def _flag(text: str) -> bool:
 
 
 _PARSERS: Mapping[str, Callable[[str], Any]] = {
-    'replicate': int, 'seed': int, 'true_success': _flag, 'damage': int, 'failures': int,
-    'attempts': int, 'questions': int, 'answered': int, 'expert_s': float, 'sim_s': float,
-    'lasting': int, 'lasting_share': float, 'wall_s': float, 'hour': float, 'memory': int,
+    'replicate': int,
+    'seed': int,
+    'true_success': _flag,
+    'damage': int,
+    'failures': int,
+    'attempts': int,
+    'questions': int,
+    'answered': int,
+    'expert_s': float,
+    'sim_s': float,
+    'lasting': int,
+    'lasting_share': float,
+    'wall_s': float,
+    'hour': float,
+    'memory': int,
     'prior': float,
 }
-_MAY_BE_EMPTY = ('true_success', 'damage', 'expert_s', 'sim_s', 'lasting', 'lasting_share',
-                 'wall_s', 'hour', 'memory', 'prior')
+_MAY_BE_EMPTY = (
+    'true_success',
+    'damage',
+    'expert_s',
+    'sim_s',
+    'lasting',
+    'lasting_share',
+    'wall_s',
+    'hour',
+    'memory',
+    'prior',
+)
 # columns that are JSON, where they are not empty
 _TEXTS: Mapping[str, Callable[[str], object]] = {'cause_log': causes_in, 'tries': tries_in}
 _ENDINGS = {ending.value for ending in TrialEnding} | {LOST}
@@ -240,24 +292,32 @@ def _parsed(line: Sequence[str], columns: int, where: str) -> TrialRow:
         raise BagError('{}: {} cells, not {}'.format(where, len(line), columns))
     cells: Dict[str, Any] = dict(zip(TrialRow._fields, line))
     # '' is no object. A row that has the damage has this, too
-    cells['wrong_object'] = (None if cells['damage'] == '' and not cells['wrong_object']
-                             else cells['wrong_object'])
+    cells['wrong_object'] = (
+        None if cells['damage'] == '' and not cells['wrong_object'] else cells['wrong_object']
+    )
     for name in cells:
         try:
             if name in _PARSERS:
-                cells[name] = (None if not cells[name] and name in _MAY_BE_EMPTY
-                               else _PARSERS[name](cells[name]))
+                cells[name] = (
+                    None
+                    if not cells[name] and name in _MAY_BE_EMPTY
+                    else _PARSERS[name](cells[name])
+                )
             elif name in _TEXTS and cells[name]:
                 _TEXTS[name](cells[name])
         except (ValueError, KeyError, TypeError) as err:
             raise BagError('{}: {}: {!r} is not allowed'.format(where, name, cells[name])) from err
     if cells['ending'] not in _ENDINGS:
-        raise BagError('{}: ending: {!r} is not allowed; allowed: {}'.format(
-            where, cells['ending'], ', '.join(sorted(_ENDINGS))))
+        raise BagError(
+            '{}: ending: {!r} is not allowed; allowed: {}'.format(
+                where, cells['ending'], ', '.join(sorted(_ENDINGS))
+            )
+        )
     return TrialRow(**cells)
 
 
 # -- truth beyond the end
+
 
 def read_details(path: str) -> Dict[int, TruthDetails]:
     """Return the details by seed. If a seed appears twice, the later line is used.
@@ -287,11 +347,17 @@ def _data_of(line: str) -> Mapping[str, Any]:
 def details_of(data: Mapping[str, Any]) -> TruthDetails:
     """Return the details of a line."""
     wrong, passed, left = (data.get(key) for key in ('wrong_object', 'passed_s', 'left'))
-    return TruthDetails(wrong if isinstance(wrong, str) else None, _damage(data.get('damage')),
-                        passed if isinstance(passed, dict) else None,
-                        _lasting(data.get('causes')), _number(data.get('wall_s')),
-                        _number(data.get('hour')), left if isinstance(left, dict) else None,
-                        causes_of(data.get('causes')), _clock(data))
+    return TruthDetails(
+        wrong if isinstance(wrong, str) else None,
+        _damage(data.get('damage')),
+        passed if isinstance(passed, dict) else None,
+        _lasting(data.get('causes')),
+        _number(data.get('wall_s')),
+        _number(data.get('hour')),
+        left if isinstance(left, dict) else None,
+        causes_of(data.get('causes')),
+        _clock(data),
+    )
 
 
 def _clock(data: Mapping[str, Any]) -> Optional[WorldClock]:

@@ -4,6 +4,7 @@ The trials have the same experiment, variant and seed. Their states, outcomes an
 compared. Exit code: 0, they are the same; 1, they are not, or some bags were skipped; 2, there is
 nothing to compare.
 """
+
 import argparse
 import sys
 from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
@@ -33,10 +34,21 @@ class TrialSteps(NamedTuple):
 def steps_of(events: Iterable[Event]) -> Tuple[TrialStep, ...]:
     """Return the trial's steps: kind, container, state, outcome, target, judgement of a failure."""
     return tuple(
-        (str(getattr(event.kind, 'name', event.kind)), event.path, event.state, event.outcome,
-         event.target, event.failure_kind, event.failure_class, repr(event.rate), event.continuous,
-         event.text if event.kind in (EventKind.FAILURE, EventKind.DECISION) else '')
-        for event in sorted(events, key=lambda event: event.seq) if event.kind not in LEFT_OUT)
+        (
+            str(getattr(event.kind, 'name', event.kind)),
+            event.path,
+            event.state,
+            event.outcome,
+            event.target,
+            event.failure_kind,
+            event.failure_class,
+            repr(event.rate),
+            event.continuous,
+            event.text if event.kind in (EventKind.FAILURE, EventKind.DECISION) else '',
+        )
+        for event in sorted(events, key=lambda event: event.seq)
+        if event.kind not in LEFT_OUT
+    )
 
 
 def load_trial_steps(place: str, skipped: List[SkippedBag]) -> Dict[TrialKey, TrialSteps]:
@@ -51,8 +63,12 @@ def load_trial_steps(place: str, skipped: List[SkippedBag]) -> Dict[TrialKey, Tr
         for trial_id, cause in content.causes.items():
             events = [event for event in content.events if event.trial_id == trial_id]
             summary = summarise(events, (path,))
-            key = (summary.experiment, 'without' if summary.recovers is False else 'with',
-                   summary.settings, cause.seed)
+            key = (
+                summary.experiment,
+                'without' if summary.recovers is False else 'with',
+                summary.settings,
+                cause.seed,
+            )
             found[key] = TrialSteps(path, steps_of(events))
     return found
 
@@ -63,9 +79,15 @@ def differences(first: Dict[TrialKey, TrialSteps], second: Dict[TrialKey, TrialS
     for key in sorted(set(first) & set(second), key=repr):
         ours, theirs = first[key], second[key]
         if ours.steps != theirs.steps:
-            texts.append('seed {}, {} oracle: {}\n  {}\n  {}'.format(
-                key[3], key[1], _first_difference(ours.steps, theirs.steps), ours.bag,
-                theirs.bag))
+            texts.append(
+                'seed {}, {} oracle: {}\n  {}\n  {}'.format(
+                    key[3],
+                    key[1],
+                    _first_difference(ours.steps, theirs.steps),
+                    ours.bag,
+                    theirs.bag,
+                )
+            )
     return texts
 
 
@@ -78,10 +100,14 @@ def _first_difference(ours: Sequence[TrialStep], theirs: Sequence[TrialStep]) ->
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
-    parser = argparse.ArgumentParser(prog='same_trials', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs=2, metavar='FOLDER', type=path_of,
-                        help='with bags in it or below it')
+    parser = argparse.ArgumentParser(
+        prog='same_trials',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        'folders', nargs=2, metavar='FOLDER', type=path_of, help='with bags in it or below it'
+    )
     args = parser.parse_args(argv)
     skipped: List[SkippedBag] = []
     try:
@@ -91,13 +117,15 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     code = report_skipped(skipped)
     common = set(first) & set(second)
     if not common:
-        return report_error('same_trials',
-                            'no trial of the same experiment, variant and seed in both')
+        return report_error(
+            'same_trials', 'no trial of the same experiment, variant and seed in both'
+        )
     found = differences(first, second)
     for text in found:
         sys.stdout.write(text + '\n')
     sys.stdout.write(
         '{} trials in both, {} of them the same in all states, outcomes and decisions\n'.format(
-            len(common),
-            len(common) - len(found)))
+            len(common), len(common) - len(found)
+        )
+    )
     return NOT_THE_SAME if found else code

@@ -1,4 +1,5 @@
 """Summaries of trials, made from the events in bags (definitions: doc/statistics.md)."""
+
 import os
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -68,8 +69,11 @@ def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) 
         gathered.add(path, content.events, content.causes)
     if not gathered.events:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
-        raise BagError('{}: nothing was recorded in {} bag(s)\n{}'.format(
-            ', '.join(places), count + len(skipped), reasons))
+        raise BagError(
+            '{}: nothing was recorded in {} bag(s)\n{}'.format(
+                ', '.join(places), count + len(skipped), reasons
+            )
+        )
     trials = gathered.summaries(failing)
     return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
 
@@ -99,24 +103,38 @@ class _TrialEvents:
         return found
 
 
-def summarise(events: Iterable[Event], bags: Tuple[str, ...] = (),
-              failing: FailingNames = DEFAULT_FAILING) -> TrialSummary:
+def summarise(
+    events: Iterable[Event], bags: Tuple[str, ...] = (), failing: FailingNames = DEFAULT_FAILING
+) -> TrialSummary:
     """Sum up the events of one trial, at least one, in any order."""
     counter = TrialCounter(failing)
     for event in sorted(events, key=lambda event: event.seq):
         counter.add(event)
     return TrialSummary(
-        trial_id=counter.trial_id, experiment=counter.experiment, recovers=counter.recovers,
-        start_time=counter.start_time, duration_s=counter.duration_s, ending=counter.ending,
-        outcome=counter.outcome, failures=counter.failures, recoveries=counter.recoveries,
-        questions=counter.questions, answered=counter.answered,
-        failures_by_state=counter.failures_by_state, lost_events=counter.lost_events, bags=bags,
-        settings=counter.settings, unwell_s=counter.unwell_s,
-        resumed=counter.resumed, down_s=counter.down_s)
+        trial_id=counter.trial_id,
+        experiment=counter.experiment,
+        recovers=counter.recovers,
+        start_time=counter.start_time,
+        duration_s=counter.duration_s,
+        ending=counter.ending,
+        outcome=counter.outcome,
+        failures=counter.failures,
+        recoveries=counter.recoveries,
+        questions=counter.questions,
+        answered=counter.answered,
+        failures_by_state=counter.failures_by_state,
+        lost_events=counter.lost_events,
+        bags=bags,
+        settings=counter.settings,
+        unwell_s=counter.unwell_s,
+        resumed=counter.resumed,
+        down_s=counter.down_s,
+    )
 
 
-def load_replicates(places: Sequence[str],
-                    skipped: List[SkippedBag]) -> Dict[str, List[List[Event]]]:
+def load_replicates(
+    places: Sequence[str], skipped: List[SkippedBag]
+) -> Dict[str, List[List[Event]]]:
     """Return the trials with an oracle, by the folder they were recorded in, in order.
 
     Bags that cannot be used go to `skipped`.
@@ -131,8 +149,9 @@ def load_replicates(places: Sequence[str],
         for events in trials.values():
             summary = summarise(events, (path,))
             if summary.recovers and not summary.lost_events:
-                found.setdefault(summary.replicate,
-                                 []).append(sorted(events, key=lambda event: event.seq))
+                found.setdefault(summary.replicate, []).append(
+                    sorted(events, key=lambda event: event.seq)
+                )
     return {
         folder: sorted(trials, key=lambda events: events[0].wall_time)
         for folder, trials in found.items()

@@ -3,6 +3,7 @@
 One JSON object a line: {"seed", "task", "success", "why", "wrong_object", "damage", "causes":
 [{"kind", "text"}], "sim_s", "wall_s", "share"}. Older lines have no "wrong_object" and "damage".
 """
+
 import json
 import os
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
@@ -14,9 +15,14 @@ TRUTH_FILE = 'truth.jsonl'
 DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds. Each lists names of things
 Allowed = Mapping[str, Tuple[Tuple[type, ...], str]]
 _FIELDS: Allowed = {
-    'seed': ((int,), 'an int'), 'task': ((str,), 'a str'), 'success': ((bool,), 'a bool'),
-    'why': ((str,), 'a str'), 'causes': ((list,), 'a list'), 'sim_s': ((int, float), 'a number'),
-    'wall_s': ((int, float), 'a number'), 'share': ((dict,), 'a dict')
+    'seed': ((int,), 'an int'),
+    'task': ((str,), 'a str'),
+    'success': ((bool,), 'a bool'),
+    'why': ((str,), 'a str'),
+    'causes': ((list,), 'a list'),
+    'sim_s': ((int, float), 'a number'),
+    'wall_s': ((int, float), 'a number'),
+    'share': ((dict,), 'a dict'),
 }
 _LATER_FIELDS: Allowed = {'wrong_object': ((str,), 'a str'), 'damage': ((dict,), 'a dict')}
 
@@ -54,7 +60,8 @@ def read_truth(path: str) -> Dict[int, Truth]:
         lines = source.read().split('\n')
     torn = lines.pop()  # behind the last line's end: nothing, or what was being written
     found = [
-        _parse(line, '{} line {}'.format(path, number)) for number, line in enumerate(lines, 1)
+        _parse(line, '{} line {}'.format(path, number))
+        for number, line in enumerate(lines, 1)
         if line.strip()
     ]
     if torn.strip():
@@ -82,19 +89,31 @@ def _parse(line: str, where: str) -> Truth:
         value = data.get(name)
         is_bool = isinstance(value, bool)
         if not isinstance(value, kinds) or (is_bool and bool not in kinds):
-            raise BagError('{}: {}: {!r} is not allowed; allowed: {}'.format(
-                where, name, value, allowed))
-    return Truth(data['seed'], data['task'], data['success'], data['why'],
-                 _causes(data['causes'], where), float(data['sim_s']), float(data['wall_s']),
-                 _shares(data['share'], where), data.get('wrong_object', ''),
-                 _damage(data['damage'], where) if 'damage' in data else None)
+            raise BagError(
+                '{}: {}: {!r} is not allowed; allowed: {}'.format(where, name, value, allowed)
+            )
+    return Truth(
+        data['seed'],
+        data['task'],
+        data['success'],
+        data['why'],
+        _causes(data['causes'], where),
+        float(data['sim_s']),
+        float(data['wall_s']),
+        _shares(data['share'], where),
+        data.get('wrong_object', ''),
+        _damage(data['damage'], where) if 'damage' in data else None,
+    )
 
 
 def _damage(by_kind: Mapping[str, Any], where: str) -> Tuple[Tuple[str, str], ...]:
     things = {kind: by_kind.get(kind, []) for kind in DAMAGE}
     if not all(isinstance(names, list) for names in things.values()):
-        raise BagError('{}: damage: {!r} is not allowed; allowed: lists of names by {}'.format(
-            where, by_kind, ', '.join(DAMAGE)))
+        raise BagError(
+            '{}: damage: {!r} is not allowed; allowed: lists of names by {}'.format(
+                where, by_kind, ', '.join(DAMAGE)
+            )
+        )
     return tuple((kind, str(name)) for kind, names in things.items() for name in names)
 
 
@@ -109,8 +128,9 @@ def _shares(share: Mapping[str, Any], where: str) -> Mapping[str, float]:
     try:
         return {str(name): float(value) for name, value in share.items()}
     except (TypeError, ValueError) as err:
-        raise BagError('{}: share: {!r} is not allowed; allowed: numbers by name'.format(
-            where, share)) from err
+        raise BagError(
+            '{}: share: {!r} is not allowed; allowed: numbers by name'.format(where, share)
+        ) from err
 
 
 class TruthFiles:

@@ -3,6 +3,7 @@
 A variant is one of the ways in which an experiment runs the same trials, such as with and without
 the oracle.
 """
+
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .intervals import Interval, replicate_interval, wilson_interval
@@ -24,8 +25,10 @@ _BY_EVENTS: Tuple[Tuple[str, Callable[[TrialSummary], int]], ...] = (
     (NOT_ANSWERED, lambda trial: trial.questions - trial.answered),
 )
 _ENDINGS = {
-    TrialEnding.SUCCESS: 'ended in success', TrialEnding.FAILURE: ENDED_IN_FAILURE,
-    TrialEnding.PREEMPTED: 'preempted', TrialEnding.UNFINISHED: 'unfinished'
+    TrialEnding.SUCCESS: 'ended in success',
+    TrialEnding.FAILURE: ENDED_IN_FAILURE,
+    TrialEnding.PREEMPTED: 'preempted',
+    TrialEnding.UNFINISHED: 'unfinished',
 }
 _BY_TRUTH: Tuple[Tuple[str, Callable[[bool, bool], bool]], ...] = (
     (TRUE_SUCCESS, lambda claimed, true: true),
@@ -94,14 +97,18 @@ def find_variants(trials: Sequence[TrialSummary]) -> List[VariantTrials]:
     variants = []
     for experiment in sorted({trial.experiment for trial in trials}):
         for recovers, name in KINDS:
-            chosen = [trial for trial in trials
-                      if trial.experiment == experiment and trial.recovers is recovers]
+            chosen = [
+                trial
+                for trial in trials
+                if trial.experiment == experiment and trial.recovers is recovers
+            ]
             variants += _by_settings(experiment, name, recovers, chosen)
     return variants
 
 
-def _by_settings(experiment: str, name: str, recovers: Optional[bool],
-                 trials: Sequence[TrialSummary]) -> List[VariantTrials]:
+def _by_settings(
+    experiment: str, name: str, recovers: Optional[bool], trials: Sequence[TrialSummary]
+) -> List[VariantTrials]:
     """One variant for each settings of the oracle, named by what differs, one without oracle."""
     parts: Dict[SettingsKey, List[TrialSummary]] = {}
     for trial in trials:
@@ -109,8 +116,10 @@ def _by_settings(experiment: str, name: str, recovers: Optional[bool],
     in_order = [(dict(parts[key][0].settings), tuple(parts[key])) for key in sorted(parts)]
     differing = _differing([settings for settings, _ in in_order])
     return [
-        VariantTrials(experiment, ', '.join([name] + _named(settings, differing)), recovers,
-                      settings, part) for settings, part in in_order
+        VariantTrials(
+            experiment, ', '.join([name] + _named(settings, differing)), recovers, settings, part
+        )
+        for settings, part in in_order
     ]
 
 
@@ -119,7 +128,8 @@ def _named(settings: Dict[str, Any], keys: Sequence[str]) -> List[str]:
 
 
 def time_series(
-        trials: Sequence[TrialSummary]) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
+    trials: Sequence[TrialSummary],
+) -> List[Tuple[Tuple[str, ...], Tuple[TrialSummary, ...]]]:
     """Return the trials of each figure: a replicate of an oracle, and trials without an oracle.
 
     Returns with each the words that distinguish it from the others: experiment, oracle, replicate,
@@ -130,15 +140,21 @@ def time_series(
     experiments = sorted({variant.experiment for variant in variants})
     for experiment in experiments:
         mine = [variant for variant in variants if variant.experiment == experiment]
-        beside = [part for variant in mine if variant.recovers is False
-                  for part in variant.replicates()]
-        with_oracle = [(variant.name, variant.replicates()) for variant in mine
-                       if variant.recovers is not False]
+        beside = [
+            part for variant in mine if variant.recovers is False for part in variant.replicates()
+        ]
+        with_oracle = [
+            (variant.name, variant.replicates())
+            for variant in mine
+            if variant.recovers is not False
+        ]
         for name, parts in with_oracle or [('', [()] * len(beside))]:
             for number, part in enumerate(parts):
-                words = ((experiment,) if len(experiments) > 1 else ()) + (
-                    (name,) if len(with_oracle) > 1 else ()) + (
-                    ('replicate', str(number)) if len(parts) > 1 else ())
+                words = (
+                    ((experiment,) if len(experiments) > 1 else ())
+                    + ((name,) if len(with_oracle) > 1 else ())
+                    + (('replicate', str(number)) if len(parts) > 1 else ())
+                )
                 without = beside[number] if number < len(beside) else ()
                 series.append((words, tuple(part) + tuple(without)))
     return series
@@ -146,8 +162,10 @@ def time_series(
 
 def _settings_key(trial: TrialSummary) -> SettingsKey:
     """Numbers in the order of their size, everything else in that of the alphabet."""
-    return tuple((key, value, '') if isinstance(value, (int, float)) else (key, 0.0, str(value))
-                 for key, value in trial.settings)
+    return tuple(
+        (key, value, '') if isinstance(value, (int, float)) else (key, 0.0, str(value))
+        for key, value in trial.settings
+    )
 
 
 def _differing(settings: Sequence[Dict[str, Any]]) -> List[str]:
@@ -167,17 +185,30 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
     counts = [_by_events(name, number, trials, parts) for name, number in _BY_EVENTS]
     counts += [make_count(name, _ended(ending), trials, parts) for ending, name in _ENDINGS.items()]
     if known:
-        counts += [make_count(name, _found(holds), known, _by_replicate(known))
-                   for name, holds in _BY_TRUTH]
-    return VariantCounts(variant.experiment, variant.name, len(trials), tuple(counts),
-                         sum(1 for trial in trials if trial.lost_events),
-                         sum(trial.lost_events for trial in trials), len(parts), len(known),
-                         sum(1 for trial in trials if trial.resumed),
-                         sum(trial.down_s for trial in trials))
+        counts += [
+            make_count(name, _found(holds), known, _by_replicate(known))
+            for name, holds in _BY_TRUTH
+        ]
+    return VariantCounts(
+        variant.experiment,
+        variant.name,
+        len(trials),
+        tuple(counts),
+        sum(1 for trial in trials if trial.lost_events),
+        sum(trial.lost_events for trial in trials),
+        len(parts),
+        len(known),
+        sum(1 for trial in trials if trial.resumed),
+        sum(trial.down_s for trial in trials),
+    )
 
 
-def _by_events(name: str, number: Callable[[TrialSummary], int], trials: Sequence[TrialSummary],
-               parts: Sequence[Sequence[TrialSummary]]) -> Count:
+def _by_events(
+    name: str,
+    number: Callable[[TrialSummary], int],
+    trials: Sequence[TrialSummary],
+    parts: Sequence[Sequence[TrialSummary]],
+) -> Count:
     count = make_count(name, lambda trial: number(trial) > 0, trials, parts)
     return count._replace(events=sum(map(number, trials)))
 
@@ -190,13 +221,23 @@ def _found(holds: Callable[[bool, bool], bool]) -> Callable[[TrialSummary], bool
     return lambda trial: trial.truth is not None and holds(trial.succeeded, trial.truth.success)
 
 
-def make_count(name: str, happened: Callable[[TrialSummary], bool], trials: Sequence[TrialSummary],
-               parts: Sequence[Sequence[TrialSummary]]) -> Count:
+def make_count(
+    name: str,
+    happened: Callable[[TrialSummary], bool],
+    trials: Sequence[TrialSummary],
+    parts: Sequence[Sequence[TrialSummary]],
+) -> Count:
     """Count the trials in which something happened.
 
     There is at least one. `parts`: the same by replicate.
     """
     number = sum(map(happened, trials))
     shares = [sum(map(happened, part)) / len(part) for part in parts]
-    return Count(name, number, number / len(trials), wilson_interval(number, len(trials)), None,
-                 replicate_interval(shares))
+    return Count(
+        name,
+        number,
+        number / len(trials),
+        wilson_interval(number, len(trials)),
+        None,
+        replicate_interval(shares),
+    )

@@ -11,6 +11,7 @@ The record is first replayed under its own settings. If that does not reproduce 
 and decisions, the folder is skipped and the reason is printed. Exit code: 0; 1, some bags or
 folders were skipped; 2, nothing could be replayed.
 """
+
 import argparse
 import itertools
 import sys
@@ -45,8 +46,11 @@ class TriedSettings(NamedTuple):
 
 def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
     """Return the recorded settings with others. Another policy has the parameters it comes with."""
-    kept = {key: value for key, value in recorded.items()
-            if 'policy' not in settings or not key.startswith('policy.')}
+    kept = {
+        key: value
+        for key, value in recorded.items()
+        if 'policy' not in settings or not key.startswith('policy.')
+    }
     return {**kept, **settings}
 
 
@@ -62,8 +66,9 @@ class Recorded:
         self.settings = dict(summarise(trials[0]).settings)
         if not set(NEEDED) <= set(self.settings):
             raise BagError('its trials do not tell the settings of their oracle')
-        self._conditioned = conditioned((event for trial in trials for event in trial),
-                                        policy_of(self.settings))
+        self._conditioned = conditioned(
+            (event for trial in trials for event in trial), policy_of(self.settings)
+        )
         self.beginnings = beginnings(trials, lambda: self.replay({}))
 
     def replay(self, settings: Mapping[str, Any]) -> Replay:
@@ -86,8 +91,9 @@ def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
                 counts[outcome] += 1
                 another = another or outcome not in (SAME, NOT_KNOWN)
         other_trials += another
-    return TriedSettings(dict(settings), counts, len(recorded.trials), other_trials,
-                         len(recorded.beginnings))
+    return TriedSettings(
+        dict(settings), counts, len(recorded.trials), other_trials, len(recorded.beginnings)
+    )
 
 
 def _outcome(recorded: str, tried: str) -> str:
@@ -107,44 +113,66 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
     columns = OUTCOMES + ((GIVES_UP,) if any(row.counts[GIVES_UP] for row in rows) else ())
     width = max(len(name) for name in names + ['settings'])
     lines = [
-        '{:<{}}  decisions'.format('settings', width) +
-        ''.join('{:>20}'.format(name) for name in columns) + '   trials with another'
+        '{:<{}}  decisions'.format('settings', width)
+        + ''.join('{:>20}'.format(name) for name in columns)
+        + '   trials with another'
     ]
     for name, row in zip(names, rows):
-        lines.append('{:<{}}  {:>9}'.format(name, width, sum(row.counts.values())) + ''.join(
-            '{:>20}'.format(row.counts[outcome]) for outcome in columns)
-            + '   {} of {}'.format(row.other_trials, row.trials))
+        lines.append(
+            '{:<{}}  {:>9}'.format(name, width, sum(row.counts.values()))
+            + ''.join('{:>20}'.format(row.counts[outcome]) for outcome in columns)
+            + '   {} of {}'.format(row.other_trials, row.trials)
+        )
     if rows[0].programs > 1:
-        lines.append('at least {} programs, each of which began with nothing learned'.format(
-            rows[0].programs))
+        lines.append(
+            'at least {} programs, each of which began with nothing learned'.format(
+                rows[0].programs
+            )
+        )
     return '\n'.join(lines) + '\n'
 
 
 def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
     """Return a folder's table as plain data, decisions counted by what became of them."""
-    return {'folder': folder, 'programs': rows[0].programs, 'tried': [{
-        'settings': row.settings, 'decisions': sum(row.counts.values()),
-        'outcomes': {name: row.counts[name] for name in OUTCOMES + (GIVES_UP,)},
-        'trials': row.trials, 'trials_with_another': row.other_trials
-    } for row in rows]}
+    return {
+        'folder': folder,
+        'programs': rows[0].programs,
+        'tried': [
+            {
+                'settings': row.settings,
+                'decisions': sum(row.counts.values()),
+                'outcomes': {name: row.counts[name] for name in OUTCOMES + (GIVES_UP,)},
+                'trials': row.trials,
+                'trials_with_another': row.other_trials,
+            }
+            for row in rows
+        ],
+    }
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
-    parser = argparse.ArgumentParser(prog='what_if', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('folders', nargs='+', metavar='FOLDER', type=path_of,
-                        help='with bags in it or below it')
+    parser = argparse.ArgumentParser(
+        prog='what_if', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        'folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it'
+    )
     parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
     parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')
     for name in ('moderate_from', 'high_from', 'prior'):
-        parser.add_argument('--' + name.replace('_', '-'), nargs='+', type=float, metavar='X',
-                            help='values to try')
-    parser.add_argument('--json', metavar='OUT', type=path_of,
-                        help='write the tables and what was skipped as JSON')
+        parser.add_argument(
+            '--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try'
+        )
+    parser.add_argument(
+        '--json', metavar='OUT', type=path_of, help='write the tables and what was skipped as JSON'
+    )
     args = parser.parse_args(argv)
-    varied = {name: values for name, values in vars(args).items()
-              if name not in ('folders', 'json') and values}
+    varied = {
+        name: values
+        for name, values in vars(args).items()
+        if name not in ('folders', 'json') and values
+    }
     skipped: List[SkippedBag] = []
     try:
         replicates = load_replicates(args.folders, skipped)
@@ -170,6 +198,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         except OSError as err:
             return report_error('what_if', err)
     if not replayed:
-        return report_error('what_if', '{}: no trials with an oracle that could be replayed'.format(
-            ', '.join(args.folders)))
+        return report_error(
+            'what_if',
+            '{}: no trials with an oracle that could be replayed'.format(', '.join(args.folders)),
+        )
     return code

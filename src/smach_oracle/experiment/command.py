@@ -4,6 +4,7 @@ Each job is a replicate of a variant, and has its own ROS master on a free port,
 its own learned rates. What is started is stopped, also on Ctrl-C, pressed once or often. Started
 again with the same --output, an experiment goes on where it was.
 """
+
 import argparse
 import os
 import shutil
@@ -49,84 +50,160 @@ DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
 BOTH = ('both', 'with', 'without')  # the oracle
 NAMED = (BARE, DEFAULT, *sorted(POLICIES))
 # Settings of the oracle that override those of the task: option, type, what it is.
-OVERRIDES = (('moderate_from', float, 'failure rate from which a state is MODERATE'),
-             ('high_from', float, 'failure rate from which a state is HIGH'),
-             ('prior', float, 'failure rate that a state starts with'),
-             ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'))
+OVERRIDES = (
+    ('moderate_from', float, 'failure rate from which a state is MODERATE'),
+    ('high_from', float, 'failure rate from which a state is HIGH'),
+    ('prior', float, 'failure rate that a state starts with'),
+    ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'),
+)
 
 
 class _RenamedOption(argparse.Action):
     """An option under its older name, which still works but warns on standard error."""
 
-    def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace,
-                 values: object, option_string: Optional[str] = None) -> None:
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: Optional[str] = None,
+    ) -> None:
         """Warn, and take the value."""
-        print('{}: {} is now called --{}'.format(parser.prog, option_string, self.dest),
-              file=sys.stderr)
+        print(
+            '{}: {} is now called --{}'.format(parser.prog, option_string, self.dest),
+            file=sys.stderr,
+        )
         setattr(namespace, self.dest, values)
 
 
 def make_parser() -> argparse.ArgumentParser:
     """The parser of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument(
-        '--protocol', choices=[*PROTOCOLS, ALL],
+        '--protocol',
+        choices=[*PROTOCOLS, ALL],
         help='the experiments of doc/protocol.md in one pool, each in a folder of its own below '
-        '--output; --task, --trials, --replicates and --variants then choose some of them')
-    parser.add_argument('--frozen', action='store_true',
-                        help='with --protocol: the evaluation seeds of the freeze that holds')
-    parser.add_argument('--plan', dest='only_plan', action='store_true',
-                        help='run nothing: print what would be run, and how long it takes')
-    parser.add_argument('--task', choices=sorted(TASKS),
-                        help='(default: pick_and_place; of a protocol: all)')
+        '--output; --task, --trials, --replicates and --variants then choose some of them',
+    )
     parser.add_argument(
-        '--trials', type=int,
-        help='per variant and replicate (default: as in the paper, {})'.format(', '.join(
-            '{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items()))))
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the first trial; the next has the next (default: 1)')
+        '--frozen',
+        action='store_true',
+        help='with --protocol: the evaluation seeds of the freeze that holds',
+    )
     parser.add_argument(
-        '--replicates', type=int,
-        help='complete repetitions on further seeds, each learns from the beginning (default: 1)')
-    parser.add_argument('--jobs', type=int, default=2,
-                        help='replicates of variants at a time (default: %(default)s)')
+        '--plan',
+        dest='only_plan',
+        action='store_true',
+        help='run nothing: print what would be run, and how long it takes',
+    )
     parser.add_argument(
-        '--variants', nargs='+', choices=[*BOTH, *NAMED], default=['both'], metavar='NAME',
+        '--task', choices=sorted(TASKS), help='(default: pick_and_place; of a protocol: all)'
+    )
+    parser.add_argument(
+        '--trials',
+        type=int,
+        help='per variant and replicate (default: as in the paper, {})'.format(
+            ', '.join(
+                '{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items())
+            )
+        ),
+    )
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)'
+    )
+    parser.add_argument(
+        '--replicates',
+        type=int,
+        help='complete repetitions on further seeds, each learns from the beginning (default: 1)',
+    )
+    parser.add_argument(
+        '--jobs',
+        type=int,
+        default=2,
+        help='replicates of variants at a time (default: %(default)s)',
+    )
+    parser.add_argument(
+        '--variants',
+        nargs='+',
+        choices=[*BOTH, *NAMED],
+        default=['both'],
+        metavar='NAME',
         help='both, with or without the oracle (default: both), or one or more of: {}'.format(
-            ', '.join(NAMED)))
-    parser.add_argument('--arms', dest='variants', nargs=1, choices=BOTH, default=argparse.SUPPRESS,
-                        action=_RenamedOption, help='the older name of --variants')
+            ', '.join(NAMED)
+        ),
+    )
     parser.add_argument(
-        '--policy', nargs='+', choices=[CONFIGURED] + sorted(POLICIES), default=[CONFIGURED],
-        help="instead of the task's own, which is as configured (default); one variant for each")
-    parser.add_argument('--memory', nargs='+', type=int, metavar='N',
-                        help="how many of a state's latest results count; one variant for each")
+        '--arms',
+        dest='variants',
+        nargs=1,
+        choices=BOTH,
+        default=argparse.SUPPRESS,
+        action=_RenamedOption,
+        help='the older name of --variants',
+    )
+    parser.add_argument(
+        '--policy',
+        nargs='+',
+        choices=[CONFIGURED] + sorted(POLICIES),
+        default=[CONFIGURED],
+        help="instead of the task's own, which is as configured (default); one variant for each",
+    )
+    parser.add_argument(
+        '--memory',
+        nargs='+',
+        type=int,
+        metavar='N',
+        help="how many of a state's latest results count; one variant for each",
+    )
     parser.add_argument('--estimator', choices=sorted(ESTIMATORS), help='of failure rates')
     for name, kind, what in OVERRIDES:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
     parser.add_argument(
-        '--answer-delay', type=float, default=15.0,
-        help='s of simulated time that the scripted operator takes, in the median (default: 15)')
+        '--answer-delay',
+        type=float,
+        default=15.0,
+        help='s of simulated time that the scripted operator takes, in the median (default: 15)',
+    )
     parser.add_argument('--benign', action='store_true', help='worlds without causes to fail')
-    parser.add_argument('--lasting', type=float, metavar='SHARE',
-                        help='of the causes, that last, 0 to 1 (default: that of the world)')
     parser.add_argument(
-        '--hours', type=float, metavar='H',
-        help='of a world that goes on from trial to trial (default: each trial has a fresh one)')
+        '--lasting',
+        type=float,
+        metavar='SHARE',
+        help='of the causes, that last, 0 to 1 (default: that of the world)',
+    )
     parser.add_argument(
-        '--hung-after', type=float, default=HUNG_AFTER_S, metavar='S',
+        '--hours',
+        type=float,
+        metavar='H',
+        help='of a world that goes on from trial to trial (default: each trial has a fresh one)',
+    )
+    parser.add_argument(
+        '--hung-after',
+        type=float,
+        default=HUNG_AFTER_S,
+        metavar='S',
         help='after so many s without an event a trial is run again, and likewise after five times '
-        'as many in all (default: {:.0f})'.format(HUNG_AFTER_S))
+        'as many in all (default: {:.0f})'.format(HUNG_AFTER_S),
+    )
     freezing = parser.add_mutually_exclusive_group()
-    freezing.add_argument('--freeze', metavar='NOTE',
-                          help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
-                          'that in doc/freezes.csv, with the note')
-    freezing.add_argument('--abandon-freeze', metavar='NOTE',
-                          help='run nothing: log that the last freeze is abandoned, and why')
+    freezing.add_argument(
+        '--freeze',
+        metavar='NOTE',
+        help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
+        'that in doc/freezes.csv, with the note',
+    )
+    freezing.add_argument(
+        '--abandon-freeze',
+        metavar='NOTE',
+        help='run nothing: log that the last freeze is abandoned, and why',
+    )
     parser.add_argument(
-        '--output', type=lambda text: Path(path_of(text)),
-        help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)')
+        '--output',
+        type=lambda text: Path(path_of(text)),
+        help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)',
+    )
     return parser
 
 
@@ -143,11 +220,15 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     task = args.task or DEFAULT_TASK
     trials = TASKS[task][1] if args.trials is None else args.trials
     replicates = 1 if args.replicates is None else args.replicates
-    for check, option, value in ((COUNT, '--trials', trials), (COUNT, '--jobs', args.jobs),
-                                 (COUNT, '--replicates', replicates),
-                                 (SEED, '--seed', args.seed), (SHARE, '--lasting', args.lasting),
-                                 (HOURS, '--hours', args.hours),
-                                 (DELAY, '--answer-delay', args.answer_delay)):
+    for check, option, value in (
+        (COUNT, '--trials', trials),
+        (COUNT, '--jobs', args.jobs),
+        (COUNT, '--replicates', replicates),
+        (SEED, '--seed', args.seed),
+        (SHARE, '--lasting', args.lasting),
+        (HOURS, '--hours', args.hours),
+        (DELAY, '--answer-delay', args.answer_delay),
+    ):
         try:
             if value is not None:
                 check(option, value)
@@ -166,8 +247,17 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
             Settings.from_dict(dict(variant.settings))
         except SettingsError as err:
             parser.error(str(err))
-    args.plan = ExperimentPlan(task, trials, args.seed, replicates, variants, args.answer_delay,
-                               args.benign, args.lasting, args.hours)
+    args.plan = ExperimentPlan(
+        task,
+        trials,
+        args.seed,
+        replicates,
+        variants,
+        args.answer_delay,
+        args.benign,
+        args.lasting,
+        args.hours,
+    )
     args.names = [name for name in args.variants if name not in BOTH]  # of a protocol's variants
     _check_protocol(parser, args)
     return args
@@ -176,8 +266,15 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
 def _check_protocol(parser: argparse.ArgumentParser, args: argparse.Namespace) -> None:
     """Refuse what a protocol says itself, and what makes sense of a protocol alone."""
     if args.protocol:
-        said = ('policy', 'memory', 'estimator', 'benign', 'lasting', 'hours',
-                *(name for name, _, _ in OVERRIDES))
+        said = (
+            'policy',
+            'memory',
+            'estimator',
+            'benign',
+            'lasting',
+            'hours',
+            *(name for name, _, _ in OVERRIDES),
+        )
         for name in said:
             if getattr(args, name) != parser.get_default(name):
                 parser.error('--{}: the protocol says it'.format(name.replace('_', '-')))
@@ -187,8 +284,9 @@ def _check_protocol(parser: argparse.ArgumentParser, args: argparse.Namespace) -
         parser.error('--frozen: name a --protocol')
 
 
-def _chosen_variants(parser: argparse.ArgumentParser, args: argparse.Namespace,
-                     settings: Mapping[str, Any]) -> Tuple[Variant, ...]:
+def _chosen_variants(
+    parser: argparse.ArgumentParser, args: argparse.Namespace, settings: Mapping[str, Any]
+) -> Tuple[Variant, ...]:
     by_oracle = [name for name in args.variants if name in BOTH]
     if not by_oracle:
         if args.policy != [CONFIGURED]:
@@ -244,7 +342,9 @@ def main(argv: Optional[List[str]] = None) -> int:
         print(
             'run_trials: stopped by {}; what was recorded stays in {}, and the same command with '
             '--output goes on '
-            'there'.format(err, output), file=sys.stderr)
+            'there'.format(err, output),
+            file=sys.stderr,
+        )
         return 128 + err.signum
     return report(jobs, output)
 
@@ -259,7 +359,8 @@ def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> Lis
 def limit_text(hung_after_s: float) -> str:
     """Return which trials are taken for hung, in words."""
     return 'A trial counts as hung after {:.0f} s without an event, or {:.0f} s in all.'.format(
-        hung_after_s, LONGEST * hung_after_s)
+        hung_after_s, LONGEST * hung_after_s
+    )
 
 
 def freeze_seeds(args: argparse.Namespace) -> int:
@@ -277,14 +378,20 @@ def freeze_seeds(args: argparse.Namespace) -> int:
 def report(jobs: Sequence[ExperimentJob], output: Path) -> int:
     """Print the tables, draw the figures, name what was lost, and return the exit code."""
     places = [str(output / name) for name in dict.fromkeys(job.variant.name for job in jobs)]
-    code = bag_statistics.main(places + [
-        '--figure',
-        str(output / 'time_series'), '--csv',
-        str(output / 'trials.csv'), '--json',
-        str(output / 'statistics.json')
-    ])
+    code = bag_statistics.main(
+        places
+        + [
+            '--figure',
+            str(output / 'time_series'),
+            '--csv',
+            str(output / 'trials.csv'),
+            '--json',
+            str(output / 'statistics.json'),
+        ]
+    )
     lost = [
-        '{}: seed {}: {}'.format(job.name, seed, why) for job in jobs
+        '{}: seed {}: {}'.format(job.name, seed, why)
+        for job in jobs
         for seed, why in sorted(job.lost.items())
     ]
     if lost:

@@ -1,4 +1,5 @@
 """The time that an experiment takes: by the trials that it has had, else as measured before."""
+
 import statistics
 from typing import Dict, List, NamedTuple, Sequence
 

@@ -3,6 +3,7 @@
 The protocol names the folders. A freeze appends a line to a log that is committed, too: it has
 every freeze, abandoned ones as well.
 """
+
 import csv
 import hashlib
 import re
@@ -42,8 +43,9 @@ def frozen_folders(protocol: str) -> List[str]:
     found = NAMED.findall(protocol)
     folders = [line.strip() for line in '\n'.join(found).splitlines() if line.strip()]
     if len(found) != 1 or not folders or len(set(folders)) < len(folders):
-        raise ExperimentError('{}: one block "```frozen" must name folders, each once'.format(
-            PROTOCOL))
+        raise ExperimentError(
+            '{}: one block "```frozen" must name folders, each once'.format(PROTOCOL)
+        )
     return folders
 
 
@@ -68,10 +70,13 @@ def frozen_seeds(root: Path) -> Freeze:
     folders = frozen_folders(protocol.decode('utf-8'))
     changed = _git(root, 'status', '--porcelain', '--', PROTOCOL, *folders).decode('utf-8')
     if changed.strip():
-        raise ExperimentError('not committed: {}'.format(', '.join(
-            line[3:] for line in changed.splitlines())))
-    trees = {folder: _git(root, 'rev-parse', '--verify', 'HEAD:' + folder).decode('ascii').strip()
-             for folder in folders}
+        raise ExperimentError(
+            'not committed: {}'.format(', '.join(line[3:] for line in changed.splitlines()))
+        )
+    trees = {
+        folder: _git(root, 'rev-parse', '--verify', 'HEAD:' + folder).decode('ascii').strip()
+        for folder in folders
+    }
     commit = _git(root, 'rev-parse', 'HEAD').decode('ascii').strip()
     return Freeze(commit, hashlib.sha256(protocol).hexdigest(), first_seed_of(protocol, trees))
 
@@ -131,10 +136,16 @@ def run_freeze(root: Path, what: str, note: str) -> str:
 
 def _git(root: Path, *command: str) -> bytes:
     try:
-        return subprocess.run(['git', *command], cwd=str(root), check=True, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE).stdout
+        return subprocess.run(
+            ['git', *command],
+            cwd=str(root),
+            check=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+        ).stdout
     except FileNotFoundError as err:
         raise ExperimentError('git is not installed') from err
     except subprocess.CalledProcessError as err:
-        raise ExperimentError('git {}: {}'.format(
-            ' '.join(command), err.stderr.decode('utf-8', 'replace').strip())) from err
+        raise ExperimentError(
+            'git {}: {}'.format(' '.join(command), err.stderr.decode('utf-8', 'replace').strip())
+        ) from err

@@ -2,6 +2,7 @@
 
 It has a master, a world and learned rates of its own.
 """
+
 import json
 import time
 from pathlib import Path
@@ -28,8 +29,14 @@ LOST_IN_A_ROW = 3  # trials, after which something is wrong with more than a tri
 class ExperimentJob:
     """Runs until all its trials are complete or lost. A trial may fail without failing the job."""
 
-    def __init__(self, plan: ExperimentPlan, variant: Variant, replicate: int, output: Path,
-                 hung_after_s: float) -> None:
+    def __init__(
+        self,
+        plan: ExperimentPlan,
+        variant: Variant,
+        replicate: int,
+        output: Path,
+        hung_after_s: float,
+    ) -> None:
         """Look through the folder.
 
         :raises ExperimentError: where the folder cannot be gone on with.
@@ -46,10 +53,12 @@ class ExperimentJob:
         self._plan = plan
         self._seed = plan.first_seed(replicate)
         self._hung_after_s = hung_after_s
-        self._records = ReplicateRecords(output / variant.name / 'replicate_{}'.format(replicate),
-                                         self._seed, plan.trials)
-        self._results = JobResults(output, plan.task, variant.name, replicate, self._seed,
-                                   plan.lasting, plan.slot_h)
+        self._records = ReplicateRecords(
+            output / variant.name / 'replicate_{}'.format(replicate), self._seed, plan.trials
+        )
+        self._results = JobResults(
+            output, plan.task, variant.name, replicate, self._seed, plan.lasting, plan.slot_h
+        )
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
@@ -59,8 +68,9 @@ class ExperimentJob:
         self._logged = 0  # bytes
         left = end_marked(str(self._records.folder), LEFTOVER_GRACE_S)
         if left:
-            self.messages.append('{}: ended {} processes that an earlier run had left'.format(
-                self.name, left))
+            self.messages.append(
+                '{}: ended {} processes that an earlier run had left'.format(self.name, left)
+            )
         self._look_through()
 
     @property
@@ -87,13 +97,17 @@ class ExperimentJob:
         progress = self._records.tidy_up(self._results.kept())
         self._untold, self._kept = [], progress.kept
         self._results.forget_from(progress.next_trial)
-        self._results.add([self._records.with_truth(trial) for trial in progress.done],
-                          progress.lost, self._records.truth)
+        self._results.add(
+            [self._records.with_truth(trial) for trial in progress.done],
+            progress.lost,
+            self._records.truth,
+        )
         self.summaries = {trial.summary.bags[0]: trial.summary for trial in progress.done}
         self._next, self._lost = progress.next_trial, progress.lost
         if progress.dropped:
-            self.messages.append('{}: trial {} was interrupted and is run again'.format(
-                self.name, self._next + 1))
+            self.messages.append(
+                '{}: trial {} was interrupted and is run again'.format(self.name, self._next + 1)
+            )
 
     def start(self) -> None:
         """Launch the trials that are missing.
@@ -102,10 +116,12 @@ class ExperimentJob:
         """
         self._ended_at = self._sign_at = time.monotonic()
         if self._plan.slot_h is not None:
-            write_lab(self._records.folder, self._seed, self._plan.slot_h,
-                      self._results.last_left())
-        self._launch = Launch(self._records.folder, TASKS[self._plan.task][0], self._arguments(),
-                              self.core)
+            write_lab(
+                self._records.folder, self._seed, self._plan.slot_h, self._results.last_left()
+            )
+        self._launch = Launch(
+            self._records.folder, TASKS[self._plan.task][0], self._arguments(), self.core
+        )
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))
@@ -117,11 +133,15 @@ class ExperimentJob:
         if self._plan.hours is not None:
             given['lab'] = self._records.folder / LAB_FILE
         return {
-            **given, 'trials': self.trials - self._next, 'seed': self._seed + self._next,
-            'record': self._records.folder, 'truth': self._records.truth,
+            **given,
+            'trials': self.trials - self._next,
+            'seed': self._seed + self._next,
+            'record': self._records.folder,
+            'truth': self._records.truth,
             'with_oracle': str(self.variant.recovers).lower(),
-            'answer_delay': self._plan.answer_delay, 'benign': str(self._plan.benign).lower(),
-            'oracle': json.dumps(settings)
+            'answer_delay': self._plan.answer_delay,
+            'benign': str(self._plan.benign).lower(),
+            'oracle': json.dumps(settings),
         }
 
     def watch(self) -> None:
@@ -164,8 +184,9 @@ class ExperimentJob:
         told = [trial for trial in self._untold if self._records.is_complete(trial)]
         if told:  # the world reports a trial when the next one begins
             self._untold = [trial for trial in self._untold if trial not in told]
-            self._results.add([self._records.with_truth(trial) for trial in told], {},
-                              self._records.truth)
+            self._results.add(
+                [self._records.with_truth(trial) for trial in told], {}, self._records.truth
+            )
 
     def _again(self, why: str) -> None:
         self.stop()
@@ -173,8 +194,9 @@ class ExperimentJob:
             return
         number = self._next
         self._attempts[number] = self._attempts.get(number, 0) + 1
-        text = '{}: seed {}: {}; see {}'.format(self.name, self._seed + number, why,
-                                                self._records.folder / LOG_FILE)
+        text = '{}: seed {}: {}; see {}'.format(
+            self.name, self._seed + number, why, self._records.folder / LOG_FILE
+        )
         if self._attempts[number] >= ATTEMPTS:
             self._give_up_trial(number, why, text)
         else:

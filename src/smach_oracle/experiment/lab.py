@@ -1,4 +1,5 @@
 """The input with which a world that goes on starts: the run, and how the last trial left it."""
+
 from pathlib import Path
 from typing import Any, Mapping, Optional
 
@@ -7,8 +8,9 @@ from .plan import write_json
 LAB_FILE = 'lab.json'
 
 
-def write_lab(folder: Path, first_seed: int, slot_h: float,
-              left: Optional[Mapping[str, Any]]) -> None:
+def write_lab(
+    folder: Path, first_seed: int, slot_h: float, left: Optional[Mapping[str, Any]]
+) -> None:
     """Write the file for a job whose world goes on.
 
     :param slot_h: h from the begin of one trial to that of the next, where none takes longer.

@@ -2,6 +2,7 @@
 
 A later experiment finds what one that crashed has left.
 """
+
 import ctypes
 import errno
 import os
@@ -34,8 +35,13 @@ class Launch:
     Its output goes to the end of `launch.log` in the job's folder, ROS's logs to `log`.
     """
 
-    def __init__(self, folder: Path, launch_file: str, arguments: Mapping[str, Any],
-                 core: Optional[int] = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        launch_file: str,
+        arguments: Mapping[str, Any],
+        core: Optional[int] = None,
+    ) -> None:
         """Start it.
 
         :param core: processor core on which all its processes stay. None means any.
@@ -47,10 +53,14 @@ class Launch:
         command = ['roslaunch', *NODE_STOP, '--port', str(port), 'smach_oracle', launch_file]
         command += ['{}:={}'.format(key, value) for key, value in arguments.items()]
         self._log_file: IO[str] = (folder / LOG_FILE).open('a')
-        self._process = subprocess.Popen(command, env=self.environment,
-                                         stdout=self._log_file, stderr=subprocess.STDOUT,
-                                         start_new_session=True,
-                                         preexec_fn=partial(_begin, core))
+        self._process = subprocess.Popen(
+            command,
+            env=self.environment,
+            stdout=self._log_file,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+            preexec_fn=partial(_begin, core),
+        )
 
     def running(self) -> bool:
         """Whether roslaunch has not ended."""
@@ -80,14 +90,17 @@ def environment_of(folder: Path, port: int) -> Dict[str, str]:
     others' way.
     """
     caller = {
-        name: value
-        for name, value in os.environ.items() if name not in ('ROS_NAMESPACE', 'ROS_IP')
+        name: value for name, value in os.environ.items() if name not in ('ROS_NAMESPACE', 'ROS_IP')
     }
     threads = {name: caller.get(name, '1') for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS')}
     return {
-        **caller, **threads, 'ROS_MASTER_URI': 'http://localhost:{}'.format(port),
-        'ROS_HOSTNAME': 'localhost', 'ROS_LOG_DIR': str(folder / 'log'), 'PYTHONUNBUFFERED': '1',
-        MARK: str(folder)
+        **caller,
+        **threads,
+        'ROS_MASTER_URI': 'http://localhost:{}'.format(port),
+        'ROS_HOSTNAME': 'localhost',
+        'ROS_LOG_DIR': str(folder / 'log'),
+        'PYTHONUNBUFFERED': '1',
+        MARK: str(folder),
     }
 
 
@@ -104,7 +117,8 @@ def last_words(log: Path, count: int = 6) -> str:
     if not log.exists():
         return ''
     lines = [
-        line for line in log.read_text(encoding='utf-8', errors='replace').splitlines()
+        line
+        for line in log.read_text(encoding='utf-8', errors='replace').splitlines()
         if line.strip()
     ]
     return ''.join('\n  ' + line for line in lines[-count:])

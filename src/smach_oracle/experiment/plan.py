@@ -1,4 +1,5 @@
 """The plan of an experiment: what it consists of, and how its folder remembers it."""
+
 import itertools
 import json
 import os
@@ -12,8 +13,10 @@ LIMITS = 'hung_after_s'  # key of the limits that trials were run with, in the o
 FORMAT = 'smach_oracle experiment'
 VERSION = 1
 # The task, its launch file, and how many trials the paper has of it.
-TASKS: Dict[str, Tuple[str, int]] = {'pick_and_place': ('pick_and_place.launch', 150),
-                                     'drink_retrieval': ('drink_retrieval.launch', 100)}
+TASKS: Dict[str, Tuple[str, int]] = {
+    'pick_and_place': ('pick_and_place.launch', 150),
+    'drink_retrieval': ('drink_retrieval.launch', 100),
+}
 ARMS = 'arms'  # key of the variants in an experiment's file: the older name
 BARE = 'bare'  # name of the variant without the oracle
 DEFAULT = 'default'  # and of that with the oracle as the task has it
@@ -62,13 +65,15 @@ class ExperimentPlan(NamedTuple):
         for name in ('lasting', 'hours'):  # folders of older versions have neither
             if data[name] is None:
                 del data[name]
-        data[ARMS] = [dict(variant._asdict(), settings=dict(variant.settings))
-                      for variant in self.variants]
+        data[ARMS] = [
+            dict(variant._asdict(), settings=dict(variant.settings)) for variant in self.variants
+        ]
         return data
 
 
-def make_variants(which: str, settings: Mapping[str, Any],
-                  varied: Mapping[str, Sequence[Any]]) -> Tuple[Variant, ...]:
+def make_variants(
+    which: str, settings: Mapping[str, Any], varied: Mapping[str, Sequence[Any]]
+) -> Tuple[Variant, ...]:
     """The variants: one with the oracle for each combination of what is varied, one without.
 
     :param which: 'both', 'with' or 'without'.
@@ -87,8 +92,9 @@ def make_variants(which: str, settings: Mapping[str, Any],
     return tuple(variants)
 
 
-def named_variants(names: Sequence[str], settings: Mapping[str, Any],
-                   memories: Sequence[int] = ()) -> Tuple[Variant, ...]:
+def named_variants(
+    names: Sequence[str], settings: Mapping[str, Any], memories: Sequence[int] = ()
+) -> Tuple[Variant, ...]:
     """Return variants by name: BARE, DEFAULT, or a policy, each with every memory.
 
     :param settings: of every oracle.
@@ -101,8 +107,11 @@ def named_variants(names: Sequence[str], settings: Mapping[str, Any],
         policy = {} if name == DEFAULT else {'policy': name}
         for memory in memories or [0]:
             given = {**settings, **policy, **({'memory': memory} if memory else {})}
-            variants.append(Variant(
-                '{}_memory_{}'.format(name, memory) if len(memories) > 1 else name, True, given))
+            variants.append(
+                Variant(
+                    '{}_memory_{}'.format(name, memory) if len(memories) > 1 else name, True, given
+                )
+            )
     return tuple(variants)
 
 
@@ -123,12 +132,19 @@ def enter_folder(folder: Path, plan: ExperimentPlan, hung_after_s: Optional[floa
             write_json(path, {**content, LIMITS: [*limits, hung_after_s]})
         return True
     if any(item.name != '.lock' for item in folder.iterdir()):
-        raise ExperimentError('{}: not empty, and no experiment: there is no {} in it'.format(
-            folder, EXPERIMENT_FILE))
+        raise ExperimentError(
+            '{}: not empty, and no experiment: there is no {} in it'.format(folder, EXPERIMENT_FILE)
+        )
     write_json(
         path,
-        {'format': FORMAT, 'version': VERSION, 'settings': plan.as_data(), 'software': software(),
-         **({} if hung_after_s is None else {LIMITS: [hung_after_s]})})
+        {
+            'format': FORMAT,
+            'version': VERSION,
+            'settings': plan.as_data(),
+            'software': software(),
+            **({} if hung_after_s is None else {LIMITS: [hung_after_s]}),
+        },
+    )
     return False
 
 
@@ -138,7 +154,8 @@ def _refuse_another(path: Path, plan: ExperimentPlan) -> Dict[str, Any]:
         content = json.loads(path.read_text(encoding='utf-8'))
         there, ours = content['settings'], json.loads(json.dumps(plan.as_data()))
         known = (content['format'], content['version']) == (FORMAT, VERSION) and isinstance(
-            there, dict)
+            there, dict
+        )
     except (ValueError, KeyError, TypeError) as err:
         raise ExperimentError('{}: no settings of an experiment: {!r}'.format(path, err)) from err
     if not known:
@@ -148,17 +165,26 @@ def _refuse_another(path: Path, plan: ExperimentPlan) -> Dict[str, Any]:
         raise ExperimentError(
             '{}: an experiment with other settings was begun there ({}); go on with those, or give '
             'another --output'.format(
-                path.parent, '; '.join('{}: there {}, now {}'.format(
-                    'variants' if key == ARMS else key, setting_text(there.get(key)),
-                    setting_text(ours.get(key))) for key in differing)))
+                path.parent,
+                '; '.join(
+                    '{}: there {}, now {}'.format(
+                        'variants' if key == ARMS else key,
+                        setting_text(there.get(key)),
+                        setting_text(ours.get(key)),
+                    )
+                    for key in differing
+                ),
+            )
+        )
     return dict(content)
 
 
 def setting_text(value: Any) -> str:
     """A setting for an error's text. Variants by their names and settings."""
     if isinstance(value, list):
-        return ', '.join('{} {}'.format(variant['name'], variant['settings'] or '').strip()
-                         for variant in value)
+        return ', '.join(
+            '{} {}'.format(variant['name'], variant['settings'] or '').strip() for variant in value
+        )
     return repr(value)
 
 

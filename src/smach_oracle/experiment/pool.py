@@ -1,4 +1,5 @@
 """Jobs, some at a time: of one experiment, or of all parts of a protocol."""
+
 import fcntl
 import os
 import sys
@@ -36,8 +37,9 @@ class PoolResult(NamedTuple):
     broken: Dict[str, str]  # jobs that could not be brought to their ends, and why
 
 
-def run(plan: ExperimentPlan, output: Path, at_a_time: int,
-        hung_after_s: float) -> List[ExperimentJob]:
+def run(
+    plan: ExperimentPlan, output: Path, at_a_time: int, hung_after_s: float
+) -> List[ExperimentJob]:
     """Run the jobs of an experiment that are not over, some at a time, and return them all.
 
     :raises ExperimentError: naming the job and its folder.
@@ -55,8 +57,9 @@ def run(plan: ExperimentPlan, output: Path, at_a_time: int,
     return jobs
 
 
-def run_parts(parts: Sequence[Part], output: Path, at_a_time: int,
-              hung_after_s: float) -> PoolResult:
+def run_parts(
+    parts: Sequence[Part], output: Path, at_a_time: int, hung_after_s: float
+) -> PoolResult:
     """Run the jobs of all parts that are not over, the longest first.
 
     A job that cannot go on costs its replicate. The others go on.
@@ -118,8 +121,13 @@ def stop_all(jobs: Sequence[ExperimentJob]) -> None:
         raise errors[0]
 
 
-def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals,
-             progress: ProgressLine, broken: Optional[Dict[str, str]] = None) -> None:
+def run_jobs(
+    jobs: Sequence[ExperimentJob],
+    at_a_time: int,
+    signals: StopSignals,
+    progress: ProgressLine,
+    broken: Optional[Dict[str, str]] = None,
+) -> None:
     """Start the jobs one after the other and wait for their ends.
 
     :param broken: gets the jobs that cannot go on, and why. None means the first such is raised.
@@ -140,8 +148,10 @@ def run_jobs(jobs: Sequence[ExperimentJob], at_a_time: int, signals: StopSignals
             try:
                 job.watch()
             except ExperimentError as err:
-                if broken is None or (len(broken) + 1 >= BROKEN_AT_ONCE
-                                      and sum(each.finished for each in jobs) == before):
+                if broken is None or (
+                    len(broken) + 1 >= BROKEN_AT_ONCE
+                    and sum(each.finished for each in jobs) == before
+                ):
                     raise
                 broken[job.name] = str(err)
                 job.messages.append('{}; the replicate is left'.format(err))

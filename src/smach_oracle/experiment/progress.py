@@ -1,4 +1,5 @@
 """The progress of an experiment: a line rewritten on a terminal, one now and then elsewhere."""
+
 import time
 from typing import IO, List, Sequence
 
@@ -64,8 +65,12 @@ class PoolProgress(ProgressLine):
     def _describe(self, jobs: Sequence[ExperimentJob]) -> str:
         lost = sum(len(job.lost) for job in jobs)
         return '{}/{} trials, {}/{} replicates over{}'.format(
-            sum(job.finished for job in jobs), sum(job.trials for job in jobs),
-            sum(job.over for job in jobs), len(jobs), ', {} lost'.format(lost) if lost else '')
+            sum(job.finished for job in jobs),
+            sum(job.trials for job in jobs),
+            sum(job.over for job in jobs),
+            len(jobs),
+            ', {} lost'.format(lost) if lost else '',
+        )
 
     def _left(self, jobs: Sequence[ExperimentJob], elapsed_s: float, done: int) -> str:
         left_s = seconds_left([job.work() for job in jobs], self._at_a_time)
@@ -77,8 +82,11 @@ def time_left(elapsed_s: float, done: int, missing: int) -> str:
     if not done or not missing:
         return ''
     left_s = elapsed_s / done * missing
-    return '   {:.0f} min left'.format(left_s /
-                                       60) if left_s >= 120 else '   {:.0f} s left'.format(left_s)
+    return (
+        '   {:.0f} min left'.format(left_s / 60)
+        if left_s >= 120
+        else '   {:.0f} s left'.format(left_s)
+    )
 
 
 def describe_variants(jobs: Sequence[ExperimentJob]) -> List[str]:
@@ -88,11 +96,15 @@ def describe_variants(jobs: Sequence[ExperimentJob]) -> List[str]:
         mine = [job for job in jobs if job.variant.name == name]
         trials = [trial for job in mine for trial in job.summaries.values()]
         lost = sum(len(job.lost) for job in mine)
-        texts.append('{} {}/{}{}{}'.format(
-            name.replace('_', ' '), sum(job.finished for job in mine),
-            sum(job.trials for job in mine),
-            ': ' + describe_trials(trials, mine[0].variant.recovers) if trials else '',
-            ', {} lost'.format(lost) if lost else ''))
+        texts.append(
+            '{} {}/{}{}{}'.format(
+                name.replace('_', ' '),
+                sum(job.finished for job in mine),
+                sum(job.trials for job in mine),
+                ': ' + describe_trials(trials, mine[0].variant.recovers) if trials else '',
+                ', {} lost'.format(lost) if lost else '',
+            )
+        )
     return texts
 
 
@@ -102,5 +114,8 @@ def describe_trials(trials: Sequence[TrialSummary], recovers: bool) -> str:
     if not recovers:
         return failed
     return '{} with failures, {} recovered, {} asked, {}'.format(
-        sum(trial.failures > 0 for trial in trials), sum(trial.recoveries > 0 for trial in trials),
-        sum(trial.questions > 0 for trial in trials), failed)
+        sum(trial.failures > 0 for trial in trials),
+        sum(trial.recoveries > 0 for trial in trials),
+        sum(trial.questions > 0 for trial in trials),
+        failed,
+    )

@@ -1,4 +1,5 @@
 """A protocol, run by one command or told in advance, as `run_trials --protocol` has it."""
+
 import argparse
 from pathlib import Path
 from typing import Dict, List, Optional, Tuple
@@ -26,9 +27,17 @@ def chosen_parts(args: argparse.Namespace) -> List[Part]:
     :raises ExperimentError: where the frozen seeds cannot be used.
     """
     seeds = frozen_blocks(checkout()) if args.frozen else dict.fromkeys(BLOCKS, args.seed)
-    return parts_of(args.protocol, ProtocolChoice(
-        seeds, args.answer_delay, tuple(args.names), (args.task,) if args.task else tuple(
-            sorted(TASKS)), args.trials, args.replicates))
+    return parts_of(
+        args.protocol,
+        ProtocolChoice(
+            seeds,
+            args.answer_delay,
+            tuple(args.names),
+            (args.task,) if args.task else tuple(sorted(TASKS)),
+            args.trials,
+            args.replicates,
+        ),
+    )
 
 
 def frozen_blocks(root: Path) -> Dict[str, int]:
@@ -38,8 +47,9 @@ def frozen_blocks(root: Path) -> Dict[str, int]:
     """
     last, here = last_freeze(root), frozen_seeds(root)
     if last.first_seed != here.first_seed:
-        raise ExperimentError('the checkout is not what was frozen at commit {}'.format(
-            last.commit))
+        raise ExperimentError(
+            'the checkout is not what was frozen at commit {}'.format(last.commit)
+        )
     return last.blocks()
 
 
@@ -52,11 +62,17 @@ def run_protocol(args: argparse.Namespace, output: Path) -> Tuple[int, str]:
     :raises ExperimentError: as run_parts() does.
     """
     result = run_parts(chosen_parts(args), output, args.jobs, args.hung_after)
-    lost = ['{}: seed {}: {}'.format(job.name, *each) for _, jobs in result.parts for job in jobs
-            for each in sorted(job.lost.items())]
+    lost = [
+        '{}: seed {}: {}'.format(job.name, *each)
+        for _, jobs in result.parts
+        for job in jobs
+        for each in sorted(job.lost.items())
+    ]
     told = compared(output)
-    for title, texts in (('Lost trials', lost), ('Replicates that were left', [
-            '{}: {}'.format(*each) for each in result.broken.items()])):
+    for title, texts in (
+        ('Lost trials', lost),
+        ('Replicates that were left', ['{}: {}'.format(*each) for each in result.broken.items()]),
+    ):
         if texts:
             told.append('{}:\n  {}'.format(title, '\n  '.join(texts)))
     told.append('Rows, bags and logs: {}'.format(output))
@@ -72,8 +88,10 @@ def compared(output: Path) -> List[str]:
         found = find_rows(output)
     except BagError as err:
         return [str(err)]
-    texts = ['{}\n\n{}'.format(kind.capitalize(), format_comparison(rows))
-             for kind, rows in found.items()]
+    texts = [
+        '{}\n\n{}'.format(kind.capitalize(), format_comparison(rows))
+        for kind, rows in found.items()
+    ]
     try:
         paths = draw_all(found, output / FIGURES)
     except OSError as err:
@@ -88,8 +106,11 @@ def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
 
     :param output: the experiment's folder, whose rows count as done. None means there is none yet.
     """
-    lines = ['{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
-        'part', 'seeds from', 'replicates', 'trials', 'done', 'one by one', 'variants')]
+    lines = [
+        '{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
+            'part', 'seeds from', 'replicates', 'trials', 'done', 'one by one', 'variants'
+        )
+    ]
     everything: List[JobWork] = []
     by_part = [(part, _works(part, output)) for part in parts]
     pace = paces([work for _, works in by_part for work in works])
@@ -97,14 +118,27 @@ def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
         plan, everything = part.plan, everything + works
         total = plan.trials * plan.replicates * len(plan.variants)
         mine = seconds_missing([work._replace(took_s=(pace[work.task],)) for work in works])
-        lines.append('{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
-            part.name or plan.task, plan.seed, plan.replicates, total,
-            total - sum(work.missing for work in works), duration(sum(mine)),
-            ' '.join(variant.name for variant in plan.variants)))
-    lines.append('{} trials to run, {} at {} jobs at a time ({})'.format(
-        sum(work.missing for work in everything),
-        duration(seconds_left(everything, at_a_time)), at_a_time, ', '.join(
-            '{:.1f} s a trial of {}'.format(each, task) for task, each in sorted(pace.items()))))
+        lines.append(
+            '{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
+                part.name or plan.task,
+                plan.seed,
+                plan.replicates,
+                total,
+                total - sum(work.missing for work in works),
+                duration(sum(mine)),
+                ' '.join(variant.name for variant in plan.variants),
+            )
+        )
+    lines.append(
+        '{} trials to run, {} at {} jobs at a time ({})'.format(
+            sum(work.missing for work in everything),
+            duration(seconds_left(everything, at_a_time)),
+            at_a_time,
+            ', '.join(
+                '{:.1f} s a trial of {}'.format(each, task) for task, each in sorted(pace.items())
+            ),
+        )
+    )
     return '\n'.join(lines)
 
 
@@ -117,8 +151,16 @@ def _works(part: Part, output: Optional[Path]) -> List[JobWork]:
     works = []
     for replicate in range(part.plan.replicates):
         for variant in part.plan.variants:
-            took = [row.wall_s for row in kept
-                    if (row.variant, row.replicate) == (variant.name, replicate)]
-            works.append(JobWork(part.plan.task, max(0, part.plan.trials - len(took)),
-                              [each for each in took if each is not None]))
+            took = [
+                row.wall_s
+                for row in kept
+                if (row.variant, row.replicate) == (variant.name, replicate)
+            ]
+            works.append(
+                JobWork(
+                    part.plan.task,
+                    max(0, part.plan.trials - len(took)),
+                    [each for each in took if each is not None],
+                )
+            )
     return works

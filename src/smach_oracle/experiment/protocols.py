@@ -1,4 +1,5 @@
 """The protocol's experiments: several parts, each an experiment with a folder of its own."""
+
 from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.decision.policy import POLICIES
@@ -13,8 +14,9 @@ MEMORIES = (2, 5, 10, 20, 50)
 SHARES = (0.0, 0.5, 1.0)  # of the causes, that last
 HOURS = {'pick_and_place': 20.0, 'drink_retrieval': 16.0}  # of continuous operation
 ALL = 'all'
-BLOCK_OF = dict(zip(('pick_and_place', 'drink_retrieval', 'persistence', 'memory', 'continuous'),
-                    BLOCKS))
+BLOCK_OF = dict(
+    zip(('pick_and_place', 'drink_retrieval', 'persistence', 'memory', 'continuous'), BLOCKS)
+)
 
 
 class Part(NamedTuple):
@@ -34,9 +36,16 @@ class ProtocolChoice(NamedTuple):
     trials: Optional[int] = None  # of a replicate, at most
     replicates: Optional[int] = None  # at most
 
-    def part(self, name: str, task: str, trials: int, replicates: int,
-             variants: Sequence[Variant], lasting: Optional[float] = None,
-             hours: Optional[float] = None) -> Part:
+    def part(
+        self,
+        name: str,
+        task: str,
+        trials: int,
+        replicates: int,
+        variants: Sequence[Variant],
+        lasting: Optional[float] = None,
+        hours: Optional[float] = None,
+    ) -> Part:
         """Return a part of so many trials and replicates at most.
 
         Where fewer trials are run, a world that goes on does so for fewer hours.
@@ -48,9 +57,19 @@ class ProtocolChoice(NamedTuple):
             hours *= fewer / trials
         seed = self.seeds[BLOCK_OF.get(name, BLOCK_OF[task])]
         told = '' if lasting is None else '_{:.0f}'.format(100 * lasting)
-        return Part('{}_{}{}'.format(task, name, told), ExperimentPlan(
-            task, fewer, seed, min(replicates, self.replicates or replicates), tuple(variants),
-            self.answer_delay, lasting=lasting, hours=hours))
+        return Part(
+            '{}_{}{}'.format(task, name, told),
+            ExperimentPlan(
+                task,
+                fewer,
+                seed,
+                min(replicates, self.replicates or replicates),
+                tuple(variants),
+                self.answer_delay,
+                lasting=lasting,
+                hours=hours,
+            ),
+        )
 
 
 def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
@@ -58,8 +77,13 @@ def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
     others = [name for name in sorted(POLICIES) if name not in COMPARED + ('prose',)]
     for task in choice.tasks:
         trials = TASKS[task][1]
-        yield choice.part('compared', task, trials, REPLICATES[task],
-                          named_variants(choice.variants or COMPARED, {}))
+        yield choice.part(
+            'compared',
+            task,
+            trials,
+            REPLICATES[task],
+            named_variants(choice.variants or COMPARED, {}),
+        )
         if not choice.variants:
             yield choice.part('others', task, trials, 1, named_variants(others, {}))
 
@@ -68,27 +92,46 @@ def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part for each share of causes that last."""
     for task in choice.tasks:
         for share in SHARES:
-            yield choice.part('persistence', task, SWEPT[task], 1,
-                              named_variants(choice.variants or COMPARED, {}), lasting=share)
+            yield choice.part(
+                'persistence',
+                task,
+                SWEPT[task],
+                1,
+                named_variants(choice.variants or COMPARED, {}),
+                lasting=share,
+            )
 
 
 def memory_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part with a variant for each memory."""
     for task in choice.tasks:
-        yield choice.part('memory', task, SWEPT[task], 1,
-                          named_variants(choice.variants or (DEFAULT,), {}, MEMORIES))
+        yield choice.part(
+            'memory',
+            task,
+            SWEPT[task],
+            1,
+            named_variants(choice.variants or (DEFAULT,), {}, MEMORIES),
+        )
 
 
 def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the parts of continuous operation."""
     for task in choice.tasks:
-        yield choice.part('continuous', task, TASKS[task][1], 1,
-                          named_variants(choice.variants or (DEFAULT,), {}), hours=HOURS[task])
+        yield choice.part(
+            'continuous',
+            task,
+            TASKS[task][1],
+            1,
+            named_variants(choice.variants or (DEFAULT,), {}),
+            hours=HOURS[task],
+        )
 
 
 PROTOCOLS: Dict[str, Callable[[ProtocolChoice], Iterator[Part]]] = {
-    'main': main_parts, 'persistence': persistence_parts, 'memory': memory_parts,
-    'continuous': continuous_parts
+    'main': main_parts,
+    'persistence': persistence_parts,
+    'memory': memory_parts,
+    'continuous': continuous_parts,
 }
 
 

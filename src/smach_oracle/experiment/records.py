@@ -6,6 +6,7 @@ The bag of a trial holds the rates learned at its end, so that a bag with its en
 is needed to go on after it, whatever happened at whichever moment. Bags are in the order of
 their names, which is that of the trials.
 """
+
 import json
 import os
 from pathlib import Path
@@ -54,8 +55,11 @@ class KeptTrials(NamedTuple):
     def before(self, number: int) -> 'KeptTrials':
         """Return those before a trial."""
         count = sum(1 for each in self.numbers if each < number)
-        return KeptTrials(self.numbers[:count], {
-            each: why for each, why in self.lost.items() if each < number}, self.learned[:count])
+        return KeptTrials(
+            self.numbers[:count],
+            {each: why for each, why in self.lost.items() if each < number},
+            self.learned[:count],
+        )
 
 
 NONE_KEPT = KeptTrials([], {}, [])
@@ -100,19 +104,25 @@ class ReplicateRecords:
             if recorded is None or not self._is_complete(recorded, seed, truths):
                 break
             if recorded.learned is None:
-                raise ExperimentError('{}: the bag does not contain the learned rates'.format(
-                    paths[len(done)]))
+                raise ExperimentError(
+                    '{}: the bag does not contain the learned rates'.format(paths[len(done)])
+                )
             done.append(recorded)
-        dropped = bags[:torn] + paths[len(done):]
+        dropped = bags[:torn] + paths[len(done) :]
         for path in dropped:
             os.replace(path, path + DROPPED)
         next_trial = (numbers + [self._trials])[len(done)]
         self._keep_lost({number: why for number, why in lost.items() if number < next_trial})
-        self._keep_truths({self._first_seed + number for number in numbers[:len(done)]})
+        self._keep_truths({self._first_seed + number for number in numbers[: len(done)]})
         learned = [each.learned for each in done] or kept.learned
         self._restore_rates(learned[-1] if learned else None)
-        return JobProgress(done, self._lost(), tuple(os.path.basename(path) for path in dropped),
-                           next_trial, len(kept.numbers))
+        return JobProgress(
+            done,
+            self._lost(),
+            tuple(os.path.basename(path) for path in dropped),
+            next_trial,
+            len(kept.numbers),
+        )
 
     def _torn_before(self, bags: Sequence[str]) -> Tuple[int, int]:
         """Return how many torn bags come first, and the trial of the first one behind them.
@@ -136,10 +146,14 @@ class ReplicateRecords:
             return None
         summary = summarise(content.events, (path,))
         end = next((event for event in content.events if event.kind == EventKind.TRIAL_END), None)
-        learned = end.data.get('learned') if end is not None and isinstance(end.data,
-                                                                            Mapping) else None
-        return RecordedTrial(summary._replace(cause=content.causes.get(summary.trial_id)), learned,
-                             tuple(tries_of(content.events, content.stamps)))
+        learned = (
+            end.data.get('learned') if end is not None and isinstance(end.data, Mapping) else None
+        )
+        return RecordedTrial(
+            summary._replace(cause=content.causes.get(summary.trial_id)),
+            learned,
+            tuple(tries_of(content.events, content.stamps)),
+        )
 
     def is_complete(self, recorded: RecordedTrial) -> bool:
         """Whether a trial has come to its end, and the world has told how."""
@@ -157,8 +171,11 @@ class ReplicateRecords:
         if summary.ending in (TrialEnding.UNFINISHED, TrialEnding.PREEMPTED) or seed not in truths:
             return False
         if summary.cause is not None and summary.cause.seed != seed:
-            raise ExperimentError('{}: a trial of seed {} where seed {} is expected'.format(
-                summary.bags[0], summary.cause.seed, seed))
+            raise ExperimentError(
+                '{}: a trial of seed {} where seed {} is expected'.format(
+                    summary.bags[0], summary.cause.seed, seed
+                )
+            )
         return True
 
     def mark_lost(self, number: int, why: str) -> None:

@@ -2,6 +2,7 @@
 
 They hold all that is needed to go on on another machine, without the bags.
 """
+
 import json
 import subprocess
 from pathlib import Path
@@ -29,9 +30,13 @@ def code_version() -> str:
     """Return the commit of the code that runs, '-dirty' behind it, or '' where there is none."""
     try:
         return subprocess.run(
-            ['git', 'describe', '--always', '--dirty', '--abbrev=12'], check=True,
-            cwd=str(Path(__file__).parent), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-            universal_newlines=True).stdout.strip()
+            ['git', 'describe', '--always', '--dirty', '--abbrev=12'],
+            check=True,
+            cwd=str(Path(__file__).parent),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            universal_newlines=True,
+        ).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return ''
 
@@ -39,9 +44,16 @@ def code_version() -> str:
 class JobResults:
     """The rows of one job."""
 
-    def __init__(self, output: Path, task: str, variant: str, replicate: int,
-                 first_seed: int, lasting_share: Optional[float] = None,
-                 slot_h: Optional[float] = None) -> None:
+    def __init__(
+        self,
+        output: Path,
+        task: str,
+        variant: str,
+        replicate: int,
+        first_seed: int,
+        lasting_share: Optional[float] = None,
+        slot_h: Optional[float] = None,
+    ) -> None:
         """Read them.
 
         :param slot_h: h from the begin of one trial to that of the next, in a world that goes on.
@@ -60,9 +72,11 @@ class JobResults:
         if self._path.exists():
             cut_torn_line(self._path)
             try:
-                self._rows = {row.seed: row for row in read_rows(self._path)
-                              if (row.task, row.variant, row.replicate) == (
-                                  task, variant, replicate)}
+                self._rows = {
+                    row.seed: row
+                    for row in read_rows(self._path)
+                    if (row.task, row.variant, row.replicate) == (task, variant, replicate)
+                }
             except BagError as err:
                 raise ExperimentError(str(err)) from err
 
@@ -97,8 +111,9 @@ class JobResults:
 
     def forget_from(self, number: int) -> None:
         """Drop the rows of this trial and of those behind it, which are run again."""
-        self._rows = {seed: row for seed, row in self._rows.items()
-                      if seed < self._first_seed + number}
+        self._rows = {
+            seed: row for seed, row in self._rows.items() if seed < self._first_seed + number
+        }
 
     def add(self, trials: Sequence[RecordedTrial], lost: Mapping[int, str], truth: Path) -> None:
         """Append the rows of trials that have none. `lost`: why, by number of the trial.
@@ -115,19 +130,38 @@ class JobResults:
                 continue
             if details is None:
                 details = read_details(str(truth)) if truth.exists() else {}
-            new.append(row_of(trial.summary, self._task, self._variant, self._replicate,
-                              cause.seed, details.get(cause.seed, NO_DETAILS), self._version,
-                              trial.learned, self._lasting_share, trial.tries))
+            new.append(
+                row_of(
+                    trial.summary,
+                    self._task,
+                    self._variant,
+                    self._replicate,
+                    cause.seed,
+                    details.get(cause.seed, NO_DETAILS),
+                    self._version,
+                    trial.learned,
+                    self._lasting_share,
+                    trial.tries,
+                )
+            )
         for number, why in lost.items():
             if self._first_seed + number not in self._rows:
-                new.append(TrialRow(self._task, self._variant, self._replicate,
-                                    self._first_seed + number, LOST, why=why,
-                                    version=self._version, lasting_share=self._lasting_share,
-                                    hour=self._hour_of(number)))
+                new.append(
+                    TrialRow(
+                        self._task,
+                        self._variant,
+                        self._replicate,
+                        self._first_seed + number,
+                        LOST,
+                        why=why,
+                        version=self._version,
+                        lasting_share=self._lasting_share,
+                        hour=self._hour_of(number),
+                    )
+                )
         if new:
             append_rows(self._path, new)
             self._rows.update((row.seed, row) for row in new)
-
 
     def _hour_of(self, number: int) -> Optional[float]:
         """Return the hour at which a lost trial was to begin, of a world that goes on.
@@ -139,14 +173,14 @@ class JobResults:
         before = [row for row in self.rows() if row.seed < self._first_seed + number and row.left]
         left = _data_in(before[-1], before[-1].left, 'how the world was left') if before else None
         ended = left.get('ended') if left else None
-        return max(number * self._slot_h,
-                   float(ended) if isinstance(ended, (int, float)) else 0.0)
+        return max(number * self._slot_h, float(ended) if isinstance(ended, (int, float)) else 0.0)
 
 
 def _data_in(row: TrialRow, text: str, what: str) -> Optional[Mapping[str, Any]]:
     try:
         data = json.loads(text)
     except ValueError as err:
-        raise ExperimentError('results of {}, seed {}: the row lacks {}'.format(
-            row.variant, row.seed, what)) from err
+        raise ExperimentError(
+            'results of {}, seed {}: the row lacks {}'.format(row.variant, row.seed, what)
+        ) from err
     return data if isinstance(data, dict) else None

@@ -1,4 +1,5 @@
 """Signals that ask to stop."""
+
 import signal
 from types import FrameType
 from typing import Any, Dict, Optional
@@ -28,8 +29,11 @@ class StopSignals:
 
     def __enter__(self) -> 'StopSignals':
         hangup_ignored = signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
-        self._before = {signum: signal.signal(signum, self._note) for signum in self.SIGNALS
-                        if not (signum == signal.SIGHUP and hangup_ignored)}
+        self._before = {
+            signum: signal.signal(signum, self._note)
+            for signum in self.SIGNALS
+            if not (signum == signal.SIGHUP and hangup_ignored)
+        }
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,4 +1,5 @@
 """Claims of questions, renewed for as long as somebody works on them."""
+
 import threading
 from typing import Dict, NamedTuple, Optional, Protocol, Set
 
@@ -24,8 +25,7 @@ class Claim(NamedTuple):
 class ClaimServer(Protocol):
     """A server whose questions can be claimed, such as a FollowedServer."""
 
-    def claim(self, query_id: str, expert: str, action: int,
-              lease_s: float) -> ClaimQueryResponse:
+    def claim(self, query_id: str, expert: str, action: int, lease_s: float) -> ClaimQueryResponse:
         """Claim a question, or renew or release its claim.
 
         :raises ServerGoneError: if the server does not answer.
@@ -114,8 +114,10 @@ class ClaimKeeper:
         held = self.held
         for claim in set(self._missed) - set(held):
             del self._missed[claim]
-        threads = [threading.Thread(target=self._renew, args=(claim,), name='renew', daemon=True)
-                   for claim in held]
+        threads = [
+            threading.Thread(target=self._renew, args=(claim,), name='renew', daemon=True)
+            for claim in held
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:
@@ -137,7 +139,8 @@ class ClaimKeeper:
         self._missed.pop(claim, None)
         try:
             response = self._questions.server(listed).claim(
-                listed.goal.query_id, claim.expert, ClaimQueryRequest.RENEW, self._lease_s)
+                listed.goal.query_id, claim.expert, ClaimQueryRequest.RENEW, self._lease_s
+            )
         except ServerGoneError as err:
             rospy.logdebug('A claim was not renewed: %s', err)
             return

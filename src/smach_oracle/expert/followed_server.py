@@ -1,4 +1,5 @@
 """One ExpertQuery server as a front end sees it: its open list, and calls to its services."""
+
 import math
 import time
 from typing import Callable, FrozenSet, Iterable, List, NamedTuple, Optional
@@ -91,26 +92,34 @@ class FollowedServer:
             self._questions = []  # the next server of this name has others
         return []
 
-    def claim(self, query_id: str, expert: str, action: int = ClaimQueryRequest.CLAIM,
-              lease_s: float = 0.0) -> ClaimQueryResponse:
+    def claim(
+        self,
+        query_id: str,
+        expert: str,
+        action: int = ClaimQueryRequest.CLAIM,
+        lease_s: float = 0.0,
+    ) -> ClaimQueryResponse:
         """Call the claim service.
 
         :raises ServerGoneError: if there is no such service now, or no answer within 5 s.
         """
         limit_s = RELEASE_LIMIT_S if action == ClaimQueryRequest.RELEASE else CALL_LIMIT_S
-        return self._call('claim', ClaimQuery, ClaimQueryRequest(action, query_id, expert, lease_s),
-                          limit_s)
+        return self._call(
+            'claim', ClaimQuery, ClaimQueryRequest(action, query_id, expert, lease_s), limit_s
+        )
 
     def answer(self, query_id: str, decision: ExpertDecision) -> AnswerQueryResponse:
         """Call the answer service. Asking the same twice does no harm.
 
         :raises ServerGoneError: if there is no such service now, or no answer within 5 s.
         """
-        return self._call('answer', AnswerQuery, AnswerQueryRequest(query_id, decision),
-                          CALL_LIMIT_S)
+        return self._call(
+            'answer', AnswerQuery, AnswerQueryRequest(query_id, decision), CALL_LIMIT_S
+        )
 
-    def refresh(self, advertised: bool, servers: Iterable[str] = (),
-                patience_s: float = 3.0) -> None:
+    def refresh(
+        self, advertised: bool, servers: Iterable[str] = (), patience_s: float = 3.0
+    ) -> None:
         """Subscribe again where the master knows the list and we do not hear it.
 
         We were registered with an earlier master, or its address has changed.
@@ -134,8 +143,9 @@ class FollowedServer:
         self._subscriber.unregister()
 
     def _subscribe(self) -> rospy.Subscriber:
-        return rospy.Subscriber(self.name + '/open', OpenQueries, self._on_list, queue_size=2,
-                                tcp_nodelay=True)
+        return rospy.Subscriber(
+            self.name + '/open', OpenQueries, self._on_list, queue_size=2, tcp_nodelay=True
+        )
 
     def _is_server(self, node: str) -> bool:
         """Whether a node takes the answers. One that plays a bag has questions and no ear."""
@@ -154,8 +164,11 @@ class FollowedServer:
     def _call(self, service: str, kind: type, request: object, limit_s: float) -> genpy.Message:
         name = '{}/{}'.format(self.name, service)
         hanging = self._unanswered
-        if hanging is not None and hanging.is_alive(
-        ) and time.monotonic() - hanging.since_s < _HANGING_S:
+        if (
+            hanging is not None
+            and hanging.is_alive()
+            and time.monotonic() - hanging.since_s < _HANGING_S
+        ):
             raise ServerGoneError('{} does not answer'.format(name))
         call = ServiceCall(name, kind, request)
         try:
@@ -167,5 +180,6 @@ class FollowedServer:
 
 def _listed(server: str, entry: OpenQuery, now_s: float) -> ListedQuestion:
     deadline_s = now_s + entry.remaining if entry.remaining >= 0 else math.inf
-    return ListedQuestion(server, entry.query, entry.status, entry.claimed_by, now_s - entry.age,
-                  deadline_s)
+    return ListedQuestion(
+        server, entry.query, entry.status, entry.claimed_by, now_s - entry.age, deadline_s
+    )

@@ -1,4 +1,5 @@
 """The ROS part of every front end for experts: open questions, claims and answers."""
+
 import threading
 import time
 from types import MappingProxyType
@@ -77,8 +78,9 @@ class FrontEnd:
         :param version: returned by an earlier call. Begin with 0.
         """
         with self._changed:
-            self._changed.wait_for(lambda: self._version != version or self._stopped.is_set(),
-                                   timeout_s)
+            self._changed.wait_for(
+                lambda: self._version != version or self._stopped.is_set(), timeout_s
+            )
             return self._version
 
     def claim(self, listed: ListedQuestion, take_over: bool = False) -> ClaimQueryResponse:
@@ -87,8 +89,9 @@ class FrontEnd:
         :raises ServerGoneError: if its server cannot be reached.
         """
         action = ClaimQueryRequest.TAKE_OVER if take_over else ClaimQueryRequest.CLAIM
-        response = self.server(listed).claim(listed.goal.query_id, self.expert, action,
-                                             self._lease_s)
+        response = self.server(listed).claim(
+            listed.goal.query_id, self.expert, action, self._lease_s
+        )
         if response.ok:
             self._claims.keep(listed, self.expert)
         return response
@@ -150,22 +153,27 @@ class FrontEnd:
         while not rospy.is_shutdown():
             try:
                 master = timed_master()
-                self._look_for_servers(master.getPublishedTopics(''),
-                                       dict(master.getSystemState()[2]))
+                self._look_for_servers(
+                    master.getPublishedTopics(''), dict(master.getSystemState()[2])
+                )
             except (OSError, rosgraph.MasterException) as err:
                 rospy.logdebug('The master does not answer: %s', err)
             if self._stopped.wait(_DISCOVERY_PERIOD_S):
                 return
 
-    def _look_for_servers(self, published: Sequence[Sequence[str]],
-                          services: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
+    def _look_for_servers(
+        self,
+        published: Sequence[Sequence[str]],
+        services: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ) -> None:
         lists = {
             topic
-            for topic, kind in published if kind == OpenQueries._type and topic.endswith('/open')
+            for topic, kind in published
+            if kind == OpenQueries._type and topic.endswith('/open')
         }
         if self._discover:
             for topic in sorted(lists):
-                name = topic[:-len('/open')]
+                name = topic[: -len('/open')]
                 if name not in self._servers:
                     self._follow(name)
         for name, server in list(self._servers.items()):
@@ -190,8 +198,9 @@ def wait_for_question(front_end: FrontEnd, timeout_s: float) -> Optional[ListedQ
     until_s = time.monotonic() + timeout_s
     version = 0
     while not rospy.is_shutdown():
-        pending = next((each for each in front_end.questions() if each.status == OpenQuery.PENDING),
-                       None)
+        pending = next(
+            (each for each in front_end.questions() if each.status == OpenQuery.PENDING), None
+        )
         left_s = until_s - time.monotonic()
         if pending is not None or left_s <= 0.0:
             return pending

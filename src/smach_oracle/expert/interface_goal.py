@@ -1,4 +1,5 @@
 """The old place of `smach_oracle.interfaces.interface_goal`, kept as an alias."""
+
 import warnings
 
 from smach_oracle.interfaces.interface_goal import (
@@ -13,4 +14,6 @@ __all__ = ['InterfaceGoal', 'InterfaceGoalError', 'SettlingServices']
 
 warnings.warn(
     'smach_oracle.expert.interface_goal has moved to smach_oracle.interfaces.interface_goal',
-    FutureWarning, stacklevel=2)
+    FutureWarning,
+    stacklevel=2,
+)

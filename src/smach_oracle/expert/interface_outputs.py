@@ -1,4 +1,5 @@
 """The printed output of the interfaces that robots have started."""
+
 import threading
 from collections import OrderedDict
 from typing import Callable, Collection, Optional
@@ -35,9 +36,11 @@ class InterfaceOutputs:
 
     def taker(self, robot: str) -> Callable[[InterfaceOutput], None]:
         """Return the function that takes a robot's messages."""
+
         def take(message: InterfaceOutput) -> None:
             if self._query_id in ('', message.query_id):
                 self._keep(robot, message)
+
         return take
 
     def _keep(self, robot: str, message: InterfaceOutput) -> None:

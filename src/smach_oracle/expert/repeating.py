@@ -1,4 +1,5 @@
 """Steps that a thread of their own repeats until the node goes down."""
+
 import threading
 import time
 from typing import Callable

@@ -1,4 +1,5 @@
 """Topics of the robots that ask."""
+
 import threading
 from collections import OrderedDict
 from typing import Any, Callable, Collection
@@ -22,8 +23,15 @@ class RobotTopic:
     the node cannot even shut down.
     """
 
-    def __init__(self, robot: str, topic: str, kind: type, take: Callable[[Any], None],
-                 queue_size: int = 100, buff_size: int = READ_BYTES) -> None:
+    def __init__(
+        self,
+        robot: str,
+        topic: str,
+        kind: type,
+        take: Callable[[Any], None],
+        queue_size: int = 100,
+        buff_size: int = READ_BYTES,
+    ) -> None:
         """
         :param robot: a node's name, as given in a question. A name that ROS forbids is ignored.
         :param topic: behind the robot's name, such as /oracle/events.
@@ -31,7 +39,8 @@ class RobotTopic:
         """
         self._stopped = threading.Event()
         self._subscribe = lambda: subscribe_to_owner(
-            robot + topic, kind, take, queue_size=queue_size, buff_size=buff_size, tcp_nodelay=True)
+            robot + topic, kind, take, queue_size=queue_size, buff_size=buff_size, tcp_nodelay=True
+        )
         if is_node_name(robot):
             threading.Thread(target=self._listen, name='listen to ' + robot, daemon=True).start()
 
@@ -53,14 +62,21 @@ class RobotTopic:
 class RobotTopics:
     """The same topic of many robots: of those that asked last. One thread calls it."""
 
-    def __init__(self, topic: str, kind: type, taker: Callable[[str], Callable[[Any], None]],
-                 queue_size: int, buff_size: int = READ_BYTES) -> None:
+    def __init__(
+        self,
+        topic: str,
+        kind: type,
+        taker: Callable[[str], Callable[[Any], None]],
+        queue_size: int,
+        buff_size: int = READ_BYTES,
+    ) -> None:
         """
         :param topic: behind the robot's name, such as /oracle/preconditions.
         :param taker: returns the function that takes the messages of a robot.
         """
-        self._listen_to = lambda robot: RobotTopic(robot, topic, kind, taker(robot), queue_size,
-                                                   buff_size)
+        self._listen_to = lambda robot: RobotTopic(
+            robot, topic, kind, taker(robot), queue_size, buff_size
+        )
         self._topics: 'OrderedDict[str, RobotTopic]' = OrderedDict()
 
     def follow(self, robots: Collection[str]) -> None:

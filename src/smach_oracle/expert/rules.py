@@ -13,6 +13,7 @@ A key is the label of the failed state, alone or behind its container path, whic
 specific one. `default` is for all others. The same questions in the same order get the same
 answers. A question about a state that still runs is ignored: rules are for failures.
 """
+
 import math
 import threading
 from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Protocol, Sequence, Tuple
@@ -29,8 +30,17 @@ OLD_NAME = 'SM_ROOT'  # of machines that were given none, before they had that o
 IGNORE = 'ignore'  # leave the question to others, or to its deadline
 KINDS = {kind.name.lower(): kind for kind in AnswerKind}
 _NAMED_BY = {'goto': 'state', 'supersede': 'outcome', 'interface': 'interface'}
-_FIELDS = ('kind', 'state', 'outcome', 'interface', 'outputs', 'why', 'delay_s', 'confirm',
-           'container')
+_FIELDS = (
+    'kind',
+    'state',
+    'outcome',
+    'interface',
+    'outputs',
+    'why',
+    'delay_s',
+    'confirm',
+    'container',
+)
 
 
 class _Choice(Protocol):
@@ -62,13 +72,20 @@ class Rule(NamedTuple):
     def why_not(self, choices: Iterable[_Choice]) -> str:
         """Return why it must not answer a question with these choices, '' where it may."""
         repeats = self.kind == 'goto' and any(
-            self._names(choice) and any(
+            self._names(choice)
+            and any(
                 (each + '/').endswith('/{}/'.format(choice.state)) or each == choice.state
-                for each in choice.repeats) for choice in choices)
+                for each in choice.repeats
+            )
+            for choice in choices
+        )
         if not repeats or self.confirm:
             return ''
-        return ('{} was done in this trial, and only a rule with confirm: true has it '
-                'repeated'.format(self.state))
+        return (
+            '{} was done in this trial, and only a rule with confirm: true has it repeated'.format(
+                self.state
+            )
+        )
 
     def _names(self, choice: _Choice) -> bool:
         return choice.state == self.state and self.container in ('', choice.container)
@@ -78,8 +95,16 @@ class Rule(NamedTuple):
 
         :raises KeyError: for a rule that ignores.
         """
-        return Answer(KINDS[self.kind], self.state, self.outcome, self.interface, self.outputs, by,
-                      self.why, self.container)
+        return Answer(
+            KINDS[self.kind],
+            self.state,
+            self.outcome,
+            self.interface,
+            self.outputs,
+            by,
+            self.why,
+            self.container,
+        )
 
 
 class Rules:
@@ -114,8 +139,9 @@ class Rules:
 class RuleExpert(Expert):
     """An expert in the same process, without ROS, that goes by rules."""
 
-    def __init__(self, rules: Rules, by: str = 'scripted',
-                 interfaces: Optional[Mapping[str, Any]] = None) -> None:
+    def __init__(
+        self, rules: Rules, by: str = 'scripted', interfaces: Optional[Mapping[str, Any]] = None
+    ) -> None:
         """
         :param interfaces: by name, functions that take the question and return a SUPERSEDE answer
             or None.
@@ -124,8 +150,9 @@ class RuleExpert(Expert):
         self._by = by
         self._interfaces = dict(interfaces or {})
 
-    def ask(self, question: Question, cancelled: threading.Event,
-            progress: Progress) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Progress
+    ) -> Optional[Answer]:
         """Return the rule's answer after its delay.
 
         None by the deadline where the rule ignores or comes too late, or would have a state
@@ -133,23 +160,33 @@ class RuleExpert(Expert):
         """
         rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
         if question.failure_kind is not FailureKind.STILL_RUNNING:
-            rule = self._rules.next('', question.trial_id, question.container_path,
-                                    question.failed_state)
+            rule = self._rules.next(
+                '', question.trial_id, question.container_path, question.failed_state
+            )
         ignores = rule.kind == IGNORE or bool(rule.why_not(question.choices))
         limit_s = question.deadline_s or math.inf
         wait_s = min(math.inf if ignores else rule.delay_s, limit_s)
-        if cancelled.wait(None if wait_s ==
-                          math.inf else wait_s) or ignores or rule.delay_s > limit_s:
+        if (
+            cancelled.wait(None if wait_s == math.inf else wait_s)
+            or ignores
+            or rule.delay_s > limit_s
+        ):
             return None
         return rule.answer(self._by)
 
-    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
-                      progress: Progress) -> Optional[Answer]:
+    def run_interface(
+        self,
+        offer: InterfaceOffer,
+        question: Question,
+        cancelled: threading.Event,
+        progress: Progress,
+    ) -> Optional[Answer]:
         """Call the function of that name. Return None where there is none."""
         progress('interface_start', offer.name, '')
         run = self._interfaces.get(offer.name)
-        answer: Optional[Answer] = run(
-            question) if run is not None and not cancelled.is_set() else None
+        answer: Optional[Answer] = (
+            run(question) if run is not None and not cancelled.is_set() else None
+        )
         progress('interface_end', offer.name, answer.outcome if answer is not None else '')
         return answer
 
@@ -162,7 +199,8 @@ def _parse_rules(state: str, value: object) -> Tuple[Rule, ...]:
     if not value:
         raise SettingsError(state, value, 'a rule, or a list of one rule or more')
     return tuple(
-        _parse_rule('{}[{}]'.format(state, index), item) for index, item in enumerate(value))
+        _parse_rule('{}[{}]'.format(state, index), item) for index, item in enumerate(value)
+    )
 
 
 def _parse_rule(key: str, value: object) -> Rule:
@@ -170,19 +208,28 @@ def _parse_rule(key: str, value: object) -> Rule:
         raise SettingsError(key, value, 'a mapping with a kind')
     unknown = sorted(str(field) for field in value if field not in _FIELDS)
     if unknown:
-        raise SettingsError('{}.{}'.format(key, unknown[0]), value,
-                          'the keys {}'.format(', '.join(_FIELDS)))
+        raise SettingsError(
+            '{}.{}'.format(key, unknown[0]), value, 'the keys {}'.format(', '.join(_FIELDS))
+        )
     kind = as_text(value.get('kind'))
     if not isinstance(kind, str) or (kind != IGNORE and kind not in KINDS):
         raise SettingsError(key + '.kind', kind, ', '.join(sorted(KINDS)) + ' or ' + IGNORE)
     named_by = _NAMED_BY.get(kind)
     if named_by is not None and not as_text(value.get(named_by)):
-        raise SettingsError('{}.{}'.format(key, named_by), value.get(named_by),
-                          'a name; {} needs one'.format(kind))
-    return Rule(kind, _text(key, value, 'state'), _text(key, value, 'outcome'),
-                _text(key, value, 'interface'), _outputs(key, value), _text(key, value, 'why'),
-                _delay_s(key, value), checks.flag(key + '.confirm', value.get('confirm', False)),
-                _text(key, value, 'container'))
+        raise SettingsError(
+            '{}.{}'.format(key, named_by), value.get(named_by), 'a name; {} needs one'.format(kind)
+        )
+    return Rule(
+        kind,
+        _text(key, value, 'state'),
+        _text(key, value, 'outcome'),
+        _text(key, value, 'interface'),
+        _outputs(key, value),
+        _text(key, value, 'why'),
+        _delay_s(key, value),
+        checks.flag(key + '.confirm', value.get('confirm', False)),
+        _text(key, value, 'container'),
+    )
 
 
 def _text(key: str, value: Mapping[str, Any], field: str) -> str:
@@ -191,8 +238,9 @@ def _text(key: str, value: Mapping[str, Any], field: str) -> str:
 
 def _outputs(key: str, value: Mapping[str, Any]) -> Optional[Mapping[str, Any]]:
     outputs = plain(value.get('outputs')) or None
-    if outputs is not None and not (isinstance(outputs, Mapping)
-                                    and all(isinstance(name, str) for name in outputs)):
+    if outputs is not None and not (
+        isinstance(outputs, Mapping) and all(isinstance(name, str) for name in outputs)
+    ):
         raise SettingsError(key + '.outputs', outputs, 'a mapping from userdata keys to plain data')
     return outputs
 

@@ -1,4 +1,5 @@
 """An expert without a person: follows the open lists and answers by rules (`rules.py`)."""
+
 import threading
 import time
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
@@ -83,8 +84,9 @@ class ScriptedExpert:
         goal = listed.goal
         rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
         if not still_runs(goal):
-            rule = self._rules.next(goal.robot, goal.trial_id, goal.container_path,
-                                    goal.failed_state)
+            rule = self._rules.next(
+                goal.robot, goal.trial_id, goal.container_path, goal.failed_state
+            )
         why_not = rule.why_not(goal.choices)
         if why_not:
             rospy.logwarn('The rule for %s does not answer: %s', goal.failed_state, why_not)
@@ -106,13 +108,15 @@ class ScriptedExpert:
             self._planned[key] = planned._replace(due_s=time.monotonic() + _RETRY_S)
             return
         except OracleError as err:
-            rospy.logerr('The rule for %s cannot be sent: %s', planned.listed.goal.failed_state,
-                         err)
+            rospy.logerr(
+                'The rule for %s cannot be sent: %s', planned.listed.goal.failed_state, err
+            )
             self._leave(key, planned)
             return
         if not response.ok:
-            rospy.logwarn('Answer for %s refused: %s', planned.listed.goal.failed_state,
-                          response.message)
+            rospy.logwarn(
+                'Answer for %s refused: %s', planned.listed.goal.failed_state, response.message
+            )
         self._leave(key, planned)
 
     def _leave(self, key: str, planned: _PlannedAnswer) -> None:
@@ -129,15 +133,17 @@ def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
     if rules:
         return Rules.parse(rules)
     if not checks.text('~rules_file', path):
-        raise SettingsError('~rules', rules,
-                          'rules in the parameter ~rules, or a YAML file in ~rules_file')
+        raise SettingsError(
+            '~rules', rules, 'rules in the parameter ~rules, or a YAML file in ~rules_file'
+        )
     given = LoadedSettings()
     allowed = 'a YAML file of rules'
     try:
         given.put(*_read(path))
     except SettingsError as err:
-        raise SettingsError('~rules_file', path, allowed,
-                            '~rules_file: {}; needed: {}'.format(err, allowed)) from err
+        raise SettingsError(
+            '~rules_file', path, allowed, '~rules_file: {}; needed: {}'.format(err, allowed)
+        ) from err
     if not given:
         raise SettingsError('~rules_file', path, allowed + ', and not an empty one')
     try:
@@ -171,7 +177,8 @@ def main() -> None:
     parameters_only(
         'Node: an expert who answers by rules. Parameters: ~rules or ~rules_file, ~servers, '
         '~expert; '
-        'see doc/expert.md.')
+        'see doc/expert.md.'
+    )
     rospy.init_node('scripted_expert')
     start_master_watch()
     try:

@@ -2,6 +2,7 @@
 
 All services of a node have one address. It is looked up while the master answers.
 """
+
 import threading
 from concurrent.futures import Future
 from typing import Any, Callable, Dict, Iterable
@@ -41,8 +42,9 @@ class StopCalls:
         """Return where its services were found last, or '' where they never were."""
         return self._addresses.get(robot, '')
 
-    def call(self, robot: str, service: str,
-             request: CommandMachineRequest) -> CommandMachineResponse:
+    def call(
+        self, robot: str, service: str, request: CommandMachineRequest
+    ) -> CommandMachineResponse:
         """Call it where it was found last, else where the master says it is.
 
         :raises StopError: where it cannot be reached.
@@ -62,5 +64,6 @@ def in_thread(work: Callable[[], Any]) -> 'Future[Any]':
             future.set_result(work())
         except Exception as err:
             future.set_exception(err)
+
     threading.Thread(target=run, name='stop', daemon=True).start()
     return future

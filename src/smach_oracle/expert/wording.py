@@ -3,6 +3,7 @@
 Text that a robot has sent comes out of `clean` fit for a terminal. A page shows it as text, never
 as markup.
 """
+
 import json
 import unicodedata
 from typing import Union
@@ -27,9 +28,11 @@ def still_runs(goal: ExpertQueryGoal) -> bool:
 
 def standing_words(goal: ExpertQueryGoal) -> str:
     """Return how the state of a question stands, to follow its name."""
-    return {ExpertQueryGoal.STILL_RUNNING: 'still runs',
-            OracleEvent.INTERRUPTED: 'was interrupted',
-            ExpertQueryGoal.HELD_BACK: 'is held back'}.get(goal.failure_kind, 'failed')
+    return {
+        ExpertQueryGoal.STILL_RUNNING: 'still runs',
+        OracleEvent.INTERRUPTED: 'was interrupted',
+        ExpertQueryGoal.HELD_BACK: 'is held back',
+    }.get(goal.failure_kind, 'failed')
 
 
 def failure_words(goal: ExpertQueryGoal) -> str:
@@ -39,10 +42,12 @@ def failure_words(goal: ExpertQueryGoal) -> str:
         ExpertQueryGoal.STILL_RUNNING: 'still runs',
         OracleEvent.FAILING_OUTCOME: 'ended with the failing outcome {}'.format(outcome),
         OracleEvent.FELL_THROUGH: 'ended with {}, which would end {}'.format(
-            outcome, clean(goal.container_path)),
+            outcome, clean(goal.container_path)
+        ),
         OracleEvent.EXCEPTION: 'raised an exception',
         OracleEvent.UNREGISTERED_OUTCOME: 'returned {}, which is not one of its outcomes'.format(
-            outcome or 'nothing'),
+            outcome or 'nothing'
+        ),
         OracleEvent.TIME_LIMIT: 'ran over its time limit',
         ExpertQueryGoal.HELD_BACK: 'was not executed',
         OracleEvent.INTERRUPTED: 'ran when the program was stopped, or was about to begin',
@@ -72,14 +77,16 @@ def next_step_words(event: Union[OracleEvent, Event]) -> str:
         OracleEvent.WARNING: 'The robot warns: {}'.format(clean(event.text)),
         OracleEvent.TRIAL_END: 'The trial ended{}.'.format(_with(outcome)),
         OracleEvent.HEALTH_WAIT_START: 'The machine waits until the robot is well ({}).'.format(
-            clean(event.text)),
-        OracleEvent.HEALTH_WAIT_END: '{}.'.format(
-            clean(event.text[:1].upper() + event.text[1:])),
+            clean(event.text)
+        ),
+        OracleEvent.HEALTH_WAIT_END: '{}.'.format(clean(event.text[:1].upper() + event.text[1:])),
         OracleEvent.HOLD_START: '{} waits before {} ({}).'.format(
-            path, state, clean(' by '.join(filter(None, (event.outcome, event.by))))),
+            path, state, clean(' by '.join(filter(None, (event.outcome, event.by))))
+        ),
         OracleEvent.HOLD_END: '{} waits no longer before {}: {}.'.format(path, state, outcome),
         OracleEvent.SENT: '{} was sent to {} instead of {}{}.'.format(
-            path, target, state, ' by ' + clean(event.by) if event.by else ''),
+            path, target, state, ' by ' + clean(event.by) if event.by else ''
+        ),
     }.get(event.kind, '')
 
 
@@ -89,29 +96,36 @@ def event_words(event: Event) -> str:
     sentence = {
         EventKind.TRIAL_START: lambda: 'The trial of {} began.'.format(event.path),
         EventKind.RESUMED: lambda: 'The trial of {} goes on after its program was stopped.'.format(
-            event.path),
+            event.path
+        ),
         EventKind.CONTAINER_START: lambda: '{} began in {}.'.format(event.path, event.state),
         EventKind.CONTAINER_END: lambda: '{} ended{}.'.format(event.path, _with(event.outcome)),
         EventKind.TRANSITION: lambda: '{} ended{}; next: {}.'.format(
-            event.state, _with(event.outcome), event.target),
+            event.state, _with(event.outcome), event.target
+        ),
         EventKind.FAILURE: lambda: '{} failed{}.'.format(event.state, _with(event.outcome)),
         EventKind.PRECONDITION_START: lambda: 'Precondition {} of {} is made to hold.'.format(
-            event.target, event.state),
+            event.target, event.state
+        ),
         EventKind.PRECONDITION_END: lambda: 'Precondition {} of {}: {}.'.format(
-            event.target, event.state, event.outcome),
+            event.target, event.state, event.outcome
+        ),
         EventKind.DECISION: lambda: _decision(event),
         EventKind.QUERY_OPENED: lambda: 'The expert is asked about {}.'.format(event.state),
         EventKind.QUERY_CLAIMED: lambda: 'The question was taken{}.'.format(by),
         EventKind.QUERY_RELEASED: lambda: 'The question was given back{}.'.format(by),
         EventKind.QUERY_ANSWERED: lambda: 'The question was answered{}: {}{}.'.format(
-            by, event.outcome.replace('_', ' '), ' ' + event.target if event.target else ''),
+            by, event.outcome.replace('_', ' '), ' ' + event.target if event.target else ''
+        ),
         EventKind.QUERY_EXPIRED: lambda: 'Nobody answered in time.',
         EventKind.QUERY_CANCELLED: lambda: 'The question was taken back.',
         EventKind.PREEMPT: lambda: '{} was asked to stop.'.format(event.path),
         EventKind.ANNOUNCE: lambda: '{} is about to be entered.'.format(event.state),
         EventKind.OPERATOR_COMMAND: lambda: 'Operator{}: {}. {}.'.format(
-            ' ' + event.by if event.by else '', event.outcome.replace('_', ' '),
-            clean(event.text[:1].upper() + event.text[1:])),
+            ' ' + event.by if event.by else '',
+            event.outcome.replace('_', ' '),
+            clean(event.text[:1].upper() + event.text[1:]),
+        ),
     }.get(event.kind)
     return sentence() if sentence else next_step_words(event)
 
@@ -120,8 +134,9 @@ def _decision(event: Event) -> str:
     """The sentence that the oracle made. Bags of 0.1 have none."""
     if event.text and DECIDED_BY in (event.data or {}):
         return clean(event.text) + '.'
-    return 'The oracle decides: {}{}.'.format(event.outcome.replace('_', ' '),
-                                              ' to ' + event.target if event.target else '')
+    return 'The oracle decides: {}{}.'.format(
+        event.outcome.replace('_', ' '), ' to ' + event.target if event.target else ''
+    )
 
 
 def _with(outcome: str) -> str:

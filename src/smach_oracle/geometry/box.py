@@ -1,4 +1,5 @@
 """Upright boxes around things that stand on a plane."""
+
 from typing import NamedTuple, Tuple
 
 import numpy as np
@@ -53,8 +54,11 @@ def upright_box(points: np.ndarray, floor: float, trim: float = 1.0) -> UprightB
     middle, extent = _spans(points[:, :2] @ np.column_stack([along, across]), trim)
     top = max(float(np.percentile(points[:, 2], 100 - trim)), floor)
     centre = middle[0] * along + middle[1] * across
-    return UprightBox(np.array([centre[0], centre[1], (top + floor) / 2]),
-                      np.array([extent[0], extent[1], top - floor]), float(yaw))
+    return UprightBox(
+        np.array([centre[0], centre[1], (top + floor) / 2]),
+        np.array([extent[0], extent[1], top - floor]),
+        float(yaw),
+    )
 
 
 def _spans(values: np.ndarray, trim: float) -> Tuple[np.ndarray, np.ndarray]:

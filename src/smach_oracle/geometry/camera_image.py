@@ -1,4 +1,5 @@
 """An image of a camera at one moment: colour, registered depth, calibration and pose."""
+
 from typing import NamedTuple
 
 import numpy as np

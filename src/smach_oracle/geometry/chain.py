@@ -1,10 +1,13 @@
 """A serial chain of joints: its forward and inverse kinematics.
 
+For example:
+
     arm = JointChain.from_urdf(text, 'base_footprint', 'r_gripper_tool_frame',
                                fixed={'torso_lift_joint': 0.2})
     tool = arm.forward(q)  # 4x4, root from tip
     q = arm.inverse(tool, seed, np.random.default_rng(1))  # None where no solution was found
 """
+
 from typing import List, Mapping, Optional, Tuple
 
 import numpy as np
@@ -42,15 +45,17 @@ class JointChain:
         self.lower = np.array([joint.lower for joint in self.joints])
         self.upper = np.array([joint.upper for joint in self.joints])
         self.velocity = np.array([joint.velocity for joint in self.joints])
-        self.continuous = np.array([joint.kind == 'continuous' for joint in self.joints],
-                                   dtype=bool)
+        self.continuous = np.array(
+            [joint.kind == 'continuous' for joint in self.joints], dtype=bool
+        )
         self._turning = np.array([joint.turns for joint in self.joints], dtype=bool)
         self._axes = np.array([joint.axis for joint in self.joints])
         self._parts = placed_parts(self.joints, [place for place, _ in moving])
 
     @classmethod
-    def from_urdf(cls, urdf: str, root: str, tip: str,
-                  fixed: Optional[Mapping[str, float]] = None) -> 'JointChain':
+    def from_urdf(
+        cls, urdf: str, root: str, tip: str, fixed: Optional[Mapping[str, float]] = None
+    ) -> 'JointChain':
         """The chain between two links of a robot description (XML text).
 
         :param fixed: joints on the way that must not move, with their positions (rad or m).
@@ -65,8 +70,9 @@ class JointChain:
         joints = joints_down(by_child, root, tip)
         unknown = sorted(set(fixed or {}) - {joint.name for joint in joints})
         if unknown:
-            raise ValueError('no joint {} between {!r} and {!r}'.format(
-                ', '.join(unknown), root, tip))
+            raise ValueError(
+                'no joint {} between {!r} and {!r}'.format(', '.join(unknown), root, tip)
+            )
         if not any(joint.moves and joint.name not in (fixed or {}) for joint in joints):
             raise ValueError('no joint moves between {!r} and {!r}'.format(root, tip))
         return cls(joints, fixed or {})
@@ -101,9 +107,14 @@ class JointChain:
         upper = np.where(self.continuous, np.pi, self.upper)
         return generator.uniform(lower, upper, (count, len(self.names)))
 
-    def inverse(self, pose: np.ndarray, seed: np.ndarray,
-                generator: Optional[np.random.Generator] = None, restarts: int = 15,
-                iterations: int = 50) -> Optional[np.ndarray]:
+    def inverse(
+        self,
+        pose: np.ndarray,
+        seed: np.ndarray,
+        generator: Optional[np.random.Generator] = None,
+        restarts: int = 15,
+        iterations: int = 50,
+    ) -> Optional[np.ndarray]:
         """Joint positions that take the tip to `pose`, within the limits.
 
         :param pose: 4x4, root from tip, reached to 1 mm and 0.3 degrees.
@@ -117,8 +128,14 @@ class JointChain:
         found = self._solve(pose, seed, generator, restarts, iterations, first=True)
         return found[0] if len(found) else None
 
-    def solutions(self, pose: np.ndarray, seed: np.ndarray, generator: np.random.Generator,
-                  restarts: int = 15, iterations: int = 50) -> np.ndarray:
+    def solutions(
+        self,
+        pose: np.ndarray,
+        seed: np.ndarray,
+        generator: np.random.Generator,
+        restarts: int = 15,
+        iterations: int = 50,
+    ) -> np.ndarray:
         """All solutions found from the seed and the restarts, nearest to the seed first.
 
         Parameters are as for inverse().
@@ -151,8 +168,15 @@ class JointChain:
             q = self.clip(q + _step(self._jacobians(frames, tips), error))
         return self.nearest_turn(found, seed)
 
-    def _solve(self, pose: np.ndarray, seed: np.ndarray, generator: Optional[np.random.Generator],
-               restarts: int, iterations: int, first: bool) -> np.ndarray:
+    def _solve(
+        self,
+        pose: np.ndarray,
+        seed: np.ndarray,
+        generator: Optional[np.random.Generator],
+        restarts: int,
+        iterations: int,
+        first: bool,
+    ) -> np.ndarray:
         seed = np.asarray(seed, dtype=float)
         _check_finite(pose, seed)
         starts = self.clip(seed)[None]
@@ -200,10 +224,14 @@ class JointChain:
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross products over the last axis. Most of np.cross's time goes into its checks."""
-    return np.stack([
-        a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
-        a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2], a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
-    ], axis=-1)
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )
 
 
 def _check_finite(poses: np.ndarray, seed: np.ndarray) -> None:
@@ -213,8 +241,9 @@ def _check_finite(poses: np.ndarray, seed: np.ndarray) -> None:
 
 def _is_there(error: np.ndarray) -> np.ndarray:
     """(k,) whether a tip is where it should be. `error` as _error() has it."""
-    there: np.ndarray = ((np.linalg.norm(error[:, :3], axis=1) < POSITION_TOLERANCE)
-                         & (np.linalg.norm(error[:, 3:], axis=1) < ANGLE_TOLERANCE))
+    there: np.ndarray = (np.linalg.norm(error[:, :3], axis=1) < POSITION_TOLERANCE) & (
+        np.linalg.norm(error[:, 3:], axis=1) < ANGLE_TOLERANCE
+    )
     return there
 
 
@@ -224,8 +253,14 @@ def _error(pose: np.ndarray, tips: np.ndarray) -> np.ndarray:
     :param pose: 4x4, or (k, 4, 4): one for each.
     """
     turn = pose[..., :3, :3] @ tips[:, :3, :3].transpose(0, 2, 1)
-    vector = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
-                             turn[:, 1, 0] - turn[:, 0, 1]], axis=1)
+    vector = 0.5 * np.stack(
+        [
+            turn[:, 2, 1] - turn[:, 1, 2],
+            turn[:, 0, 2] - turn[:, 2, 0],
+            turn[:, 1, 0] - turn[:, 0, 1],
+        ],
+        axis=1,
+    )
     sine = np.linalg.norm(vector, axis=1)
     angle = np.arctan2(sine, 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0))
     scale = np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)

@@ -2,6 +2,7 @@
 
 Its frame: z forward, x right, y down. A pixel's coordinates (u, v) are those of its centre.
 """
+
 from typing import Tuple
 
 import numpy as np
@@ -9,8 +10,13 @@ import numpy as np
 from .transforms import apply, inverse
 
 
-def points_of(depth: np.ndarray, intrinsics: np.ndarray, target_from_camera: np.ndarray,
-              corner: Tuple[int, int] = (0, 0), stride: int = 1) -> np.ndarray:
+def points_of(
+    depth: np.ndarray,
+    intrinsics: np.ndarray,
+    target_from_camera: np.ndarray,
+    corner: Tuple[int, int] = (0, 0),
+    stride: int = 1,
+) -> np.ndarray:
     """(h, w, 3) points in m of a depth image (h, w), NaN where it measured nothing.
 
     :param corner: column and row of the depth image's first pixel in the image that `intrinsics`
@@ -24,13 +30,19 @@ def points_of(depth: np.ndarray, intrinsics: np.ndarray, target_from_camera: np.
     return apply(target_from_camera, np.stack([across * known, down * known, known], axis=-1))
 
 
-def pixels_of(points: np.ndarray, intrinsics: np.ndarray,
-              target_from_camera: np.ndarray) -> np.ndarray:
+def pixels_of(
+    points: np.ndarray, intrinsics: np.ndarray, target_from_camera: np.ndarray
+) -> np.ndarray:
     """(n, 3): column, row and depth (m) at which points (n, 3) appear.
 
     A depth of 0 or less is behind the camera.
     """
     seen = apply(inverse(target_from_camera), np.asarray(points, float))
     depth = np.where(np.abs(seen[:, 2]) < 1e-9, 1e-9, seen[:, 2])
-    return np.column_stack([intrinsics[0, 0] * seen[:, 0] / depth + intrinsics[0, 2],
-                            intrinsics[1, 1] * seen[:, 1] / depth + intrinsics[1, 2], seen[:, 2]])
+    return np.column_stack(
+        [
+            intrinsics[0, 0] * seen[:, 0] / depth + intrinsics[0, 2],
+            intrinsics[1, 1] * seen[:, 1] / depth + intrinsics[1, 2],
+            seen[:, 2],
+        ]
+    )

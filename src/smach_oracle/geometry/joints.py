@@ -1,4 +1,5 @@
 """The joints of a URDF, and how each moves the link that it carries: all kinematics begins here."""
+
 import xml.etree.ElementTree as ElementTree
 from functools import lru_cache
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Union
@@ -63,8 +64,9 @@ class Joint(NamedTuple):
         return self.mimic.multiplier * positions.get(self.mimic.joint, 0.0) + self.mimic.offset
 
 
-def moved(parts: np.ndarray, turns: Union[bool, np.ndarray],
-          q: Union[float, np.ndarray]) -> np.ndarray:
+def moved(
+    parts: np.ndarray, turns: Union[bool, np.ndarray], q: Union[float, np.ndarray]
+) -> np.ndarray:
     """Joints after their motion.
 
     :param parts: (3, ..., 4, 4), of each joint as `Joint.parts`, in whatever frame.
@@ -122,22 +124,36 @@ def _joint(element: ElementTree.Element) -> Joint:
     direction = np.array(_three_numbers(axis, 'xyz') if axis is not None else [1.0, 0.0, 0.0])
     direction = direction / max(float(np.linalg.norm(direction)), 1e-12)
     kind = element.get('type', '')
-    lower, upper = (float(limit.get(end, 0.0)) if limit is not None else 0.0
-                    for end in ('lower', 'upper'))
+    lower, upper = (
+        float(limit.get(end, 0.0)) if limit is not None else 0.0 for end in ('lower', 'upper')
+    )
     velocity = float(limit.get('velocity', np.inf)) if limit is not None else np.inf
     if kind == 'continuous':
         lower, upper = -np.inf, np.inf
-    return Joint(element.get('name', ''), kind, _link(element, 'parent'), _link(element, 'child'),
-                 origin_of(element), direction, lower, upper, velocity, _parts(kind, direction),
-                 _mimic(element))
+    return Joint(
+        element.get('name', ''),
+        kind,
+        _link(element, 'parent'),
+        _link(element, 'child'),
+        origin_of(element),
+        direction,
+        lower,
+        upper,
+        velocity,
+        _parts(kind, direction),
+        _mimic(element),
+    )
 
 
 def _mimic(joint: ElementTree.Element) -> Optional[Mimic]:
     element = joint.find('mimic')
     if element is None:
         return None
-    return Mimic(element.get('joint', ''), _number(element, 'multiplier', 1.0),
-                 _number(element, 'offset', 0.0))
+    return Mimic(
+        element.get('joint', ''),
+        _number(element, 'multiplier', 1.0),
+        _number(element, 'offset', 0.0),
+    )
 
 
 def _number(element: ElementTree.Element, name: str, default: float) -> float:

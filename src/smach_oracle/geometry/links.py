@@ -1,4 +1,5 @@
 """The poses of a robot's links, from its URDF and its joint positions."""
+
 from typing import Dict, List, Mapping, Sequence
 
 import numpy as np
@@ -6,8 +7,9 @@ import numpy as np
 from .joints import Joint
 
 
-def link_poses(joints: Sequence[Joint], root: str,
-               positions: Mapping[str, float]) -> Dict[str, np.ndarray]:
+def link_poses(
+    joints: Sequence[Joint], root: str, positions: Mapping[str, float]
+) -> Dict[str, np.ndarray]:
     """4x4 by link: `root` from it.
 
     :param joints: below `root`, every link's after that of the link that it hangs on.
@@ -21,8 +23,9 @@ def link_poses(joints: Sequence[Joint], root: str,
     return poses
 
 
-def link_pose(joints: Mapping[str, Joint], root: str, link: str,
-              positions: Mapping[str, float]) -> np.ndarray:
+def link_pose(
+    joints: Mapping[str, Joint], root: str, link: str, positions: Mapping[str, float]
+) -> np.ndarray:
     """4x4: `root` from `link`.
 
     :param joints: as `joints.read_joints` gives them, by the link that each carries.

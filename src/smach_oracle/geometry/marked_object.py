@@ -1,4 +1,5 @@
 """Finds the points of an object among marked ones, and the upright box around them."""
+
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -18,8 +19,9 @@ class MarkedObject(NamedTuple):
     surface: Optional[Plane]  # the one it stands on
 
 
-def object_above(points: np.ndarray, surface: Optional[Plane],
-                 clearance: float) -> Optional[MarkedObject]:
+def object_above(
+    points: np.ndarray, surface: Optional[Plane], clearance: float
+) -> Optional[MarkedObject]:
     """The object among points (n, 3), n >= 1, some of which show what is behind it.
 
     It is the largest connected piece.
@@ -39,6 +41,9 @@ def object_above(points: np.ndarray, surface: Optional[Plane],
         return None
     chosen[np.flatnonzero(chosen)[~largest_piece(points[chosen], CELL)]] = False
     own = points[chosen]
-    floor = (surface.z_at(*own[:, :2].mean(axis=0)) if surface is not None
-             else float(np.percentile(own[:, 2], 2)))
+    floor = (
+        surface.z_at(*own[:, :2].mean(axis=0))
+        if surface is not None
+        else float(np.percentile(own[:, 2], 2))
+    )
     return MarkedObject(upright_box(own, floor), chosen, surface)

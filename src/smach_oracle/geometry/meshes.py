@@ -3,6 +3,7 @@
 Files are read as data: sizes are checked before anything is made of them, and whatever is wrong is
 a MeshError.
 """
+
 import xml.etree.ElementTree as ElementTree
 from typing import Callable, Dict, Iterator, List, NamedTuple, Tuple
 
@@ -16,7 +17,7 @@ MOST_TEXT = 40000000  # of one that is text: it takes many times its size to rea
 MOST_TRIANGLES = 2000000
 FURTHEST = 1e6  # of a corner from the origin, in the file's unit
 _STL = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
-_FINEST = 2 ** 20  # steps over the whole mesh: closer corners are one
+_FINEST = 2**20  # steps over the whole mesh: closer corners are one
 _DEEPEST = 60  # nodes of a COLLADA scene within each other
 
 
@@ -38,8 +39,9 @@ def read_mesh(data: bytes, kind: str) -> Mesh:
     """
     reader = _READERS.get(kind)
     if reader is None:
-        raise MeshError('it is of the kind {!r}; readable: {}'.format(kind[:20],
-                                                                      ', '.join(sorted(_READERS))))
+        raise MeshError(
+            'it is of the kind {!r}; readable: {}'.format(kind[:20], ', '.join(sorted(_READERS)))
+        )
     most = MOST_BYTES if kind == 'stl' else MOST_TEXT
     if len(data) > most:
         raise MeshError('it has {} bytes; allowed: {}'.format(len(data), most))
@@ -52,14 +54,16 @@ def read_mesh(data: bytes, kind: str) -> Mesh:
     if not len(mesh.triangles):
         raise MeshError('it has no triangles')
     if len(mesh.triangles) > MOST_TRIANGLES:
-        raise MeshError('it has {} triangles; allowed: {}'.format(len(mesh.triangles),
-                                                                  MOST_TRIANGLES))
+        raise MeshError(
+            'it has {} triangles; allowed: {}'.format(len(mesh.triangles), MOST_TRIANGLES)
+        )
     if mesh.triangles.min() < 0 or mesh.triangles.max() >= len(mesh.corners):
         raise MeshError('its triangles have corners that are not there')
     used = mesh.corners[mesh.triangles]
     if not (np.isfinite(used).all() and np.abs(used).max() < FURTHEST):
         raise MeshError(
-            'its corners are not all finite, or further away than {:g}'.format(FURTHEST))
+            'its corners are not all finite, or further away than {:g}'.format(FURTHEST)
+        )
     return mesh
 
 
@@ -98,8 +102,9 @@ def _merged(mesh: Mesh, cell: float) -> Mesh:
     corners = mesh.corners
     low, span = corners.min(axis=0), float(np.ptp(corners, axis=0).max())
     steps = np.round((corners - low) / max(cell, span / _FINEST, 1e-12)).astype(np.int64)
-    _, index = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2],
-                         return_inverse=True)
+    _, index = np.unique(
+        (steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_inverse=True
+    )
     index = index.reshape(-1)
     count = np.bincount(index).astype(float)
     merged = np.stack([np.bincount(index, corners[:, axis]) / count for axis in range(3)], axis=1)
@@ -117,11 +122,13 @@ def _merged(mesh: Mesh, cell: float) -> Mesh:
 def _box(mesh: Mesh) -> Mesh:
     """The box around it."""
     low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1)
-                        for z in (0, 1)]) * (high - low) + low
+    corners = (
+        np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
+    )
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return Mesh(corners,
-                np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
+    return Mesh(
+        corners, np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))])
+    )
 
 
 def _stl(data: bytes) -> Mesh:
@@ -133,10 +140,12 @@ def _stl(data: bytes) -> Mesh:
         words = data.split() if len(data) <= MOST_TEXT else []
         if len(words) < 4 or words[0] != b'solid':
             raise MeshError(
-                'it is no STL file, or one of text with more than {} bytes'.format(MOST_TEXT))
+                'it is no STL file, or one of text with more than {} bytes'.format(MOST_TEXT)
+            )
         corners = np.array(
-            [words[at + 1:at + 4] for at, word in enumerate(words) if word == b'vertex'],
-            np.float64).reshape(-1, 3)
+            [words[at + 1 : at + 4] for at, word in enumerate(words) if word == b'vertex'],
+            np.float64,
+        ).reshape(-1, 3)
     return Mesh(corners, np.arange(len(corners) // 3 * 3).reshape(-1, 3))
 
 
@@ -156,8 +165,8 @@ def _obj(data: bytes) -> Mesh:
             if len(triangles) > MOST_TRIANGLES:
                 raise MeshError('it has more than {} triangles'.format(MOST_TRIANGLES))
     return Mesh(
-        np.array(corners, float).reshape(-1, 3),
-        np.array(triangles, np.int64).reshape(-1, 3))
+        np.array(corners, float).reshape(-1, 3), np.array(triangles, np.int64).reshape(-1, 3)
+    )
 
 
 def _dae(data: bytes) -> Mesh:
@@ -165,7 +174,8 @@ def _dae(data: bytes) -> Mesh:
         root = read_xml(data.decode('utf-8'), 'COLLADA', MOST_TEXT)
     except ValueError as err:
         raise MeshError(
-            'it is no COLLADA file, or one with a document type or in another encoding') from err
+            'it is no COLLADA file, or one with a document type or in another encoding'
+        ) from err
     for element in root.iter():
         element.tag = str(element.tag).rsplit('}', 1)[-1]
     unit = root.find('asset/unit')
@@ -188,11 +198,15 @@ def _dae(data: bytes) -> Mesh:
     return Mesh(np.concatenate(corners), np.concatenate(triangles))
 
 
-def _placed(root: ElementTree.Element, geometries: Dict[str,
-                                                        Mesh]) -> Iterator[Tuple[np.ndarray, Mesh]]:
+def _placed(
+    root: ElementTree.Element, geometries: Dict[str, Mesh]
+) -> Iterator[Tuple[np.ndarray, Mesh]]:
     """The geometries where the scenes have them."""
-    waiting = [(node, np.eye(4), 0) for scene in root.findall('library_visual_scenes/visual_scene')
-               for node in scene.findall('node')]
+    waiting = [
+        (node, np.eye(4), 0)
+        for scene in root.findall('library_visual_scenes/visual_scene')
+        for node in scene.findall('node')
+    ]
     found = 0
     while waiting:
         node, place, deep = waiting.pop()
@@ -236,7 +250,7 @@ def _dae_geometry(geometry: ElementTree.Element) -> Mesh:
     triangles = [np.zeros((0, 3), np.int64)]
     for kind in ('triangles', 'polylist', 'polygons'):
         triangles += [_faces(each, kind) for each in mesh.findall(kind)]
-    return Mesh(corners[:len(corners) // 3 * 3].reshape(-1, 3), np.concatenate(triangles))
+    return Mesh(corners[: len(corners) // 3 * 3].reshape(-1, 3), np.concatenate(triangles))
 
 
 def _floats(source: ElementTree.Element) -> np.ndarray:
@@ -249,25 +263,34 @@ def _faces(element: ElementTree.Element, kind: str) -> np.ndarray:
     inputs = element.findall('input')
     step = 1 + max((int(each.get('offset', '0')) for each in inputs), default=0)
     offset = next(
-        (int(each.get('offset', '0')) for each in inputs if each.get('semantic') == 'VERTEX'), 0)
+        (int(each.get('offset', '0')) for each in inputs if each.get('semantic') == 'VERTEX'), 0
+    )
     if not 0 <= offset < step <= 100:
-        raise MeshError('invalid COLLADA input offset {} for stride {}; allowed: an offset from 0 '
-                        'below the stride, and a stride of at most 100'.format(offset, step))
+        raise MeshError(
+            'invalid COLLADA input offset {} for stride {}; allowed: an offset from 0 '
+            'below the stride, and a stride of at most 100'.format(offset, step)
+        )
     lists = [
         np.array((each.text or '').split(), np.int64)[offset::step] for each in element.findall('p')
     ]
     if kind == 'triangles':
-        return np.concatenate([each[:len(each) // 3 * 3].reshape(-1, 3) for each in lists]
-                              or [np.zeros((0, 3), int)])
+        return np.concatenate(
+            [each[: len(each) // 3 * 3].reshape(-1, 3) for each in lists] or [np.zeros((0, 3), int)]
+        )
     if kind == 'polylist':
         counts = element.find('vcount')
         sides = np.array((counts.text or '').split() if counts is not None else [], np.int64)
         lists = [
-            part for each in lists
+            part
+            for each in lists
             for part in np.split(each, np.cumsum(np.clip(sides, 0, 10000)))[:-1]
         ]
-    fans = [(each[0], one, other) for each in lists if len(each) > 2
-            for one, other in zip(each[1:], each[2:])]
+    fans = [
+        (each[0], one, other)
+        for each in lists
+        if len(each) > 2
+        for one, other in zip(each[1:], each[2:])
+    ]
     return np.array(fans, np.int64).reshape(-1, 3)
 
 

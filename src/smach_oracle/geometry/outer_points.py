@@ -2,6 +2,7 @@
 
 A hull of thirty thousand points takes long.
 """
+
 import numpy as np
 
 LEAST = 64  # fewer points are not worth the work

@@ -1,4 +1,5 @@
 """Connected points: pieces of a cloud, the largest piece of a surface, what stands on it."""
+
 from typing import List, Optional
 
 import numpy as np
@@ -42,19 +43,27 @@ def largest_patch(points: np.ndarray) -> np.ndarray:
     """
     if not len(points):
         return points
-    cells = np.floor(np.minimum(points[:, :2] - points[:, :2].min(axis=0), FARTHEST) /
-                     PATCH_CELL).astype(int)
+    cells = np.floor(
+        np.minimum(points[:, :2] - points[:, :2].min(axis=0), FARTHEST) / PATCH_CELL
+    ).astype(int)
     grid = np.zeros(cells.max(axis=0) + 5, bool)
     grid[tuple(cells.T + 2)] = True
-    labels = ndimage.label(ndimage.binary_closing(grid, iterations=2), np.ones(
-        (3, 3)))[0][tuple(cells.T + 2)]
+    labels = ndimage.label(ndimage.binary_closing(grid, iterations=2), np.ones((3, 3)))[0][
+        tuple(cells.T + 2)
+    ]
     sizes = np.bincount(labels)
     sizes[0] = 0
     return points[(sizes >= max(1, PATCH_SHARE * sizes.max()))[labels]]
 
 
-def standing_on(points: np.ndarray, plane: Plane, patch: np.ndarray, lowest: float, highest: float,
-                margin: float) -> List[np.ndarray]:
+def standing_on(
+    points: np.ndarray,
+    plane: Plane,
+    patch: np.ndarray,
+    lowest: float,
+    highest: float,
+    margin: float,
+) -> List[np.ndarray]:
     """Return the things that stand on a surface: for each thing, the indices of its points.
 
     Few points are taken for noise.

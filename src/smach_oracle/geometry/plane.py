@@ -1,4 +1,5 @@
 """The level plane on which things stand, found among points whose z axis points up."""
+
 from typing import NamedTuple, Optional
 
 import numpy as np
@@ -18,12 +19,21 @@ class Plane(NamedTuple):
 
     def z_at(self, x: float, y: float) -> float:
         """Its z (m) at a place."""
-        return float(self.point[2] - (self.normal[0] * (x - self.point[0]) + self.normal[1] *
-                                      (y - self.point[1])) / self.normal[2])
+        return float(
+            self.point[2]
+            - (self.normal[0] * (x - self.point[0]) + self.normal[1] * (y - self.point[1]))
+            / self.normal[2]
+        )
 
 
-def find_plane(points: np.ndarray, generator: np.random.Generator, tolerance: float = 0.012,
-               max_tilt: float = 0.17, least: int = 500, hypotheses: int = 150) -> Optional[Plane]:
+def find_plane(
+    points: np.ndarray,
+    generator: np.random.Generator,
+    tolerance: float = 0.012,
+    max_tilt: float = 0.17,
+    least: int = 500,
+    hypotheses: int = 150,
+) -> Optional[Plane]:
     """The level plane with the most points, by RANSAC and a least-squares fit.
 
     :param points: (n, 3), m, all finite.
@@ -46,8 +56,13 @@ def find_plane(points: np.ndarray, generator: np.random.Generator, tolerance: fl
     return plane if plane.normal[2] >= np.cos(max_tilt) else None
 
 
-def _best_hypothesis(sample: np.ndarray, generator: np.random.Generator, tolerance: float,
-                     max_tilt: float, hypotheses: int) -> Optional[Plane]:
+def _best_hypothesis(
+    sample: np.ndarray,
+    generator: np.random.Generator,
+    tolerance: float,
+    max_tilt: float,
+    hypotheses: int,
+) -> Optional[Plane]:
     triples = sample[generator.integers(0, len(sample), size=(hypotheses, 3))]
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
     lengths = np.linalg.norm(normals, axis=1)
@@ -65,6 +80,6 @@ def _best_hypothesis(sample: np.ndarray, generator: np.random.Generator, toleran
 def _fitted(points: np.ndarray) -> Plane:
     """Least squares."""
     middle = points.mean(axis=0)
-    some = (points - middle)[::max(1, len(points) // SAMPLE)]
+    some = (points - middle)[:: max(1, len(points) // SAMPLE)]
     normal = np.linalg.svd(some, full_matrices=False)[2][2]
     return Plane(normal * np.sign(normal[2]), middle)

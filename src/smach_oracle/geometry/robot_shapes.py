@@ -4,6 +4,7 @@ Anybody on the robot's network may have set a robot description. So its size, it
 and its numbers are checked, and document types (with them entities) and circles of links are
 refused.
 """
+
 import math
 import xml.etree.ElementTree as ElementTree
 from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
@@ -70,7 +71,8 @@ def read_shapes(urdf: str) -> RobotShapes:
         raise ValueError(
             'robot description: a URDF begins with <robot> and has a <link>; this one with <{}> '
             'and {} '
-            'links'.format(root.tag[:40], len(elements)))
+            'links'.format(root.tag[:40], len(elements))
+        )
     if max(len(elements), len(root.findall('joint'))) > MOST_LINKS:
         raise ValueError('robot description: more than {} links or joints'.format(MOST_LINKS))
     by_child = read_joints(urdf) if root.find('joint') is not None else {}
@@ -88,21 +90,31 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
     """The joints from the root outwards, and the root."""
     below: Dict[str, List[Joint]] = {}
     for joint in by_child.values():
-        if not (np.isfinite(joint.origin).all() and np.isfinite(joint.axis).all()
-                and np.abs(joint.origin).max() < FURTHEST):
+        if not (
+            np.isfinite(joint.origin).all()
+            and np.isfinite(joint.axis).all()
+            and np.abs(joint.origin).max() < FURTHEST
+        ):
             raise ValueError(
                 'robot description: joint {!r} has an invalid place or axis'.format(
-                    joint.name[:100]))
+                    joint.name[:100]
+                )
+            )
         if joint.mimic is not None and not _is_finite(joint.mimic):
             raise ValueError(
                 'robot description: joint {!r} mimics another by a number that is not finite, '
-                'or not below {:g}'.format(joint.name[:100], FURTHEST))
+                'or not below {:g}'.format(joint.name[:100], FURTHEST)
+            )
         below.setdefault(joint.parent, []).append(joint)
     roots = [name for name in names if name not in by_child]
     if len(roots) != 1:
-        raise ValueError('robot description: {}; exactly one link must hang on no other'.format(
-            'the links go round in a circle' if not roots else '{} links hang on no other: {}'.
-            format(len(roots), ', '.join(roots)[:200])))
+        raise ValueError(
+            'robot description: {}; exactly one link must hang on no other'.format(
+                'the links go round in a circle'
+                if not roots
+                else '{} links hang on no other: {}'.format(len(roots), ', '.join(roots)[:200])
+            )
+        )
     ordered: List[Joint] = []
     waiting = list(below.get(roots[0], []))
     while waiting:
@@ -111,8 +123,11 @@ def _ordered(by_child: Mapping[str, Joint], names: List[str]) -> Tuple[List[Join
         waiting.extend(below.get(joint.child, []))
     lost = sorted(set(by_child) - {joint.child for joint in ordered})
     if lost:
-        raise ValueError('robot description: {} does not hang on {}, by whatever way'.format(
-            ', '.join(lost)[:200], roots[0][:100]))
+        raise ValueError(
+            'robot description: {} does not hang on {}, by whatever way'.format(
+                ', '.join(lost)[:200], roots[0][:100]
+            )
+        )
     return ordered, roots[0]
 
 
@@ -120,8 +135,9 @@ def _is_finite(mimic: Mimic) -> bool:
     return all(abs(number) < FURTHEST for number in (mimic.multiplier, mimic.offset))
 
 
-def _all_shapes(elements: List[ElementTree.Element],
-                known: Mapping[str, Colour]) -> Tuple[List[Shape], List[Shape]]:
+def _all_shapes(
+    elements: List[ElementTree.Element], known: Mapping[str, Colour]
+) -> Tuple[List[Shape], List[Shape]]:
     looks: List[Shape] = []
     spare: List[Shape] = []
     for link in elements:
@@ -134,15 +150,17 @@ def _all_shapes(elements: List[ElementTree.Element],
     return looks, spare
 
 
-def _shape(link: ElementTree.Element, element: ElementTree.Element,
-           known: Mapping[str, Colour]) -> Shape:
+def _shape(
+    link: ElementTree.Element, element: ElementTree.Element, known: Mapping[str, Colour]
+) -> Shape:
     name = link.get('name', '')
     geometry = element.find('geometry')
     kind = next((each.tag for each in geometry), '') if geometry is not None else ''
     where = 'robot description: link {!r}'.format(name[:100])
     if geometry is None or kind not in ('box', 'cylinder', 'sphere', 'mesh', 'capsule'):
-        raise ValueError('{}: a shape is a box, cylinder, sphere or mesh, not {!r}'.format(
-            where, kind[:40]))
+        raise ValueError(
+            '{}: a shape is a box, cylinder, sphere or mesh, not {!r}'.format(where, kind[:40])
+        )
     found = geometry[0]
     origin = element.find('origin')
     place = from_rpy(_numbers(where, origin, 'xyz'), *_numbers(where, origin, 'rpy'))
@@ -152,26 +170,43 @@ def _shape(link: ElementTree.Element, element: ElementTree.Element,
         size = _numbers(where, found, 'scale', '1 1 1')
     else:
         radius = _numbers(where, found, 'radius', count=1)[0]
-        size = [2 * radius] * 3 if kind == 'sphere' else [
-            2 * radius, 2 * radius, _numbers(where, found, 'length', count=1)[0]]
-    return Shape(name, 'cylinder' if kind == 'capsule' else kind, place, np.array(size),
-                 found.get('filename', '') if kind == 'mesh' else '',
-                 _colour(element.find('material'), known))
+        size = (
+            [2 * radius] * 3
+            if kind == 'sphere'
+            else [2 * radius, 2 * radius, _numbers(where, found, 'length', count=1)[0]]
+        )
+    return Shape(
+        name,
+        'cylinder' if kind == 'capsule' else kind,
+        place,
+        np.array(size),
+        found.get('filename', '') if kind == 'mesh' else '',
+        _colour(element.find('material'), known),
+    )
 
 
-def _numbers(where: str, element: Optional[ElementTree.Element], name: str, default: str = '0 0 0',
-             count: int = 3) -> List[float]:
+def _numbers(
+    where: str,
+    element: Optional[ElementTree.Element],
+    name: str,
+    default: str = '0 0 0',
+    count: int = 3,
+) -> List[float]:
     text = (element.get(name) if element is not None else None) or default
     try:
-        numbers = [float(word) for word in text.split()[:count + 1]]
+        numbers = [float(word) for word in text.split()[: count + 1]]
     except ValueError:
         numbers = []
     if element is not None and name in ('radius', 'length') and not element.get(name):
         numbers = []
     if len(numbers) != count or not all(
-            math.isfinite(each) and abs(each) < FURTHEST for each in numbers):
-        raise ValueError('{}: {}="{}"; it takes {} finite number{}, below {:g}'.format(
-            where, name, text[:60], count, 's' * (count > 1), FURTHEST))
+        math.isfinite(each) and abs(each) < FURTHEST for each in numbers
+    ):
+        raise ValueError(
+            '{}: {}="{}"; it takes {} finite number{}, below {:g}'.format(
+                where, name, text[:60], count, 's' * (count > 1), FURTHEST
+            )
+        )
     return numbers
 
 

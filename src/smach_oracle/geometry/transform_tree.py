@@ -1,4 +1,5 @@
 """The transforms along a robot's joints, from its description and the joints' positions."""
+
 from typing import List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -26,20 +27,20 @@ class TransformTree:
 
     def __init__(self, urdf: str, measured: Sequence[str]) -> None:
         joints = list(read_joints(urdf).values())
-        self.names = [
-            joint.name for joint in joints if joint.moves and joint.name in set(measured)
-        ]
+        self.names = [joint.name for joint in joints if joint.moves and joint.name in set(measured)]
         self._moving = [joint for joint in joints if joint.name in self.names]
         self.fixed: List[LinkTransform] = [
-            _link(joint, joint.origin[:3, 3], quaternion(joint.origin)) for joint in joints
+            _link(joint, joint.origin[:3, 3], quaternion(joint.origin))
+            for joint in joints
             if joint.name not in self.names
         ]
         self._origins = np.array([joint.origin[:3, 3] for joint in self._moving]).reshape(-1, 3)
         self._turns = np.array([quaternion(joint.origin) for joint in self._moving]).reshape(-1, 4)
         self._axes = np.array([joint.axis for joint in self._moving]).reshape(-1, 3)
         self._slides = np.array([not joint.turns for joint in self._moving], bool)
-        self._directions = np.array([joint.origin[:3, :3] @ joint.axis
-                                     for joint in self._moving]).reshape(-1, 3)
+        self._directions = np.array(
+            [joint.origin[:3, :3] @ joint.axis for joint in self._moving]
+        ).reshape(-1, 3)
 
     def moving(self, positions: Mapping[str, float]) -> List[LinkTransform]:
         """The links that move, at joint positions (rad or m)."""
@@ -60,10 +61,12 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(n, 4) quaternions a times b, x y z w."""
     vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
     return np.hstack(
-        [vector, a[:, 3:] * b[:, 3:] - np.sum(a[:, :3] * b[:, :3], axis=1, keepdims=True)])
+        [vector, a[:, 3:] * b[:, 3:] - np.sum(a[:, :3] * b[:, :3], axis=1, keepdims=True)]
+    )
 
 
 def link_transform(parent: str, child: str, matrix: np.ndarray) -> LinkTransform:
     """A link from its 4x4, parent from child."""
-    return LinkTransform(parent, child, tuple(matrix[:3, 3].tolist()),
-                         tuple(quaternion(matrix).tolist()))
+    return LinkTransform(
+        parent, child, tuple(matrix[:3, 3].tolist()), tuple(quaternion(matrix).tolist())
+    )

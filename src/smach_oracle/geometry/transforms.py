@@ -2,6 +2,7 @@
 
 Lengths are m. Frames are right-handed (REP 103).
 """
+
 from typing import Sequence, Union
 
 import numpy as np
@@ -12,8 +13,9 @@ UNTURNED = np.eye(3)
 VectorLike = Union[Sequence[float], np.ndarray]
 
 
-def transform(position: VectorLike = (0.0, 0.0, 0.0),
-              rotation: np.ndarray = UNTURNED) -> np.ndarray:
+def transform(
+    position: VectorLike = (0.0, 0.0, 0.0), rotation: np.ndarray = UNTURNED
+) -> np.ndarray:
     """4x4 of a position (3,) in m and a rotation matrix (3, 3)."""
     result = np.eye(4)
     result[:3, :3] = rotation
@@ -21,8 +23,9 @@ def transform(position: VectorLike = (0.0, 0.0, 0.0),
     return result
 
 
-def from_rpy(position: VectorLike, roll: float = 0.0, pitch: float = 0.0,
-             yaw: float = 0.0) -> np.ndarray:
+def from_rpy(
+    position: VectorLike, roll: float = 0.0, pitch: float = 0.0, yaw: float = 0.0
+) -> np.ndarray:
     """4x4 of a position (m) and angles about the fixed axes x, y, z (rad), as in URDF."""
     return transform(position, Rotation.from_euler('xyz', [roll, pitch, yaw]).as_matrix())
 
@@ -34,11 +37,13 @@ def from_quaternion(position: VectorLike, xyzw: VectorLike) -> np.ndarray:
         or one that is not finite.
     """
     if not np.isfinite(xyzw).all() or not np.isfinite(position).all():
-        raise ValueError('pose is not finite: position {}, quaternion {}'.format(
-            list(position), list(xyzw)))
+        raise ValueError(
+            'pose is not finite: position {}, quaternion {}'.format(list(position), list(xyzw))
+        )
     if not 1e-6 <= np.abs(xyzw).max() <= 1e6:
-        raise ValueError('quaternion {} is no rotation; allowed: a length of about 1'.format(
-            list(xyzw)))
+        raise ValueError(
+            'quaternion {} is no rotation; allowed: a length of about 1'.format(list(xyzw))
+        )
     return transform(position, Rotation.from_quat(xyzw).as_matrix())
 
 

@@ -1,4 +1,5 @@
 """XML from people that one need not trust: no document types, and no more text than allowed."""
+
 import xml.etree.ElementTree as ElementTree
 
 
@@ -13,7 +14,8 @@ def read_xml(text: str, what: str, most: int) -> ElementTree.Element:
         raise ValueError('{}: {} characters; allowed: {}'.format(what, len(text), most))
     if '<!doctype' in text.lower() or '<!entity' in text.lower():
         raise ValueError(
-            '{}: it declares a document type or entities; that is not allowed'.format(what))
+            '{}: it declares a document type or entities; that is not allowed'.format(what)
+        )
     try:
         return ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError, RecursionError) as err:

@@ -3,6 +3,7 @@
 Each takes a machine's userdata, which it does not read, and listens to the robot's topics. Those
 that check look at one message. Those that wait return once the check holds, or after a while.
 """
+
 import time
 from typing import Any, Callable
 

@@ -1,4 +1,5 @@
 """Distances along rays to walls and to round things, in the plane."""
+
 from typing import Sequence, Tuple
 
 import numpy as np
@@ -27,13 +28,14 @@ def to_circle(origin: Sequence[float], angles: np.ndarray, circle: Circle) -> np
     """(n,) m along each ray to a circle, or inf where it misses. From within it is 0."""
     offset = np.array([circle[0] - origin[0], circle[1] - origin[1]])
     along = offset[0] * np.cos(angles) + offset[1] * np.sin(angles)
-    inside = circle[2]**2 - (offset @ offset - along**2)
+    inside = circle[2] ** 2 - (offset @ offset - along**2)
     reached = along - np.sqrt(np.maximum(inside, 0.0))
     return np.where((inside > 0) & (along > 0), np.maximum(reached, 0.0), np.inf)
 
 
-def ranges(origin: Sequence[float], angles: np.ndarray, walls: np.ndarray,
-           circles: Sequence[Circle]) -> np.ndarray:
+def ranges(
+    origin: Sequence[float], angles: np.ndarray, walls: np.ndarray, circles: Sequence[Circle]
+) -> np.ndarray:
     """(n,) m along each ray to the first wall or circle."""
     found = to_walls(origin, angles, walls)
     for circle in circles:

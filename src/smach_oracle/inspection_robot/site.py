@@ -1,4 +1,5 @@
 """The hall as its plan has it: walls, and panels with a gauge each. The robot knows this plan."""
+
 import math
 from typing import NamedTuple, Tuple
 
@@ -17,14 +18,25 @@ class GaugePanel(NamedTuple):
 
 
 # (n, 4) m: x and y of both ends
-WALLS = np.array([
-    (0.0, 0.0, 10.0, 0.0), (10.0, 0.0, 10.0, 7.0), (10.0, 7.0, 0.0, 7.0), (0.0, 7.0, 0.0, 0.0),
-    (3.5, 0.0, 3.5, 4.4), (6.5, 2.6, 6.5, 7.0), (8.4, 0.0, 8.4, 0.8), (0.0, 3.0, 0.7, 3.0)
-])
+WALLS = np.array(
+    [
+        (0.0, 0.0, 10.0, 0.0),
+        (10.0, 0.0, 10.0, 7.0),
+        (10.0, 7.0, 0.0, 7.0),
+        (0.0, 7.0, 0.0, 0.0),
+        (3.5, 0.0, 3.5, 4.4),
+        (6.5, 2.6, 6.5, 7.0),
+        (8.4, 0.0, 8.4, 0.8),
+        (0.0, 3.0, 0.7, 3.0),
+    ]
+)
 SIZE = (10.0, 7.0)  # m
 START: Pose = (1.2, 1.2, math.pi / 2)
-PANELS = (GaugePanel(1, 1.8, 7.0, -math.pi / 2), GaugePanel(2, 5.0, 0.0, math.pi / 2),
-          GaugePanel(3, 10.0, 4.8, math.pi))
+PANELS = (
+    GaugePanel(1, 1.8, 7.0, -math.pi / 2),
+    GaugePanel(2, 5.0, 0.0, math.pi / 2),
+    GaugePanel(3, 10.0, 4.8, math.pi),
+)
 
 ROBOT_RADIUS = 0.25  # m
 CAMERA_HEIGHT = 1.0  # m
@@ -52,5 +64,8 @@ def before_panel(panel: GaugePanel, distance: float, aside: float = 0.0) -> Pose
     :param aside: m to the left, as the robot sees it.
     """
     yaw = wrapped(panel.facing + math.pi)
-    return (panel.x + distance * math.cos(panel.facing) - aside * math.sin(yaw),
-            panel.y + distance * math.sin(panel.facing) + aside * math.cos(yaw), yaw)
+    return (
+        panel.x + distance * math.cos(panel.facing) - aside * math.sin(yaw),
+        panel.y + distance * math.sin(panel.facing) + aside * math.cos(yaw),
+        yaw,
+    )

@@ -3,6 +3,7 @@
 That person ends its one goal. A second goal is refused with a text. A preempt, and the loss of the
 node that asked, end the goal.
 """
+
 import time
 import warnings
 from typing import Any, Callable, Collection, Mapping, Optional, Protocol, Sequence
@@ -51,8 +52,9 @@ class InterfaceGoal:
     The callbacks hold the action server's lock and must not wait for anything.
     """
 
-    def __init__(self, name: str, begun: Callable[[SharedAutonomyGoal], None],
-                 ended: Callable[[], None]) -> None:
+    def __init__(
+        self, name: str, begun: Callable[[SharedAutonomyGoal], None], ended: Callable[[], None]
+    ) -> None:
         """
         :param name: of the action, e.g. manipulation_interface.
         :param begun: called with each new goal. May raise ValueError, whose text refuses the goal.
@@ -64,8 +66,9 @@ class InterfaceGoal:
         self._handle: Optional[actionlib.ServerGoalHandle] = None
         self._asker: Optional[_AskerConnection] = None
         self._asker_seen_s = 0.0
-        self._action = QuietActionServer(self.name, SharedAutonomyAction, self._on_goal,
-                                              self._on_cancel, auto_start=False)
+        self._action = QuietActionServer(
+            self.name, SharedAutonomyAction, self._on_goal, self._on_cancel, auto_start=False
+        )
         # its callbacks come under it. A second lock would invite a deadlock
         self._lock = self._action.lock
         self._action.start()
@@ -82,8 +85,14 @@ class InterfaceGoal:
         if handle is not None:
             handle.publish_feedback(SharedAutonomyFeedback(progress, text))
 
-    def finish(self, outcome: str, known: Mapping[str, Any], given: Sequence[UserdataItem] = (),
-               text: str = '', query_id: str = '') -> None:
+    def finish(
+        self,
+        outcome: str,
+        known: Mapping[str, Any],
+        given: Sequence[UserdataItem] = (),
+        text: str = '',
+        query_id: str = '',
+    ) -> None:
         """Supersede the state with `outcome`.
 
         :param known: outputs that the interface has. Keys that the state does not have are left
@@ -116,10 +125,14 @@ class InterfaceGoal:
         with self._lock:
             handle = self._handle
             if handle is not None and self._asker_missing_s(handle) > ASKER_GONE_S:
-                rospy.logwarn('%s: the asker is gone; its goal for %s ends', self.name,
-                              handle.get_goal().state)
+                rospy.logwarn(
+                    '%s: the asker is gone; its goal for %s ends',
+                    self.name,
+                    handle.get_goal().state,
+                )
                 self._end(
-                    lambda handle: handle.set_aborted(SharedAutonomyResult(), 'the asker is gone'))
+                    lambda handle: handle.set_aborted(SharedAutonomyResult(), 'the asker is gone')
+                )
 
     def _meant(self, query_id: str) -> SharedAutonomyGoal:
         goal = self.goal
@@ -128,7 +141,9 @@ class InterfaceGoal:
         if query_id and query_id != goal.query_id:
             raise InterfaceGoalError(
                 'question {} is over; the interface now works on another one, {}'.format(
-                    query_id, goal.query_id))
+                    query_id, goal.query_id
+                )
+            )
         return goal
 
     def stop(self) -> None:
@@ -155,8 +170,9 @@ class InterfaceGoal:
             goal = handle.get_goal()
             why = self._why_not(goal)
             if why:
-                rospy.logwarn('%s: goal for %s refused: %s', self.name, goal.state or '(no state)',
-                              why)
+                rospy.logwarn(
+                    '%s: goal for %s refused: %s', self.name, goal.state or '(no state)', why
+                )
                 handle.set_rejected(SharedAutonomyResult(text=why), why)
                 return
             self._handle, self._asker, self._asker_seen_s = handle, None, time.monotonic()
@@ -167,10 +183,12 @@ class InterfaceGoal:
         active = self.goal
         if active is not None:
             return 'busy with {} of question {}; one goal at a time'.format(
-                active.state, active.query_id)
+                active.state, active.query_id
+            )
         if not goal.state or not goal.outcomes:
             return 'a goal needs a state and its outcomes; given: {!r}, {}'.format(
-                goal.state, names(goal.outcomes))
+                goal.state, names(goal.outcomes)
+            )
         try:
             self._begun(goal)
         except ValueError as err:
@@ -181,8 +199,11 @@ class InterfaceGoal:
         with self._lock:
             mine_id = None if self._handle is None else self._handle.get_goal_id().id
             if handle.get_goal_id().id == mine_id:
-                self._end(lambda mine: mine.set_canceled(SharedAutonomyResult(text='preempted'),
-                                                         'preempted'))
+                self._end(
+                    lambda mine: mine.set_canceled(
+                        SharedAutonomyResult(text='preempted'), 'preempted'
+                    )
+                )
 
     def _end(self, send: Callable[[actionlib.ServerGoalHandle], None]) -> None:
         """Forget the goal, and let `send` send its result."""
@@ -194,22 +215,26 @@ class InterfaceGoal:
 class FinishServices:
     """The services `~finish` and `~give_up` of an interface, for the front end of its person."""
 
-    def __init__(self, goal: InterfaceGoal, outputs: Callable[[str, Collection[str]],
-                                                              Mapping[str, Any]]) -> None:
+    def __init__(
+        self, goal: InterfaceGoal, outputs: Callable[[str, Collection[str]], Mapping[str, Any]]
+    ) -> None:
         """
         :param outputs: returns, for an outcome and the keys that the person gives, the other
             outputs that the interface has.
         """
         self._goal = goal
         self._outputs = outputs
-        self._services = [rospy.Service('~finish', FinishInterface, self._finish),
-                          rospy.Service('~give_up', GiveUpInterface, self._give_up)]
+        self._services = [
+            rospy.Service('~finish', FinishInterface, self._finish),
+            rospy.Service('~give_up', GiveUpInterface, self._give_up),
+        ]
 
     def _finish(self, request: FinishInterfaceRequest) -> FinishInterfaceResponse:
         try:
             known = self._outputs(request.outcome, {item.key for item in request.outputs})
-            self._goal.finish(request.outcome, known, request.outputs, request.text,
-                              request.query_id)
+            self._goal.finish(
+                request.outcome, known, request.outputs, request.text, request.query_id
+            )
         except (InterfaceGoalError, UserdataCodecError) as err:
             return FinishInterfaceResponse(False, str(err))
         return FinishInterfaceResponse(True, '')
@@ -240,6 +265,9 @@ def __getattr__(name: str) -> Any:
     """Give the class that had another name under its old one, with a warning."""
     if name != 'SettlingServices':
         raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
-    warnings.warn('smach_oracle.interfaces.interface_goal.SettlingServices is now called '
-                  'FinishServices', FutureWarning, stacklevel=2)
+    warnings.warn(
+        'smach_oracle.interfaces.interface_goal.SettlingServices is now called FinishServices',
+        FutureWarning,
+        stacklevel=2,
+    )
     return FinishServices

@@ -1,4 +1,5 @@
 """A node's share of a busy machine: its nice value, where the system allows it."""
+
 import os
 import time
 from pathlib import Path
@@ -26,8 +27,11 @@ def take_priority() -> None:
     """
     wanted = int(number_of('~nice', NICE, -20, 19))
     if wanted and not set_nice(wanted):
-        rospy.loginfo('%s: nice %d is not allowed here; beside a busy core it may be slow',
-                      rospy.get_name(), wanted)
+        rospy.loginfo(
+            '%s: nice %d is not allowed here; beside a busy core it may be slow',
+            rospy.get_name(),
+            wanted,
+        )
 
 
 def set_nice(nice: int) -> bool:

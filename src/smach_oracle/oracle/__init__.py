@@ -8,6 +8,7 @@ Pure are `decision`, `settings`, all of `records` except the rates file, the que
 
 `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
 """
+
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,21 +23,42 @@ if TYPE_CHECKING:
     from .settings.settings import Settings
 
 _LAZY = {
-    'OracleContainer': 'container', 'oracle_of': 'machine.oracle', 'Settings': 'settings.settings',
-    'FailureRate': 'decision.failure_rate', 'ExponentialFailureRate': 'decision.failure_rate',
-    'FailureClass': 'decision.failure_rate', 'Answer': 'asking.question',
-    'AnswerKind': 'asking.question', 'Expert': 'asking.question', 'Question': 'asking.question',
-    'OperatorHand': 'operator_hand', 'register_codec': 'checkpoint.storable',
+    'OracleContainer': 'container',
+    'oracle_of': 'machine.oracle',
+    'Settings': 'settings.settings',
+    'FailureRate': 'decision.failure_rate',
+    'ExponentialFailureRate': 'decision.failure_rate',
+    'FailureClass': 'decision.failure_rate',
+    'Answer': 'asking.question',
+    'AnswerKind': 'asking.question',
+    'Expert': 'asking.question',
+    'Question': 'asking.question',
+    'OperatorHand': 'operator_hand',
+    'register_codec': 'checkpoint.storable',
     'unwrap': 'execution.unwrapping',
-    'CheckpointError': 'errors'
+    'CheckpointError': 'errors',
 }
-__all__ = ['Answer', 'AnswerKind', 'CheckpointError', 'Expert', 'ExponentialFailureRate',
-           'FailureClass', 'FailureRate', 'OperatorHand', 'OracleContainer', 'Question',
-           'Settings', 'oracle_of', 'register_codec', 'unwrap']
+__all__ = [
+    'Answer',
+    'AnswerKind',
+    'CheckpointError',
+    'Expert',
+    'ExponentialFailureRate',
+    'FailureClass',
+    'FailureRate',
+    'OperatorHand',
+    'OracleContainer',
+    'Question',
+    'Settings',
+    'oracle_of',
+    'register_codec',
+    'unwrap',
+]
 
 
 def __getattr__(name: str) -> object:
     if name not in _LAZY:
         raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
     from importlib import import_module
+
     return getattr(import_module('{}.{}'.format(__name__, _LAZY[name])), name)

@@ -1,4 +1,5 @@
 """Calls a function in a thread of its own, so that nobody has to wait for its end."""
+
 import contextvars
 import threading
 from typing import Callable, Optional
@@ -11,8 +12,12 @@ class BackgroundCall:
     once the function has ended after all.
     """
 
-    def __init__(self, function: Callable[[], object], name: str,
-                 on_late_end: Optional[Callable[[], None]] = None) -> None:
+    def __init__(
+        self,
+        function: Callable[[], object],
+        name: str,
+        on_late_end: Optional[Callable[[], None]] = None,
+    ) -> None:
         self.result: object = None
         self.error: Optional[BaseException] = None
         self.done = threading.Event()
@@ -20,8 +25,9 @@ class BackgroundCall:
         self._function = function
         self._on_late_end = on_late_end
         self._lock = threading.Lock()
-        self._thread = threading.Thread(target=contextvars.copy_context().run, args=(self._work,),
-                                        name=name, daemon=True)
+        self._thread = threading.Thread(
+            target=contextvars.copy_context().run, args=(self._work,), name=name, daemon=True
+        )
 
     def start(self) -> None:
         """Begin the call in its thread."""

@@ -2,6 +2,7 @@
 
 It asks an expert only when it must.
 """
+
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, cast
 
 import smach
@@ -50,11 +51,20 @@ class OracleContainer(smach.StateMachine):
     _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none, never written
     _pause_requested = False  # of engines that do not pause
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
-                 preconditions: PreconditionLists = None, name: str = '',
-                 expert: Optional[Expert] = None, recover: bool = True,
-                 strict: Strictness = True, health: Optional[HealthFunction] = None) -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        *,
+        settings: SettingsLike = None,
+        preconditions: PreconditionLists = None,
+        name: str = '',
+        expert: Optional[Expert] = None,
+        recover: bool = True,
+        strict: Strictness = True,
+        health: Optional[HealthFunction] = None,
+    ) -> None:
         """Make an empty machine under an oracle.
 
         `settings`: a Settings or a dictionary of them. `preconditions`: lists by LABEL or
@@ -69,10 +79,18 @@ class OracleContainer(smach.StateMachine):
         self._oracle.strict = strict
 
     @classmethod
-    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
-             settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: Strictness = True, recover: bool = True,
-             health: Optional[HealthFunction] = None) -> 'OracleContainer':
+    def wrap(
+        cls,
+        machine: smach.StateMachine,
+        preconditions: PreconditionLists = None,
+        settings: SettingsLike = None,
+        nested: Optional[Nested] = None,
+        name: str = '',
+        expert: Optional[Expert] = None,
+        strict: Strictness = True,
+        recover: bool = True,
+        health: Optional[HealthFunction] = None,
+    ) -> 'OracleContainer':
         """Put `machine` under an oracle and return it.
 
         It stays the same object, with a class made of this class and its own.
@@ -86,20 +104,30 @@ class OracleContainer(smach.StateMachine):
         """
         checked = as_settings(settings, preconditions)
         tree = Tree(OracleContainer, recover, expert, health)
-        wrapped = wrap_machine(cls, machine, tree, checked,
-                                                checked.nested if nested is None
-                               else checked_nested('nested', nested), name,
-                                                strict)
+        wrapped = wrap_machine(
+            cls,
+            machine,
+            tree,
+            checked,
+            checked.nested if nested is None else checked_nested('nested', nested),
+            name,
+            strict,
+        )
         return cast(OracleContainer, wrapped)
 
     @staticmethod
-    def add(label: str, state: smach.State, transitions: Optional[Mapping[str,
-                                                                          Optional[str]]] = None,
-            remapping: Optional[Mapping[str, str]] = None, constants: Optional[Mapping[str,
-                                                                                       Any]] = None,
-            preconditions: Optional[List[Any]] = None, prior: Optional[float] = None,
-            time_limit_s: Optional[float] = None, on_retry: Optional[str] = None,
-            autonomy: Optional[str] = None) -> smach.State:
+    def add(
+        label: str,
+        state: smach.State,
+        transitions: Optional[Mapping[str, Optional[str]]] = None,
+        remapping: Optional[Mapping[str, str]] = None,
+        constants: Optional[Mapping[str, Any]] = None,
+        preconditions: Optional[List[Any]] = None,
+        prior: Optional[float] = None,
+        time_limit_s: Optional[float] = None,
+        on_retry: Optional[str] = None,
+        autonomy: Optional[str] = None,
+    ) -> smach.State:
         """Add a state, with settings of its own, to the innermost open machine.
 
         The rest is as with `smach.StateMachine.add`.
@@ -109,13 +137,21 @@ class OracleContainer(smach.StateMachine):
         :raises SettingsError: for a setting that is not allowed. `StateMachine.add` may raise other
             errors.
         """
-        own = {'preconditions': preconditions, 'prior': prior, 'time_limit_s': time_limit_s,
-               'on_retry': on_retry, 'autonomy': autonomy}
+        own = {
+            'preconditions': preconditions,
+            'prior': prior,
+            'time_limit_s': time_limit_s,
+            'on_retry': on_retry,
+            'autonomy': autonomy,
+        }
         given = {key: value for key, value in own.items() if value is not None}
         machine = smach.StateMachine._currently_opened_container()
         if given and not isinstance(machine, OracleContainer):
-            raise SettingsError('add', sorted(given),
-                              'these settings in an OracleContainer, not {!r}'.format(machine))
+            raise SettingsError(
+                'add',
+                sorted(given),
+                'these settings in an OracleContainer, not {!r}'.format(machine),
+            )
         if given:
             machine._oracle.settings.with_states({label: given})
         more = {} if constants is None else {'constants': constants}
@@ -194,8 +230,9 @@ class OracleContainer(smach.StateMachine):
             edges += [(EDGE_TO_ORACLE, label, meta) for label in self._oracle.labels()]
         return edges
 
-    def set_initial_state(self, initial_states: Sequence[str],
-                          userdata: Optional[smach.UserData] = None) -> None:
+    def set_initial_state(
+        self, initial_states: Sequence[str], userdata: Optional[smach.UserData] = None
+    ) -> None:
         """Begin at this label (one, in a list) from now on, with these keys added to the userdata.
 
         :raises InvalidStateError: for ORACLE, which failures alone enter. Nothing is changed then.
@@ -231,17 +268,22 @@ class OracleContainer(smach.StateMachine):
         outcomes = self.get_registered_outcomes()
         if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
             raise SettingsError(
-                'oracle_label', label,
+                'oracle_label',
+                label,
                 'a name that is no state or outcome of {}, which has {}'.format(
-                    node.path, names(set(states).union(outcomes))))
+                    node.path, names(set(states).union(outcomes))
+                ),
+            )
         if meta is None:
             meta = OracleState()
             self._remappings[label] = {}
         if set(self._transitions.get(label, ())) != set(states).union(outcomes).difference(
-            (label,)):
+            (label,)
+        ):
             self._transitions[label] = meta.lead_to(
-                tuple(node.labels()) +
-                tuple(name for name in sorted(outcomes, key=str) if name not in states))
+                tuple(node.labels())
+                + tuple(name for name in sorted(outcomes, key=str) if name not in states)
+            )
         states[label] = meta
 
     def _remove_oracle(self) -> None:
@@ -277,8 +319,11 @@ class OracleContainer(smach.StateMachine):
             entry.enter(node)
             how = 'going on'
         if how:
-            smach.loginfo("State machine {} in state '{}' with userdata: \n\t{}".format(
-                how, self._current_label, list(self.userdata.keys())))
+            smach.loginfo(
+                "State machine {} in state '{}' with userdata: \n\t{}".format(
+                    how, self._current_label, list(self.userdata.keys())
+                )
+            )
         super().call_start_cbs()
 
     def _tell_start(self) -> None:
@@ -314,10 +359,13 @@ class OracleContainer(smach.StateMachine):
             state: smach.State = self._current_state  # type: ignore[assignment]
             userdata = self.userdata
             view = record.view
-            if (view.state is not state or view.userdata is not userdata
-                    or view.remapping is not self._remappings[label]
-                    or view.input_keys is not state._input_keys
-                    or view.output_keys is not state._output_keys):
+            if (
+                view.state is not state
+                or view.userdata is not userdata
+                or view.remapping is not self._remappings[label]
+                or view.input_keys is not state._input_keys
+                or view.output_keys is not state._output_keys
+            ):
                 view = record.view = StateView(self, label, state)
             record.snapshot = userdata._data.copy()
             observed = node.events.observers
@@ -367,8 +415,12 @@ class OracleContainer(smach.StateMachine):
                 smach.loginfo(edge.message)
                 if self._transition_cbs or engine.tells_transitions:
                     self.call_transition_cbs()
-                if (not engine.has_own_loop or not self._is_running or smach.is_shutdown()
-                        or self._pause_requested):
+                if (
+                    not engine.has_own_loop
+                    or not self._is_running
+                    or smach.is_shutdown()
+                    or self._pause_requested
+                ):
                     return None
             finally:
                 if not engine.lock_is_held:

@@ -1,5 +1,7 @@
 """Errors of the executive.
 
+Their tree:
+
     OracleError
     +-- SettingsError (also a ValueError): a setting is wrong
     +-- AnswerError (also a ValueError): an expert's answer does not fit its question
@@ -9,6 +11,7 @@
     +-- TrialError: the executive was used out of order
     +-- TooDeepError (also a RecursionError): too many containers lie in each other
 """
+
 import warnings
 
 
@@ -22,10 +25,10 @@ class SettingsError(OracleError, ValueError):
     `problem` stands after the value and says what is wrong with it.
     """
 
-    def __init__(self, key: str, value: object, allowed: str, text: str = '',
-                 problem: str = 'is not allowed') -> None:
-        super().__init__(
-            text or '{}: {!r} {}; allowed: {}'.format(key, value, problem, allowed))
+    def __init__(
+        self, key: str, value: object, allowed: str, text: str = '', problem: str = 'is not allowed'
+    ) -> None:
+        super().__init__(text or '{}: {!r} {}; allowed: {}'.format(key, value, problem, allowed))
         self.key = key
         self.value = value
         self.allowed = allowed
@@ -35,8 +38,9 @@ class SettingsError(OracleError, ValueError):
     def set_at(self, origin: str) -> 'SettingsError':
         """Return the same error with the file, line or parameter that set the key before it."""
         text = '{}: {}'.format(origin, self._text) if self._text else ''
-        return SettingsError('{}: {}'.format(origin, self.key), self.value, self.allowed, text,
-                             self._problem)
+        return SettingsError(
+            '{}: {}'.format(origin, self.key), self.value, self.allowed, text, self._problem
+        )
 
     def allowing(self, more: str) -> 'SettingsError':
         """Return the same error with more that is allowed."""
@@ -77,6 +81,9 @@ def __getattr__(name: str) -> type:
     """Give the class that had another name under its old one, with a warning."""
     if name != 'ConfigError':
         raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
-    warnings.warn('smach_oracle.oracle.errors.ConfigError is now called SettingsError',
-                  FutureWarning, stacklevel=2)
+    warnings.warn(
+        'smach_oracle.oracle.errors.ConfigError is now called SettingsError',
+        FutureWarning,
+        stacklevel=2,
+    )
     return SettingsError

@@ -3,6 +3,7 @@
 A user's class may define `__eq__`, `__hash__`, `__bool__` or `__getattr__` to its own ends, and may
 raise there. A machine, a state, a function or a message is itself, and equal to nothing else.
 """
+
 import inspect
 import types
 import weakref
@@ -85,7 +86,8 @@ def is_same(one: object, other: object) -> bool:
         return len(one) == len(other) and all(map(is_same, one, other))
     if isinstance(one, dict) and isinstance(other, dict):
         return len(one) == len(other) and all(
-            key in other and is_same(value, other[key]) for key, value in one.items())
+            key in other and is_same(value, other[key]) for key, value in one.items()
+        )
     return False
 
 

@@ -1,4 +1,5 @@
 """Decides which values are numbers. Pure. True and False are not."""
+
 import math
 import sys
 

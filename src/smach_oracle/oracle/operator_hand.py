@@ -3,6 +3,7 @@
 Stopping, pausing and letting go are never refused. Whatever lets a machine go on says what will
 run.
 """
+
 from typing import List, Mapping, NamedTuple, Sequence, Tuple
 
 import smach
@@ -122,8 +123,9 @@ class OperatorHand:
         """
         held = self._top.tree.control.confirm(path)
         if not held:
-            raise OperatorError('{} waits for a confirmation'.format(
-                'nothing in ' + path if path else 'nothing'))
+            raise OperatorError(
+                '{} waits for a confirmation'.format('nothing in ' + path if path else 'nothing')
+            )
         text = _runs(held)
         if self._top.tree.control.paused:
             text += ' once it is resumed'
@@ -131,8 +133,14 @@ class OperatorHand:
 
     # -- elsewhere
 
-    def go_to(self, path: str, state: str, by: str = '', confirm_repeats: bool = False,
-              written: Sequence[str] = ()) -> str:
+    def go_to(
+        self,
+        path: str,
+        state: str,
+        by: str = '',
+        confirm_repeats: bool = False,
+        written: Sequence[str] = (),
+    ) -> str:
         """Send the machine to a state, at the next state boundary of the state's container.
 
         Where that does not run, the innermost container around it that runs goes to it, and those
@@ -151,17 +159,30 @@ class OperatorHand:
         if prospect.why_not:
             raise OperatorError(prospect.why_not)
         if prospect.repeats and not confirm_repeats:
-            raise OperatorError('going to {} may repeat {}: confirm that it may'.format(
-                state, ', '.join(prospect.repeats)))
+            raise OperatorError(
+                'going to {} may repeat {}: confirm that it may'.format(
+                    state, ', '.join(prospect.repeats)
+                )
+            )
         sent = way_for(place).meets
         if sent.machine.is_running():
-            text = self._ask_jump(sent, Jump(state, by, '', prospect.repeats, tuple(written),
-                                             '' if sent is node else node.path))
+            text = self._ask_jump(
+                sent,
+                Jump(
+                    state,
+                    by,
+                    '',
+                    prospect.repeats,
+                    tuple(written),
+                    '' if sent is node else node.path,
+                ),
+            )
         else:
             node.machine.set_initial_state([state])
             text = '{} does not run; it will begin in {}'.format(node.path, state)
-        return self._told('go_to', text + _in_spite_of(prospect), by,
-                          '{}/{}'.format(node.path, state))
+        return self._told(
+            'go_to', text + _in_spite_of(prospect), by, '{}/{}'.format(node.path, state)
+        )
 
     def send(self, state: str, by: str, written: Sequence[str] = ()) -> bool:
         """Send this machine to a state for somebody who hears no answer, such as a viewer.
@@ -191,7 +212,8 @@ class OperatorHand:
         control.ask_jump(node.key, jump)
         if is_held:
             return '{} goes to {} instead of {}{}'.format(
-                node.path, jump.named(), label, ', where it waits' if control.paused else '')
+                node.path, jump.named(), label, ', where it waits' if control.paused else ''
+            )
         return '{} goes to {} once {} has ended'.format(node.path, jump.named(), label)
 
     # -- what is set
@@ -204,8 +226,12 @@ class OperatorHand:
         """
         meant = _pattern(pattern)
         self._top.tree.control.set_breakpoint(meant)
-        return self._told('set_breakpoint', '{} pauses before {}'.format(
-            self._top.path, self._states_meant(meant)), by, meant.text)
+        return self._told(
+            'set_breakpoint',
+            '{} pauses before {}'.format(self._top.path, self._states_meant(meant)),
+            by,
+            meant.text,
+        )
 
     def remove_breakpoint(self, pattern: str, by: str = '') -> str:
         """Remove a breakpoint. A pause that it caused stays.
@@ -214,10 +240,14 @@ class OperatorHand:
         """
         meant, control = _pattern(pattern), self._top.tree.control
         if not control.remove_breakpoint(meant):
-            raise OperatorError('there is no breakpoint {}; there are: {}'.format(
-                meant.text, ', '.join(control.breakpoints()) or 'none'))
-        return self._told('remove_breakpoint', 'the breakpoint {} is gone'.format(meant.text), by,
-                          meant.text)
+            raise OperatorError(
+                'there is no breakpoint {}; there are: {}'.format(
+                    meant.text, ', '.join(control.breakpoints()) or 'none'
+                )
+            )
+        return self._told(
+            'remove_breakpoint', 'the breakpoint {} is gone'.format(meant.text), by, meant.text
+        )
 
     def set_autonomy(self, pattern: str, level: str, by: str = '') -> str:
         """Set the autonomy of states. The latest setting for a state applies.
@@ -228,18 +258,30 @@ class OperatorHand:
         """
         meant = _pattern(pattern)
         if level and level not in AUTONOMY_LEVELS:
-            raise OperatorError('there is no autonomy {!r}; allowed: {}'.format(
-                level, ', '.join(AUTONOMY_LEVELS)))
+            raise OperatorError(
+                'there is no autonomy {!r}; allowed: {}'.format(level, ', '.join(AUTONOMY_LEVELS))
+            )
         self._top.tree.control.set_level(meant, level)
-        return self._told('set_autonomy', 'autonomy {} for {}'.format(
-            level or 'as the settings say', self._states_meant(meant)), by, meant.text)
+        return self._told(
+            'set_autonomy',
+            'autonomy {} for {}'.format(level or 'as the settings say', self._states_meant(meant)),
+            by,
+            meant.text,
+        )
 
     def _states_meant(self, pattern: PathPattern) -> str:
-        found = ['{}/{}'.format(node.path, label) for node in nodes_of(self._top.machine)
-                 for label in node.labels() if pattern.matches(node.path, label)]
+        found = [
+            '{}/{}'.format(node.path, label)
+            for node in nodes_of(self._top.machine)
+            for label in node.labels()
+            if pattern.matches(node.path, label)
+        ]
         more = ', ...' if len(found) > 10 else ''
-        return (', '.join(found[:10]) + more if found
-                else '{}, which is no state there now'.format(pattern.text))
+        return (
+            ', '.join(found[:10]) + more
+            if found
+            else '{}, which is no state there now'.format(pattern.text)
+        )
 
     # -- status
 
@@ -247,8 +289,16 @@ class OperatorHand:
         """Return how the machine stands, and what is set."""
         top, control = self._top, self._top.tree.control
         jumps = {path: jump.named() for path, jump in control.jumps().items()}
-        return HandStatus(top.path, top.machine.is_running(), control.paused, control.paused_by,
-                          tuple(self._active()), control.breakpoints(), control.levels(), jumps)
+        return HandStatus(
+            top.path,
+            top.machine.is_running(),
+            control.paused,
+            control.paused_by,
+            tuple(self._active()),
+            control.breakpoints(),
+            control.levels(),
+            jumps,
+        )
 
     def _active(self) -> List[ActiveState]:
         held = self._top.tree.control.holds()
@@ -256,11 +306,14 @@ class OperatorHand:
         found = []
         for node in nodes_of(self._top.machine):
             label = node.machine._current_label
-            if (node.machine.is_running() and label is not None
-                    and node.key not in at_boundary):
+            if node.machine.is_running() and label is not None and node.key not in at_boundary:
                 found.append(ActiveState(node.path, str(label), '', False))
-        return found + [ActiveState(hold.place.path, hold.place.state, hold.held_by.value,
-                                    hold.waits_for_confirmation) for hold in held]
+        return found + [
+            ActiveState(
+                hold.place.path, hold.place.state, hold.held_by.value, hold.waits_for_confirmation
+            )
+            for hold in held
+        ]
 
     # -- words
 
@@ -291,18 +344,23 @@ class OperatorHand:
         """
         active = self._active()
         around = [each.path + '/' for each in active]
-        return [_in_words(each) for each in active
-                if not each.held_by and not any(
-                    path.startswith('{}/{}/'.format(each.path, each.state)) for path in around)
-                and not self._is_oracle(each)]
+        return [
+            _in_words(each)
+            for each in active
+            if not each.held_by
+            and not any(path.startswith('{}/{}/'.format(each.path, each.state)) for path in around)
+            and not self._is_oracle(each)
+        ]
 
     def _what_recovers(self) -> List[str]:
         """Return the paths of the containers whose oracle decides or asks now."""
         return [each.path for each in self._active() if self._is_oracle(each)]
 
     def _is_oracle(self, active: ActiveState) -> bool:
-        return any(node.path == active.path and node.is_oracle(active.state)
-                   for node in nodes_of(self._top.machine))
+        return any(
+            node.path == active.path and node.is_oracle(active.state)
+            for node in nodes_of(self._top.machine)
+        )
 
     def _what_goes_on(self, held: Sequence[Hold]) -> str:
         top = self._top
@@ -335,8 +393,11 @@ class OperatorHand:
         nodes = list(nodes_of(top.machine))
         found = [node for node in nodes if node.path == (path.strip('/') or top.path)]
         if not found:
-            raise OperatorError('there is no container {!r}; there are: {}'.format(
-                path, ', '.join(sorted({node.path for node in nodes}))))
+            raise OperatorError(
+                'there is no container {!r}; there are: {}'.format(
+                    path, ', '.join(sorted({node.path for node in nodes}))
+                )
+            )
         return found
 
 

@@ -1,4 +1,5 @@
 """Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
+
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, cast
 
 import smach
@@ -71,8 +72,11 @@ def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
 
 def _joined(one: ContainerProspect, other: ContainerProspect) -> ContainerProspect:
     """Return the branches of one container as one."""
-    return one._replace(initial='{}, {}'.format(one.initial, other.initial),
-                        states=one.states + other.states, guarded=one.guarded + other.guarded)
+    return one._replace(
+        initial='{}, {}'.format(one.initial, other.initial),
+        states=one.states + other.states,
+        guarded=one.guarded + other.guarded,
+    )
 
 
 def good_outcome(container: smach.Container, settings: Settings) -> Optional[str]:
@@ -81,8 +85,10 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
     `succeeded` comes before all others, a preempt after them.
     """
     failing = FailingNames(settings.failing_outcomes)
-    names = sorted((name for name in container.get_registered_outcomes() if name not in failing),
-                   key=lambda name: (name != 'succeeded', name == PREEMPTED, str(name)))
+    names = sorted(
+        (name for name in container.get_registered_outcomes() if name not in failing),
+        key=lambda name: (name != 'succeeded', name == PREEMPTED, str(name)),
+    )
     return names[0] if names else None
 
 
@@ -92,15 +98,22 @@ def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     if node.branch is not None:
         machine = node.branch.container
     return ContainerProspect(
-        node.path, machine, initial, tuple(sorted(machine.get_registered_outcomes(), key=str)),
-        node.settings, node.parent is None, node.tree.recover,
-        tuple(_state(node, label, decides) for label in node.labels()), tuple(_guarded(node)),
-        node.branch is not None)
+        node.path,
+        machine,
+        initial,
+        tuple(sorted(machine.get_registered_outcomes(), key=str)),
+        node.settings,
+        node.parent is None,
+        node.tree.recover,
+        tuple(_state(node, label, decides) for label in node.labels()),
+        tuple(_guarded(node)),
+        node.branch is not None,
+    )
 
 
 def _guarded(node: TreeNode) -> Iterator[str]:
     for each in nodes_of(node.machine):
-        below = each.path[len(node.path) + 1:]
+        below = each.path[len(node.path) + 1 :]
         for label in each.labels():
             if each.settings_of(label).on_retry != ALLOW:
                 yield '{}/{}'.format(below, label) if below else label
@@ -109,11 +122,16 @@ def _guarded(node: TreeNode) -> Iterator[str]:
 def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
     state, settings = node.machine._states[label], node.settings_of(label)
     return StateProspect(
-        label, state, settings,
-        tuple(_outcome(node, label, outcome, settings)
-              for outcome in sorted(state.get_registered_outcomes(), key=str)),
+        label,
+        state,
+        settings,
+        tuple(
+            _outcome(node, label, outcome, settings)
+            for outcome in sorted(state.get_registered_outcomes(), key=str)
+        ),
         tuple(_actions(node.in_force.policy, settings, decides)),
-        node.settings.offers_for(node.relative_path, label))
+        node.settings.offers_for(node.relative_path, label),
+    )
 
 
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
@@ -122,18 +140,26 @@ def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) 
     branch = node.branch
     if branch is not None:
         return OutcomeProspect(
-            outcome, Route(branch.leads_to(outcome), True),
+            outcome,
+            Route(branch.leads_to(outcome), True),
             kind is not FailureKind.NOT_A_FAILURE,
-            kind is not FailureKind.NOT_A_FAILURE and settings.author_recoveries != 'override'
-            and branch.foresees(node, outcome))
+            kind is not FailureKind.NOT_A_FAILURE
+            and settings.author_recoveries != 'override'
+            and branch.foresees(node, outcome),
+        )
     return OutcomeProspect(
-        outcome, route, kind is not FailureKind.NOT_A_FAILURE,
-        author_recovers(outcome, route, kind, settings.failure_outcomes,
-                        settings.author_recoveries))
+        outcome,
+        route,
+        kind is not FailureKind.NOT_A_FAILURE,
+        author_recovers(
+            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
+        ),
+    )
 
 
-def _actions(policy: Policy, settings: StateSettings, decides: bool
-             ) -> Iterator[Tuple[FailureClass, Tuple[Action, ...]]]:
+def _actions(
+    policy: Policy, settings: StateSettings, decides: bool
+) -> Iterator[Tuple[FailureClass, Tuple[Action, ...]]]:
     """Yield each class of the failure rate with what the policy may do in it, mildest first.
 
     `decides`: whether the budget of the trial lets the oracle go anywhere by itself.
@@ -150,8 +176,9 @@ def _actions(policy: Policy, settings: StateSettings, decides: bool
         yield failure_class, tuple(action for action in Action if action in possible)
 
 
-def _situations(policy: Policy, failure_class: FailureClass, conditioned: bool
-                ) -> Iterator[Situation]:
+def _situations(
+    policy: Policy, failure_class: FailureClass, conditioned: bool
+) -> Iterator[Situation]:
     standing: Tuple[Preconditions, ...] = (Preconditions.NONE,)
     if conditioned:
         runs = policy.runs_preconditions(failure_class)

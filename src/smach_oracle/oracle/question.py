@@ -1,4 +1,5 @@
 """The former place of `smach_oracle.oracle.asking.question`, kept as an alias."""
+
 import warnings
 
 from .asking.question import (
@@ -13,10 +14,23 @@ from .asking.question import (
 from .records.visits import Visit, VisitResult
 from .settings.interfaces import InterfaceOffer, InterfaceStart
 
-__all__ = ['Answer', 'AnswerKind', 'Expert', 'InterfaceOffer', 'InterfaceStart', 'OutcomeChoice',
-           'Progress', 'Question', 'StateChoice', 'Visit', 'VisitResult']
+__all__ = [
+    'Answer',
+    'AnswerKind',
+    'Expert',
+    'InterfaceOffer',
+    'InterfaceStart',
+    'OutcomeChoice',
+    'Progress',
+    'Question',
+    'StateChoice',
+    'Visit',
+    'VisitResult',
+]
 
 warnings.warn(
     'smach_oracle.oracle.question has moved to smach_oracle.oracle.asking.question; '
     'smach_oracle.oracle has Answer, AnswerKind, Expert and Question too',
-    FutureWarning, stacklevel=2)
+    FutureWarning,
+    stacklevel=2,
+)

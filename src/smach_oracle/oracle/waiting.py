@@ -1,4 +1,5 @@
 """Waits of an oracle before it goes on, through a clock that others may hand in."""
+
 import time
 from typing import Callable, Protocol
 

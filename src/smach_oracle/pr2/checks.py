@@ -4,6 +4,7 @@ Each takes a machine's userdata, which it does not read. They use head camera an
 names of topics and services relative to the script's node. Where its parameter ~snapshot names no
 service, or `none`, the next image of a real camera counts.
 """
+
 import functools
 from typing import Any, NamedTuple
 
@@ -76,5 +77,8 @@ def _eyes() -> _Eyes:
     snapshot = name_of('~snapshot', SNAPSHOT)
     simulated = snapshot != NONE
     pass_time = name_of('~pass_time', PASS_TIME)
-    return _Eyes(RosSenses(snapshot if simulated else '', COMES_S),
-                 WorldTime(pass_time if simulated and pass_time != NONE else ''), simulated)
+    return _Eyes(
+        RosSenses(snapshot if simulated else '', COMES_S),
+        WorldTime(pass_time if simulated and pass_time != NONE else ''),
+        simulated,
+    )

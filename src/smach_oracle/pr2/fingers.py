@@ -1,4 +1,5 @@
 """The fingers of a gripper, by their encoders."""
+
 from typing import Mapping
 
 from .robot import FINGER_JOINTS, GRIPPER_OPEN

@@ -4,6 +4,7 @@ The fridge's frame: origin on the floor in the middle of the front opening, x in
 the left of whoever faces it, z up. Its door hangs on the left and opens towards that side. Lengths
 in m, angles in rad.
 """
+
 from typing import Any, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -48,12 +49,18 @@ def kitchen_from(settings: object) -> Kitchen:
         raise ValueError('kitchen: a dictionary is needed, not {!r}'.format(settings))
     unknown = sorted(str(name) for name in settings if name not in Kitchen._fields)
     if unknown:
-        raise ValueError('kitchen: unknown {}; allowed: {}'.format(', '.join(unknown),
-                                                                   ', '.join(Kitchen._fields)))
+        raise ValueError(
+            'kitchen: unknown {}; allowed: {}'.format(
+                ', '.join(unknown), ', '.join(Kitchen._fields)
+            )
+        )
     kitchen = Kitchen(**{name: _like(name, value) for name, value in settings.items()})
     if not 0 <= kitchen.drinks_shelf < len(kitchen.shelves):
-        raise ValueError('kitchen: drinks_shelf is {}, shelves there are {}'.format(
-            kitchen.drinks_shelf, len(kitchen.shelves)))
+        raise ValueError(
+            'kitchen: drinks_shelf is {}, shelves there are {}'.format(
+                kitchen.drinks_shelf, len(kitchen.shelves)
+            )
+        )
     return kitchen
 
 
@@ -69,7 +76,8 @@ def base_from_fridge(kitchen: Kitchen, odom_from_base: np.ndarray) -> np.ndarray
 def odom_from_pose(kitchen: Kitchen, x: float, y: float, yaw: float) -> np.ndarray:
     """4x4 in odom_combined of a pose on the floor given in the fridge's frame."""
     return from_rpy((kitchen.place[0], kitchen.place[1], 0.0), yaw=kitchen.place[2]) @ from_rpy(
-        (x, y, 0.0), yaw=yaw)
+        (x, y, 0.0), yaw=yaw
+    )
 
 
 def door_frame(kitchen: Kitchen, angle: float) -> np.ndarray:
@@ -89,15 +97,18 @@ def handle_point(kitchen: Kitchen, angle: float, height: float) -> np.ndarray:
     :param height: m above the floor.
     """
     out = kitchen.door_thickness + kitchen.handle_stand_off
-    return apply(door_frame(kitchen, angle),
-                 np.array([out, kitchen.width - kitchen.handle_inset, height]))
+    return apply(
+        door_frame(kitchen, angle), np.array([out, kitchen.width - kitchen.handle_inset, height])
+    )
 
 
 def door_angle_at(kitchen: Kitchen, handle: np.ndarray) -> float:
     """Return the door's angle, rad, with its handle at a point (3,) of the fridge's frame."""
     hinge = np.array([0.0, kitchen.width / 2])
-    shut, now = (np.arctan2(*(point[:2] - hinge)[::-1])
-                 for point in (handle_point(kitchen, 0.0, 0.0), handle))
+    shut, now = (
+        np.arctan2(*(point[:2] - hinge)[::-1])
+        for point in (handle_point(kitchen, 0.0, 0.0), handle)
+    )
     return float((shut - now + np.pi) % (2 * np.pi) - np.pi)
 
 
@@ -109,21 +120,41 @@ def fridge_boxes(kitchen: Kitchen, base_from_fridge: np.ndarray, door_angle: flo
     """
     wall, half_width = kitchen.wall, kitchen.width / 2
     middle = kitchen.depth / 2
-    parts = [((middle, side * (half_width - wall / 2), kitchen.height / 2),
-              (middle, wall / 2, kitchen.height / 2)) for side in (-1, 1)]
-    parts.append(((kitchen.depth - wall / 2, 0.0, kitchen.height / 2), (wall / 2, half_width,
-                                                                        kitchen.height / 2)))
-    parts += [((middle, 0.0, top - 0.01), (middle, half_width, 0.01))
-              for top in kitchen.shelves + (kitchen.height,)]
+    parts = [
+        (
+            (middle, side * (half_width - wall / 2), kitchen.height / 2),
+            (middle, wall / 2, kitchen.height / 2),
+        )
+        for side in (-1, 1)
+    ]
+    parts.append(
+        (
+            (kitchen.depth - wall / 2, 0.0, kitchen.height / 2),
+            (wall / 2, half_width, kitchen.height / 2),
+        )
+    )
+    parts += [
+        ((middle, 0.0, top - 0.01), (middle, half_width, 0.01))
+        for top in kitchen.shelves + (kitchen.height,)
+    ]
     boxes = [_placed(base_from_fridge, centre, half) for centre, half in parts]
     base_from_door = base_from_fridge @ door_frame(kitchen, door_angle)
     thick, low, high = kitchen.door_thickness, kitchen.handle_span[0], kitchen.handle_span[1]
-    boxes.append(_placed(base_from_door, (thick / 2, half_width, kitchen.height / 2),
-                         (thick / 2, half_width, kitchen.height / 2)))
+    boxes.append(
+        _placed(
+            base_from_door,
+            (thick / 2, half_width, kitchen.height / 2),
+            (thick / 2, half_width, kitchen.height / 2),
+        )
+    )
     out = (thick + kitchen.handle_stand_off + kitchen.handle_radius) / 2
     boxes.append(
-        _placed(base_from_door, (out, kitchen.width - kitchen.handle_inset, (low + high) / 2),
-                (out, kitchen.handle_radius, (high - low) / 2)))
+        _placed(
+            base_from_door,
+            (out, kitchen.width - kitchen.handle_inset, (low + high) / 2),
+            (out, kitchen.handle_radius, (high - low) / 2),
+        )
+    )
     return boxes
 
 
@@ -148,8 +179,9 @@ def shelf_point(kitchen: Kitchen) -> np.ndarray:
     return np.array([0.15, 0.0, kitchen.shelves[kitchen.drinks_shelf] + 0.05])
 
 
-def _placed(base_from_part: np.ndarray, centre: Tuple[float, float, float],
-            half: Tuple[float, float, float]) -> MapBox:
+def _placed(
+    base_from_part: np.ndarray, centre: Tuple[float, float, float], half: Tuple[float, float, float]
+) -> MapBox:
     return MapBox(apply(base_from_part, np.array(centre)), np.array(half), yaw_of(base_from_part))
 
 
@@ -165,8 +197,9 @@ def _like(name: str, value: Any) -> Any:
             return _floats(value, 0 if name == 'shelves' else len(default))
         return _number(value, type(default))
     except (TypeError, ValueError, OverflowError) as err:
-        raise ValueError('kitchen: {} is {!r}; needed is something like {!r}'.format(
-            name, value, default)) from err
+        raise ValueError(
+            'kitchen: {} is {!r}; needed is something like {!r}'.format(name, value, default)
+        ) from err
 
 
 def _floats(values: Sequence[float], count: int) -> Tuple[float, ...]:

@@ -1,4 +1,5 @@
 """Tells a robot's localisation where the robot stands."""
+
 import numpy as np
 import rospy
 from geometry_msgs.msg import (
@@ -37,10 +38,14 @@ class PoseTeller:
         """Tell where the robot stands (4x4, in ODOM_FRAME)."""
         covariance = np.zeros(36)
         covariance[[0, 7]], covariance[35] = SIGMA[0] ** 2, SIGMA[1] ** 2
-        pose = Pose(Point(*odom_from_base[:3, 3].tolist()),
-                    Quaternion(*quaternion(odom_from_base).tolist()))
-        self._poses.publish(PoseWithCovarianceStamped(
-            Header(frame_id=ODOM_FRAME), PoseWithCovariance(pose, covariance.tolist())))
+        pose = Pose(
+            Point(*odom_from_base[:3, 3].tolist()), Quaternion(*quaternion(odom_from_base).tolist())
+        )
+        self._poses.publish(
+            PoseWithCovarianceStamped(
+                Header(frame_id=ODOM_FRAME), PoseWithCovariance(pose, covariance.tolist())
+            )
+        )
 
 
 def told(wanted: np.ndarray, believed: np.ndarray) -> bool:

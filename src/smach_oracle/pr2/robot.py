@@ -4,6 +4,7 @@ Implemented by RosRobot (the actions and topics of a PR2) and, for unit tests an
 world's DirectRobot, which runs in one process. Lengths in m, angles in rad, times in s; frames as
 in REP 105 and REP 120.
 """
+
 from typing import Dict, List, NamedTuple, Protocol, Sequence
 
 import numpy as np
@@ -16,9 +17,16 @@ from .work_costs import Work
 ARMS = ('left', 'right')
 ARM_JOINTS: Dict[str, List[str]] = {
     arm: [
-        arm[0] + name for name in ('_shoulder_pan_joint', '_shoulder_lift_joint',
-                                   '_upper_arm_roll_joint', '_elbow_flex_joint',
-                                   '_forearm_roll_joint', '_wrist_flex_joint', '_wrist_roll_joint')
+        arm[0] + name
+        for name in (
+            '_shoulder_pan_joint',
+            '_shoulder_lift_joint',
+            '_upper_arm_roll_joint',
+            '_elbow_flex_joint',
+            '_forearm_roll_joint',
+            '_wrist_flex_joint',
+            '_wrist_roll_joint',
+        )
     ]
     for arm in ARMS
 }

@@ -1,4 +1,5 @@
 """The PR2 behind its actions and topics: what the subsystems' nodes drive, simulated or real."""
+
 import math
 import threading
 import time
@@ -61,16 +62,21 @@ class RosRobot:
     :param timeout_s: wall s that the robot may be silent, or not there, before a call fails.
     """
 
-    def __init__(self, snapshot: str = 'world/snapshot', timeout_s: float = 30.0,
-                 pass_time: str = 'world/pass_time') -> None:
+    def __init__(
+        self,
+        snapshot: str = 'world/snapshot',
+        timeout_s: float = 30.0,
+        pass_time: str = 'world/pass_time',
+    ) -> None:
         self._timeout_s = timeout_s
         self._simulated = snapshot != NO_SNAPSHOT
         self._senses = RosSenses('' if snapshot == NO_SNAPSHOT else snapshot, timeout_s)
         self._time = WorldTime('' if pass_time == NO_PASS_TIME else pass_time)
         self._links: Dict[str, GoalLink] = {}
         for side in (arm[0] for arm in ARMS):
-            self._link(side + '_arm_controller/follow_joint_trajectory',
-                       FollowJointTrajectoryAction)
+            self._link(
+                side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction
+            )
             self._link(side + '_gripper_controller/gripper_action', GripperCommandAction)
         self._link('head_traj_controller/point_head_action', PointHeadAction)
         self._link('torso_controller/position_joint_action', SingleJointPositionAction)
@@ -142,8 +148,10 @@ class RosRobot:
             if told(odom_from_base, self.odom_from_base()):
                 return
             if time.monotonic() > until or rospy.is_shutdown():
-                raise RobotError('the robot did not take over where it stands: nobody listens to '
-                                 '{}, or it moves'.format(self._localisation.name))
+                raise RobotError(
+                    'the robot did not take over where it stands: nobody listens to '
+                    '{}, or it moves'.format(self._localisation.name)
+                )
 
     def see(self) -> CameraImage:
         """See Robot."""
@@ -165,23 +173,32 @@ class RosRobot:
         """
         arm = next((arm for arm in ARMS if set(joints) <= set(ARM_JOINTS[arm])), '')
         if not arm or not len(joints):
-            raise RobotError('follow: joints {}; allowed: those of one arm, {}'.format(
-                list(joints), ' or '.join(', '.join(ARM_JOINTS[each]) for each in ARMS)))
+            raise RobotError(
+                'follow: joints {}; allowed: those of one arm, {}'.format(
+                    list(joints), ' or '.join(', '.join(ARM_JOINTS[each]) for each in ARMS)
+                )
+            )
         shape = np.shape(positions)
         if shape != (len(times), len(joints)):
-            raise RobotError('follow: positions {} do not fit {} times and {} joints'.format(
-                shape, len(times), len(joints)))
+            raise RobotError(
+                'follow: positions {} do not fit {} times and {} joints'.format(
+                    shape, len(times), len(joints)
+                )
+            )
         points = [
-            JointTrajectoryPoint(positions=list(map(float, point)),
-                                 time_from_start=_duration(moment))
+            JointTrajectoryPoint(
+                positions=list(map(float, point)), time_from_start=_duration(moment)
+            )
             for point, moment in zip(positions, times)
         ]
         goal = FollowJointTrajectoryGoal(
-            trajectory=JointTrajectory(joint_names=list(joints), points=points))
+            trajectory=JointTrajectory(joint_names=list(joints), points=points)
+        )
         result = self._do(arm[0] + '_arm_controller/follow_joint_trajectory', goal, arm + ' arm')
         if result.error_code != FollowJointTrajectoryResult.SUCCESSFUL:
-            raise RobotError('{} arm: error {} {}'.format(arm, result.error_code,
-                                                          result.error_string))
+            raise RobotError(
+                '{} arm: error {} {}'.format(arm, result.error_code, result.error_string)
+            )
 
     def gripper(self, arm: str, position: float, max_effort: float = 50.0) -> GripperState:
         """See Robot. A gripper that stalls has not failed.
@@ -192,20 +209,29 @@ class RosRobot:
             raise RobotError('unknown arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = float(position), float(max_effort)
-        result = self._do(arm[0] + '_gripper_controller/gripper_action', goal, arm + ' gripper',
-                          stalls=True, ends_within_s=0.0 if position > 0 else CLOSING_S)
+        result = self._do(
+            arm[0] + '_gripper_controller/gripper_action',
+            goal,
+            arm + ' gripper',
+            stalls=True,
+            ends_within_s=0.0 if position > 0 else CLOSING_S,
+        )
         return GripperState(result.position, result.effort, result.stalled, result.reached_goal)
 
     def torso(self, height: float) -> None:
         """See Robot."""
-        self._do('torso_controller/position_joint_action',
-                 SingleJointPositionGoal(position=float(height)), 'torso')
+        self._do(
+            'torso_controller/position_joint_action',
+            SingleJointPositionGoal(position=float(height)),
+            'torso',
+        )
 
     def look_at(self, point: VectorLike) -> None:
         """See Robot."""
         target = PointStamped(Header(frame_id=BASE_FRAME), Point(*map(float, point)))
-        goal = PointHeadGoal(target=target, pointing_axis=Vector3(0.0, 0.0, 1.0),
-                             pointing_frame=CAMERA_FRAME)
+        goal = PointHeadGoal(
+            target=target, pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=CAMERA_FRAME
+        )
         self._do('head_traj_controller/point_head_action', goal, 'head')
 
     def drive(self, odom_from_goal: np.ndarray) -> None:
@@ -218,8 +244,14 @@ class RosRobot:
         target = PoseStamped(Header(frame_id=ODOM_FRAME), _pose_of(odom_from_goal))
         self._do('move_base', MoveBaseGoal(target), 'base')
 
-    def _do(self, name: str, goal: genpy.Message, what: str,
-            stalls: bool = False, ends_within_s: float = 0.0) -> genpy.Message:
+    def _do(
+        self,
+        name: str,
+        goal: genpy.Message,
+        what: str,
+        stalls: bool = False,
+        ends_within_s: float = 0.0,
+    ) -> genpy.Message:
         """Send a goal and wait for its result.
 
         :param stalls: a goal that was aborted still has a result (a gripper that holds
@@ -270,18 +302,25 @@ class RosRobot:
 
     @staticmethod
     def _result(event: GoalEvent, what: str, stalls: bool) -> genpy.Message:
-        ended_well = event.status == GoalStatus.SUCCEEDED or (stalls and event.status
-                                                              == GoalStatus.ABORTED)
+        ended_well = event.status == GoalStatus.SUCCEEDED or (
+            stalls and event.status == GoalStatus.ABORTED
+        )
         if ended_well and event.result is not None:
             return event.result
         if lost(event):
             raise RobotError('{}: the controller was restarted'.format(what))
         text = event.text or getattr(event.result, 'error_string', '')
-        raise RobotError('{}: {}{}'.format(
-            what, {
-                GoalStatus.REJECTED: 'rejected', GoalStatus.PREEMPTED: 'preempted',
-                GoalStatus.RECALLED: 'preempted'
-            }.get(event.status, 'failed'), ': ' + text if text else ''))
+        raise RobotError(
+            '{}: {}{}'.format(
+                what,
+                {
+                    GoalStatus.REJECTED: 'rejected',
+                    GoalStatus.PREEMPTED: 'preempted',
+                    GoalStatus.RECALLED: 'preempted',
+                }.get(event.status, 'failed'),
+                ': ' + text if text else '',
+            )
+        )
 
 
 def _pose_of(pose: np.ndarray) -> Pose:

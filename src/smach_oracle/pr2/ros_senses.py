@@ -2,6 +2,7 @@
 
 Where its world gives snapshots, all of it is of one moment.
 """
+
 import collections
 import threading
 import time
@@ -41,8 +42,9 @@ class MessageHistory:
         self._arrived = threading.Condition()
         kept = KEPT.get(kind, KEPT_OTHERS)
         self._messages: Deque[genpy.Message] = collections.deque(maxlen=kept)
-        self._subscriber = rospy.Subscriber(topic, kind, self._heard, queue_size=kept,
-                                            buff_size=1 << 24, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(
+            topic, kind, self._heard, queue_size=kept, buff_size=1 << 24, tcp_nodelay=True
+        )
 
     def connected(self) -> bool:
         """Whether somebody publishes. It waits until a new publisher has registered this node."""
@@ -77,6 +79,7 @@ class MessageHistory:
     def _wait(self, fits: Callable[[genpy.Message], bool], timeout_s: float) -> genpy.Message:
         def found() -> Optional[genpy.Message]:
             return next((message for message in reversed(self._messages) if fits(message)), None)
+
         with self._arrived:
             message = self._arrived.wait_for(found, timeout_s)
         if message is None:
@@ -162,8 +165,9 @@ class RosSenses:
             colour, info = (topics[number].at(stamp, self._timeout_s) for number in (0, 2))
         pose = self._looked_up(base, camera, stamp)
         try:
-            return CameraImage(stamp.to_sec(), colour_of(colour), depth_of(depth),
-                               intrinsics_of(info), pose)
+            return CameraImage(
+                stamp.to_sec(), colour_of(colour), depth_of(depth), intrinsics_of(info), pose
+            )
         except ImageError as err:
             raise RobotError('camera: {}'.format(err)) from err
 
@@ -180,7 +184,7 @@ class RosSenses:
         return [
             MessageHistory('head_camera/rgb/image_raw', Image),
             MessageHistory('head_camera/depth_registered/image_raw', Image),
-            MessageHistory('head_camera/rgb/camera_info', CameraInfo)
+            MessageHistory('head_camera/rgb/camera_info', CameraInfo),
         ]
 
     def _states_of_snapshot(self) -> JointState:
@@ -197,10 +201,12 @@ class RosSenses:
             stamps.append(self._shot(True))
             colour = topics[0].at_one_of(stamps, wait_s)
             return [colour] + [topic.at(colour.header.stamp, wait_s) for topic in topics[1:]]
+
         return self._asked_again(take, NotReceivedError)
 
-    def _asked_again(self, take: Callable[[float], T],
-                     again_after: Type[RobotError] = RobotError) -> T:
+    def _asked_again(
+        self, take: Callable[[float], T], again_after: Type[RobotError] = RobotError
+    ) -> T:
         """The result of `take`, which asks the world and waits so many seconds at most.
 
         It asks again after an error: a publisher may have been slow to learn who listens.
@@ -259,8 +265,9 @@ class RosSenses:
                 break
             except tf2_ros.TransformException as err:
                 if time.monotonic() > until or rospy.is_shutdown():
-                    raise RobotError('no transform from {} to {}: {}'.format(source, target,
-                                                                             err)) from err
+                    raise RobotError(
+                        'no transform from {} to {}: {}'.format(source, target, err)
+                    ) from err
             time.sleep(0.002)
         place, turn = found.translation, found.rotation
         return from_quaternion((place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w))

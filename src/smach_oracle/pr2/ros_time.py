@@ -1,4 +1,5 @@
 """The time that work takes in a simulated world, passed over ROS."""
+
 import threading
 from typing import Optional
 

@@ -4,6 +4,7 @@ Costs go by the amount of work and never by a clock: the same question costs the
 and under any load. The figures are orders of magnitude for the computers that a PR2 carries, not
 measurements. On today's machines the same work takes a tenth of that, or less.
 """
+
 from typing import NamedTuple
 
 # With a millisecond for a check of the whole robot, a path of 75 to 1000 checks takes 0.1 to 1 s,
@@ -29,5 +30,9 @@ class Work(NamedTuple):
     @property
     def seconds(self) -> float:
         """s of the world's time that it takes."""
-        return (self.checks * CHECK_S + self.samples * SAMPLE_S + self.images * IMAGE_S +
-                self.detections * DETECTION_S)
+        return (
+            self.checks * CHECK_S
+            + self.samples * SAMPLE_S
+            + self.images * IMAGE_S
+            + self.detections * DETECTION_S
+        )

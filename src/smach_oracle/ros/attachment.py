@@ -5,6 +5,7 @@ The expert, the publishers, the introspection, the recorder and the watch over t
 Started at the first execute of a machine that needs it, so that importing this package, building
 machines and wrapping them cost nothing and need no ROS master.
 """
+
 import functools
 import os
 import threading
@@ -141,8 +142,11 @@ class Attachments:
             yield
         finally:
             self._leave(trial)
-            if not is_inner and self.guard is not None and (
-                    threading.current_thread() is threading.main_thread()):
+            if (
+                not is_inner
+                and self.guard is not None
+                and (threading.current_thread() is threading.main_thread())
+            ):
                 self.guard.wait_for_handler()  # others may still run
 
     def _leave(self, trial: _BegunTrial) -> None:
@@ -154,8 +158,10 @@ class Attachments:
 
         It takes no lock: a signal's handler asks.
         """
-        return max((oracle_of(each.machine).settings.after_preempt_s
-                    for each in list(self._trials)), default=0.0)
+        return max(
+            (oracle_of(each.machine).settings.after_preempt_s for each in list(self._trials)),
+            default=0.0,
+        )
 
     def attach(self, machine: OracleContainer) -> None:
         """Attach a top-level machine. It does nothing the second time.
@@ -227,7 +233,8 @@ class Attachments:
         self._hand = HandServer()
         if private_flag('diagnostics', True):
             self._diagnostics = DiagnosticsPublisher(
-                rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER))
+                rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER)
+            )
 
     def _attach_to_node(self, machine: OracleContainer) -> None:
         introspect = private_flag('introspection', True)  # first, since it may raise
@@ -263,8 +270,9 @@ class Attachments:
 
     def _shared_expert(self) -> ExpertQueryClient:
         if self._expert is None:
-            self._expert = ExpertQueryClient(private_text('expert_query_server'),
-                                             cameras=private_names('failure_cameras'))
+            self._expert = ExpertQueryClient(
+                private_text('expert_query_server'), cameras=private_names('failure_cameras')
+            )
         return self._expert
 
     def _plan_recording(self, node: bool) -> Optional[_RecordingPlan]:
@@ -283,9 +291,11 @@ class Attachments:
         if node:
             topics += private_names('record_topics')
             topics += smach_topics(rospy.get_name()) + action_topics(
-                rospy.resolve_name('~expert_query'))
+                rospy.resolve_name('~expert_query')
+            )
             audit = audit_topic(
-                rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER))
+                rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER)
+            )
             types = {audit: ConsoleCommand, rospy.resolve_name(OUTPUT_TOPIC): InterfaceOutput}
             if private_names('failure_cameras'):
                 types[rospy.resolve_name(FRAMES_TOPIC)] = FailureFrames
@@ -295,13 +305,15 @@ class Attachments:
 
     def _record(self, machine: OracleContainer, plan: Optional[_RecordingPlan]) -> None:
         if plan is not None:
-            self._recorder = TrialRecorder(plan.folder, plan.topics, types=plan.types,
-                                           keep=plan.keep)
+            self._recorder = TrialRecorder(
+                plan.folder, plan.topics, types=plan.types, keep=plan.keep
+            )
         if self._recorder is not None:
             if self._diagnostics is not None:
                 self._diagnostics.listen_to_recorder()
-            self._recorder.attach(oracle_of(machine).events,
-                                  {'~oracle/rates': _snapshot_of_rates(machine)})
+            self._recorder.attach(
+                oracle_of(machine).events, {'~oracle/rates': _snapshot_of_rates(machine)}
+            )
 
     def _on_shutdown(self) -> None:
         """rospy's shutdown hook, often run inside a signal handler in the machine's own thread.
@@ -326,12 +338,17 @@ def leave_node_to_parent() -> None:
     rospy would close the connections under the parent, and unregister its topics.
     """
     core = rospy.core
-    hooks = ((core._client_shutdown_hooks, ('smach_oracle.',)),
-             (core._preshutdown_hooks, ('rospy.', 'rosgraph.')),
-             (core._shutdown_hooks, ('rospy.', 'rosgraph.')))
+    hooks = (
+        (core._client_shutdown_hooks, ('smach_oracle.',)),
+        (core._preshutdown_hooks, ('rospy.', 'rosgraph.')),
+        (core._shutdown_hooks, ('rospy.', 'rosgraph.')),
+    )
     for registered, modules in hooks:
-        registered[:] = [each for each in registered
-                         if not str(getattr(each, '__module__', '')).startswith(modules)]
+        registered[:] = [
+            each
+            for each in registered
+            if not str(getattr(each, '__module__', '')).startswith(modules)
+        ]
     del core._shutdown_threads[:]
     if _bare_loggers:
         smach.set_loggers(*_bare_loggers)
@@ -364,8 +381,10 @@ def _is_running_proxy(callback: object) -> bool:
     if not isinstance(callback, types.MethodType):
         return False
     owner = callback.__self__
-    return (type(owner).__module__ == 'smach_ros.introspection'
-            and own_mark(owner, '_keep_running') is not False)
+    return (
+        type(owner).__module__ == 'smach_ros.introspection'
+        and own_mark(owner, '_keep_running') is not False
+    )
 
 
 def start_introspection(machine: OracleContainer) -> IntrospectionServer:
@@ -381,6 +400,7 @@ def _snapshot_of_rates(machine: OracleContainer) -> Callable[[], Optional[Oracle
     def take() -> Optional[OracleRates]:
         alive = reference()
         return None if alive is None else rates_of(alive)
+
     return take
 
 

@@ -1,4 +1,5 @@
 """The command line of a node that is set by ROS parameters alone, and a name that is free."""
+
 import argparse
 import http.client
 import itertools
@@ -29,7 +30,7 @@ def init_beside_others(name: str) -> None:
     ROS would end the other one. This node takes the name with a number then, `expert_console_2`,
     with the parameters that were set for the name it gave up.
     """
-    wanted = next((arg[len(OWN_NAME):] for arg in sys.argv if arg.startswith(OWN_NAME)), name)
+    wanted = next((arg[len(OWN_NAME) :] for arg in sys.argv if arg.startswith(OWN_NAME)), name)
     free = _free_name(wanted)
     if free == wanted:
         rospy.init_node(name)
@@ -37,8 +38,9 @@ def init_beside_others(name: str) -> None:
     given = [arg for arg in sys.argv if not arg.startswith(OWN_NAME)]
     _copy_parameters(wanted, free)
     rospy.init_node(free, argv=given)
-    rospy.logwarn('A node %s already runs on this master. This one is %s.', _full(wanted),
-                  rospy.get_name())
+    rospy.logwarn(
+        'A node %s already runs on this master. This one is %s.', _full(wanted), rospy.get_name()
+    )
 
 
 def _full(name: str) -> str:

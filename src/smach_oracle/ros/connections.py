@@ -1,4 +1,5 @@
 """Connections that are there, of which the other side surely knows, or that rospy is closing."""
+
 import http.client
 import socket
 import time
@@ -66,8 +67,9 @@ class ConnectionGrace:
         :param connections: of subscribers of this node.
         """
         sockets = tuple(each.socket for each in connections)
-        new = [each for each in connections
-               if not any(each.socket is known for known in self._known)]
+        new = [
+            each for each in connections if not any(each.socket is known for known in self._known)
+        ]
         if new:
             _wait_until_known(new)
         self._known = sockets
@@ -100,8 +102,17 @@ def _topics_sent_by(uri: str) -> Optional[Set[str]]:
         with xmlrpc.client.ServerProxy(uri, TimedTransport()) as node:
             answer: Any = node.getBusInfo(caller)
         code, _, listed = answer
-        return {each[4] for each in listed
-                if each[1] == caller and each[2] == 'o'} if code == 1 else None
-    except (OSError, xmlrpc.client.Error, http.client.HTTPException, ValueError, TypeError,
-            IndexError):
+        return (
+            {each[4] for each in listed if each[1] == caller and each[2] == 'o'}
+            if code == 1
+            else None
+        )
+    except (
+        OSError,
+        xmlrpc.client.Error,
+        http.client.HTTPException,
+        ValueError,
+        TypeError,
+        IndexError,
+    ):
         return None

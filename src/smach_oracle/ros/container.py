@@ -6,6 +6,7 @@ expert (action server `~expert_query`, or the one that `~expert_query_server` na
 `~oracle/events` and `~oracle/rates`, an introspection server (`~introspection`, default true) and a
 recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves as the bare one.
 """
+
 import functools
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
 
@@ -60,25 +61,50 @@ class OracleContainer(BareContainer):
     as it is.
     """
 
-    def __init__(self, outcomes: Sequence[str], input_keys: Sequence[str] = (),
-                 output_keys: Sequence[str] = (), *, settings: SettingsLike = None,
-                 preconditions: PreconditionLists = None, name: str = '',
-                 expert: Optional[Expert] = None, recover: bool = True,
-                 strict: Strictness = True, health: Optional[HealthFunction] = None) -> None:
+    def __init__(
+        self,
+        outcomes: Sequence[str],
+        input_keys: Sequence[str] = (),
+        output_keys: Sequence[str] = (),
+        *,
+        settings: SettingsLike = None,
+        preconditions: PreconditionLists = None,
+        name: str = '',
+        expert: Optional[Expert] = None,
+        recover: bool = True,
+        strict: Strictness = True,
+        health: Optional[HealthFunction] = None,
+    ) -> None:
         """See `smach_oracle.oracle.OracleContainer`.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
-        super().__init__(outcomes, input_keys, output_keys,
-                         settings=checked(settings, preconditions), name=name, expert=expert,
-                         recover=recover, strict=strict, health=health)
+        super().__init__(
+            outcomes,
+            input_keys,
+            output_keys,
+            settings=checked(settings, preconditions),
+            name=name,
+            expert=expert,
+            recover=recover,
+            strict=strict,
+            health=health,
+        )
         _remember(self, settings, preconditions, None)
 
     @classmethod
-    def wrap(cls, machine: smach.StateMachine, preconditions: PreconditionLists = None,
-             settings: SettingsLike = None, nested: Optional[Nested] = None, name: str = '',
-             expert: Optional[Expert] = None, strict: Strictness = True, recover: bool = True,
-             health: Optional[HealthFunction] = None) -> 'OracleContainer':
+    def wrap(
+        cls,
+        machine: smach.StateMachine,
+        preconditions: PreconditionLists = None,
+        settings: SettingsLike = None,
+        nested: Optional[Nested] = None,
+        name: str = '',
+        expert: Optional[Expert] = None,
+        strict: Strictness = True,
+        recover: bool = True,
+        health: Optional[HealthFunction] = None,
+    ) -> 'OracleContainer':
         """Put a machine under an oracle and return it: the same object.
 
         See `smach_oracle.oracle.OracleContainer.wrap`.
@@ -86,8 +112,15 @@ class OracleContainer(BareContainer):
         :raises SettingsError: naming key, value and what is allowed.
         """
         wrapped: OracleContainer = super().wrap(  # type: ignore[assignment]
-            machine, settings=checked(settings, preconditions), nested=nested, name=name,
-            expert=expert, strict=strict, recover=recover, health=health)
+            machine,
+            settings=checked(settings, preconditions),
+            nested=nested,
+            name=name,
+            expert=expert,
+            strict=strict,
+            recover=recover,
+            health=health,
+        )
         _remember(wrapped, settings, preconditions, nested)
         return wrapped
 
@@ -124,8 +157,11 @@ def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> 
         is known.
     """
     try:
-        result = settings if isinstance(settings, Settings) else Settings.from_dict(
-            settings, resolve_python)
+        result = (
+            settings
+            if isinstance(settings, Settings)
+            else Settings.from_dict(settings, resolve_python)
+        )
     except SettingsError as err:
         raise (settings.located(err) if isinstance(settings, LoadedSettings) else err) from err
     if preconditions is None:
@@ -133,12 +169,16 @@ def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> 
     if not isinstance(preconditions, Mapping):
         raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
     return result.with_states(
-        {label: {'preconditions': given}
-         for label, given in preconditions.items()}, resolve_python)
+        {label: {'preconditions': given} for label, given in preconditions.items()}, resolve_python
+    )
 
 
-def _remember(machine: BareContainer, settings: SettingsLike, preconditions: PreconditionLists,
-              nested: Optional[Nested]) -> None:
+def _remember(
+    machine: BareContainer,
+    settings: SettingsLike,
+    preconditions: PreconditionLists,
+    nested: Optional[Nested],
+) -> None:
     if isinstance(settings, Settings):
         _given.forget(machine)
     else:
@@ -162,16 +202,21 @@ def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
     checkpoint, checkpoint_name = outside_main_thread(read_checkpoint)
     if parameters or checkpoint:
         settings = LoadedSettings(given.settings)
-        for values, name in ((parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM)),
-                             (checkpoint, checkpoint_name)):
+        for values, name in (
+            (parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM)),
+            (checkpoint, checkpoint_name),
+        ):
             for change in settings.overridden_by(values):
-                _tell_once('{}: the {} overrides {}'.format(
-                    oracle_of(machine).path, name, change))
+                _tell_once('{}: the {} overrides {}'.format(oracle_of(machine).path, name, change))
             settings.put(values, name)
         complain: Strictness = strict
         if callable(strict):
             complain = Complaint(strict, settings.located)
-        BareContainer.wrap(machine, settings=checked(settings, given.preconditions),
-                           nested=given.nested, strict=complain,
-                           recover=oracle_of(machine).recovers)
+        BareContainer.wrap(
+            machine,
+            settings=checked(settings, given.preconditions),
+            nested=given.nested,
+            strict=complain,
+            recover=oracle_of(machine).recovers,
+        )
     _given.forget(machine)  # only now: a program that tries again after an error gets it again

@@ -1,4 +1,5 @@
 """Translates the executive's events and rates to OracleEvent and OracleRates messages."""
+
 import json
 from typing import Iterable, Optional
 
@@ -22,26 +23,49 @@ def to_msg(event: Event, stamp: Optional[genpy.Time] = None) -> OracleEvent:
     header = Header(stamp=ros_now() if stamp is None else stamp)
     place = (event.path, event.state, event.outcome, event.target)
     words = (event.query_id, event.by, event.text)
-    return OracleEvent(int(event.kind), header, float(event.wall_time),
-                       sendable_text(event.trial_id), event.seq, *map(sendable_text, place),
-                       int(event.failure_kind), int(event.failure_class), float(event.rate),
-                       bool(event.continuous), *map(sendable_text, words), json_of(event.data))
+    return OracleEvent(
+        int(event.kind),
+        header,
+        float(event.wall_time),
+        sendable_text(event.trial_id),
+        event.seq,
+        *map(sendable_text, place),
+        int(event.failure_kind),
+        int(event.failure_class),
+        float(event.rate),
+        bool(event.continuous),
+        *map(sendable_text, words),
+        json_of(event.data),
+    )
 
 
-def rates_to_msg(trial_id: str, rates: Iterable[StateRateRow],
-                 transitions: Iterable[TransitionRow]) -> OracleRates:
+def rates_to_msg(
+    trial_id: str, rates: Iterable[StateRateRow], transitions: Iterable[TransitionRow]
+) -> OracleRates:
     """Translate what has been learned of one wrapped machine.
 
     :param rates: rows of `OracleContainer.rates()`.
     :param transitions: rows of `OracleContainer.transition_counts()`.
     :returns: an OracleRates, stamped with ROS time now (zero where this process runs without ROS).
     """
-    return OracleRates(Header(stamp=ros_now()), sendable_text(trial_id), [
-        StateRate(sendable_text(row.path), sendable_text(row.state), float(row.rate),
-                  int(row.failure_class), row.successes, row.failures, row.recoveries,
-                  bool(row.has_preconditions))
-        for row in rates
-    ], [TransitionCount(*map(sendable_text, row[:4]), row[4]) for row in transitions])
+    return OracleRates(
+        Header(stamp=ros_now()),
+        sendable_text(trial_id),
+        [
+            StateRate(
+                sendable_text(row.path),
+                sendable_text(row.state),
+                float(row.rate),
+                int(row.failure_class),
+                row.successes,
+                row.failures,
+                row.recoveries,
+                bool(row.has_preconditions),
+            )
+            for row in rates
+        ],
+        [TransitionCount(*map(sendable_text, row[:4]), row[4]) for row in transitions],
+    )
 
 
 def ros_now() -> genpy.Time:

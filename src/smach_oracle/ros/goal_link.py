@@ -3,6 +3,7 @@
 actionlib's own waiting goes by ROS time, which stands still in a paused simulation, and does not
 notice a server that has died. This goes by the connections themselves.
 """
+
 import math
 import queue
 import threading
@@ -79,8 +80,12 @@ class SentGoal:
             self._ended_s = time.monotonic()
         elif state == actionlib.CommState.DONE:
             self._events.put(
-                GoalEvent(status=handle.get_terminal_state(), result=handle.get_result(),
-                          text=handle.get_goal_status_text()))
+                GoalEvent(
+                    status=handle.get_terminal_state(),
+                    result=handle.get_result(),
+                    text=handle.get_goal_status_text(),
+                )
+            )
 
     def on_feedback(self, _handle: actionlib.ClientGoalHandle, feedback: genpy.Message) -> None:
         """Take feedback. This is actionlib's callback."""
@@ -116,8 +121,12 @@ class ServedClient(actionlib.ActionClient):
             return True
         if now_s - self._ignored_s.setdefault(node, now_s) > LISTENS_AFTER_S:
             self._ignored_s[node] = math.inf
-            rospy.logwarn('%s: ignored what %s reports about goals, as it does not listen for '
-                          'them. A bag that is played does that', rospy.resolve_name(self.ns), node)
+            rospy.logwarn(
+                '%s: ignored what %s reports about goals, as it does not listen for '
+                'them. A bag that is played does that',
+                rospy.resolve_name(self.ns),
+                node,
+            )
         return False
 
 
@@ -131,9 +140,13 @@ class GoalLink:
         self.name = name
         # Small messages that must not wait for a full packet, the first subscriber of a topic
         # decides.
-        self._fast = [rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
-                      for end, kind in (('/result', type(action_spec().action_result)),
-                                        ('/feedback', type(action_spec().action_feedback)))]
+        self._fast = [
+            rospy.Subscriber(name + end, kind, queue_size=10, tcp_nodelay=True)
+            for end, kind in (
+                ('/result', type(action_spec().action_result)),
+                ('/feedback', type(action_spec().action_feedback)),
+            )
+        ]
         self._client = ServedClient(name, action_spec)
         self._grace = ConnectionGrace()
 
@@ -154,12 +167,16 @@ class GoalLink:
         news = (client.status_sub, client.result_sub, client.feedback_sub)
         for server in [each.callerid_pub for each in live_connections(client.status_sub)]:
             heard = [
-                next((each
-                      for each in live_connections(topic) if each.callerid_pub == server), None)
+                next(
+                    (each for each in live_connections(topic) if each.callerid_pub == server), None
+                )
                 for topic in news
             ]
-            if all(heard) and _reaches(client.pub_goal, server) and _reaches(
-                    client.pub_cancel, server):
+            if (
+                all(heard)
+                and _reaches(client.pub_goal, server)
+                and _reaches(client.pub_cancel, server)
+            ):
                 return heard
         return []
 

@@ -11,6 +11,7 @@ the first goals 2 of 20 still hung. With what follows 0 of 30 did.
 The lock cannot be part of a deadlock. Its holder is within `send_goal`, which calls nobody back and
 takes no lock of a goal. Whoever waits for it may therefore hold any of those, as callbacks do.
 """
+
 import functools
 import threading
 from typing import Any

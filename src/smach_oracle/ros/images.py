@@ -1,4 +1,5 @@
 """Images and point clouds between ROS messages and arrays. Needs the message packages, no node."""
+
 from typing import Optional, Tuple
 
 import numpy as np
@@ -6,8 +7,13 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2, PointField
 from std_msgs.msg import Header
 
 _COLOURS = {
-    'rgb8': (3, (0, 1, 2)), 'bgr8': (3, (2, 1, 0)), 'rgba8': (4, (0, 1, 2)),
-    'bgra8': (4, (2, 1, 0)), 'mono8': (1, (0, 0, 0)), '8UC1': (1, (0, 0, 0)), '8UC3': (3, (2, 1, 0))
+    'rgb8': (3, (0, 1, 2)),
+    'bgr8': (3, (2, 1, 0)),
+    'rgba8': (4, (0, 1, 2)),
+    'bgra8': (4, (2, 1, 0)),
+    'mono8': (1, (0, 0, 0)),
+    '8UC1': (1, (0, 0, 0)),
+    '8UC3': (3, (2, 1, 0)),
 }
 _DEPTHS = {'32FC1': ('f4', 1.0), '16UC1': ('u2', 0.001), 'mono16': ('u2', 0.001)}
 
@@ -52,7 +58,9 @@ def intrinsics_of(info: CameraInfo) -> np.ndarray:
     if not (np.isfinite(matrix).all() and matrix[0, 0] > 0 and matrix[1, 1] > 0):
         raise ImageError(
             'camera info of {}: focal lengths must be greater than 0; is it calibrated?'.format(
-                info.header.frame_id or '(no frame)'))
+                info.header.frame_id or '(no frame)'
+            )
+        )
     return matrix
 
 
@@ -71,8 +79,9 @@ def mask_image(mask: np.ndarray, header: Header) -> Image:
     return _image(np.where(mask, 255, 0).astype(np.uint8), 'mono8', header)
 
 
-def cloud_message(points: np.ndarray, header: Header,
-                  colours: Optional[np.ndarray] = None) -> PointCloud2:
+def cloud_message(
+    points: np.ndarray, header: Header, colours: Optional[np.ndarray] = None
+) -> PointCloud2:
     """Make a cloud of points (n, 3) in m, or organised (h, w, 3).
 
     :param colours: uint8 of the same shape. They become `rgb`.
@@ -98,13 +107,15 @@ def cloud_message(points: np.ndarray, header: Header,
         fields=[
             PointField(name, 4 * index, PointField.FLOAT32, 1)  # rgb, too: so RViz and PCL have it
             for index, (name, _) in enumerate(fields)
-        ])
+        ],
+    )
 
 
 def _known(image: Image, table: dict) -> Tuple:
     if image.encoding not in table:
-        raise ImageError('image has encoding {!r}; allowed: {}'.format(
-            image.encoding, ', '.join(sorted(table))))
+        raise ImageError(
+            'image has encoding {!r}; allowed: {}'.format(image.encoding, ', '.join(sorted(table)))
+        )
     return table[image.encoding]
 
 
@@ -112,17 +123,37 @@ def _pixels(image: Image, kind: str, channels: int) -> np.ndarray:
     """(h, w, channels), rows without their padding."""
     pixel = np.dtype(kind).newbyteorder('>' if image.is_bigendian else '<')
     row = image.width * channels * pixel.itemsize
-    if not image.width or not image.height or image.step < row or len(
-            image.data) < image.step * image.height:
+    if (
+        not image.width
+        or not image.height
+        or image.step < row
+        or len(image.data) < image.step * image.height
+    ):
         raise ImageError(
-            'image of {} x {} {} has {} bytes in rows of {}; it needs {} in rows of {} or more'.
-            format(image.width, image.height, image.encoding, len(image.data), image.step,
-                   row * image.height, row))
-    rows = np.frombuffer(image.data, np.uint8,
-                         image.step * image.height).reshape(image.height, image.step)[:, :row]
+            'image of {} x {} {} has {} bytes in rows of {}; it needs {} in rows of {} '
+            'or more'.format(
+                image.width,
+                image.height,
+                image.encoding,
+                len(image.data),
+                image.step,
+                row * image.height,
+                row,
+            )
+        )
+    rows = np.frombuffer(image.data, np.uint8, image.step * image.height).reshape(
+        image.height, image.step
+    )[:, :row]
     return np.ascontiguousarray(rows).view(pixel).reshape(image.height, image.width, channels)
 
 
 def _image(array: np.ndarray, encoding: str, header: Header) -> Image:
-    return Image(header=header, height=array.shape[0], width=array.shape[1], encoding=encoding,
-                 is_bigendian=0, step=array.strides[0], data=array.tobytes())
+    return Image(
+        header=header,
+        height=array.shape[0],
+        width=array.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=array.strides[0],
+        data=array.tobytes(),
+    )

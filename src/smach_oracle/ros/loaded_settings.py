@@ -4,6 +4,7 @@ The parameter `~oracle` overrides the file, the command line overrides both. Map
 by key, everything else is replaced. `smach_oracle.oracle` checks the values. Here every error
 learns where the key came from.
 """
+
 import importlib
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
 
@@ -32,8 +33,9 @@ class LoadedSettings(Dict[str, Any]):
         if values:
             self.put(values, 'settings given in code')
 
-    def put(self, values: Mapping[str, Any], origin: str,
-            lines: Optional[Mapping[str, int]] = None) -> None:
+    def put(
+        self, values: Mapping[str, Any], origin: str, lines: Optional[Mapping[str, int]] = None
+    ) -> None:
         """Merge values over those that are there.
 
         :param origin: what to call this source in an error.
@@ -52,15 +54,18 @@ class LoadedSettings(Dict[str, Any]):
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
         mine, theirs = dict(_leaves(plain(self))), dict(_leaves(plain(values)))
-        return ['{}: {!r}, now {!r}'.format(key, mine[key], value)
-                for key, value in theirs.items() if key in mine and not is_same(mine[key], value)]
+        return [
+            '{}: {!r}, now {!r}'.format(key, mine[key], value)
+            for key, value in theirs.items()
+            if key in mine and not is_same(mine[key], value)
+        ]
 
     def origin(self, key: str) -> str:
         """Return where a dotted key, or the mapping it should be in, was set, '' for nowhere."""
         while key:
             if key in self._origins:
                 return self._origins[key]
-            key = key[:max(key.rfind('.'), key.rfind('['), 0)]
+            key = key[: max(key.rfind('.'), key.rfind('['), 0)]
         return ''
 
     def located(self, err: SettingsError) -> SettingsError:
@@ -69,8 +74,11 @@ class LoadedSettings(Dict[str, Any]):
         return err.set_at(origin) if origin else err
 
 
-def load_settings(path: Optional[str] = None, param: Optional[str] = DEFAULT_PARAM,
-                  overrides: Optional[Mapping[str, Any]] = None) -> LoadedSettings:
+def load_settings(
+    path: Optional[str] = None,
+    param: Optional[str] = DEFAULT_PARAM,
+    overrides: Optional[Mapping[str, Any]] = None,
+) -> LoadedSettings:
     """Read and merge the settings.
 
     :param path: a YAML file, or None.
@@ -99,8 +107,9 @@ def read_param(param: str) -> Dict[str, Any]:
     """
     values = read_or_default(param, {})
     if not isinstance(values, dict):
-        raise SettingsError('parameter ' + rospy.resolve_name(param), values,
-                            'a mapping of settings')
+        raise SettingsError(
+            'parameter ' + rospy.resolve_name(param), values, 'a mapping of settings'
+        )
     if isinstance(values.get('states'), dict):
         values['states'] = dict(_state_entries(values['states']))
     return values
@@ -112,8 +121,10 @@ def read_checkpoint() -> Tuple[Dict[str, Any], str]:
     :returns: with it the name of the parameter.
     """
     value = read_or_default(CHECKPOINT_PARAM, '')
-    return ({'checkpoint': value} if value != '' else {},
-            'parameter ' + str(rospy.resolve_name(CHECKPOINT_PARAM)))
+    return (
+        {'checkpoint': value} if value != '' else {},
+        'parameter ' + str(rospy.resolve_name(CHECKPOINT_PARAM)),
+    )
 
 
 def resolve_python(name: str) -> object:
@@ -146,7 +157,7 @@ def split_python_name(name: str) -> Tuple[str, str]:
 
     :raises ValueError: where it has another form.
     """
-    parts = name[len(PYTHON_PREFIX):].split(':') if name.startswith(PYTHON_PREFIX) else []
+    parts = name[len(PYTHON_PREFIX) :].split(':') if name.startswith(PYTHON_PREFIX) else []
     if len(parts) != 2 or not all(parts):
         raise ValueError('the form is python:module:attribute')
     return parts[0], parts[1]

@@ -4,6 +4,7 @@ A name is the first part of every path, in events, bags and pages, so it has no 
 node /robot1/task it is `task`. What rospy adds to the name of an anonymous node is left out, for a
 machine goes by one name in every run.
 """
+
 import re
 import threading
 from contextlib import contextmanager

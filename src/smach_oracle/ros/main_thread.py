@@ -4,6 +4,7 @@ rospy's proxy of the master has one lock, which is not re-entrant, and rospy's o
 signal takes it: a signal that meets the main thread within a call to the master hangs the process
 for good. In another thread the call ends while the handler waits for the lock.
 """
+
 import threading
 from typing import Callable, List, TypeVar
 
@@ -26,8 +27,7 @@ def outside_main_thread(function: Callable[[], Result]) -> Result:
     :raises rospy.ROSInterruptException: where the node shuts down, and the function has not
         returned 2 s later.
     """
-    if (threading.current_thread() is not threading.main_thread()
-            or not rospy.core.is_initialized()):
+    if threading.current_thread() is not threading.main_thread() or not rospy.core.is_initialized():
         return function()
     results: List[Result] = []
     call = BackgroundCall(lambda: results.append(function()), 'calls the master')

@@ -4,6 +4,7 @@ A node registers its topics and services once. A master that is restarted knows 
 existing connections go on, but nobody new can find the node. `MasterWatch` notices and registers
 everything again.
 """
+
 import threading
 import time
 import xmlrpc.client
@@ -86,8 +87,10 @@ class MasterLink:
         with self._proxy() as master:
             for service, uri in items.services:
                 self._call(master.registerService, service, uri, self._node_uri)
-            found = [(topic, self._call(master.registerSubscriber, topic, kind, self._node_uri))
-                     for topic, kind in items.subscriptions]
+            found = [
+                (topic, self._call(master.registerSubscriber, topic, kind, self._node_uri))
+                for topic, kind in items.subscriptions
+            ]
             for topic, kind in items.publications:
                 self._call(master.registerPublisher, topic, kind, self._node_uri)
             return found
@@ -110,9 +113,13 @@ class MasterWatch:
     process id, or does not know this node, or could not be reached before.
     """
 
-    def __init__(self, link: MasterLink, registrations: Callable[[], Registrations],
-                 found_publishers: Callable[[str, List[str]],
-                                            None], poll_s: float = POLL_S) -> None:
+    def __init__(
+        self,
+        link: MasterLink,
+        registrations: Callable[[], Registrations],
+        found_publishers: Callable[[str, List[str]], None],
+        poll_s: float = POLL_S,
+    ) -> None:
         self._link = link
         self._registrations = registrations
         self._found_publishers = found_publishers
@@ -158,12 +165,18 @@ class MasterWatch:
         rospy.logwarn(
             'The ROS master was restarted: registered %d publishers, %d subscribers and %d '
             'services again.',
-            len(items.publications), len(items.subscriptions), len(items.services))
+            len(items.publications),
+            len(items.subscriptions),
+            len(items.services),
+        )
 
     def _note_loss(self, err: Exception) -> None:
         if not self._lost and not self._stop.is_set() and not rospy.is_shutdown():
-            rospy.logwarn('The ROS master does not answer (%s); looking again every %.1f s.', err,
-                          self._poll_s)
+            rospy.logwarn(
+                'The ROS master does not answer (%s); looking again every %.1f s.',
+                err,
+                self._poll_s,
+            )
         self._lost = True
 
     def _run(self) -> None:
@@ -195,8 +208,9 @@ def start_master_watch() -> MasterWatch:
     with _watch_lock:
         if _watch is None:
             _keep_log_from_master()
-            link = MasterLink(rosgraph.get_master_uri(), rospy.get_name(),
-                              rospy.core.get_node_uri())
+            link = MasterLink(
+                rosgraph.get_master_uri(), rospy.get_name(), rospy.core.get_node_uri()
+            )
             _watch = MasterWatch(link, _own_registrations, _connect)
             _watch.start()
         return _watch
@@ -224,8 +238,9 @@ def _keep_log_from_master() -> None:
 
 def _own_registrations() -> Registrations:
     topics = get_topic_manager()
-    return Registrations(topics.get_publications(), topics.get_subscriptions(),
-                         get_service_manager().get_services())
+    return Registrations(
+        topics.get_publications(), topics.get_subscriptions(), get_service_manager().get_services()
+    )
 
 
 def _connect(topic: str, publisher_uris: List[str]) -> None:

@@ -1,4 +1,5 @@
 """A node's private parameters, checked: an error names the parameter and what is allowed."""
+
 import math
 from typing import Any, List, Mapping
 
@@ -104,8 +105,11 @@ def private_number(name: str) -> float:
 
     :raises SettingsError: where it is not.
     """
-    return float(checks.number(0, math.inf, 'a number from 0')(
-        _key_of(name), read_or_default('~' + name, 0.0)))
+    return float(
+        checks.number(0, math.inf, 'a number from 0')(
+            _key_of(name), read_or_default('~' + name, 0.0)
+        )
+    )
 
 
 def private_names(name: str) -> List[str]:

@@ -4,6 +4,7 @@ Both are fed by the machine's own thread and never hold it: an event goes to ros
 which drops its oldest entry where a subscriber is too slow (the gap shows in the sequence numbers).
 Rates go out from a thread of their own.
 """
+
 import threading
 import time
 import weakref
@@ -23,10 +24,16 @@ from .log.said_once import SaidOnce
 
 QUEUE_SIZE = 1000  # events waiting for one slow subscriber, about 0.3 MB
 RATES_PERIOD_S = 0.2  # at most 5 Hz
-KINDS_THAT_CHANGE_RATES = frozenset([
-    EventKind.TRIAL_START, EventKind.TRANSITION, EventKind.FAILURE, EventKind.JUMP,
-    EventKind.SUPERSEDE, EventKind.GIVE_UP
-])
+KINDS_THAT_CHANGE_RATES = frozenset(
+    [
+        EventKind.TRIAL_START,
+        EventKind.TRANSITION,
+        EventKind.FAILURE,
+        EventKind.JUMP,
+        EventKind.SUPERSEDE,
+        EventKind.GIVE_UP,
+    ]
+)
 
 
 class RatesSource(Protocol):
@@ -173,8 +180,9 @@ class RatesPublisher:
             # a table grew while it was read: the machine goes on, the next round gets it
             self.request(machine)
         except Exception as err:  # this thread serves every machine of the process
-            self._error_once('~oracle/rates are not published: {}. This is said once'.format(
-                error_text(err)))
+            self._error_once(
+                '~oracle/rates are not published: {}. This is said once'.format(error_text(err))
+            )
 
 
 class _RatesObserver(OwnObserver):

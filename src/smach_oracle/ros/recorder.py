@@ -2,6 +2,7 @@
 
 No event is lost, and the robot is never held up for good.
 """
+
 import atexit
 import logging
 import os
@@ -62,11 +63,20 @@ class TrialRecorder(OwnObserver):
     observer_name = 'the recorder'
     without_it = 'this event is not in the bag'
 
-    def __init__(self, folder: str, topics: Sequence[str] = (), *,
-                 types: Optional[Mapping[str, MessageClass]] = None, warn: Optional[Log] = None,
-                 say: Optional[Log] = None, on_status: Optional[StatusCallback] = None,
-                 max_events: int = MAX_EVENTS, max_message_bytes: int = MAX_MESSAGE_BYTES,
-                 hung_after_s: float = HUNG_AFTER_S, keep: Limits = NO_LIMITS) -> None:
+    def __init__(
+        self,
+        folder: str,
+        topics: Sequence[str] = (),
+        *,
+        types: Optional[Mapping[str, MessageClass]] = None,
+        warn: Optional[Log] = None,
+        say: Optional[Log] = None,
+        on_status: Optional[StatusCallback] = None,
+        max_events: int = MAX_EVENTS,
+        max_message_bytes: int = MAX_MESSAGE_BYTES,
+        hung_after_s: float = HUNG_AFTER_S,
+        keep: Limits = NO_LIMITS,
+    ) -> None:
         """Create the folder, mend the bags of recorders that died in it, and start.
 
         :param topics: names of other topics to record, each from when it is first published.
@@ -94,8 +104,14 @@ class TrialRecorder(OwnObserver):
         self._topics = own_topics()
         listens = bool(topics) and has_node()
         self._last_end = -LATE_S  # of a trial, by time.monotonic()
-        self._bags = TrialBags(self.folder, self._topics, self._reporter, self.losses, self._watch,
-                               LATE_S if listens else 0.0)
+        self._bags = TrialBags(
+            self.folder,
+            self._topics,
+            self._reporter,
+            self.losses,
+            self._watch,
+            LATE_S if listens else 0.0,
+        )
         self._bags.recover()
         self._attached: WeakIdentityMap[EventSource, bool] = WeakIdentityMap()
         self._hung = False
@@ -110,8 +126,9 @@ class TrialRecorder(OwnObserver):
     def _let_go(self) -> None:
         self._is_parents = True  # a child has no writer thread, and the bag is its parent's
 
-    def attach(self, machine: Union['OracleContainer', EventSource],
-               snapshots: Optional[Snapshots] = None) -> None:
+    def attach(
+        self, machine: Union['OracleContainer', EventSource], snapshots: Optional[Snapshots] = None
+    ) -> None:
         """Record the trials of a machine: an OracleContainer, or any EventSource. Twice is once.
 
         :param snapshots: by topic, what gives a message (or None) to be recorded at the start and
@@ -122,9 +139,14 @@ class TrialRecorder(OwnObserver):
             return
         self._attached[source] = True
         source.observers.append(
-            _MachineObserver(self._observe, self._put_snapshot, self._put_end, self._warn_once,
-                        {resolve(topic): take
-                         for topic, take in (snapshots or {}).items()}))
+            _MachineObserver(
+                self._observe,
+                self._put_snapshot,
+                self._put_end,
+                self._warn_once,
+                {resolve(topic): take for topic, take in (snapshots or {}).items()},
+            )
+        )
 
     def __call__(self, event: Event) -> None:
         """Record one event. The observer that a machine without snapshots may be given directly."""
@@ -134,8 +156,7 @@ class TrialRecorder(OwnObserver):
         if self._is_parents:
             return
         item = EventItem(event, now()._replace(wall=event.wall_time))
-        weight = (WEIGHT_OF_A_FILE
-                  if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED) else 1)
+        weight = WEIGHT_OF_A_FILE if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED) else 1
         if not self._queue.put_event(item, self._may_wait, weight):
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
@@ -159,13 +180,17 @@ class TrialRecorder(OwnObserver):
         if self._hung or self._closed:
             return
         self._hung = True
-        text = '{}: the disk has hung for more than {:g} s'.format(self.folder,
-                                                                   self._watch.hung_after_s)
+        text = '{}: the disk has hung for more than {:g} s'.format(
+            self.folder, self._watch.hung_after_s
+        )
         self._reporter.warn(
-            'Trials are not recorded any more, events are dropped and counted; {}'.format(text))
+            'Trials are not recorded any more, events are dropped and counted; {}'.format(text)
+        )
         self._report(
-            RecordingStatus(RecorderState.DROPPING, events_lost_in_total=self.losses.events,
-                            text=text))
+            RecordingStatus(
+                RecorderState.DROPPING, events_lost_in_total=self.losses.events, text=text
+            )
+        )
 
     def _write_all(self) -> None:
         try:
@@ -183,8 +208,9 @@ class TrialRecorder(OwnObserver):
     def _note_answer(self, items: Sequence[QueueItem]) -> None:
         if self._hung and items:
             self._hung = False
-            self._reporter.info('The disk answers again; {} events were lost so far'.format(
-                self.losses.events))
+            self._reporter.info(
+                'The disk answers again; {} events were lost so far'.format(self.losses.events)
+            )
 
     def _write(self, item: QueueItem) -> None:
         try:
@@ -195,9 +221,12 @@ class TrialRecorder(OwnObserver):
             self._tell_not_recorded(item, error_text(err))
 
     def _tell_not_recorded(self, item: QueueItem, why: str) -> None:
-        self._warn_once('Not recorded: {}: {}. The recorder goes on, and counts what it '
-                        'loses. This is said once'.format(repr_of(item)[:LONGEST_ITEM], why),
-                        type(item), why)
+        self._warn_once(
+            'Not recorded: {}: {}. The recorder goes on, and counts what it '
+            'loses. This is said once'.format(repr_of(item)[:LONGEST_ITEM], why),
+            type(item),
+            why,
+        )
 
     def _report(self, status: RecordingStatus) -> None:
         if status.state is RecorderState.IDLE and not self._closed:
@@ -207,8 +236,11 @@ class TrialRecorder(OwnObserver):
                 try:
                     publish(status)
                 except Exception as err:  # a listener must not stop the writer
-                    self._warn_once('Recorder status not passed on: {}. This is said once'.format(
-                        error_text(err)))
+                    self._warn_once(
+                        'Recorder status not passed on: {}. This is said once'.format(
+                            error_text(err)
+                        )
+                    )
 
     def close(self, timeout_s: float = CLOSE_S) -> bool:
         """Write what waits, close all bags, also of trials that have not ended, and stop.
@@ -228,8 +260,9 @@ class TrialRecorder(OwnObserver):
         done = self._queue.close(max(0.0, deadline - time.monotonic()))
         # unsubscribing talks to the master, which may be gone
         if first and self._listener is not None:
-            threading.Thread(target=self._listener.close, name='recorder unsubscribes',
-                             daemon=True).start()
+            threading.Thread(
+                target=self._listener.close, name='recorder unsubscribes', daemon=True
+            ).start()
         if first:
             self._report_closing(done)
         return done
@@ -241,9 +274,15 @@ class TrialRecorder(OwnObserver):
         atexit.unregister(self.close)
         if not done:
             self._reporter.warn(
-                '{}: the disk did not let the recorder close its bags in time'.format(self.folder))
-        self._report(RecordingStatus(RecorderState.CLOSED, events_lost_in_total=self.losses.events,
-                            messages_dropped=self.losses.messages))
+                '{}: the disk did not let the recorder close its bags in time'.format(self.folder)
+            )
+        self._report(
+            RecordingStatus(
+                RecorderState.CLOSED,
+                events_lost_in_total=self.losses.events,
+                messages_dropped=self.losses.messages,
+            )
+        )
 
 
 class _MachineObserver(OwnObserver):
@@ -254,9 +293,14 @@ class _MachineObserver(OwnObserver):
 
     observer_name, without_it = TrialRecorder.observer_name, TrialRecorder.without_it
 
-    def __init__(self, observe: Callable[[Event], None],
-                 put_snapshot: Callable[[str, str, genpy.Message], None],
-                 put_end: Callable[[str], None], warn_once: SaidOnce, snapshots: Snapshots) -> None:
+    def __init__(
+        self,
+        observe: Callable[[Event], None],
+        put_snapshot: Callable[[str, str, genpy.Message], None],
+        put_end: Callable[[str], None],
+        warn_once: SaidOnce,
+        snapshots: Snapshots,
+    ) -> None:
         self._observe = observe
         self._put_snapshot = put_snapshot
         self._put_end = put_end
@@ -280,8 +324,13 @@ class _MachineObserver(OwnObserver):
                 message = take()
             except Exception as err:  # the rates must not cost the events
                 why = error_text(err)
-                self._warn_once('No {} in the bag of {}: {}. This is said once'.format(
-                    topic, event.trial_id, why), topic, why)
+                self._warn_once(
+                    'No {} in the bag of {}: {}. This is said once'.format(
+                        topic, event.trial_id, why
+                    ),
+                    topic,
+                    why,
+                )
                 continue
             if message is not None:
                 self._put_snapshot(event.trial_id, topic, message)
@@ -292,8 +341,10 @@ class StatusPublisher:
 
     def __init__(self) -> None:
         from smach_oracle.msg import RecorderStatus
-        self._publisher = rospy.Publisher('~record/status', RecorderStatus, latch=True,
-                                          queue_size=10)
+
+        self._publisher = rospy.Publisher(
+            '~record/status', RecorderStatus, latch=True, queue_size=10
+        )
 
     def __call__(self, status: RecordingStatus) -> None:
         message = status_message(status)

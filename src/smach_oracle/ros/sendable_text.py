@@ -1,4 +1,5 @@
 """Texts that rospy can send. Pure."""
+
 from smach_oracle.foreign import text_of
 
 

@@ -1,4 +1,5 @@
 """Calls of services that end in time, whatever the server does."""
+
 import threading
 import time
 from typing import Optional
@@ -76,15 +77,17 @@ class ServiceCall(threading.Thread):
         if self.is_alive():
             raise ServerGoneError('{} does not answer'.format(name))
         if isinstance(self._error, NOT_REACHED):
-            raise ServerGoneError('{} cannot be reached: {}'.format(name,
-                                                                    self._error)) from self._error
+            raise ServerGoneError(
+                '{} cannot be reached: {}'.format(name, self._error)
+            ) from self._error
         if self._error is not None:
             raise self._error
         return self._response
 
 
-def call_service(name: str, kind: type, request: object,
-                 limit_s: float = CALL_LIMIT_S) -> genpy.Message:
+def call_service(
+    name: str, kind: type, request: object, limit_s: float = CALL_LIMIT_S
+) -> genpy.Message:
     """Call a service, waiting no longer than `limit_s`.
 
     :raises ServerGoneError: if there is no such service now, or no answer in time.

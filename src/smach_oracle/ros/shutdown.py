@@ -8,6 +8,7 @@ The guard hears a signal while the main thread sits in a C call that never comes
 process does with the signal otherwise (rospy's handler, KeyboardInterrupt) stays as it is. Where
 states behind a preempt may run, that waits for them.
 """
+
 import os
 import signal
 import sys
@@ -40,9 +41,14 @@ class ShutdownGuard:
         The handler of the signal waits until `trials_ended`, or so long, or until a second signal.
     """
 
-    def __init__(self, preempt: Callable[[], None], close: Callable[[float], None],
-                 end: Callable[[int], None] = end_program, limit_s: float = LIMIT_S,
-                 after_preempt_s: Callable[[], float] = lambda: 0.0) -> None:
+    def __init__(
+        self,
+        preempt: Callable[[], None],
+        close: Callable[[float], None],
+        end: Callable[[int], None] = end_program,
+        limit_s: float = LIMIT_S,
+        after_preempt_s: Callable[[], float] = lambda: 0.0,
+    ) -> None:
         self._preempt = preempt
         self._close = close
         self._end = end
@@ -70,8 +76,9 @@ class ShutdownGuard:
         setattr(signal, 'signal', self._signal_for_script)
         setattr(signal, 'getsignal', self._getsignal_for_script)
         in_child(self._let_go)
-        threading.Thread(target=self._listen, args=(ear,), name='shutdown_guard',
-                         daemon=True).start()
+        threading.Thread(
+            target=self._listen, args=(ear,), name='shutdown_guard', daemon=True
+        ).start()
 
     def arm(self, exit_code: int) -> None:
         """Preempt now and end the process by force after the limit.
@@ -216,8 +223,10 @@ def _means_the_end(number: int, handler: Any) -> bool:
     if isinstance(handler, int):
         return number == signal.SIGTERM and handler == signal.SIG_DFL
     function = getattr(handler, 'func', handler)  # asyncio's is a functools.partial
-    return function is signal.default_int_handler or getattr(
-        function, '__module__', '') in ('rospy.core', 'asyncio.runners')
+    return function is signal.default_int_handler or getattr(function, '__module__', '') in (
+        'rospy.core',
+        'asyncio.runners',
+    )
 
 
 def _within(limit_s: float, function: Callable[[Argument], object], argument: Argument) -> None:

@@ -1,4 +1,5 @@
 """JSON as the standard has it: Python alone also takes NaN, and makes infinity of 1e999. Pure."""
+
 import json
 import math
 from typing import Any, NoReturn

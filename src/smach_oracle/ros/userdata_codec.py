@@ -10,6 +10,7 @@ What fits neither encoding, or is larger than a limit, becomes an UNSENT item th
 type, so that a person at least sees that the key exists. Nothing is ever pickled. A tuple arrives
 as a list.
 """
+
 import io
 import json
 import math
@@ -75,8 +76,12 @@ def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> 
     A key that is no string (SMACH does not mind) is named, and its value UNSENT.
     """
     items = sorted(list(values.items()), key=lambda item: text_of(item[0]))
-    return [encode(key, value, limit_bytes) if isinstance(key, str)
-            else _unsent(text_of(key), _python_type(value)) for key, value in items]
+    return [
+        encode(key, value, limit_bytes)
+        if isinstance(key, str)
+        else _unsent(text_of(key), _python_type(value))
+        for key, value in items
+    ]
 
 
 def decode(item: UserdataItem) -> Any:
@@ -92,11 +97,13 @@ def decode(item: UserdataItem) -> Any:
         message_class = _message_class(item)
         return [_deserialize(item, part, message_class) for part in _parts(item)]
     if item.encoding == UserdataItem.UNSENT:
-        raise UserdataCodecError('userdata {!r}: its value (a {}) was not sent'.format(
-            item.key, item.type or '?'))
+        raise UserdataCodecError(
+            'userdata {!r}: its value (a {}) was not sent'.format(item.key, item.type or '?')
+        )
     raise UserdataCodecError(
         'userdata {!r}: encoding {} is unknown; allowed: JSON (1), ROS_MESSAGE (2), UNSENT (3), '
-        'ROS_MESSAGES (4)'.format(item.key, item.encoding))
+        'ROS_MESSAGES (4)'.format(item.key, item.encoding)
+    )
 
 
 def check(item: UserdataItem) -> None:
@@ -111,7 +118,9 @@ def check(item: UserdataItem) -> None:
     if not _MD5SUM.match(item.md5sum):
         raise UserdataCodecError(
             'userdata {!r}: md5sum {!r} of {} is wrong. `rosmsg md5 {}` prints it'.format(
-                item.key, item.md5sum, item.type, item.type))
+                item.key, item.md5sum, item.type, item.type
+            )
+        )
     if getattr(roslib.message.get_message_class(item.type), '_md5sum', '') == item.md5sum:
         decode(item)
     elif item.encoding == UserdataItem.ROS_MESSAGES:
@@ -135,8 +144,11 @@ def decode_all(items: Iterable[UserdataItem], skip_unsent: bool = False) -> Dict
 
 def _message_list(value: Any) -> Optional[Sequence[genpy.Message]]:
     """The messages in a list of one type, such as the objects of a detection, else None."""
-    if not (issubclass(type(value), (list, tuple)) and value
-            and issubclass(type(value[0]), genpy.Message)):
+    if not (
+        issubclass(type(value), (list, tuple))
+        and value
+        and issubclass(type(value[0]), genpy.Message)
+    ):
         return None
     return value if all(type(item) is type(value[0]) for item in value) else None
 
@@ -152,8 +164,9 @@ def _json_bytes(value: object, limit_bytes: int) -> Optional[bytes]:
     return text if len(text) <= limit_bytes else None
 
 
-def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
-                     limit_bytes: int) -> UserdataItem:
+def _encode_messages(
+    key: str, encoding: int, messages: Sequence[genpy.Message], limit_bytes: int
+) -> UserdataItem:
     buffer = io.BytesIO()
     single = encoding == UserdataItem.ROS_MESSAGE
     try:
@@ -163,14 +176,20 @@ def _encode_messages(key: str, encoding: int, messages: Sequence[genpy.Message],
                 buffer.write(_LENGTH.pack(0))
             message.serialize(buffer)
             if not single:
-                buffer.getbuffer()[start:start + _LENGTH.size] = _LENGTH.pack(buffer.tell() -
-                                                                              start - _LENGTH.size)
+                buffer.getbuffer()[start : start + _LENGTH.size] = _LENGTH.pack(
+                    buffer.tell() - start - _LENGTH.size
+                )
             if buffer.tell() > limit_bytes:
                 return _unsent(key, _python_type(messages) if not single else message._type)
     except Exception:  # fields of the wrong type: the message itself is broken
         return _unsent(key, messages[0]._type)
-    return UserdataItem(key=key, encoding=encoding, type=messages[0]._type,
-                        md5sum=messages[0]._md5sum, value=buffer.getvalue())
+    return UserdataItem(
+        key=key,
+        encoding=encoding,
+        type=messages[0]._type,
+        md5sum=messages[0]._md5sum,
+        value=buffer.getvalue(),
+    )
 
 
 def _decode_json(item: UserdataItem) -> object:
@@ -183,22 +202,29 @@ def _decode_json(item: UserdataItem) -> object:
 def _check_type_name(item: UserdataItem) -> None:
     """Check it, and so keep odd names away from the import that follows."""
     if not item.type:
-        raise UserdataCodecError('userdata {!r}: the type of its ROS message is missing, such as '
-                                 'geometry_msgs/PoseStamped'.format(item.key))
+        raise UserdataCodecError(
+            'userdata {!r}: the type of its ROS message is missing, such as '
+            'geometry_msgs/PoseStamped'.format(item.key)
+        )
     if not _MESSAGE_TYPE.match(item.type):
-        raise UserdataCodecError('userdata {!r}: {!r} is not the name of a message type'.format(
-            item.key, item.type))
+        raise UserdataCodecError(
+            'userdata {!r}: {!r} is not the name of a message type'.format(item.key, item.type)
+        )
 
 
 def _message_class(item: UserdataItem) -> type:
     _check_type_name(item)
     message_class = roslib.message.get_message_class(item.type)
     if message_class is None:
-        raise UserdataCodecError('userdata {!r}: message type {} is not installed here'.format(
-            item.key, item.type))
+        raise UserdataCodecError(
+            'userdata {!r}: message type {} is not installed here'.format(item.key, item.type)
+        )
     if message_class._md5sum != item.md5sum:
-        raise UserdataCodecError('userdata {!r}: {} has md5 {} here and {} at the sender'.format(
-            item.key, item.type, message_class._md5sum, item.md5sum or '(none)'))
+        raise UserdataCodecError(
+            'userdata {!r}: {} has md5 {} here and {} at the sender'.format(
+                item.key, item.type, message_class._md5sum, item.md5sum or '(none)'
+            )
+        )
     return message_class
 
 
@@ -210,9 +236,12 @@ def _parts(item: UserdataItem) -> Iterator[bytes]:
         start = position + _LENGTH.size
         length = _LENGTH.unpack_from(data, position)[0] if start <= len(data) else -1
         if length < 0 or start + length > len(data):
-            raise UserdataCodecError('userdata {!r}: its list of {} is cut off at byte {}'.format(
-                item.key, item.type, position))
-        yield data[start:start + length]
+            raise UserdataCodecError(
+                'userdata {!r}: its list of {} is cut off at byte {}'.format(
+                    item.key, item.type, position
+                )
+            )
+        yield data[start : start + length]
         position = start + length
 
 
@@ -223,11 +252,15 @@ def _deserialize(item: UserdataItem, data: bytes, message_class: type) -> genpy.
         again = io.BytesIO()
         message.serialize(again)
     except Exception as err:  # generated code raises whatever the bytes drive it to
-        raise UserdataCodecError('userdata {!r}: {} bytes are no {}: {}'.format(
-            item.key, len(data), item.type, err)) from err
+        raise UserdataCodecError(
+            'userdata {!r}: {} bytes are no {}: {}'.format(item.key, len(data), item.type, err)
+        ) from err
     if again.getvalue() != data:  # genpy reads past a short end without a word
-        raise UserdataCodecError('userdata {!r}: its {} bytes are not those of a {}'.format(
-            item.key, len(data), item.type))
+        raise UserdataCodecError(
+            'userdata {!r}: its {} bytes are not those of a {}'.format(
+                item.key, len(data), item.type
+            )
+        )
     return message
 
 
@@ -268,4 +301,4 @@ def _unsent(key: str, type_name: str) -> UserdataItem:
 
 def _python_type(value: object) -> str:
     name = type_name(value)
-    return name[len('builtins.'):] if name.startswith('builtins.') else name
+    return name[len('builtins.') :] if name.startswith('builtins.') else name

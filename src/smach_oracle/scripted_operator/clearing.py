@@ -1,4 +1,5 @@
 """Moving things by hand that are in the way, or too far away: to where there is room."""
+
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -26,17 +27,22 @@ def gap_between(one: SeenThing, other: SeenThing) -> float:
 
 def in_the_way(scene: SeenScene, thing: SeenThing) -> Optional[SeenThing]:
     """Return the thing so close to another one that a hand has no room, or None."""
-    close = [(gap_between(thing, other), number) for number, other in enumerate(scene.things)
-             if other.movable and other.name != thing.name]
+    close = [
+        (gap_between(thing, other), number)
+        for number, other in enumerate(scene.things)
+        if other.movable and other.name != thing.name
+    ]
     gap, number = min(close, default=(float('inf'), -1))
     return scene.things[number] if gap < CROWDED else None
 
 
 def on_place(scene: SeenScene, place: np.ndarray) -> Optional[SeenThing]:
     """Return the thing nearest to a place (3,) m at which another one should stand, or None."""
-    beside = [(float(np.hypot(*(thing.box.centre - place)[:2])), number)
-              for number, thing in enumerate(scene.things)
-              if thing.movable and thing.box is not None and not thing.wanted]
+    beside = [
+        (float(np.hypot(*(thing.box.centre - place)[:2])), number)
+        for number, thing in enumerate(scene.things)
+        if thing.movable and thing.box is not None and not thing.wanted
+    ]
     away, number = min(beside, default=(float('inf'), -1))
     return scene.things[number] if away < ABOUT_PLACE else None
 
@@ -50,16 +56,17 @@ def free_spot(scene: SeenScene, arm: str, kept: List[np.ndarray], thing: str) ->
     """
     side = 1.0 if arm == 'left' else -1.0
     taken = [box.centre for box in scene.boxes_but(thing)] + kept
-    for x, y in sorted(((x, side * y) for x in SPOTS_X for y in SPOTS_Y),
-                       key=lambda spot: abs(spot[1] - side * 0.25)):
+    for x, y in sorted(
+        ((x, side * y) for x in SPOTS_X for y in SPOTS_Y),
+        key=lambda spot: abs(spot[1] - side * 0.25),
+    ):
         roomy = all(np.hypot(x - other[0], y - other[1]) > ROOM for other in taken)
         if roomy and scene.surface_at(np.array([x, y])) is not None:
             return x, y
     return None
 
 
-def move_aside(attempt: Attempt, target: Target, about: np.ndarray,
-               kept: List[np.ndarray]) -> str:
+def move_aside(attempt: Attempt, target: Target, about: np.ndarray, kept: List[np.ndarray]) -> str:
     """Take a thing and put it where there is room. Return its name.
 
     :param kept: (3,) m, places that should stay free.

@@ -1,4 +1,5 @@
 """Drives a hand by velocities, as a person at a joystick does: towards a place, watching it."""
+
 from typing import NamedTuple, Protocol, Tuple
 
 import numpy as np
@@ -52,8 +53,9 @@ class HandDriver:
         self._speed = speed
         self._turn = turn
 
-    def go(self, goal: np.ndarray, share: float = 1.0, near: Tuple[float,
-                                                                   float] = (0.01, 0.05)) -> None:
+    def go(
+        self, goal: np.ndarray, share: float = 1.0, near: Tuple[float, float] = (0.01, 0.05)
+    ) -> None:
         """Drive the tool straight to a pose (4x4, base_footprint from tool).
 
         :param share: of the speed of free motions.
@@ -69,10 +71,15 @@ class HandDriver:
             left = distance + 0.2 * angle
             best, since = (left, 0) if left < best - 5e-4 else (best, since + 1)
             if since > _PATIENCE:
-                raise StuckError('the hand stays {:.0f} cm and {:.0f} degrees away{}'.format(
-                    100 * distance, np.degrees(angle), ': ' + limit if limit else ''))
-            limit = self.hand.move(
-                np.concatenate([way, turn]) / self._time_for(distance, angle, share)) or limit
+                raise StuckError(
+                    'the hand stays {:.0f} cm and {:.0f} degrees away{}'.format(
+                        100 * distance, np.degrees(angle), ': ' + limit if limit else ''
+                    )
+                )
+            limit = (
+                self.hand.move(np.concatenate([way, turn]) / self._time_for(distance, angle, share))
+                or limit
+            )
 
     def come_to(self, point: np.ndarray, near: float = 0.03) -> None:
         """Drive the tool to a point (3,) m, base_footprint, and let the arm turn to its posture.
@@ -86,16 +93,20 @@ class HandDriver:
                 break
             way = point - before[:3, 3]
             velocity = way / self._time_for(float(np.linalg.norm(way)), 0.0, 1.0)
-            limit = self.hand.move(np.concatenate([velocity, np.zeros(3)]),
-                                   turn_freely=True) or limit
+            limit = (
+                self.hand.move(np.concatenate([velocity, np.zeros(3)]), turn_freely=True) or limit
+            )
             now = self.hand.tool()
             moved, turned = (float(np.linalg.norm(part)) for part in error(before, now))
             still = still + 1 if moved < 5e-4 and turned < 4e-3 else 0
             before = now
         distance = float(np.linalg.norm(point - before[:3, 3]))
         if distance > near:
-            raise StuckError('the hand stays {:.0f} cm away{}'.format(100 * distance,
-                                                                 ': ' + limit if limit else ''))
+            raise StuckError(
+                'the hand stays {:.0f} cm away{}'.format(
+                    100 * distance, ': ' + limit if limit else ''
+                )
+            )
 
     def shift(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, share: float = 1.0) -> None:
         """Drive by so many m along the axes of base_footprint.
@@ -129,8 +140,9 @@ class HandDriver:
             self.hand.move(np.zeros(6))
 
     def _time_for(self, distance: float, angle: float, share: float) -> float:
-        return max(distance / (self._speed * share), angle / (self._turn * share),
-                   self.hand.period / _FINE)
+        return max(
+            distance / (self._speed * share), angle / (self._turn * share), self.hand.period / _FINE
+        )
 
 
 def error(tool: np.ndarray, goal: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

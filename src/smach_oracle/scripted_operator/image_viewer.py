@@ -1,4 +1,5 @@
 """The operator's eye: the robot's images, and what people recognise in them."""
+
 from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -33,8 +34,9 @@ class ImageViewer:
 
     def __init__(self, topics: ViewerTopics, base: str) -> None:
         """`base`: the frame in which places are told."""
-        self._source = ImageSource(topics.rgb, topics.depth, topics.camera_info, base,
-                                   topics.snapshot)
+        self._source = ImageSource(
+            topics.rgb, topics.depth, topics.camera_info, base, topics.snapshot
+        )
         self._recognise = rospy.resolve_name(topics.recognise)
         self.chance = 0  # of the trial that was seen last, for what a person gets wrong
 
@@ -52,8 +54,9 @@ class ImageViewer:
         found += self.outlines(taken.message.header.stamp, size, (ROBOT, *names))
         return seen_scene(taken.image, found)
 
-    def outlines(self, stamp: rospy.Time, size: Tuple[int, int],
-                 names: Sequence[str] = ()) -> List[Outline]:
+    def outlines(
+        self, stamp: rospy.Time, size: Tuple[int, int], names: Sequence[str] = ()
+    ) -> List[Outline]:
         """Return the outlines of what is recognised in a published image.
 
         :param size: its width and height, px.
@@ -61,9 +64,9 @@ class ImageViewer:
         :raises ViewError: where nobody answers, or the image is not known.
         """
         try:
-            answer: RecogniseResponse = call_service(self._recognise, Recognise,
-                                                     RecogniseRequest(stamp, list(names)),
-                                                     _ANSWER_S)
+            answer: RecogniseResponse = call_service(
+                self._recognise, Recognise, RecogniseRequest(stamp, list(names)), _ANSWER_S
+            )
         except ServerGoneError as err:
             raise ViewError(str(err)) from err
         self.chance = answer.chance
@@ -81,7 +84,8 @@ class ImageViewer:
         """
         return [
             SeenThing(each.name, True, each.movable, _region(each.mask), each.mask, None)
-            for each in self.outlines(stamp, size) if each.wanted
+            for each in self.outlines(stamp, size)
+            if each.wanted
         ]
 
 
@@ -89,8 +93,10 @@ def _mask(thing: SeenThingMessage, size: Tuple[int, int]) -> np.ndarray:
     region = thing.region
     mask = np.zeros((size[1], size[0]), bool)
     part = np.frombuffer(thing.mask.data, np.uint8).reshape(region.height, region.width) > 0
-    mask[region.y_offset:region.y_offset + region.height,
-         region.x_offset:region.x_offset + region.width] = part
+    mask[
+        region.y_offset : region.y_offset + region.height,
+        region.x_offset : region.x_offset + region.width,
+    ] = part
     return mask
 
 

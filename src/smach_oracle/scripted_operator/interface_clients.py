@@ -1,4 +1,5 @@
 """Clients of the two interfaces' services."""
+
 import time
 from typing import Callable, Sequence, TypeVar
 
@@ -55,6 +56,7 @@ class PerceptionClient:
         :returns: its stamp.
         :raises GoalEndedError: where it does not, or gets no image.
         """
+
         def use_fresh() -> UseFrameResponse:
             return self._use_frame(UseFrameRequest.FRESH)
 
@@ -68,8 +70,11 @@ class PerceptionClient:
 
     def segment(self, region: Region, strokes: Sequence[OperatorStroke]) -> MarkedResult:
         """See showing.SegmentCall."""
-        request = SegmentObjectRequest(region=RegionOfInterest(
-            x_offset=region[0], y_offset=region[1], width=region[2], height=region[3]))
+        request = SegmentObjectRequest(
+            region=RegionOfInterest(
+                x_offset=region[0], y_offset=region[1], width=region[2], height=region[3]
+            )
+        )
         request.strokes = [
             SegmentStroke(line.foreground, [Point32(x, y, 0.0) for x, y in line.points], 0.0)
             for line in strokes

@@ -1,4 +1,5 @@
 """A person's knowledge of a failed state when they decide, by looking about."""
+
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -27,8 +28,9 @@ class Impression(NamedTuple):
     about: np.ndarray  # (3,) m, base_footprint
 
 
-def look_about(plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene,
-               means: RobotMeans) -> Impression:
+def look_about(
+    plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene, means: RobotMeans
+) -> Impression:
     """Look about for what the failed state is about.
 
     :param first: what is seen before the head has moved.
@@ -42,19 +44,37 @@ def look_about(plan: StatePlan, userdata: Mapping[str, Any], first: SeenScene,
     search = _search(points, first, means)
     if search.thing is None or search.thing.box is None:
         covered = search.thing is not None and search.scene.covered(search.thing)
-        return Impression(Sight(seen=search.thing is not None, located=False, holds=holds,
-                                dazzled=search.before.dazzled(), dim=search.before.dim(),
-                                open=_shows_things(search.before, points[0]),
-                                covered=covered), AHEAD)
+        return Impression(
+            Sight(
+                seen=search.thing is not None,
+                located=False,
+                holds=holds,
+                dazzled=search.before.dazzled(),
+                dim=search.before.dim(),
+                open=_shows_things(search.before, points[0]),
+                covered=covered,
+            ),
+            AHEAD,
+        )
     scene, thing, at = search.scene, search.thing, search.thing.box.centre
     reachable = plan.means == SHOW or _reaches(plan, at)
     lies = thing.lies(means.tall(thing.name))
     there = plan.means == PUT_DOWN and _is_there(plan, userdata, at, means)
-    sight = Sight(holds=holds, crowded=in_the_way(scene, thing) is not None,
-                  covered=scene.covered(thing) and not holds, reachable=reachable,
-                  moved=_moved(detected_in(plan, userdata), at), dazzled=scene.dazzled(),
-                  dim=scene.dim(), lies=lies, shelf=plan.inside, lost=_is_lost(at), there=there,
-                  place=tuple(map(float, at)), around=_around(scene, thing.name, at))
+    sight = Sight(
+        holds=holds,
+        crowded=in_the_way(scene, thing) is not None,
+        covered=scene.covered(thing) and not holds,
+        reachable=reachable,
+        moved=_moved(detected_in(plan, userdata), at),
+        dazzled=scene.dazzled(),
+        dim=scene.dim(),
+        lies=lies,
+        shelf=plan.inside,
+        lost=_is_lost(at),
+        there=there,
+        place=tuple(map(float, at)),
+        around=_around(scene, thing.name, at),
+    )
     return Impression(sight, at)
 
 
@@ -64,8 +84,9 @@ def _is_lost(at: np.ndarray) -> bool:
 
 
 def _around(scene: SeenScene, name: str, at: np.ndarray) -> Tuple[Tuple[float, ...], ...]:
-    close = [box.centre for box in scene.boxes_but(name)
-             if np.hypot(*(box.centre - at)[:2]) < _AROUND]
+    close = [
+        box.centre for box in scene.boxes_but(name) if np.hypot(*(box.centre - at)[:2]) < _AROUND
+    ]
     return tuple(sorted(tuple(map(float, each)) for each in close))
 
 
@@ -73,11 +94,13 @@ def _shows_things(scene: SeenScene, about: np.ndarray) -> bool:
     """Whether things are seen near a point (3,) m, and no limb. Then nothing hides it."""
     limbs = scene.limbs is not None and float(scene.limbs.mean()) > LEAST_LIMB
     return not limbs and any(
-        np.linalg.norm(box.centre - about) < 2 * _AROUND for box in scene.boxes_but())
+        np.linalg.norm(box.centre - about) < 2 * _AROUND for box in scene.boxes_but()
+    )
 
 
-def _is_there(plan: StatePlan, userdata: Mapping[str, Any], at: np.ndarray,
-              means: RobotMeans) -> bool:
+def _is_there(
+    plan: StatePlan, userdata: Mapping[str, Any], at: np.ndarray, means: RobotMeans
+) -> bool:
     try:
         place, _ = place_of(plan, userdata, means)
     except ManoeuvreError:
@@ -140,8 +163,12 @@ def _about_place(plan: StatePlan, userdata: Mapping[str, Any], means: RobotMeans
     if place is None:
         return Impression(Sight(holds=True), AHEAD)
     scene = means.look_at(place)
-    return Impression(Sight(holds=True, blocked=on_place(scene, place) is not None,
-                            around=_around(scene, '', place)), place)
+    return Impression(
+        Sight(
+            holds=True, blocked=on_place(scene, place) is not None, around=_around(scene, '', place)
+        ),
+        place,
+    )
 
 
 def _reaches(plan: StatePlan, point: np.ndarray) -> bool:

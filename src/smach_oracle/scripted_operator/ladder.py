@@ -4,6 +4,7 @@ Each rung is tried a few times at most, only where what is seen speaks for it. W
 not done again as long as all that is seen is as it was. Where nothing is left, a person gives up.
 Pure.
 """
+
 import math
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -21,8 +22,13 @@ BASE = 'base'  # drive the base a little, and have it tried again
 HIDDEN, LOST, BACK = 'hidden', 'lost', 'back'  # go to that state of the plan
 LEAVE = 'leave'  # leave it undone
 GIVE_UP = 'give up'
-BY_INTERFACE = {MARK: 'perception', BY_HAND: 'manipulation', CLEAR: 'manipulation',
-                CLOSER: 'manipulation', UPRIGHT: 'manipulation'}
+BY_INTERFACE = {
+    MARK: 'perception',
+    BY_HAND: 'manipulation',
+    CLEAR: 'manipulation',
+    CLOSER: 'manipulation',
+    UPRIGHT: 'manipulation',
+}
 PREPARING = (CLEAR, CLOSER, UPRIGHT)  # the state itself is not done by these
 WAIT_S = 20.0  # of the world's time
 ALIKE = 0.04  # m: what is seen no further from where it was seen before has not been moved
@@ -57,10 +63,12 @@ class Sight(NamedTuple):
 
     def unchanged(self, before: 'Sight') -> bool:
         """Whether all is seen to be as it was, within what the eye gets wrong."""
-        return (all(getattr(self, field) == getattr(before, field) for field in _TELLING)
-                and _alike(self.place, before.place) and len(self.around) == len(before.around)
-                and all(any(_alike(one, other) for other in before.around)
-                        for one in self.around))
+        return (
+            all(getattr(self, field) == getattr(before, field) for field in _TELLING)
+            and _alike(self.place, before.place)
+            and len(self.around) == len(before.around)
+            and all(any(_alike(one, other) for other in before.around) for one in self.around)
+        )
 
 
 _TELLING = ('seen', 'located', 'holds', 'lies', 'covered', 'dazzled', 'dim')
@@ -85,8 +93,11 @@ class NextAct(NamedTuple):
     def same(self, other: 'NextAct') -> bool:
         """Whether it comes to the same for the robot, whatever it is called."""
         return (self.interface, self.goto, self.wait_s, self.base) == (
-            other.interface, other.goto, other.wait_s, other.base) and (
-                not self.interface or self.act == other.act)
+            other.interface,
+            other.goto,
+            other.wait_s,
+            other.base,
+        ) and (not self.interface or self.act == other.act)
 
 
 class Tried(NamedTuple):
@@ -151,8 +162,16 @@ _LADDERS: Dict[str, List[Rung]] = {
     ],
     PUT_DOWN: [
         Rung(GIVE_UP, 1, lambda sight: sight.lost and not sight.holds),
-        Rung(BY_HAND, 0, lambda sight: not sight.holds and sight.located and sight.reachable
-             and (sight.there or sight.lies)),
+        Rung(
+            BY_HAND,
+            0,
+            lambda sight: (
+                not sight.holds
+                and sight.located
+                and sight.reachable
+                and (sight.there or sight.lies)
+            ),
+        ),
         Rung(LOST, 3, lambda sight: not sight.holds),
         Rung(BY_HAND, 1, lambda sight: sight.holds and not sight.blocked),
         Rung(CLEAR, 2, lambda sight: sight.blocked),
@@ -200,8 +219,13 @@ class TrialMemory:
 
         An act of the hand or the eye that came about was not futile.
         """
-        return any(_is_about(each, state) and choice.same(each.choice) and not each.worked
-                   and sight.unchanged(each.sight) for each in self._tried)
+        return any(
+            _is_about(each, state)
+            and choice.same(each.choice)
+            and not each.worked
+            and sight.unchanged(each.sight)
+            for each in self._tried
+        )
 
 
 def choose(plan: StatePlan, asked: Asked, sight: Sight, memory: TrialMemory) -> NextAct:
@@ -234,15 +258,24 @@ def _made(act: str, plan: StatePlan, asked: Asked) -> Optional[NextAct]:
     if not state or state not in asked.states:
         return None
     if act == BASE:
-        return NextAct(act, goto=state, base=plan.base,
-                      why='from another place') if any(plan.base) else None
+        return (
+            NextAct(act, goto=state, base=plan.base, why='from another place')
+            if any(plan.base)
+            else None
+        )
     return NextAct(act, goto=state, wait_s=WAIT_S if act == WAIT else 0.0, why=_WHY[act])
 
 
 _WHY = {
-    AGAIN: 'once more', WAIT: 'once more, a while later', HIDDEN: 'it is hidden',
-    LOST: 'the hand holds nothing', BACK: 'from further back', LEAVE: 'it is left as it is'
+    AGAIN: 'once more',
+    WAIT: 'once more, a while later',
+    HIDDEN: 'it is hidden',
+    LOST: 'the hand holds nothing',
+    BACK: 'from further back',
+    LEAVE: 'it is left as it is',
 }
 _PREPARED = {
-    CLEAR: 'there is room now', CLOSER: 'it stands nearer now', UPRIGHT: 'it stands upright now'
+    CLEAR: 'there is room now',
+    CLOSER: 'it stands nearer now',
+    UPRIGHT: 'it stands upright now',
 }

@@ -1,4 +1,5 @@
 """Work by hand in place of the robot: take a thing, put it down."""
+
 from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
@@ -105,8 +106,11 @@ def pick(attempt: Attempt, target: Target, about: np.ndarray) -> None:
     """
     if not attempt.feels(_GRIP):
         scene, thing = found(attempt, target, about)
-        fetch(attempt, thing.bottom + float(_box(thing).size[2]),
-              _grasps_to_try(attempt, scene, thing))
+        fetch(
+            attempt,
+            thing.bottom + float(_box(thing).size[2]),
+            _grasps_to_try(attempt, scene, thing),
+        )
     lift(attempt)
 
 
@@ -122,8 +126,9 @@ def lift(attempt: Attempt) -> None:
         raise ManoeuvreError('it slipped out of the hand')
 
 
-def fetch(attempt: Attempt, top: float, ways: Sequence[np.ndarray],
-          until_it_touches: bool = False) -> None:
+def fetch(
+    attempt: Attempt, top: float, ways: Sequence[np.ndarray], until_it_touches: bool = False
+) -> None:
     """Close the hand on a thing.
 
     :param top: m, how high it is.
@@ -164,8 +169,9 @@ def _approach(driver: HandDriver, grasp: np.ndarray, top: float, until_it_touche
             raise
 
 
-def _grasps_to_try(attempt: Attempt, scene: SeenScene, thing: SeenThing,
-                   pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
+def _grasps_to_try(
+    attempt: Attempt, scene: SeenScene, thing: SeenThing, pitches: Sequence[float] = _PITCHES
+) -> List[np.ndarray]:
     """Return how the hand takes a thing: another way at each try, and misjudged a little.
 
     :returns: _WAYS of them, perhaps the same again.
@@ -198,12 +204,14 @@ def come_out(driver: HandDriver, height: float) -> None:
         as_far_as_it_goes(lambda: driver.shift(z=height + 0.15 - tool[2, 3]))
     elif tool[2, 3] < height + 0.05:
         as_far_as_it_goes(lambda: driver.shift(z=height + 0.10 - tool[2, 3]))
-    driver.come_to(READY[driver.hand.arm] +
-                   [0.0, 0.0, max(0.0, height + 0.1 - READY[driver.hand.arm][2])])
+    driver.come_to(
+        READY[driver.hand.arm] + [0.0, 0.0, max(0.0, height + 0.1 - READY[driver.hand.arm][2])]
+    )
 
 
-def grasps(thing: UprightBox, others: List[UprightBox], arm: str,
-           pitches: Sequence[float] = _PITCHES) -> List[np.ndarray]:
+def grasps(
+    thing: UprightBox, others: List[UprightBox], arm: str, pitches: Sequence[float] = _PITCHES
+) -> List[np.ndarray]:
     """Poses (4x4, base_footprint from tool) from which to take a thing, most promising first."""
     straight = float(np.arctan2(*(thing.centre[:2] - SHOULDER[arm])[::-1]))
     found = []
@@ -217,8 +225,13 @@ def grasps(thing: UprightBox, others: List[UprightBox], arm: str,
         pose[:3, 3] = thing.centre[:2].tolist() + [height]
         pose[:2, 3] += ahead * pose[:2, 0] / max(float(np.linalg.norm(pose[:2, 0])), 0.2)
         crowded = sum(max(0.0, CLEAR_OF - _beside(pose, other)) for other in others)
-        found.append((20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - pitches[0]),
-                      order, pose))
+        found.append(
+            (
+                20.0 * crowded * np.cos(pitch) + abs(turn) + 0.4 * abs(pitch - pitches[0]),
+                order,
+                pose,
+            )
+        )
     return [pose for _, _, pose in sorted(found, key=lambda item: item[:2])]
 
 
@@ -385,8 +398,9 @@ def _reach_in(attempt: Attempt, scene: SeenScene, thing: SeenThing) -> None:
     driver, centre = attempt.driver, _box(thing).centre
     grasp = _grasps_to_try(attempt, scene, thing, _LEVEL)[0]
     driver.open()
-    as_far_as_it_goes(lambda: driver.shift(
-        x=min(0.0, centre[0] - OUT - driver.hand.tool()[0, 3]), share=0.5))
+    as_far_as_it_goes(
+        lambda: driver.shift(x=min(0.0, centre[0] - OUT - driver.hand.tool()[0, 3]), share=0.5)
+    )
     as_far_as_it_goes(lambda: driver.come_to(grasp[:3, 3] - [OUT, 0.0, -0.03]))
     driver.go(transform(grasp[:3, 3] - OUT * 0.7 * grasp[:3, 0], grasp[:3, :3]))
     driver.go(grasp, share=0.4, near=(0.006, 0.05))

@@ -1,4 +1,5 @@
 """The operator's work once an interface runs: show a thing or drive the hand, end the goal."""
+
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -115,8 +116,13 @@ def _driven(task: ManualTask, interfaces: OperatorInterfaces) -> str:
             driven.append(arm)
             interfaces.means.pass_time(_TAKE_HOLD_S)
         hand = TopicHand(interfaces.hand, arm, BASE, interfaces.period)
-        return Attempt(HandDriver(hand), interfaces.means, task.number,
-                       lambda: task.generator.normal(0.0, _MISJUDGED))
+        return Attempt(
+            HandDriver(hand),
+            interfaces.means,
+            task.number,
+            lambda: task.generator.normal(0.0, _MISJUDGED),
+        )
+
     try:
         _WORK[task.choice.act](task, interfaces.means, attempt)
     except (ManoeuvreError, StuckError) as err:
@@ -175,8 +181,7 @@ def _put_away(attempt: Attempt, task: ManualTask, place: np.ndarray) -> None:
 
 def _clear(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     """Move what stands beside the thing, or where something should be put."""
-    kept = [] if task.plan.means != PUT_DOWN else [
-        place_of(task.plan, task.userdata, means)[0]]
+    kept = [] if task.plan.means != PUT_DOWN else [place_of(task.plan, task.userdata, means)[0]]
     about = kept[0] if kept else task.about
 
     def blocking(scene: SeenScene) -> Optional[SeenThing]:
@@ -192,8 +197,12 @@ def _clear(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     if kept and arm == task.plan.arm:
         raise ManoeuvreError('{} is in the way, and no hand is free for it'.format(thing.name))
     name = thing.name
-    move_aside(take_wheel(arm), lambda scene: scene.named(name), thing.box.centre,
-               kept + [np.array(each) for each in task.plan.keep])
+    move_aside(
+        take_wheel(arm),
+        lambda scene: scene.named(name),
+        thing.box.centre,
+        kept + [np.array(each) for each in task.plan.keep],
+    )
 
 
 def _closer(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
@@ -204,9 +213,16 @@ def _closer(task: ManualTask, means: RobotMeans, take_wheel: TakeWheel) -> None:
     inner = 1.0 if other == 'left' else -1.0
     spots = [(x, inner * y) for y in (0.05, 0.12, 0.19) for x in (0.58, 0.64, 0.52)]
     taken = scene.boxes_but(thing.name)
-    spot = next((each for each in spots
-                 if all(np.hypot(each[0] - box.centre[0], each[1] - box.centre[1]) > 0.14
-                        for box in taken)), None) or free_spot(scene, other, [], thing.name)
+    spot = next(
+        (
+            each
+            for each in spots
+            if all(
+                np.hypot(each[0] - box.centre[0], each[1] - box.centre[1]) > 0.14 for box in taken
+            )
+        ),
+        None,
+    ) or free_spot(scene, other, [], thing.name)
     if spot is None or thing.box is None:
         raise ManoeuvreError('there is no room for {}'.format(thing.name))
     move_to(attempt, SeenScene.wanted, thing.box.centre, spot)
@@ -218,11 +234,16 @@ def _upright(task: ManualTask, _means: RobotMeans, take_wheel: TakeWheel) -> Non
 
 
 _WORK: Dict[str, Callable[[ManualTask, RobotMeans, TakeWheel], None]] = {
-    BY_HAND: _state_by_hand, CLEAR: _clear, CLOSER: _closer, UPRIGHT: _upright}
+    BY_HAND: _state_by_hand,
+    CLEAR: _clear,
+    CLOSER: _closer,
+    UPRIGHT: _upright,
+}
 
 
-def place_of(plan: StatePlan, userdata: Mapping[str, Any],
-             means: RobotMeans) -> Tuple[np.ndarray, Optional[float]]:
+def place_of(
+    plan: StatePlan, userdata: Mapping[str, Any], means: RobotMeans
+) -> Tuple[np.ndarray, Optional[float]]:
     """Return the place to put something, (3,) m in base_footprint, and the surface's height.
 
     :raises ManoeuvreError: where nobody knows.
@@ -269,9 +290,21 @@ class InterfaceNames(NamedTuple):
     operator: str
 
 
-def connect(names: InterfaceNames, eye: ImageViewer, means: RobotMeans, image: Tuple[int, int],
-            rate_hz: float) -> OperatorInterfaces:
+def connect(
+    names: InterfaceNames,
+    eye: ImageViewer,
+    means: RobotMeans,
+    image: Tuple[int, int],
+    rate_hz: float,
+) -> OperatorInterfaces:
     """Connect to the interfaces of these names."""
-    return OperatorInterfaces(TeleoperationClient(names.manipulation, names.operator),
-                              FinishClient(names.manipulation), PerceptionClient(names.perception),
-                              FinishClient(names.perception), eye, means, image, 1.0 / rate_hz)
+    return OperatorInterfaces(
+        TeleoperationClient(names.manipulation, names.operator),
+        FinishClient(names.manipulation),
+        PerceptionClient(names.perception),
+        FinishClient(names.perception),
+        eye,
+        means,
+        image,
+        1.0 / rate_hz,
+    )

@@ -1,4 +1,5 @@
 """The node `scripted_operator`: an expert by script who works with the interfaces of people."""
+
 import math
 import time
 import zlib
@@ -45,19 +46,29 @@ class OperatorSettings:
 
     def __init__(self) -> None:
         self.plans = StatePlans(rospy.get_param('~states', {}))
-        self.seed = int(number_of('~seed', 0, 0, 2 ** 31))
+        self.seed = int(number_of('~seed', 0, 0, 2**31))
         self.median_s = number_of('~delay_median_s', 15.0, 0.0, 3600.0)
         self.sigma = number_of('~delay_sigma', 0.5, 0.0, 3.0)
         self.most_questions = int(number_of('~most_questions', 6, 1, 1000))
         self.rate_hz = number_of('~rate_hz', 30.0, 10.0, 500.0)
         self.perception = name_of('~perception', 'perception_interface')
         self.manipulation = name_of('~manipulation', 'manipulation_interface')
-        self.image = (int(number_of('~image_width', 640, 1,
-                                    10000)), int(number_of('~image_height', 480, 1, 10000)))
-        self.eye = ViewerTopics(**{field: name_of('~' + field, default) for field, default
-                                in ViewerTopics._field_defaults.items()})
-        self.means = MeansNames(**{field: name_of('~' + field, default) for field, default
-                                   in MeansNames._field_defaults.items()})
+        self.image = (
+            int(number_of('~image_width', 640, 1, 10000)),
+            int(number_of('~image_height', 480, 1, 10000)),
+        )
+        self.eye = ViewerTopics(
+            **{
+                field: name_of('~' + field, default)
+                for field, default in ViewerTopics._field_defaults.items()
+            }
+        )
+        self.means = MeansNames(
+            **{
+                field: name_of('~' + field, default)
+                for field, default in MeansNames._field_defaults.items()
+            }
+        )
         self.grippers = grippers_of(rospy.get_param('~grippers', {}))
 
 
@@ -67,8 +78,9 @@ def grippers_of(value: object) -> Dict[str, List[str]]:
     :raises SettingsError: for anything but lists of names.
     """
     if not isinstance(value, dict) or not all(
-            isinstance(joints, list) and all(isinstance(each, str) for each in joints)
-            for joints in value.values()):
+        isinstance(joints, list) and all(isinstance(each, str) for each in joints)
+        for joints in value.values()
+    ):
         raise SettingsError('~grippers', value, 'a mapping from arms to lists of joints')
     return {str(arm): list(joints) for arm, joints in value.items()}
 
@@ -76,8 +88,13 @@ def grippers_of(value: object) -> Dict[str, List[str]]:
 class ScriptedOperator:
     """Answers one question after the other."""
 
-    def __init__(self, settings: OperatorSettings, front_end: FrontEnd, eye: ImageViewer,
-                 interfaces: OperatorInterfaces) -> None:
+    def __init__(
+        self,
+        settings: OperatorSettings,
+        front_end: FrontEnd,
+        eye: ImageViewer,
+        interfaces: OperatorInterfaces,
+    ) -> None:
         self._settings = settings
         self._front_end = front_end
         self._eye = eye
@@ -97,8 +114,11 @@ class ScriptedOperator:
             version = self._front_end.wait_for_change(version, _PAUSE_S)
             for listed in self._front_end.questions():
                 still_runs = listed.goal.failure_kind == ExpertQueryGoal.STILL_RUNNING
-                if (listed.status == OpenQuery.PENDING and not still_runs
-                        and listed.key not in self._done):
+                if (
+                    listed.status == OpenQuery.PENDING
+                    and not still_runs
+                    and listed.key not in self._done
+                ):
                     self._done = self._done[-99:] + [listed.key]
                     self._attend_to(listed)
 
@@ -120,17 +140,24 @@ class ScriptedOperator:
         goal = listed.goal
         self._begin(listed)
         scene = self._eye.look()
-        generator = np.random.default_rng([
-            self._settings.seed, self._eye.chance,
-            zlib.crc32(goal.failed_state.encode()), self._questions
-        ])
+        generator = np.random.default_rng(
+            [
+                self._settings.seed,
+                self._eye.chance,
+                zlib.crc32(goal.failed_state.encode()),
+                self._questions,
+            ]
+        )
         if not self._front_end.claim(listed).ok:
             return
         means = self._interfaces.means
         means.pass_time(
             float(
-                generator.lognormal(math.log(max(self._settings.median_s, 1e-6)),
-                                    self._settings.sigma)))
+                generator.lognormal(
+                    math.log(max(self._settings.median_s, 1e-6)), self._settings.sigma
+                )
+            )
+        )
         userdata = userdata_of(goal.userdata)
         choice, impression = self._decide(listed, userdata, scene)
         self._prepare(choice)
@@ -141,13 +168,19 @@ class ScriptedOperator:
             self._memory.note(goal.failed_state, choice, impression.sight)
             return
         plan = self._settings.plans.of(goal.failed_state)
-        task = ManualTask(goal.query_id, choice, plan, userdata, number, generator,
-                          impression.about)
+        task = ManualTask(
+            goal.query_id, choice, plan, userdata, number, generator, impression.about
+        )
         begun_s = time.monotonic()
         result = carry_out(task, self._interfaces)
         self._memory.note(goal.failed_state, choice, impression.sight, result.worked)
-        rospy.loginfo('%s, %s: %s (%.1f s)', goal.failed_state, choice.act, result.text or 'done',
-                      time.monotonic() - begun_s)
+        rospy.loginfo(
+            '%s, %s: %s (%.1f s)',
+            goal.failed_state,
+            choice.act,
+            result.text or 'done',
+            time.monotonic() - begun_s,
+        )
 
     def _begin(self, listed: ListedQuestion) -> None:
         """Count the question. A new trial is begun with an empty memory."""
@@ -158,22 +191,28 @@ class ScriptedOperator:
             self._interfaces.means.forget()
         self._questions += 1
 
-    def _decide(self, listed: ListedQuestion, userdata: Dict[str, Any],
-                scene: SeenScene) -> Tuple[NextAct, Impression]:
+    def _decide(
+        self, listed: ListedQuestion, userdata: Dict[str, Any], scene: SeenScene
+    ) -> Tuple[NextAct, Impression]:
         """Decide what to do about a question, after a look about."""
         goal = listed.goal
         plan = self._settings.plans.of(goal.failed_state)
         offered = [offer.name for offer in goal.interfaces]
         self._warn(goal.failed_state, plan, offered)
         if self._questions > self._settings.most_questions:
-            return NextAct('give up', why='{} questions in one trial are enough'.format(
-                self._settings.most_questions)), Impression(Sight(), np.zeros(3))
+            return NextAct(
+                'give up',
+                why='{} questions in one trial are enough'.format(self._settings.most_questions),
+            ), Impression(Sight(), np.zeros(3))
         impression = look_about(plan, userdata, scene, self._interfaces.means)
         impression = impression._replace(
-            sight=impression.sight._replace(repeated=goal.recoveries > 0))
-        asked = Asked(goal.failed_state, [
-            choice.state for choice in goal.choices if not (choice.blocked or choice.container)
-        ], offered)
+            sight=impression.sight._replace(repeated=goal.recoveries > 0)
+        )
+        asked = Asked(
+            goal.failed_state,
+            [choice.state for choice in goal.choices if not (choice.blocked or choice.container)],
+            offered,
+        )
         return choose(plan, asked, impression.sight, self._memory), impression
 
     def _prepare(self, choice: NextAct) -> None:
@@ -192,17 +231,36 @@ class ScriptedOperator:
             rospy.logwarn(
                 '%s: means %s needs an interface offered under the name %r; offered: %s. It is '
                 'tried again '
-                'without.', state, plan.means, lacking, ', '.join(offered) or 'none')
+                'without.',
+                state,
+                plan.means,
+                lacking,
+                ', '.join(offered) or 'none',
+            )
 
     def _send_answer(self, listed: ListedQuestion, planned: NextAct) -> bool:
-        kind = (ExpertDecision.INTERFACE if planned.interface
-                else ExpertDecision.GOTO if planned.goto else ExpertDecision.GIVE_UP)
-        rospy.loginfo('%s failed (%s): %s %s', listed.goal.failed_state, listed.goal.text
-                      or listed.goal.outcome, planned.act, planned.interface or planned.goto)
+        kind = (
+            ExpertDecision.INTERFACE
+            if planned.interface
+            else ExpertDecision.GOTO
+            if planned.goto
+            else ExpertDecision.GIVE_UP
+        )
+        rospy.loginfo(
+            '%s failed (%s): %s %s',
+            listed.goal.failed_state,
+            listed.goal.text or listed.goal.outcome,
+            planned.act,
+            planned.interface or planned.goto,
+        )
         if not planned.interface:
             self._interfaces.means.end_work()
-        answer = self._front_end.answer(listed, ExpertDecision(
-            kind=kind, state=planned.goto, interface=planned.interface, why=planned.why))
+        answer = self._front_end.answer(
+            listed,
+            ExpertDecision(
+                kind=kind, state=planned.goto, interface=planned.interface, why=planned.why
+            ),
+        )
         if not answer.ok:
             rospy.logwarn('Answer for %s refused: %s', listed.goal.failed_state, answer.message)
             self._front_end.release(listed)
@@ -224,7 +282,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a scripted operator who works with the interfaces of people. Parameters: ~states, '
-        '~seed, ~delay_median_s, ~delay_sigma and more; see doc/shared_autonomy.md.')
+        '~seed, ~delay_median_s, ~delay_sigma and more; see doc/shared_autonomy.md.'
+    )
     rospy.init_node('scripted_operator')
     start_master_watch()
     try:

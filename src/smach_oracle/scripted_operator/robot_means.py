@@ -1,4 +1,5 @@
 """A person's other means: the robot's head, its base, its joint states, and time."""
+
 import math
 import threading
 import time
@@ -60,8 +61,9 @@ class RobotMeans:
     :param grippers: by arm, the joints whose positions add up to the gap between the tips.
     """
 
-    def __init__(self, names: MeansNames, grippers: Mapping[str, List[str]],
-                 eye: ImageViewer) -> None:
+    def __init__(
+        self, names: MeansNames, grippers: Mapping[str, List[str]], eye: ImageViewer
+    ) -> None:
         self._names = names
         self._grippers = grippers
         self._eye = eye
@@ -72,10 +74,12 @@ class RobotMeans:
         self._heard = threading.Condition()
         self._states: 'OrderedDict[rospy.Time, Dict[str, float]]' = OrderedDict()
         self._stands: Optional[Odometry] = None
-        self._odometry = rospy.Subscriber(names.odometry, Odometry, self._keep_odometry,
-                                          queue_size=100, tcp_nodelay=True)
-        self._subscriber = rospy.Subscriber(names.joint_states, JointState, self._keep,
-                                            queue_size=100, tcp_nodelay=True)
+        self._odometry = rospy.Subscriber(
+            names.odometry, Odometry, self._keep_odometry, queue_size=100, tcp_nodelay=True
+        )
+        self._subscriber = rospy.Subscriber(
+            names.joint_states, JointState, self._keep, queue_size=100, tcp_nodelay=True
+        )
 
     def look_at(self, point: np.ndarray, *names: str) -> SeenScene:
         """See Watcher.
@@ -101,7 +105,9 @@ class RobotMeans:
         """Point the camera at (3,) m, base_footprint. A head that does not obey stays as it is."""
         goal = PointHeadGoal(
             target=PointStamped(Header(frame_id=self._names.base_frame), Point(*map(float, point))),
-            pointing_axis=Vector3(0.0, 0.0, 1.0), pointing_frame=self._names.camera_frame)
+            pointing_axis=Vector3(0.0, 0.0, 1.0),
+            pointing_frame=self._names.camera_frame,
+        )
         wrong = _moved(self._head, goal)
         if wrong:
             rospy.logwarn('the head does not turn: %s', wrong)
@@ -109,8 +115,9 @@ class RobotMeans:
     def drive(self, x: float, y: float, yaw: float) -> str:
         """Drive the base by so much (m, rad) along its own axes. Return why not, or ''."""
         turn = Quaternion(0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2))
-        goal = MoveBaseGoal(PoseStamped(Header(frame_id=self._names.base_frame),
-                                        Pose(Point(x, y, 0.0), turn)))
+        goal = MoveBaseGoal(
+            PoseStamped(Header(frame_id=self._names.base_frame), Pose(Point(x, y, 0.0), turn))
+        )
         return _moved(self._base, goal)
 
     def odom_from_base(self) -> np.ndarray:
@@ -146,8 +153,11 @@ class RobotMeans:
             state = self._awaited(self._snap())
             if joints and all(name in state for name in joints):
                 return float(sum(state[name] for name in joints))
-        raise ViewError('no joint states of {} come on {}'.format(
-            ', '.join(joints) or arm, self._names.joint_states))
+        raise ViewError(
+            'no joint states of {} come on {}'.format(
+                ', '.join(joints) or arm, self._names.joint_states
+            )
+        )
 
     def pass_time(self, seconds: float) -> None:
         """Let a person's time pass: in the world, or by waiting in ROS time."""
@@ -157,8 +167,12 @@ class RobotMeans:
             rospy.sleep(seconds)
             return
         try:
-            call_service(rospy.resolve_name(self._names.pass_time), PassTime,
-                         PassTimeRequest(seconds, WHAT), _MOTION_S)
+            call_service(
+                rospy.resolve_name(self._names.pass_time),
+                PassTime,
+                PassTimeRequest(seconds, WHAT),
+                _MOTION_S,
+            )
         except (ServerGoneError, rospy.ServiceException) as err:
             raise ViewError('time does not pass: {}'.format(err)) from err
 
@@ -184,8 +198,12 @@ class RobotMeans:
         if NONE in (self._names.pass_time, self._names.charge_time):
             return
         try:
-            call_service(rospy.resolve_name(self._names.charge_time), ChargeTime,
-                         ChargeTimeRequest(WHAT, on), _MOTION_S)
+            call_service(
+                rospy.resolve_name(self._names.charge_time),
+                ChargeTime,
+                ChargeTimeRequest(WHAT, on),
+                _MOTION_S,
+            )
         except (ServerGoneError, rospy.ServiceException) as err:
             raise ViewError('nobody counts the time: {}'.format(err)) from err
 
@@ -194,8 +212,12 @@ class RobotMeans:
         if self._names.snapshot == NONE:
             return None
         try:
-            answer = call_service(rospy.resolve_name(self._names.snapshot), Snapshot,
-                                  SnapshotRequest(camera=False), _MOTION_S)
+            answer = call_service(
+                rospy.resolve_name(self._names.snapshot),
+                Snapshot,
+                SnapshotRequest(camera=False),
+                _MOTION_S,
+            )
         except ServerGoneError as err:
             raise ViewError(str(err)) from err
         if not answer.ok:

@@ -3,6 +3,7 @@
 Places come from the outlines and the measured depth alone, so they err as these do. Where the depth
 is lost, a person still tells about where a thing stands, by what it stands on.
 """
+
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -92,7 +93,8 @@ class SeenScene(NamedTuple):
         if self.limbs is None:
             return False
         beside = ndimage.binary_dilation(
-            thing.mask, iterations=max(1, round(BESIDE * thing.mask.shape[1])))
+            thing.mask, iterations=max(1, round(BESIDE * thing.mask.shape[1]))
+        )
         return int((beside & self.limbs).sum()) > LEAST_LIMB * thing.mask.size
 
     def dazzled(self) -> bool:
@@ -106,26 +108,33 @@ class SeenScene(NamedTuple):
 
     def heights(self) -> Dict[str, float]:
         """Return how tall (m) the things are that are seen standing, by name."""
-        return {thing.name: float(thing.box.size[2]) for thing in self.things
-                if thing.stands and thing.box is not None and not thing.lies(None)}
+        return {
+            thing.name: float(thing.box.size[2])
+            for thing in self.things
+            if thing.stands and thing.box is not None and not thing.lies(None)
+        }
 
     def boxes_but(self, *names: str) -> List[UprightBox]:
         """The boxes of all other movable things."""
         return [
-            thing.box for thing in self.things
+            thing.box
+            for thing in self.things
             if thing.movable and thing.box is not None and thing.name not in names
         ]
 
     def near(self, point: np.ndarray, within: float) -> Optional[SeenThing]:
         """The movable thing whose middle is nearest to a point (3,) m, within that many m."""
-        beside = [(float(np.linalg.norm(thing.box.centre - point)), number)
-                  for number, thing in enumerate(self.things)
-                  if thing.movable and thing.box is not None]
+        beside = [
+            (float(np.linalg.norm(thing.box.centre - point)), number)
+            for number, thing in enumerate(self.things)
+            if thing.movable and thing.box is not None
+        ]
         distance, number = min(beside, default=(np.inf, -1))
         return self.things[number] if distance <= within else None
 
-    def surface_at(self, place: np.ndarray, radius: float = 0.09,
-                   below: float = np.inf) -> Optional[float]:
+    def surface_at(
+        self, place: np.ndarray, radius: float = 0.09, below: float = np.inf
+    ) -> Optional[float]:
         """m above the floor of the level surface that is seen at a place (2,) or (3,) m.
 
         :param radius: m around the place that are looked at.
@@ -137,8 +146,9 @@ class SeenScene(NamedTuple):
         heights = points[near & (points[:, 2] > FLOOR) & (points[:, 2] < below), 2]
         if len(heights) < LEAST_SURFACE:
             return None
-        counts, edges = np.histogram(heights, np.arange(heights.min(), heights.max() + 2 * LEVEL,
-                                                        LEVEL))
+        counts, edges = np.histogram(
+            heights, np.arange(heights.min(), heights.max() + 2 * LEVEL, LEVEL)
+        )
         # the highest of those that are seen well: a shelf is seen beneath another one
         level = edges[int(np.flatnonzero(counts >= WELL_SEEN * counts.max())[-1])]
         close = heights[(heights > level - LEVEL / 2) & (heights < level + 1.5 * LEVEL)]
@@ -170,8 +180,7 @@ def seen_scene(image: CameraImage, outlines: Sequence[Outline]) -> SeenScene:
     return SeenScene([_seen(image, points, taken, outline) for outline in outlines], image, limbs)
 
 
-def _seen(image: CameraImage, points: np.ndarray, taken: np.ndarray,
-          outline: Outline) -> SeenThing:
+def _seen(image: CameraImage, points: np.ndarray, taken: np.ndarray, outline: Outline) -> SeenThing:
     rows, columns = np.nonzero(outline.mask)
     region = (int(columns.min()), int(rows.min()), int(np.ptp(columns)) + 1, int(np.ptp(rows)) + 1)
     own = points[outline.mask & np.isfinite(points[..., 2])]
@@ -181,21 +190,36 @@ def _seen(image: CameraImage, points: np.ndarray, taken: np.ndarray,
         found = object_above(own, surface, ON_SURFACE)
         box = found.box if found is not None else None
         own = own[found.chosen] if found is not None else own
-        stands = box is not None and surface is not None and bool(
-            np.percentile(own[:, 2], 2) < surface.z_at(*own[:, :2].mean(axis=0)) + STANDING)
+        stands = (
+            box is not None
+            and surface is not None
+            and bool(
+                np.percentile(own[:, 2], 2) < surface.z_at(*own[:, :2].mean(axis=0)) + STANDING
+            )
+        )
     elif surface is not None:
         box = _guessed(image, region, surface)
-    return SeenThing(outline.name, outline.wanted, outline.movable, region, outline.mask, box,
-                     _top(own) if box is not None and len(own) else None,
-                     float(np.percentile(own[:, 2], 2)) if len(own) else 0.0, stands)
+    return SeenThing(
+        outline.name,
+        outline.wanted,
+        outline.movable,
+        region,
+        outline.mask,
+        box,
+        _top(own) if box is not None and len(own) else None,
+        float(np.percentile(own[:, 2], 2)) if len(own) else 0.0,
+        stands,
+    )
 
 
 def _surface_around(points: np.ndarray, taken: np.ndarray, region: Region) -> Optional[Plane]:
     """Return the surface that a thing stands on, where enough of it is seen around the region."""
     left, top, width, height = region
     across, down = max(12, int(0.8 * width)), max(12, int(0.5 * height))
-    window = (slice(max(0, top - down // 2), top + height + down),
-              slice(max(0, left - across), left + width + across))
+    window = (
+        slice(max(0, top - down // 2), top + height + down),
+        slice(max(0, left - across), left + width + across),
+    )
     around = points[window][~taken[window]]
     around = around[np.isfinite(around[:, 2])]
     return find_plane(around, np.random.default_rng(1), least=max(150, len(around) // 10))

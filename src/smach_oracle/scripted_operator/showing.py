@@ -1,4 +1,5 @@
 """Shows a thing in the camera's image as a person does: a hasty rectangle, then strokes."""
+
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -33,8 +34,9 @@ SegmentCall = Callable[[Region, Sequence[OperatorStroke]], MarkedResult]
 Look = Callable[[], Optional[SeenThing]]
 
 
-def show(segment: SegmentCall, thing: SeenThing, generator: np.random.Generator,
-         look_again: Look) -> str:
+def show(
+    segment: SegmentCall, thing: SeenThing, generator: np.random.Generator, look_again: Look
+) -> str:
     """Mark a thing until the mask looks right.
 
     :param look_again: shows another image, between two tries, and finds the thing there.
@@ -59,10 +61,14 @@ def rectangle(region: Region, image: Tuple[int, int], generator: np.random.Gener
     left, top, width, height = region
     scale = image[0] / _USUAL_WIDTH  # a small image is shown as large as any
     missed, margin = scale * generator.normal(0.0, _EDGE_SIGMA, 4), scale * _MARGIN
-    x, right = (int(np.clip(round(edge), 0, image[0]))
-                for edge in (left - margin + missed[0], left + width + margin + missed[1]))
-    y, bottom = (int(np.clip(round(edge), 0, image[1]))
-                 for edge in (top - margin + missed[2], top + height + margin + missed[3]))
+    x, right = (
+        int(np.clip(round(edge), 0, image[0]))
+        for edge in (left - margin + missed[0], left + width + margin + missed[1])
+    )
+    y, bottom = (
+        int(np.clip(round(edge), 0, image[1]))
+        for edge in (top - margin + missed[2], top + height + margin + missed[3])
+    )
     return x, y, max(right - x, 1), max(bottom - y, 1)
 
 
@@ -72,7 +78,8 @@ def strokes_on(region: Region, generator: np.random.Generator) -> Tuple[Operator
     middle = left + width / 2 + generator.normal(0.0, 0.05) * width
     inside = OperatorStroke(True, [(middle, top + 0.25 * height), (middle, top + 0.75 * height)])
     beside = [
-        OperatorStroke(False, [(x, top + height / 2)]) for x in (left - 5.0, left + width + 5.0)
+        OperatorStroke(False, [(x, top + height / 2)])
+        for x in (left - 5.0, left + width + 5.0)
         if x >= 0.0
     ]
     return (inside,) + tuple(beside)
@@ -84,5 +91,8 @@ def looks_wrong(marked: MarkedResult, thing: SeenThing) -> str:
         return 'no mask is shown'
     both, either = (marked.mask & thing.mask).sum(), (marked.mask | thing.mask).sum()
     alike = float(both) / max(int(either), 1)
-    return '' if alike >= _ALIKE else 'the mask shares {:.0f}% with what is seen of it'.format(
-        100 * alike)
+    return (
+        ''
+        if alike >= _ALIKE
+        else 'the mask shares {:.0f}% with what is seen of it'.format(100 * alike)
+    )

@@ -1,9 +1,12 @@
-"""The scripted operator's plan for each state, from its settings. Pure.
+"""The scripted operator's plan for each state, from its settings.
+
+Pure.
 
     states:
       PICK: {means: take, arm: right, what: objects, otherwise: DETECT_TABLETOP}
       default: {means: retry}
 """
+
 import math
 from typing import Dict, Mapping, NamedTuple, Sequence, Tuple
 
@@ -57,8 +60,7 @@ class StatePlans:
         if not isinstance(settings, Mapping):
             raise SettingsError('states', settings, 'a mapping from states to means')
         self._plans: Dict[str, StatePlan] = {
-            state: _plan(state, value)
-            for state, value in settings.items()
+            state: _plan(state, value) for state, value in settings.items()
         }
         self._plans.setdefault(DEFAULT, StatePlan(RETRY))
 
@@ -77,8 +79,11 @@ def _plan(state: str, value: object) -> StatePlan:
         raise SettingsError(state, value, 'a mapping with means')
     unknown = sorted(str(field) for field in value if field not in StatePlan._fields)
     if unknown:
-        raise SettingsError('{}.{}'.format(state, unknown[0]), value[unknown[0]],
-                          'the keys ' + ', '.join(StatePlan._fields))
+        raise SettingsError(
+            '{}.{}'.format(state, unknown[0]),
+            value[unknown[0]],
+            'the keys ' + ', '.join(StatePlan._fields),
+        )
     choice(sorted(MEANS))(state + '.means', value.get('means'))
     for field in _TEXTS:
         if not isinstance(value.get(field, ''), str):
@@ -88,9 +93,14 @@ def _plan(state: str, value: object) -> StatePlan:
         raise SettingsError(state, dict(value), 'either place or onto')
     whole(1, 'a number from 1 to 20', 20)(state + '.tries', value.get('tries', 2))
     flag(state + '.inside', value.get('inside', False))
-    return StatePlan(**dict(value, base=_point(state + '.base', value.get('base', [0, 0, 0])),
-                            look=_points(state + '.look', value.get('look', [])),
-                            keep=_points(state + '.keep', value.get('keep', []))))
+    return StatePlan(
+        **dict(
+            value,
+            base=_point(state + '.base', value.get('base', [0, 0, 0])),
+            look=_points(state + '.look', value.get('look', [])),
+            keep=_points(state + '.keep', value.get('keep', [])),
+        )
+    )
 
 
 def _points(key: str, value: object) -> Tuple[Point, ...]:
@@ -102,8 +112,12 @@ def _points(key: str, value: object) -> Tuple[Point, ...]:
 def _point(key: str, value: object) -> Point:
     numbers = value if isinstance(value, (list, tuple)) else ()
     if len(numbers) != 3 or any(
-            isinstance(each, bool) or not isinstance(each, (int, float)) or not math.isfinite(each)
-            or abs(each) > 5 for each in numbers):
+        isinstance(each, bool)
+        or not isinstance(each, (int, float))
+        or not math.isfinite(each)
+        or abs(each) > 5
+        for each in numbers
+    ):
         raise SettingsError(key, value, 'three numbers from -5 to 5')
     x, y, z = (float(each) for each in numbers)
     return x, y, z

@@ -1,4 +1,5 @@
 """A hand behind the manipulation interface: one command at a time, in lock-step."""
+
 import threading
 import time
 from typing import Callable, Optional
@@ -30,10 +31,12 @@ class TeleoperationClient:
         self._seq = 0
         self._changed = threading.Condition()
         self._state: Optional[TeleopState] = None
-        self._publisher = rospy.Publisher(interface + '/command', TeleopCommand, queue_size=10,
-                                          tcp_nodelay=True)
-        self._subscriber = rospy.Subscriber(interface + '/state', TeleopState, self._heard,
-                                            queue_size=100, tcp_nodelay=True)
+        self._publisher = rospy.Publisher(
+            interface + '/command', TeleopCommand, queue_size=10, tcp_nodelay=True
+        )
+        self._subscriber = rospy.Subscriber(
+            interface + '/state', TeleopState, self._heard, queue_size=100, tcp_nodelay=True
+        )
 
     def wait_for_goal(self, query_id: str, limit_s: float) -> bool:
         """Wait until the interface works on a question. Return whether it does.
@@ -123,6 +126,12 @@ class TopicHand:
         self._client.let_go(self.arm)
 
     def _send(self, twist: np.ndarray, **more: object) -> TeleopState:
-        return self._client.send(TeleopCommand(
-            header=Header(frame_id=self._base), arm=self.arm, dead_man=True,
-            twist=Twist(Vector3(*twist[:3]), Vector3(*twist[3:])), **more))
+        return self._client.send(
+            TeleopCommand(
+                header=Header(frame_id=self._base),
+                arm=self.arm,
+                dead_man=True,
+                twist=Twist(Vector3(*twist[:3]), Vector3(*twist[3:])),
+                **more,
+            )
+        )

@@ -1,4 +1,5 @@
 """Work by hand with a thing that lies: taken from above, along its own axis, and held upright."""
+
 from typing import List
 
 import numpy as np
@@ -42,8 +43,7 @@ def take_upright(attempt: Attempt, target: Target, about: np.ndarray) -> np.ndar
     missed = attempt.slip()
     for way in ways:
         way[:3, 3] += missed
-    fetch(attempt, thing.bottom + float(thing.box.size[2]), ways,
-          until_it_touches=True)
+    fetch(attempt, thing.bottom + float(thing.box.size[2]), ways, until_it_touches=True)
     lift(attempt)
     tool = driver.hand.tool()
     pitch = float(np.arcsin(np.clip(-tool[2, 0], -1.0, 1.0)))
@@ -71,8 +71,9 @@ def lying_grasps(box: UprightBox, arm: str) -> List[np.ndarray]:
     The hand is turned along the thing, to the side that is more straight ahead.
     """
     straight = _straight(box.centre[:2], arm)
-    heading = min((box.yaw + half * np.pi for half in (-1, 0, 1)),
-                  key=lambda yaw: abs(yaw - straight))
+    heading = min(
+        (box.yaw + half * np.pi for half in (-1, 0, 1)), key=lambda yaw: abs(yaw - straight)
+    )
     found_ways = []
     for pitch in _DOWN:
         pose = from_rpy((0, 0, 0), pitch=pitch, yaw=heading)

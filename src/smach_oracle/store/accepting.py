@@ -4,6 +4,7 @@ Each of its trials that has not ended gets a moment BROKEN. A trial may be lost 
 the store keeps the number behind which new ones begin: a machine without a later trial is in doubt.
 The trials that go on get numbers behind it. A machine is then asked about its trial alone.
 """
+
 import os
 import sqlite3
 import time
@@ -35,16 +36,19 @@ def prepare(where: str, path: str) -> None:
         is_log_bad = True
     known = mark or {'trial': 0, 'ended': 0, 'log': CLOSED}
     unfinished = Mark(where, 'FULL')
-    unfinished.write(Content(_NO_STORE_HAS, known['trial'], known['ended']),
-                     log='' if known['log'] == CLOSED else known['log'])
+    unfinished.write(
+        Content(_NO_STORE_HAS, known['trial'], known['ended']),
+        log='' if known['log'] == CLOSED else known['log'],
+    )
     unfinished.close()
     if is_log_bad:
         try:
             set_log_aside(where)
         except OSError as err:
-            raise StoreError('{0}: its log cannot be kept as {0}{1}{2}: {3}. Mend that, and accept '
-                             'the store again'.format(
-                                 path, LOG, SET_ASIDE, err.strerror)) from err
+            raise StoreError(
+                '{0}: its log cannot be kept as {0}{1}{2}: {3}. Mend that, and accept '
+                'the store again'.format(path, LOG, SET_ASIDE, err.strerror)
+            ) from err
 
 
 def put_in_doubt(database: sqlite3.Connection, who: str) -> None:
@@ -54,13 +58,18 @@ def put_in_doubt(database: sqlite3.Connection, who: str) -> None:
     """
     now = time.time()
     database.execute('BEGIN IMMEDIATE')
-    database.execute('INSERT INTO moments (trial, at, seq, kind, path, label) SELECT number, ?, '
-                     '(SELECT coalesce(max(seq), -1) FROM moments WHERE trial = trials.number), '
-                     "?, machine, '' FROM trials WHERE ended IS NULL", (now, BROKEN))
-    since, = database.execute('SELECT coalesce(max(number), 0) FROM trials').fetchone()
+    database.execute(
+        'INSERT INTO moments (trial, at, seq, kind, path, label) SELECT number, ?, '
+        '(SELECT coalesce(max(seq), -1) FROM moments WHERE trial = trials.number), '
+        "?, machine, '' FROM trials WHERE ended IS NULL",
+        (now, BROKEN),
+    )
+    (since,) = database.execute('SELECT coalesce(max(number), 0) FROM trials').fetchone()
     database.execute('INSERT INTO marked VALUES (?)', (since,))
-    going_on = ('(SELECT number FROM trials WHERE ended IS NULL AND number IN '
-                '(SELECT max(number) FROM trials GROUP BY machine))')
+    going_on = (
+        '(SELECT number FROM trials WHERE ended IS NULL AND number IN '
+        '(SELECT max(number) FROM trials GROUP BY machine))'
+    )
     database.execute('UPDATE moments SET trial = trial + ? WHERE trial IN ' + going_on, (since,))
     database.execute('UPDATE trials SET number = number + ? WHERE number IN ' + going_on, (since,))
     database.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)', (now, who, WHAT))

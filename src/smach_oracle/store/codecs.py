@@ -3,6 +3,7 @@
 Plain data become JSON. What JSON has no word for becomes an object with one key that begins with
 `$`, such as {"$tuple": [1, 2]}. Long bytes and long texts are handed over apart, by content.
 """
+
 import base64
 import dataclasses
 import enum
@@ -96,8 +97,11 @@ class Codecs:
         :raises TypeError: where `of` is no type, or one of the functions cannot be called.
         """
         if not isinstance(of, type) or not callable(encode) or not callable(decode):
-            raise TypeError('a codec is a type and two functions, not {!r}, {!r}, {!r}'.format(
-                of, encode, decode))
+            raise TypeError(
+                'a codec is a type and two functions, not {!r}, {!r}, {!r}'.format(
+                    of, encode, decode
+                )
+            )
         codec = _Registered(name or name_of(of), encode, decode)
         self._by_type[of] = codec
         self._by_name[codec.name] = codec
@@ -193,8 +197,9 @@ class _Writer:
     def part(self, data: bytes) -> bytes:
         """Keep bytes apart, and return their digest."""
         if len(data) > MOST:
-            raise NotStorable('it has {} MB, and {} are allowed'.format(len(data) >> 20,
-                                                                       MOST >> 20))
+            raise NotStorable(
+                'it has {} MB, and {} are allowed'.format(len(data) >> 20, MOST >> 20)
+            )
         digest = hashlib.blake2b(data, digest_size=DIGEST).digest()
         self.parts[digest] = data
         return digest
@@ -225,8 +230,10 @@ class _Writer:
         if self._depth > MOST_DEPTH:
             _refuse_depth()
         if self._containers > MOST_CONTAINERS:
-            raise NotStorable('it has more than {} lists, mappings and objects, and one that '
-                              'stands in several places counts in each'.format(MOST_CONTAINERS))
+            raise NotStorable(
+                'it has more than {} lists, mappings and objects, and one that '
+                'stands in several places counts in each'.format(MOST_CONTAINERS)
+            )
 
     def _list(self, values: Iterable[object]) -> Any:
         plain = self.plain
@@ -266,8 +273,9 @@ class _Writer:
         names = [each.name for each in dataclasses.fields(kind)]
         unset = [name for name in names if not is_set(value, name)]
         if unset:
-            raise NotStorable('{} is not set, a field of {}'.format(
-                ', '.join(unset), name_of(kind)))
+            raise NotStorable(
+                '{} is not set, a field of {}'.format(', '.join(unset), name_of(kind))
+            )
         self._tell_dropped(value, kind, frozenset(names))
         return {name: getattr(value, name) for name in names}
 
@@ -277,7 +285,8 @@ class _Writer:
             return
         for name in attributes(value, kind):
             if name not in stored and not isinstance(
-                    class_attribute(kind, name), functools.cached_property):
+                class_attribute(kind, name), functools.cached_property
+            ):
                 self._drops(name)
 
     def _bytes(self, value: bytes, kind: type) -> object:
@@ -344,8 +353,11 @@ def _data(name: str, values: Mapping[str, object]) -> object:
     kind: Any = _class_named(name, dataclasses.is_dataclass)
     known = {each.name for each in dataclasses.fields(kind)}
     if known != set(values):
-        raise NotReadable('{} has other fields now: {}'.format(
-            name, ', '.join(sorted(known.symmetric_difference(values)))))
+        raise NotReadable(
+            '{} has other fields now: {}'.format(
+                name, ', '.join(sorted(known.symmetric_difference(values)))
+            )
+        )
     made: object = object.__new__(kind)  # without its __init__, which may do anything
     for key, value in values.items():
         object.__setattr__(made, key, value)
@@ -353,17 +365,23 @@ def _data(name: str, values: Mapping[str, object]) -> object:
 
 
 def _named(name: str, values: List[object]) -> object:
-    kind: Any = _class_named(name, lambda found: issubclass(found, tuple)
-                             and hasattr(found, '_fields'))
+    kind: Any = _class_named(
+        name, lambda found: issubclass(found, tuple) and hasattr(found, '_fields')
+    )
     if len(values) != len(kind._fields):
-        raise NotReadable('{} has {} fields now, not {}'.format(
-            name, len(kind._fields), len(values)))
+        raise NotReadable(
+            '{} has {} fields now, not {}'.format(name, len(kind._fields), len(values))
+        )
     made: object = tuple.__new__(kind, values)
     return made
 
 
 _CLASSES: Dict[str, Callable[[str, Any], object]] = {
-    '$enum': _enum, '$flag': _flag, '$data': _data, '$named': _named}
+    '$enum': _enum,
+    '$flag': _flag,
+    '$data': _data,
+    '$named': _named,
+}
 _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),

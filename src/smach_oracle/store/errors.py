@@ -1,4 +1,5 @@
 """The errors of a store."""
+
 import os
 import sqlite3
 
@@ -27,5 +28,6 @@ def _why_not_opened(path: str, said: str) -> str:
         return ''
     if os.path.exists(where + '-wal'):
         return '; nothing can be written there, so copy it with {}-wal to another folder'.format(
-            os.path.basename(where))
+            os.path.basename(where)
+        )
     return '; nothing can be written there'

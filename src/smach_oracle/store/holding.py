@@ -1,4 +1,5 @@
 """The hold on a machine of a store: a lock of the operating system, which ends with its process."""
+
 import fcntl
 import glob
 import hashlib
@@ -45,8 +46,9 @@ class MachineLock:
         if not _locked(descriptor, fcntl.LOCK_EX, TAKE_S):
             holder = _holder(descriptor)
             os.close(descriptor)
-            raise Held('{}: machine {} is held by process {}'.format(
-                self._path, self._machine, holder))
+            raise Held(
+                '{}: machine {} is held by process {}'.format(self._path, self._machine, holder)
+            )
         self._descriptor = descriptor
         try:
             os.ftruncate(descriptor, 0)
@@ -99,8 +101,9 @@ def check_nobody_holds(where: str, path: str) -> None:
             raise StoreError('{}: its lock cannot be read: {}'.format(path, err)) from err
         try:
             if not _locked(descriptor, fcntl.LOCK_SH, TAKE_S):
-                raise Held('{}: a machine of it is held by process {}'.format(
-                    path, _holder(descriptor)))
+                raise Held(
+                    '{}: a machine of it is held by process {}'.format(path, _holder(descriptor))
+                )
         finally:
             _close(descriptor)
 

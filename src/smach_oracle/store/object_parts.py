@@ -1,4 +1,5 @@
 """The names of classes, and what an object has, whatever its class says of itself."""
+
 import contextlib
 import sys
 from types import MemberDescriptorType

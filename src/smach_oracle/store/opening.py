@@ -1,4 +1,5 @@
 """Opens the database of a store, after a look at whether all of it is there."""
+
 import os
 import sqlite3
 import time
@@ -27,8 +28,9 @@ LOOKS_AGAIN_S = (0.05, 0.2)
 class Opening:
     """How one store is opened."""
 
-    def __init__(self, path: str, where: str, read_only: bool, accepts: str,
-                 begin: Callable[[Content], None]) -> None:
+    def __init__(
+        self, path: str, where: str, read_only: bool, accepts: str, begin: Callable[[Content], None]
+    ) -> None:
         """`path`: as the user has named it. `where`: of its own file.
 
         `accepts`: who takes what is left of a store that has lost some of it, '' for nobody.
@@ -78,8 +80,11 @@ class Opening:
             return
         database = None
         try:
-            database = connect('file:{}?{}'.format(
-                quote(self._where), 'immutable=1' if files.lacks_log else 'mode=ro'))
+            database = connect(
+                'file:{}?{}'.format(
+                    quote(self._where), 'immutable=1' if files.lacks_log else 'mode=ro'
+                )
+            )
             content = content_of(database)
             is_lost = files.lacks_log and needs_log(database)
         except sqlite3.OperationalError:
@@ -90,10 +95,15 @@ class Opening:
         if missed(files.mark, content) if files.mark else is_lost:
             raise StoreDamaged(
                 '{0}: {1}. Put its files back from a copy. {2}'.format(
-                    self.path, 'its log, {}{}, is missing, and with it the latest moments'.format(
-                        self.path, LOG) if files.lacks_log else
-                    'its latest moments are missing: it or its log was damaged or replaced',
-                    ACCEPT.format(self.path)))
+                    self.path,
+                    'its log, {}{}, is missing, and with it the latest moments'.format(
+                        self.path, LOG
+                    )
+                    if files.lacks_log
+                    else 'its latest moments are missing: it or its log was damaged or replaced',
+                    ACCEPT.format(self.path),
+                )
+            )
 
     def opened(self, synchronous: str) -> sqlite3.Connection:
         """Return its database.
@@ -134,11 +144,12 @@ class Opening:
             raise
 
     def _check(self, database: sqlite3.Connection) -> None:
-        magic, = database.execute('PRAGMA application_id').fetchone()
-        version, = database.execute('PRAGMA user_version').fetchone()
-        tables, = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
+        (magic,) = database.execute('PRAGMA application_id').fetchone()
+        (version,) = database.execute('PRAGMA user_version').fetchone()
+        (tables,) = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
         if (tables or self.read_only) and magic != MAGIC:
             raise StoreError('{}: is no store of smach_oracle'.format(self.path))
         if version > FORMAT:
-            raise StoreError('{}: has format {}, and this program knows {}'.format(
-                self.path, version, FORMAT))
+            raise StoreError(
+                '{}: has format {}, and this program knows {}'.format(self.path, version, FORMAT)
+            )

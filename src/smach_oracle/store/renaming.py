@@ -2,6 +2,7 @@
 
 What is stored stays as it is. A fact that is read is told under the new names.
 """
+
 import json
 from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -38,7 +39,7 @@ class Renaming:
             return fact
         for word in (STATE, MARK):
             if fact.name.startswith(word):
-                path, label = self.state(fact.path, fact.name[len(word):])
+                path, label = self.state(fact.path, fact.name[len(word) :])
                 return fact._replace(path=path, name=word + label)
         path = self._below(fact.path)
         fact = fact._replace(path=self._whole(self._path(path)))
@@ -83,9 +84,10 @@ class Renaming:
 
     def _history(self, path: str, told: List[Any]) -> List[Any]:
         labels = [self._label_here(path, each) for each in told[:3]]
-        return labels + [[self._label_here(path, state), successes,
-                          self._label_here(path, anchor), is_anchored]
-                         for state, successes, anchor, is_anchored in told[3:]]
+        return labels + [
+            [self._label_here(path, state), successes, self._label_here(path, anchor), is_anchored]
+            for state, successes, anchor, is_anchored in told[3:]
+        ]
 
     def _label_here(self, path: str, label: Optional[str]) -> Optional[str]:
         """Return the label of a state that still stands in its container, else None."""
@@ -108,8 +110,9 @@ class Renaming:
         parent, _, last = path.rpartition('/')
         if self._is_branch(path) and last == label:
             path = parent
-        container, _, now = self._path('{}/{}'.format(path, label) if path else label
-                                       ).rpartition('/')
+        container, _, now = self._path('{}/{}'.format(path, label) if path else label).rpartition(
+            '/'
+        )
         return StatePath(container, now)
 
     def _path(self, path: str) -> str:
@@ -120,7 +123,7 @@ class Renaming:
         return '{}/{}'.format(self._path(parent), label) if slash else path
 
     def _below(self, path: str) -> str:
-        return path[len(self._machine) + 1:]
+        return path[len(self._machine) + 1 :]
 
     def _whole(self, path: str) -> str:
         return '{}/{}'.format(self._machine, path) if path else self._machine
@@ -140,9 +143,11 @@ def containers_of(description: str) -> Dict[str, Mapping[str, Any]]:
 
 def states_of(description: str) -> List[str]:
     """Return the paths of all states that the description of a structure names."""
-    return ['/'.join(filter(None, (path, label)))
-            for path, container in containers_of(description).items()
-            for label in container.get('states', {})]
+    return [
+        '/'.join(filter(None, (path, label)))
+        for path, container in containers_of(description).items()
+        for label in container.get('states', {})
+    ]
 
 
 def told_renaming(value: StoredValue) -> Tuple[str, Dict[str, str]]:

@@ -1,4 +1,5 @@
 """The trials that go from a store: those that have ended, the oldest first."""
+
 import json
 import re
 import sqlite3
@@ -89,8 +90,9 @@ class Retention:
                 lock = MachineLock(self._store.path, machine)
                 lock.take()
                 locks.append(lock)
-                numbers += [each.trial.number for each in self.going
-                            if each.trial.machine == machine]
+                numbers += [
+                    each.trial.number for each in self.going if each.trial.machine == machine
+                ]
             with transaction(self._store) as database:
                 _take_out(database, numbers)
         finally:
@@ -101,8 +103,10 @@ class Retention:
 
 def size_of(database: sqlite3.Connection) -> int:
     """Return the bytes of a store that are in use."""
-    pages, free, size = (database.execute('PRAGMA ' + name).fetchone()[0]
-                         for name in ('page_count', 'freelist_count', 'page_size'))
+    pages, free, size = (
+        database.execute('PRAGMA ' + name).fetchone()[0]
+        for name in ('page_count', 'freelist_count', 'page_size')
+    )
     return int((pages - free) * size)
 
 
@@ -110,31 +114,45 @@ def _take_out(database: sqlite3.Connection, trials: Iterable[int]) -> None:
     structures = set()
     for number in trials:  # each has ended: see `_why_kept`
         structures.update(_structures(database, number))
-        database.execute('DELETE FROM facts WHERE moment IN '
-                         '(SELECT number FROM moments WHERE trial = ?)', (number,))
+        database.execute(
+            'DELETE FROM facts WHERE moment IN (SELECT number FROM moments WHERE trial = ?)',
+            (number,),
+        )
         database.execute('DELETE FROM moments WHERE trial = ?', (number,))
         database.execute('DELETE FROM trials WHERE number = ?', (number,))
     if structures:
-        left = {each for trial, in database.execute('SELECT number FROM trials').fetchall()
-                for each in _structures(database, trial)}
-        database.executemany('DELETE FROM structures WHERE id = ?',
-                             [(each,) for each in structures - left])
+        left = {
+            each
+            for (trial,) in database.execute('SELECT number FROM trials').fetchall()
+            for each in _structures(database, trial)
+        }
+        database.executemany(
+            'DELETE FROM structures WHERE id = ?', [(each,) for each in structures - left]
+        )
     used = used_parts(database)
-    for digest, in database.execute('SELECT digest FROM parts').fetchall():
+    for (digest,) in database.execute('SELECT digest FROM parts').fetchall():
         if bytes(digest) not in used:
             database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
 
 
 def _structures(database: sqlite3.Connection, trial: int) -> Set[str]:
     """Return the ids of the structures of a trial: it may have gone on with a changed script."""
-    found = {str(structure) for structure, in database.execute(
-        'SELECT structure FROM trials WHERE number = ?', (trial,))}
+    found = {
+        str(structure)
+        for (structure,) in database.execute(
+            'SELECT structure FROM trials WHERE number = ?', (trial,)
+        )
+    }
     for name, text in database.execute(
-            "SELECT name, text FROM facts JOIN moments ON moment = moments.number WHERE trial = ? "
-            "AND facts.path = '' AND name IN (?, ?) AND text IS NOT NULL",
-            (trial, STRUCTURE, RENAMED)):
-        found.add(str(json.loads(text)) if name == STRUCTURE
-                  else told_renaming(StoredValue(text, None))[0])
+        'SELECT name, text FROM facts JOIN moments ON moment = moments.number WHERE trial = ? '
+        "AND facts.path = '' AND name IN (?, ?) AND text IS NOT NULL",
+        (trial, STRUCTURE, RENAMED),
+    ):
+        found.add(
+            str(json.loads(text))
+            if name == STRUCTURE
+            else told_renaming(StoredValue(text, None))[0]
+        )
     return found
 
 
@@ -144,14 +162,16 @@ def used_parts(database: sqlite3.Connection, since: int = 0) -> Set[bytes]:
     `since`: the first moment whose facts count.
     """
     used: Set[bytes] = set()
-    for text, in database.execute(
-            "SELECT text FROM facts WHERE moment >= ? AND text LIKE '%$part%'", (since,)):
+    for (text,) in database.execute(
+        "SELECT text FROM facts WHERE moment >= ? AND text LIKE '%$part%'", (since,)
+    ):
         used.update(map(bytes.fromhex, _PART.findall(text)))
-    wholes = database.execute('SELECT DISTINCT whole FROM facts WHERE moment >= ? AND '
-                              'whole IS NOT NULL', (since,)).fetchall()
-    for digest, in wholes:
+    wholes = database.execute(
+        'SELECT DISTINCT whole FROM facts WHERE moment >= ? AND whole IS NOT NULL', (since,)
+    ).fetchall()
+    for (digest,) in wholes:
         used.add(bytes(digest))
-        for data, in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):
+        for (data,) in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):
             used.update(map(bytes.fromhex, _PART.findall(bytes(data).decode('ascii', 'replace'))))
     return used
 
@@ -161,6 +181,6 @@ def check(store: StoreFile) -> None:
 
     :raises StoreError: where SQLite finds it damaged: nothing is taken out of it then.
     """
-    for found, in store.integrity():
+    for (found,) in store.integrity():
         if found != 'ok':
             raise StoreError('{}: is damaged ({}); nothing is removed'.format(store.path, found))

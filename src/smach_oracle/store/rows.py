@@ -1,4 +1,5 @@
 """The rows of a store, as plain tuples: those to write, and those that were read."""
+
 from typing import Iterable, NamedTuple, Optional, Tuple
 
 from .codecs import Encoded

@@ -3,6 +3,7 @@
 SQLite takes a log that is lost for one that was never there, and an empty file for a new database.
 Both would be a new trial where a machine had stood in the middle of one.
 """
+
 import json
 import os
 import stat
@@ -18,10 +19,15 @@ ACCEPT = '`oracle_state {} accept` goes on with what can still be read'
 _HEAD = b'SQLite format 3\0'
 _HEAD_BYTES, _LOG_HEAD_BYTES = 100, 32
 _MODE = 18  # place in the head of what is 2 where a log follows
-_LOG_MAGICS = (0x377f0682, 0x377f0683)
+_LOG_MAGICS = (0x377F0682, 0x377F0683)
 _LONGEST_MARK = 512  # bytes
-_KINDS = ((stat.S_ISDIR, 'a folder'), (stat.S_ISFIFO, 'a pipe'), (stat.S_ISSOCK, 'a socket'),
-          (stat.S_ISCHR, 'a device'), (stat.S_ISBLK, 'a device'))
+_KINDS = (
+    (stat.S_ISDIR, 'a folder'),
+    (stat.S_ISFIFO, 'a pipe'),
+    (stat.S_ISSOCK, 'a socket'),
+    (stat.S_ISCHR, 'a device'),
+    (stat.S_ISBLK, 'a device'),
+)
 
 
 class Content(NamedTuple):
@@ -53,11 +59,16 @@ class Mark:
         """
         try:
             if self._descriptor is None:
-                self._descriptor = os.open(self._path + MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC,
-                                           0o644)
+                self._descriptor = os.open(
+                    self._path + MARK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644
+                )
             text = '{{"moment":{},"trial":{},"ended":{},"log":"{}","synchronous":"{}","boot":"{}"}}'
-            told = text.format(*content, self._salts() if log is None else log,
-                               self._synchronous, self._boot).ljust(_LONGEST_MARK - 1) + '\n'
+            told = (
+                text.format(
+                    *content, self._salts() if log is None else log, self._synchronous, self._boot
+                ).ljust(_LONGEST_MARK - 1)
+                + '\n'
+            )
             os.pwrite(self._descriptor, told.encode('ascii'), 0)
         except OSError:
             pass
@@ -116,15 +127,18 @@ def examined(path: str, shown: str) -> Files:
         return Files(False)
     for is_kind, kind in _KINDS:
         if is_kind(found.st_mode):
-            raise StoreError('{}: unable to open it: it is {}, no store. Name a file'.format(
-                shown, kind))
+            raise StoreError(
+                '{}: unable to open it: it is {}, no store. Name a file'.format(shown, kind)
+            )
     try:
         head = _start(path, _HEAD_BYTES)
     except OSError as err:
         raise StoreError('{}: cannot be read: {}'.format(shown, err)) from err
     if len(head) < _HEAD_BYTES or not head.startswith(_HEAD):
-        raise StoreDamaged('{}: is damaged, or no store: it does not begin as an SQLite file. Put '
-                           'it back from a copy, with the files next to it'.format(shown))
+        raise StoreDamaged(
+            '{}: is damaged, or no store: it does not begin as an SQLite file. Put '
+            'it back from a copy, with the files next to it'.format(shown)
+        )
     mark = read_mark(path)
     follows = head[_MODE] == 2
     has_log = _size(path + LOG) >= _LOG_HEAD_BYTES
@@ -140,21 +154,31 @@ def _check_nothing_is_left(path: str, shown: str, is_empty: bool) -> None:
     if is_empty:
         left.append(shown)
     if left:
-        raise StoreDamaged('{}: is {}{}, so a store was here. Put it back from a copy. To begin '
-                           'a new one, remove {}'.format(
-                               shown, 'empty' if is_empty else 'missing', '' if is_empty else
-                               ', and {} is there'.format(left[0]), ' and '.join(left)))
+        raise StoreDamaged(
+            '{}: is {}{}, so a store was here. Put it back from a copy. To begin '
+            'a new one, remove {}'.format(
+                shown,
+                'empty' if is_empty else 'missing',
+                '' if is_empty else ', and {} is there'.format(left[0]),
+                ' and '.join(left),
+            )
+        )
 
 
 def _check_log(path: str, shown: str, follows: bool, mark: Optional[Dict[str, Any]]) -> None:
     head = _start(path + LOG, _LOG_HEAD_BYTES)
-    magic, = struct.unpack_from('>I', head)
+    (magic,) = struct.unpack_from('>I', head)
     if magic not in _LOG_MAGICS or _sums(head[:24], magic) != struct.unpack_from('>II', head, 24):
-        raise StoreDamaged('{0}: its log, {0}{1}, is damaged, and with it the latest moments. Put '
-                           'it back from a copy. {2}'.format(shown, LOG, ACCEPT.format(shown)))
+        raise StoreDamaged(
+            '{0}: its log, {0}{1}, is damaged, and with it the latest moments. Put '
+            'it back from a copy. {2}'.format(shown, LOG, ACCEPT.format(shown))
+        )
     if not follows or (mark and mark['log'] and not _is_of(head[16:24], mark['log'])):
-        raise StoreDamaged('{0}: the log {0}{1} is not its own. Put back the one that was there. '
-                           '{2}'.format(shown, LOG, ACCEPT.format(shown)))
+        raise StoreDamaged(
+            '{0}: the log {0}{1} is not its own. Put back the one that was there. {2}'.format(
+                shown, LOG, ACCEPT.format(shown)
+            )
+        )
 
 
 def _is_of(salts: bytes, known: str) -> bool:
@@ -168,8 +192,8 @@ def _sums(data: bytes, magic: int) -> Any:
     one = two = 0
     words: List[int] = list(struct.unpack('{}6I'.format('>' if magic & 1 else '<'), data))
     for first, second in zip(words[::2], words[1::2]):
-        one = (one + first + two) & 0xffffffff
-        two = (two + second + one) & 0xffffffff
+        one = (one + first + two) & 0xFFFFFFFF
+        two = (two + second + one) & 0xFFFFFFFF
     return one, two
 
 

@@ -1,4 +1,5 @@
 """The command oracle_state: look at the store of stopped machines, and change what is in it."""
+
 import argparse
 import getpass
 import socket
@@ -20,8 +21,10 @@ from .stopped_trial import (
 from .store_file import StoreFile
 
 WRONG = 2  # exit code
-IN_DOUBT = ('. The latest moments may be lost, and whole trials. So each machine asks a person '
-            'before it moves, and repeats no state by itself that has `on_retry`')
+IN_DOUBT = (
+    '. The latest moments may be lost, and whole trials. So each machine asks a person '
+    'before it moves, and repeats no state by itself that has `on_retry`'
+)
 
 
 def main(arguments: Optional[List[str]] = None) -> int:
@@ -40,9 +43,11 @@ def main(arguments: Optional[List[str]] = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='oracle_state', description='Look at the stored state of machines whose program has '
+        prog='oracle_state',
+        description='Look at the stored state of machines whose program has '
         'stopped, and change it before it goes on. Nothing is changed while a program holds the '
-        'machine.')
+        'machine.',
+    )
     parser.add_argument('path', help='the store, as the setting `checkpoint` names it')
     parser.set_defaults(work=_list)
     works = parser.add_subparsers(metavar='WHAT')
@@ -52,25 +57,36 @@ def _parser() -> argparse.ArgumentParser:
     _add(works, 'moments', _moments, 'the moments of a trial, with their numbers')
     _add(works, 'log', _log, 'what was changed by hand, when and by whom')
     edit = _add(works, 'edit', _edit, 'give a userdata key another value')
-    edit.add_argument('assignment', metavar='KEY=JSON', help="such as count=3 or name='\"cup\"'")
+    edit.add_argument('assignment', metavar='KEY=JSON', help='such as count=3 or name=\'"cup"\'')
     edit.add_argument('--container', metavar='PATH', help='by default the top machine')
     go_to = _add(works, 'goto', _go_to, 'let it go on at another state')
-    go_to.add_argument('label', metavar='LABEL', help='of a state, or its path below the top '
-                       'machine')
-    go_to.add_argument('--repeat', metavar='STATE', action='append', default=[],
-                       help='let it repeat this state once, whatever its on_retry says '
-                       '(repeatable)')
+    go_to.add_argument(
+        'label', metavar='LABEL', help='of a state, or its path below the top machine'
+    )
+    go_to.add_argument(
+        '--repeat',
+        metavar='STATE',
+        action='append',
+        default=[],
+        help='let it repeat this state once, whatever its on_retry says (repeatable)',
+    )
     _add(works, 'drop', _drop, 'end the trial: it is never resumed')
-    works.add_parser('accept', help='go on with what can be read of a store that has lost some '
-                     'of it').set_defaults(work=_accept)
+    works.add_parser(
+        'accept', help='go on with what can be read of a store that has lost some of it'
+    ).set_defaults(work=_accept)
     return parser
 
 
-def _add(works: 'argparse._SubParsersAction[argparse.ArgumentParser]', name: str, work: object,
-         about: str) -> argparse.ArgumentParser:
+def _add(
+    works: 'argparse._SubParsersAction[argparse.ArgumentParser]',
+    name: str,
+    work: object,
+    about: str,
+) -> argparse.ArgumentParser:
     parser = works.add_parser(name, help=about, description=about)
-    parser.add_argument('--trial', type=int, metavar='NUMBER',
-                        help='by default the latest one that has not ended')
+    parser.add_argument(
+        '--trial', type=int, metavar='NUMBER', help='by default the latest one that has not ended'
+    )
     parser.set_defaults(work=work)
     return parser
 
@@ -81,9 +97,15 @@ def _list(given: argparse.Namespace) -> None:
     if not trials:
         sys.stdout.write('no trial is stored\n')
     for trial in trials:
-        sys.stdout.write('{:>5}  {:<20} {}  {:>6} moments  {}\n'.format(
-            trial.number, trial.machine, _when(trial.begun), trial.moments,
-            _how_it_is(store, trial)))
+        sys.stdout.write(
+            '{:>5}  {:<20} {}  {:>6} moments  {}\n'.format(
+                trial.number,
+                trial.machine,
+                _when(trial.begun),
+                trial.moments,
+                _how_it_is(store, trial),
+            )
+        )
 
 
 def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
@@ -95,8 +117,13 @@ def _how_it_is(store: StoreFile, trial: StoredTrial) -> str:
     standing = stopped.places()
     if not standing:
         return 'stopped before it began'
-    how = ('kept, as nobody answered' if stopped.is_kept() else
-           'not stored to its end, last' if stopped.is_broken() else 'stopped')
+    how = (
+        'kept, as nobody answered'
+        if stopped.is_kept()
+        else 'not stored to its end, last'
+        if stopped.is_broken()
+        else 'stopped'
+    )
     return '{}: {}'.format(how, ', '.join(map(in_words, innermost(standing))))
 
 
@@ -106,8 +133,11 @@ def _show(given: argparse.Namespace) -> None:
     if given.at is not None:
         trial = _trial_of(store, given.at, trial if given.trial is not None else None)
     stopped = StoppedTrial(store, trial, given.at)
-    _say('trial {} of {}, begun {}: {}'.format(trial.number, trial.machine, _when(trial.begun),
-                                              _how_it_is(store, trial)))
+    _say(
+        'trial {} of {}, begun {}: {}'.format(
+            trial.number, trial.machine, _when(trial.begun), _how_it_is(store, trial)
+        )
+    )
     _say('\nWhere it stood')
     for standing in stopped.places():
         _say('  ' + in_words(standing))
@@ -129,18 +159,26 @@ def _trial_of(store: StoreFile, moment: int, wanted: Optional[StoredTrial]) -> S
     """
     trial = store.trial_of(moment)
     if trial is None or (wanted is not None and wanted.number != trial.number):
-        raise StoreError('{}: there is no moment {}{}; `moments` lists them'.format(
-            store.path, moment, '' if wanted is None else ' of trial {}'.format(wanted.number)))
+        raise StoreError(
+            '{}: there is no moment {}{}; `moments` lists them'.format(
+                store.path, moment, '' if wanted is None else ' of trial {}'.format(wanted.number)
+            )
+        )
     return trial
 
 
 def _moments(given: argparse.Namespace) -> None:
     store = StoreFile(given.path, read_only=True)
     for moment in store.moments(chosen_trial(store, given.trial).number):
-        _say('{:>7}  {}  {:<18} {}{}'.format(
-            moment.number, _when(moment.at), moment.kind.lower(),
-            '/'.join(filter(None, (moment.path, moment.label))),
-            '' if moment.after is None else '  (goes on from {})'.format(moment.after)))
+        _say(
+            '{:>7}  {}  {:<18} {}{}'.format(
+                moment.number,
+                _when(moment.at),
+                moment.kind.lower(),
+                '/'.join(filter(None, (moment.path, moment.label))),
+                '' if moment.after is None else '  (goes on from {})'.format(moment.after),
+            )
+        )
 
 
 def _log(given: argparse.Namespace) -> None:
@@ -157,16 +195,23 @@ def _edit(given: argparse.Namespace) -> None:
         path = given.container or stopped.trial.machine
         keys = stopped.keys(path)
         stopped.edit(key, text, path, _user_name())
-    _say('{} is changed'.format(key) if key in keys else
-         '{} is new: {} had {}'.format(key, path, ', '.join(keys) or 'no key'))
+    _say(
+        '{} is changed'.format(key)
+        if key in keys
+        else '{} is new: {} had {}'.format(key, path, ', '.join(keys) or 'no key')
+    )
 
 
 def _go_to(given: argparse.Namespace) -> None:
     with trial_to_change(given.path, given.trial) as stopped:
         stopped.go_to(given.label, _user_name(), given.repeat)
         asked = [each for each in stopped.guarded() if each not in given.repeat]
-    _say('it will go on at {}{}'.format(given.label, '; a person is asked before it repeats ' +
-                                        ', '.join(asked) if asked else ''))
+    _say(
+        'it will go on at {}{}'.format(
+            given.label,
+            '; a person is asked before it repeats ' + ', '.join(asked) if asked else '',
+        )
+    )
 
 
 def _drop(given: argparse.Namespace) -> None:
@@ -181,9 +226,14 @@ def _accept(given: argparse.Namespace) -> None:
         trials = store.trials()
     finally:
         store.close()
-    _say('{} is accepted as it is, with {} trial{}{}'.format(
-        given.path, len(trials), '' if len(trials) == 1 else 's',
-        IN_DOUBT if store.was_damaged else ''))
+    _say(
+        '{} is accepted as it is, with {} trial{}{}'.format(
+            given.path,
+            len(trials),
+            '' if len(trials) == 1 else 's',
+            IN_DOUBT if store.was_damaged else '',
+        )
+    )
 
 
 def _user_name() -> str:

@@ -1,4 +1,5 @@
 """A stored trial, looked at and changed by hand."""
+
 import contextlib
 import json
 import time
@@ -112,16 +113,21 @@ class StoppedTrial:
         """Yield path, key and value as JSON, long ones cut, or why there is none."""
         for (path, name), value in sorted(self._facts.items()):
             if name.startswith(KEY) and value.is_there:
-                yield path, name[len(KEY):], self._text_of(value)
+                yield path, name[len(KEY) :], self._text_of(value)
             elif name.startswith(KEPT_OUT) and value.is_there:
                 kind, why = json.loads(value.text or '["", ""]')
-                yield path, name[len(KEPT_OUT):], '({}, not stored: {})'.format(kind, why)
+                yield path, name[len(KEPT_OUT) :], '({}, not stored: {})'.format(kind, why)
 
     def keys(self, path: str) -> List[str]:
         """Return the userdata keys of a container, also of values that could not be stored."""
-        return sorted({name[len(word):] for (of, name), value in self._facts.items()
-                       for word in (KEY, KEPT_OUT)
-                       if of == path and name.startswith(word) and value.is_there})
+        return sorted(
+            {
+                name[len(word) :]
+                for (of, name), value in self._facts.items()
+                for word in (KEY, KEPT_OUT)
+                if of == path and name.startswith(word) and value.is_there
+            }
+        )
 
     def is_kept(self) -> bool:
         """Whether its program ended as nobody had said how it goes on."""
@@ -147,7 +153,7 @@ class StoppedTrial:
             if name.startswith(STATE) and value.is_there:
                 count = json.loads(value.text or '{}').get('counts', [0, 0])[1]
                 if count:
-                    yield self._state_path(path, name[len(STATE):]), int(count)
+                    yield self._state_path(path, name[len(STATE) :]), int(count)
 
     def containers(self) -> List[str]:
         """Return the paths of all containers, the top machine's name first in each."""
@@ -168,8 +174,9 @@ class StoppedTrial:
         if text is None and value.whole is not None:
             text = self._store.part(value.whole).decode('ascii', 'replace')
         text = text or ''
-        return text if len(text) <= LONGEST else '{}... ({} letters)'.format(
-            text[:LONGEST], len(text))
+        return (
+            text if len(text) <= LONGEST else '{}... ({} letters)'.format(text[:LONGEST], len(text))
+        )
 
     # -- changing it
 
@@ -183,13 +190,17 @@ class StoppedTrial:
             it cannot be written.
         """
         if path not in self.containers():
-            raise StoreError('there is no container {!r}; there are {}'.format(
-                path, ', '.join(sorted(self.containers()))))
+            raise StoreError(
+                'there is no container {!r}; there are {}'.format(
+                    path, ', '.join(sorted(self.containers()))
+                )
+            )
         try:
             encoded = Codecs().encode(json.loads(json_text))
         except (ValueError, RecursionError, NotStorable) as err:
-            raise StoreError('{}: {!r} is no JSON ({}); a text needs quotes'.format(
-                key, json_text, err)) from err
+            raise StoreError(
+                '{}: {!r} is no JSON ({}); a text needs quotes'.format(key, json_text, err)
+            ) from err
         facts = [Fact(path, KEY + key, encoded)]
         if (path, KEPT_OUT + key) in self._facts:
             facts.append(Fact(path, KEPT_OUT + key, None))
@@ -205,7 +216,7 @@ class StoppedTrial:
             if name.startswith(MARK) and value.is_there:
                 done, _, on_retry = (*json.loads(value.text or '[]'), 'allow')[2:5]
                 if done and on_retry != 'allow':
-                    found[self._state_path(path, name[len(MARK):])[len(top) + 1:]] = on_retry
+                    found[self._state_path(path, name[len(MARK) :])[len(top) + 1 :]] = on_retry
         return found
 
     def go_to(self, label: str, who: str, repeat: Sequence[str] = ()) -> None:
@@ -219,21 +230,27 @@ class StoppedTrial:
         top, states = self.trial.machine, self.states()
         for each in (label, *repeat):
             if each not in states:
-                raise StoreError('there is no state {!r}; there are {}'.format(
-                    each, ', '.join(sorted(states))))
+                raise StoreError(
+                    'there is no state {!r}; there are {}'.format(each, ', '.join(sorted(states)))
+                )
         for each, on_retry in self.guarded().items():
             if (label + '/').startswith(each + '/') and each not in repeat:
                 raise StoreError(
                     '{0} was done in this trial, and is not repeated by itself (on_retry: {1}). '
                     '`oracle_state {2} goto {3} --repeat {0}` sends the machine there '
-                    'anyway'.format(each, on_retry, self._store.path, label))
+                    'anyway'.format(each, on_retry, self._store.path, label)
+                )
         first, _, below = label.partition('/')
-        at: List[Any] = [first, BEFORE, '{}/{}'.format(top, label) if below else None,
-                         list(repeat)]
+        at: List[Any] = [first, BEFORE, '{}/{}'.format(top, label) if below else None, list(repeat)]
         facts = [Fact(top, AT, Encoded(json.dumps(at), None, {}))]  # also a long path as text
         facts += (Fact(path, ASKED, None) for path, _ in self._named(ASKED))
-        self._commit(top, first, facts, who, 'go to {}{}'.format(label, ''.join(
-            ', and repeat ' + each for each in repeat)))
+        self._commit(
+            top,
+            first,
+            facts,
+            who,
+            'go to {}{}'.format(label, ''.join(', and repeat ' + each for each in repeat)),
+        )
 
     def drop(self, who: str) -> None:
         """End the trial, so that it is never resumed.
@@ -251,17 +268,23 @@ class StoppedTrial:
         try:
             moments = self._store.moments(self.trial.number)
             seq = max((moment.seq for moment in moments), default=-1)
-            self._store.edit(self.trial.number, NewMoment(
-                time.time(), seq, EDIT, path, label, tuple(facts)), who,
-                'trial {}: {}'.format(self.trial.number, what))
+            self._store.edit(
+                self.trial.number,
+                NewMoment(time.time(), seq, EDIT, path, label, tuple(facts)),
+                who,
+                'trial {}: {}'.format(self.trial.number, what),
+            )
         finally:
             lock.release()
 
     def _held(self) -> MachineLock:
         """Hold the machine, so that no program begins while it is changed."""
         if self.trial.ended is not None:
-            raise StoreError('trial {} has ended ({}), and is never resumed'.format(
-                self.trial.number, self.trial.outcome))
+            raise StoreError(
+                'trial {} has ended ({}), and is never resumed'.format(
+                    self.trial.number, self.trial.outcome
+                )
+            )
         lock = MachineLock(self._store.path, self.trial.machine)
         lock.take()
         try:
@@ -277,18 +300,22 @@ class StoppedTrial:
         now = [each for each in self._store.trials(self.trial.machine) if each.number == number]
         latest = max((each.number for each in self._store.moments(number)), default=0)
         if not now or now[0].ended is not None or latest != self.latest:
-            raise StoreError('trial {} has gone on, was changed or has ended since it was looked '
-                             'at: look at it again'.format(number))
+            raise StoreError(
+                'trial {} has gone on, was changed or has ended since it was looked '
+                'at: look at it again'.format(number)
+            )
 
     def _structure(self) -> str:
         latest = self._facts.get(('', STRUCTURE))
         return self._store.description(
-            self.trial.structure if latest is None else json.loads(latest.text or '""'))
+            self.trial.structure if latest is None else json.loads(latest.text or '""')
+        )
 
 
 @contextlib.contextmanager
-def trial_to_change(path: str, number: Optional[int] = None,
-                    seen: Optional[int] = None) -> Iterator[StoppedTrial]:
+def trial_to_change(
+    path: str, number: Optional[int] = None, seen: Optional[int] = None
+) -> Iterator[StoppedTrial]:
     """Yield a trial of the store at `path`, for one change.
 
     :param number: of the trial, by default the latest one that has not ended.
@@ -320,8 +347,11 @@ def chosen_trial(store: StoreFile, number: Optional[int]) -> StoredTrial:
     else:
         trials = [trial for trial in trials if trial.number == number]
     if not trials:
-        raise StoreError('{}: there is no {}'.format(
-            store.path, 'trial' if number is None else 'trial {}'.format(number)))
+        raise StoreError(
+            '{}: there is no {}'.format(
+                store.path, 'trial' if number is None else 'trial {}'.format(number)
+            )
+        )
     return trials[-1]
 
 
@@ -332,14 +362,20 @@ def in_words(standing: StoppedPlace) -> str:
     if standing.phase == FAILED:
         return '{}/{} had failed: {}'.format(standing.path, standing.label, standing.text)
     if standing.phase == BEFORE:
-        return '{}/{} was next{}'.format(standing.path, standing.label, standing.text and (
-            ', on the way to ' + standing.text))
+        return '{}/{} was next{}'.format(
+            standing.path, standing.label, standing.text and (', on the way to ' + standing.text)
+        )
     return '{}/{} was under way'.format(standing.path, standing.label)
 
 
 def innermost(places: List[StoppedPlace]) -> List[StoppedPlace]:
     """Return those in which nothing else stands: the states under way, one of each branch."""
     going = [each for each in places if each.phase != ENDED]
-    return [each for each in going if not any(
-        '{}/'.format(other.path).startswith('{}/{}/'.format(each.path, each.label))
-        for other in going)] or places[-1:]
+    return [
+        each
+        for each in going
+        if not any(
+            '{}/'.format(other.path).startswith('{}/{}/'.format(each.path, each.label))
+            for other in going
+        )
+    ] or places[-1:]

@@ -4,6 +4,7 @@ Every moment of a trial can be resumed from. The older ones of a long trial are 
 trial has gone on from an earlier one, those between stay, too, and count for nothing that follows.
 A moment has the facts that changed with it. What is large is kept once, by its content.
 """
+
 import contextlib
 import ctypes
 import os
@@ -36,8 +37,9 @@ class NewTrial(NamedTuple):
 class StoreFile:
     """An open store. To be used in one thread at a time."""
 
-    def __init__(self, path: str, synchronous: str = 'FULL', read_only: bool = False,
-                 accept_by: str = '') -> None:
+    def __init__(
+        self, path: str, synchronous: str = 'FULL', read_only: bool = False, accept_by: str = ''
+    ) -> None:
         """Open the store at `path`, made if there is nothing of one.
 
         `synchronous`: FULL survives a power cut, NORMAL may lose the last moments by one, OFF by a
@@ -78,7 +80,7 @@ class StoreFile:
         if not self.read_only:
             with contextlib.suppress(sqlite3.Error):
                 self._db.execute('PRAGMA busy_timeout = 0')
-                mode, = self._db.execute('PRAGMA journal_mode = DELETE').fetchone()
+                (mode,) = self._db.execute('PRAGMA journal_mode = DELETE').fetchone()
                 if mode == 'delete':
                     self._note(log=CLOSED)
         self._mark.close()
@@ -87,9 +89,10 @@ class StoreFile:
     def _note(self, log: Optional[str] = None, **changed: int) -> None:
         """Mark what it has. Where another program has changed it, trials may have gone."""
         with contextlib.suppress(sqlite3.Error):  # what was committed is there all the same
-            version, = self._db.execute('PRAGMA data_version').fetchone()
-            self._has = (self._has._replace(**changed) if version == self._version
-                         else content_of(self._db))
+            (version,) = self._db.execute('PRAGMA data_version').fetchone()
+            self._has = (
+                self._has._replace(**changed) if version == self._version else content_of(self._db)
+            )
             self._version = version
             self._mark.write(self._has, log)
 
@@ -105,8 +108,14 @@ class StoreFile:
             row = self._db.execute(
                 'INSERT INTO trials (number, machine, trial_id, structure, begun) VALUES '
                 '((SELECT max(coalesce(max(number), 0), ?) + 1 FROM trials), ?, ?, ?, ?)',
-                (self.lost_until() or 0, trial.machine, trial.trial_id, trial.structure[0],
-                 trial.begun))
+                (
+                    self.lost_until() or 0,
+                    trial.machine,
+                    trial.trial_id,
+                    trial.structure[0],
+                    trial.begun,
+                ),
+            )
         number = int(row.lastrowid or 0)
         self._note(trial=number)
         return number
@@ -135,7 +144,9 @@ class StoreFile:
         for moment in moments:
             number = database.execute(
                 'INSERT INTO moments (trial, at, seq, kind, path, label, after) VALUES '
-                '(?, ?, ?, ?, ?, ?, ?)', (trial, *moment[:5], moment.after)).lastrowid
+                '(?, ?, ?, ?, ?, ?, ?)',
+                (trial, *moment[:5], moment.after),
+            ).lastrowid
             parts: Dict[bytes, bytes] = {}
             rows = []
             for path, name, value in moment.facts:
@@ -190,8 +201,9 @@ class StoreFile:
         self._db.execute('INSERT INTO log (at, who, what) VALUES (?, ?, ?)', (at, who, what))
 
     def _end(self, trial: int, at: float, outcome: str) -> None:
-        self._db.execute('UPDATE trials SET ended = ?, outcome = ? WHERE number = ?',
-                         (at, outcome, trial))
+        self._db.execute(
+            'UPDATE trials SET ended = ?, outcome = ? WHERE number = ?', (at, outcome, trial)
+        )
 
     # -- reading
 
@@ -201,33 +213,43 @@ class StoreFile:
         :raises StoreDamaged: where it cannot be read.
         """
         chosen, given = ('', ()) if machine is None else ('WHERE machine = ? ', (machine,))
-        return [StoredTrial(*row) for row in self._read(
-            'SELECT number, machine, trial_id, structure, begun, ended, outcome, '
-            '(SELECT count(*) FROM moments WHERE trial = trials.number) '
-            'FROM trials {}ORDER BY number'.format(chosen), given)]
+        return [
+            StoredTrial(*row)
+            for row in self._read(
+                'SELECT number, machine, trial_id, structure, begun, ended, outcome, '
+                '(SELECT count(*) FROM moments WHERE trial = trials.number) '
+                'FROM trials {}ORDER BY number'.format(chosen),
+                given,
+            )
+        ]
 
     def lost_until(self) -> Optional[int]:
         """Return the number of the trial behind which others may be lost. None: none is lost.
 
         :raises StoreDamaged: where it cannot be read.
         """
-        return next(since for since, in self._read('SELECT max(since) FROM marked', ()))
+        return next(since for (since,) in self._read('SELECT max(since) FROM marked', ()))
 
     def description(self, structure: str) -> str:
         """Return the description of a machine's structure, '' where it is not known."""
-        for text, in self._read('SELECT description FROM structures WHERE id = ?', (structure,)):
+        for (text,) in self._read('SELECT description FROM structures WHERE id = ?', (structure,)):
             return str(text)
         return ''
 
     def moments(self, trial: int) -> List[StoredMoment]:
         """Return the moments of a trial, oldest first."""
-        return [StoredMoment(*row) for row in self._read(
-            'SELECT number, at, seq, kind, path, label, after FROM moments WHERE trial = ? '
-            'ORDER BY number', (trial,))]
+        return [
+            StoredMoment(*row)
+            for row in self._read(
+                'SELECT number, at, seq, kind, path, label, after FROM moments WHERE trial = ? '
+                'ORDER BY number',
+                (trial,),
+            )
+        ]
 
     def trial_of(self, moment: int) -> Optional[StoredTrial]:
         """Return the trial of a moment, None where there is no such moment."""
-        for number, in self._read('SELECT trial FROM moments WHERE number = ?', (moment,)):
+        for (number,) in self._read('SELECT trial FROM moments WHERE number = ?', (moment,)):
             return next(each for each in self.trials() if each.number == number)
         return None
 
@@ -244,21 +266,24 @@ class StoreFile:
         renamings = self._renamings(trial, stretches)
         for position, (first, last) in enumerate(stretches):
             for row in self._read(
-                    'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
-                    'name, text, whole FROM moments LEFT JOIN facts '
-                    'ON facts.moment = moments.number WHERE trial = ? '
-                    'AND moments.number BETWEEN ? AND ? ORDER BY moments.number, facts.rowid',
-                    (trial, first, last)):
+                'SELECT moments.number, moments.kind, moments.path, moments.label, facts.path, '
+                'name, text, whole FROM moments LEFT JOIN facts '
+                'ON facts.moment = moments.number WHERE trial = ? '
+                'AND moments.number BETWEEN ? AND ? ORDER BY moments.number, facts.rowid',
+                (trial, first, last),
+            ):
                 number, kind, path, label, of, name, text, whole = row
-                fact = StoredFact(number, kind, path, label, of or '', name or '',
-                                  StoredValue(text, whole))
+                fact = StoredFact(
+                    number, kind, path, label, of or '', name or '', StoredValue(text, whole)
+                )
                 for behind, renaming in renamings:
                     if (position, number) < behind:
                         fact = renaming(fact)
                 yield fact
 
-    def _renamings(self, trial: int, stretches: List[Tuple[int, int]]
-                   ) -> List[Tuple[Tuple[int, int], Renaming]]:
+    def _renamings(
+        self, trial: int, stretches: List[Tuple[int, int]]
+    ) -> List[Tuple[Tuple[int, int], Renaming]]:
         """Return the names of states from certain moments on, oldest first.
 
         Each moment is the position of its stretch, and its number.
@@ -266,21 +291,28 @@ class StoreFile:
         found = []
         for position, (first, last) in enumerate(stretches):
             for number, machine, text in self._read(
-                    'SELECT moment, machine, text FROM facts JOIN moments ON moment = '
-                    'moments.number JOIN trials ON trial = trials.number WHERE trial = ? AND '
-                    "facts.path = '' AND name = ? AND moment BETWEEN ? AND ? ORDER BY moment",
-                    (trial, RENAMED, first, last)):
+                'SELECT moment, machine, text FROM facts JOIN moments ON moment = '
+                'moments.number JOIN trials ON trial = trials.number WHERE trial = ? AND '
+                "facts.path = '' AND name = ? AND moment BETWEEN ? AND ? ORDER BY moment",
+                (trial, RENAMED, first, last),
+            ):
                 structure, names = told_renaming(StoredValue(text, None))
-                found.append(((position, number), Renaming(
-                    machine, names, containers_of(self.description(structure)))))
+                found.append(
+                    (
+                        (position, number),
+                        Renaming(machine, names, containers_of(self.description(structure))),
+                    )
+                )
         return found
 
     def _stretches(self, trial: int, until: int) -> List[Tuple[int, int]]:
         """Return the first and last numbers of the moments that lead to `until`, oldest first."""
         found = []
         for number, after in self._read(
-                'SELECT number, after FROM moments WHERE trial = ? AND after IS NOT NULL '
-                'ORDER BY number DESC', (trial,)):
+            'SELECT number, after FROM moments WHERE trial = ? AND after IS NOT NULL '
+            'ORDER BY number DESC',
+            (trial,),
+        ):
             if number <= until:
                 found.append((number, until))
                 until = after
@@ -291,14 +323,15 @@ class StoreFile:
 
         :raises StoreDamaged: where they are not there.
         """
-        for data, in self._read('SELECT data FROM parts WHERE digest = ?', (digest,)):
+        for (data,) in self._read('SELECT data FROM parts WHERE digest = ?', (digest,)):
             return bytes(data)
         raise StoreDamaged('{}: the bytes {} are missing'.format(self.path, digest.hex()))
 
     def log(self) -> List[LogLine]:
         """Return what was changed by hand, oldest first."""
-        return [LogLine(*row) for row in self._read('SELECT at, who, what FROM log ORDER BY number',
-                                                    ())]
+        return [
+            LogLine(*row) for row in self._read('SELECT at, who, what FROM log ORDER BY number', ())
+        ]
 
     def compact(self) -> None:
         """Give what is free in the file back to the disk.

@@ -1,4 +1,5 @@
 """Writes moments in a thread of its own, so that no disk holds the machine up for long."""
+
 import threading
 import time
 import weakref
@@ -41,8 +42,9 @@ class StoreWriter:
     caught up nobody waits for it. All is written then, and that is said, too.
     """
 
-    def __init__(self, store: StoreFile, trial: Union[NewTrial, int], wait_s: float,
-                 warn: Warn) -> None:
+    def __init__(
+        self, store: StoreFile, trial: Union[NewTrial, int], wait_s: float, warn: Warn
+    ) -> None:
         """`trial`: one that begins, or the number of one that goes on."""
         self._store, self._trial = store, trial
         self._end: Optional[Ending] = None
@@ -104,8 +106,10 @@ class StoreWriter:
                 return True
             self._is_behind = True
             why = self._error or 'took more than {:g} s'.format(self._wait_s)
-        self._warn('{}: {}. The machine goes on, and what is not stored yet is stored as soon as '
-                   'that can be done'.format(self._store.path, why))
+        self._warn(
+            '{}: {}. The machine goes on, and what is not stored yet is stored as soon as '
+            'that can be done'.format(self._store.path, why)
+        )
         return False
 
     def close(self, ending: Optional[Ending] = None, timeout_s: float = CLOSE_S) -> bool:
@@ -120,8 +124,11 @@ class StoreWriter:
         self._thread.join(timeout_s)
         is_written = not self._thread.is_alive() and not self._waiting
         if not is_written:
-            self._warn('{}: the end of the trial is not stored: {}'.format(
-                self._store.path, self._error or 'the disk takes too long'))
+            self._warn(
+                '{}: the end of the trial is not stored: {}'.format(
+                    self._store.path, self._error or 'the disk takes too long'
+                )
+            )
         return is_written
 
     def _work(self) -> None:

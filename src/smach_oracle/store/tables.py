@@ -1,4 +1,5 @@
 """The tables of a store, and how a new one is made: whole, or not at all."""
+
 import contextlib
 import os
 import sqlite3
@@ -8,7 +9,7 @@ from .soundness import Content
 FORMAT = 1
 MAGIC = 0x534D4F53  # "SMOS": which program's file it is, where SQLite keeps that
 BUSY_S = 5.0  # how long one process waits for another that writes
-_SCHEMA = '''
+_SCHEMA = """
 CREATE TABLE IF NOT EXISTS marked (since INTEGER);
 CREATE TABLE IF NOT EXISTS structures (id TEXT PRIMARY KEY, description TEXT NOT NULL);
 CREATE TABLE IF NOT EXISTS trials (number INTEGER PRIMARY KEY, machine TEXT NOT NULL,
@@ -25,13 +26,18 @@ CREATE INDEX IF NOT EXISTS facts_of ON facts (moment);
 CREATE TABLE IF NOT EXISTS parts (digest BLOB PRIMARY KEY, data BLOB NOT NULL) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, at REAL NOT NULL, who TEXT NOT NULL,
     what TEXT NOT NULL);
-'''
+"""
 
 
 def connect(where: str) -> sqlite3.Connection:
     """Open a database, by its path or by a URI."""
-    return sqlite3.connect(where, timeout=BUSY_S, isolation_level=None, check_same_thread=False,
-                           uri=where.startswith('file:'))
+    return sqlite3.connect(
+        where,
+        timeout=BUSY_S,
+        isolation_level=None,
+        check_same_thread=False,
+        uri=where.startswith('file:'),
+    )
 
 
 def make_store(where: str) -> None:
@@ -92,9 +98,16 @@ def content_of(database: sqlite3.Connection) -> Content:
     """
     if not _has_table(database, 'moments'):
         return Content()
-    return Content(*(int(database.execute('SELECT {}'.format(what)).fetchone()[0] or 0)
-                     for what in ('max(number) FROM moments', 'max(number) FROM trials',
-                                  'count(*) FROM trials WHERE ended IS NOT NULL')))
+    return Content(
+        *(
+            int(database.execute('SELECT {}'.format(what)).fetchone()[0] or 0)
+            for what in (
+                'max(number) FROM moments',
+                'max(number) FROM trials',
+                'count(*) FROM trials WHERE ended IS NOT NULL',
+            )
+        )
+    )
 
 
 def needs_log(database: sqlite3.Connection) -> bool:
@@ -102,13 +115,14 @@ def needs_log(database: sqlite3.Connection) -> bool:
 
     Earlier programs left the same file behind as they closed it.
     """
-    tables, = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
+    (tables,) = database.execute('SELECT count(*) FROM sqlite_master').fetchone()
     return not tables or _has_table(database, 'marked')
 
 
 def _has_table(database: sqlite3.Connection, name: str) -> bool:
-    return bool(database.execute('SELECT count(*) FROM sqlite_master WHERE name = ?',
-                                 (name,)).fetchone()[0])
+    return bool(
+        database.execute('SELECT count(*) FROM sqlite_master WHERE name = ?', (name,)).fetchone()[0]
+    )
 
 
 def try_to_write(database: sqlite3.Connection) -> None:

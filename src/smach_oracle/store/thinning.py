@@ -4,6 +4,7 @@ A moment that goes hands what it has to the next one that stays. So each moment 
 it has always said. Of the last ones that is all. An older one may not know any more with what
 userdata some states had begun by then.
 """
+
 import sqlite3
 from typing import Dict, List, NamedTuple, Optional, Set, Tuple
 
@@ -33,17 +34,23 @@ def thin(store: StoreFile, trial: int) -> int:
     :raises StoreError: where that cannot be done. Nothing has changed then.
     """
     with transaction(store) as database:
-        moments = [_ListedMoment(*row) for row in database.execute(
-            'SELECT number, kind, path, label, after FROM moments WHERE trial = ? '
-            'ORDER BY number', (trial,))]
+        moments = [
+            _ListedMoment(*row)
+            for row in database.execute(
+                'SELECT number, kind, path, label, after FROM moments WHERE trial = ? '
+                'ORDER BY number',
+                (trial,),
+            )
+        ]
         ends = {each.after for each in moments if each.after is not None}
         kept = _kept(moments[:-LAST], ends, _renamed(database, trial))
         kept.update(each.number for each in moments[-LAST:])
         going = [each.number for each in moments if each.number not in kept]
         if going:
             _hand_on(database, trial, kept)
-            database.executemany('DELETE FROM moments WHERE number = ?',
-                                 [(number,) for number in going])
+            database.executemany(
+                'DELETE FROM moments WHERE number = ?', [(number,) for number in going]
+            )
             if store.added_parts:
                 _drop_parts(database, store.added_parts)
         return len(going)
@@ -51,9 +58,14 @@ def thin(store: StoreFile, trial: int) -> int:
 
 def _renamed(database: sqlite3.Connection, trial: int) -> Set[int]:
     """Return the moments from which on states have other names."""
-    return {int(number) for number, in database.execute(
-        "SELECT moment FROM facts JOIN moments ON moment = moments.number WHERE trial = ? AND "
-        "facts.path = '' AND name IN (?, ?)", (trial, STRUCTURE, RENAMED))}
+    return {
+        int(number)
+        for (number,) in database.execute(
+            'SELECT moment FROM facts JOIN moments ON moment = moments.number WHERE trial = ? AND '
+            "facts.path = '' AND name IN (?, ?)",
+            (trial, STRUCTURE, RENAMED),
+        )
+    }
 
 
 def _kept(moments: List[_ListedMoment], ends: Set[int], renamed: Set[int]) -> Set[int]:
@@ -105,9 +117,11 @@ def _hand_on(database: sqlite3.Connection, trial: int, kept: Set[int]) -> None:
         pending.clear()
 
     for moment, row, path, name, says_gone in database.execute(
-            'SELECT moments.number, facts.rowid, facts.path, name, text IS NULL AND whole IS NULL '
-            'FROM moments LEFT JOIN facts ON moment = moments.number WHERE trial = ? '
-            'ORDER BY moments.number, facts.rowid', (trial,)).fetchall():
+        'SELECT moments.number, facts.rowid, facts.path, name, text IS NULL AND whole IS NULL '
+        'FROM moments LEFT JOIN facts ON moment = moments.number WHERE trial = ? '
+        'ORDER BY moments.number, facts.rowid',
+        (trial,),
+    ).fetchall():
         if moment != latest and latest in kept:
             hand_to(latest)
         latest = moment

@@ -5,6 +5,7 @@ A plain SMACH script over actions. It stops a trial at the first action that fai
 state executed again, in the same trial, has it done otherwise: the robot looks into the fridge from
 another place and head pose, and grips the drink firmer.
 """
+
 import argparse
 import math
 import sys
@@ -90,44 +91,73 @@ def make_machine() -> smach.StateMachine:
     sm.register_start_cb(begin)
     with sm:
         smach.StateMachine.add('RAISE_TORSO', torso(TORSO_HEIGHT), {'succeeded': 'LOCALISE'})
-        smach.StateMachine.add('LOCALISE', action('localise_at_fridge', LocaliseAtFridgeAction),
-                               {'succeeded': 'OPEN_FRIDGE'})
-        smach.StateMachine.add('OPEN_FRIDGE',
-                               action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
-                               {'succeeded': 'MOVE_IN'})
-        smach.StateMachine.add('MOVE_IN', action('move_base', MoveBaseAction, goal_cb=move_in_goal,
-                                                 input_keys=['missed']),
-                               {'succeeded': 'DETECT_DRINK'})
-        smach.StateMachine.add('DETECT_DRINK',
-                               action('detect_drink', DetectDrinkAction,
-                                      goal_cb=detect_goal, result_cb=detected,
-                                      input_keys=['missed'], output_keys=['missed'],
-                                      result_slots=['drink', 'size']),
-                               {'succeeded': 'PICK_DRINK'})
+        smach.StateMachine.add(
+            'LOCALISE',
+            action('localise_at_fridge', LocaliseAtFridgeAction),
+            {'succeeded': 'OPEN_FRIDGE'},
+        )
+        smach.StateMachine.add(
+            'OPEN_FRIDGE',
+            action('open_door', OpenDoorAction, goal=OpenDoorGoal('right')),
+            {'succeeded': 'MOVE_IN'},
+        )
+        smach.StateMachine.add(
+            'MOVE_IN',
+            action('move_base', MoveBaseAction, goal_cb=move_in_goal, input_keys=['missed']),
+            {'succeeded': 'DETECT_DRINK'},
+        )
+        smach.StateMachine.add(
+            'DETECT_DRINK',
+            action(
+                'detect_drink',
+                DetectDrinkAction,
+                goal_cb=detect_goal,
+                result_cb=detected,
+                input_keys=['missed'],
+                output_keys=['missed'],
+                result_slots=['drink', 'size'],
+            ),
+            {'succeeded': 'PICK_DRINK'},
+        )
         smach.StateMachine.add(
             'PICK_DRINK',
-            action('pick', PickAction, goal_cb=pick_goal, input_keys=['drink', 'size', 'picks'],
-                   output_keys=['picks'], result_slots=['grasp']), {'succeeded': 'MOVE_OUT'})
+            action(
+                'pick',
+                PickAction,
+                goal_cb=pick_goal,
+                input_keys=['drink', 'size', 'picks'],
+                output_keys=['picks'],
+                result_slots=['grasp'],
+            ),
+            {'succeeded': 'MOVE_OUT'},
+        )
         smach.StateMachine.add('MOVE_OUT', drive(*OUT_OF_THE_FRIDGE), {'succeeded': 'CLOSE_FRIDGE'})
-        smach.StateMachine.add('CLOSE_FRIDGE',
-                               action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
-                               {'succeeded': 'MOVE_HOME'})
+        smach.StateMachine.add(
+            'CLOSE_FRIDGE',
+            action('close_door', CloseDoorAction, goal=CloseDoorGoal('left')),
+            {'succeeded': 'MOVE_HOME'},
+        )
         smach.StateMachine.add('MOVE_HOME', drive(*HOME), {'succeeded': 'HAND_OVER'})
         smach.StateMachine.add(
-            'HAND_OVER', action('hand_over', HandOverAction, goal=HandOverGoal('right', palm())))
+            'HAND_OVER', action('hand_over', HandOverAction, goal=HandOverGoal('right', palm()))
+        )
     return sm
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
     """An action state that does not wait for its server forever."""
-    return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
-                             **options)
+    return SimpleActionState(
+        name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S), **options
+    )
 
 
 def torso(height_m: float) -> SimpleActionState:
     """A state that lifts the torso."""
-    return action('torso_controller/position_joint_action', SingleJointPositionAction,
-                  goal=SingleJointPositionGoal(position=height_m))
+    return action(
+        'torso_controller/position_joint_action',
+        SingleJointPositionAction,
+        goal=SingleJointPositionGoal(position=height_m),
+    )
 
 
 def drive(x_m: float, y_m: float, yaw: float) -> SimpleActionState:
@@ -159,7 +189,9 @@ def find_reset() -> rospy.ServiceProxy:
         raise SystemExit(
             'drink_retrieval: no world here: {} does not come within {:.0f} s; what starts both: '
             'roslaunch smach_oracle drink_retrieval.launch'.format(
-                rospy.resolve_name('world/reset'), SERVER_WAIT_S)) from err
+                rospy.resolve_name('world/reset'), SERVER_WAIT_S
+            )
+        ) from err
     return rospy.ServiceProxy('world/reset', ResetWorld)
 
 
@@ -187,10 +219,12 @@ def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        description='Fetch a drink out of a refrigerator and hand it over.')
+        description='Fetch a drink out of a refrigerator and hand it over.'
+    )
     parser.add_argument('--trials', type=int, default=1, help='how many times (default: 1)')
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the first trial; the next has the next (default: 1)')
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)'
+    )
     args = parser.parse_args(rospy.myargv(argv if argv is not None else sys.argv)[1:])
     if args.trials < 1 or args.seed < 0:
         parser.error('--trials must be 1 or more and --seed 0 or more')

@@ -4,6 +4,7 @@
 A plain SMACH script over an action and services, for a wheeled robot with a camera. It stops a tour
 at the first thing that fails.
 """
+
 import argparse
 import math
 import re
@@ -35,14 +36,19 @@ class Report(smach.State):
     """Tell a reading to whoever keeps the books."""
 
     def __init__(self) -> None:
-        smach.State.__init__(self, outcomes=['succeeded'],
-                             input_keys=['place', 'reading', 'readings'], output_keys=['readings'])
+        smach.State.__init__(
+            self,
+            outcomes=['succeeded'],
+            input_keys=['place', 'reading', 'readings'],
+            output_keys=['readings'],
+        )
         self.publisher = rospy.Publisher('inspection/report', String, queue_size=10)
 
     def execute(self, userdata: smach.UserData) -> str:
         """Publish it, and put it on the list."""
-        self.publisher.publish('panel {}: {:.2f} bar'.format(userdata.place['panel'],
-                                                             userdata.reading))
+        self.publisher.publish(
+            'panel {}: {:.2f} bar'.format(userdata.place['panel'], userdata.reading)
+        )
         userdata.readings = userdata.readings + [(userdata.place['name'], userdata.reading)]
         rospy.loginfo('%s: %.2f bar', userdata.place['name'], userdata.reading)
         return 'succeeded'
@@ -50,24 +56,47 @@ class Report(smach.State):
 
 def make_machine() -> smach.StateMachine:
     """LOCALISE, DRIVE, INSPECT, REPORT, at each place."""
-    at_place = smach.StateMachine(outcomes=OUTCOMES, input_keys=['place', 'readings'],
-                                  output_keys=['readings'])
+    at_place = smach.StateMachine(
+        outcomes=OUTCOMES, input_keys=['place', 'readings'], output_keys=['readings']
+    )
     with at_place:
-        smach.StateMachine.add('LOCALISE',
-                               ServiceState('localise', Trigger, response_cb=localised,
-                                            outcomes=OUTCOMES), {'succeeded': 'DRIVE'})
+        smach.StateMachine.add(
+            'LOCALISE',
+            ServiceState('localise', Trigger, response_cb=localised, outcomes=OUTCOMES),
+            {'succeeded': 'DRIVE'},
+        )
         smach.StateMachine.add(
             'DRIVE',
-            SimpleActionState('move_base', MoveBaseAction, goal_cb=drive_goal, input_keys=['place'],
-                              server_wait_timeout=rospy.Duration(SERVER_WAIT_S)),
-            {'succeeded': 'INSPECT'})
+            SimpleActionState(
+                'move_base',
+                MoveBaseAction,
+                goal_cb=drive_goal,
+                input_keys=['place'],
+                server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
+            ),
+            {'succeeded': 'INSPECT'},
+        )
         smach.StateMachine.add(
             'INSPECT',
-            ServiceState('inspect', Trigger, response_cb=inspected, outcomes=OUTCOMES,
-                         input_keys=['place'], output_keys=['reading']), {'succeeded': 'REPORT'})
+            ServiceState(
+                'inspect',
+                Trigger,
+                response_cb=inspected,
+                outcomes=OUTCOMES,
+                input_keys=['place'],
+                output_keys=['reading'],
+            ),
+            {'succeeded': 'REPORT'},
+        )
         smach.StateMachine.add('REPORT', Report())
-    tour = smach.Iterator(outcomes=OUTCOMES, input_keys=['readings'], output_keys=['readings'],
-                          it=PLACES, it_label='place', exhausted_outcome='succeeded')
+    tour = smach.Iterator(
+        outcomes=OUTCOMES,
+        input_keys=['readings'],
+        output_keys=['readings'],
+        it=PLACES,
+        it_label='place',
+        exhausted_outcome='succeeded',
+    )
     with tour:
         smach.Iterator.set_contained_state('AT_PLACE', at_place, loop_outcomes=['succeeded'])
     sm = smach.StateMachine(outcomes=OUTCOMES)
@@ -81,8 +110,9 @@ def drive_goal(userdata: smach.UserData, goal: MoveBaseGoal) -> MoveBaseGoal:
     """Return the goal with which the robot drives to a place, to stand there."""
     place = userdata.place
     turn = Quaternion(0.0, 0.0, math.sin(0.5 * place['yaw']), math.cos(0.5 * place['yaw']))
-    return MoveBaseGoal(PoseStamped(Header(frame_id='map'),
-                                    Pose(Point(place['x'], place['y'], 0.0), turn)))
+    return MoveBaseGoal(
+        PoseStamped(Header(frame_id='map'), Pose(Point(place['x'], place['y'], 0.0), turn))
+    )
 
 
 def localised(userdata: smach.UserData, response: TriggerResponse) -> str:
@@ -113,8 +143,10 @@ def wait_for_robot() -> None:
         except rospy.ROSException as err:
             raise SystemExit(
                 'inspection: no world here: {} does not come within {:.0f} s; what starts both: '
-                'roslaunch smach_oracle inspection.launch'.format(rospy.resolve_name(name),
-                                                                  SERVER_WAIT_S)) from err
+                'roslaunch smach_oracle inspection.launch'.format(
+                    rospy.resolve_name(name), SERVER_WAIT_S
+                )
+            ) from err
 
 
 def run_trials(sm: smach.StateMachine, trials: int) -> int:
@@ -131,9 +163,15 @@ def run_trials(sm: smach.StateMachine, trials: int) -> int:
         sm.userdata.readings = []
         outcome = sm.execute()
         successes += outcome == 'succeeded'
-        rospy.loginfo('trial %d of %d (%s): %s after %.0f s: %s', trial + 1, trials, told.message,
-                      outcome, time.monotonic() - begun,
-                      ', '.join('{} {:.2f} bar'.format(*each) for each in sm.userdata.readings))
+        rospy.loginfo(
+            'trial %d of %d (%s): %s after %.0f s: %s',
+            trial + 1,
+            trials,
+            told.message,
+            outcome,
+            time.monotonic() - begun,
+            ', '.join('{} {:.2f} bar'.format(*each) for each in sm.userdata.readings),
+        )
     return successes
 
 

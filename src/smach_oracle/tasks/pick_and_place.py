@@ -8,6 +8,7 @@ otherwise. An object that could not be placed is taken from above. No transition
 STEP_ASIDE: it is for those who recover, where light falls into the camera or the object is out of
 reach.
 """
+
 import argparse
 import sys
 from typing import Any, List, Optional, Sequence
@@ -63,21 +64,27 @@ def begin(userdata: smach.UserData, initial_states: Sequence[str] = ()) -> None:
             'look_at': None,  # PointStamped, where the last one said there is more to see
             'picks': 0,
             # what the object looked like when it was first seen, a 0: not seen yet
-            'colour': ColorRGBA(), 'size': Vector3()
+            'colour': ColorRGBA(),
+            'size': Vector3(),
         }
 
 
 def head_goal(userdata: smach.UserData, goal: PointHeadGoal) -> PointHeadGoal:
     """Look at the table. From another head pose after each look that showed too little."""
     view = VIEWS[userdata.memory['missed'] % len(VIEWS)]
-    return PointHeadGoal(userdata.memory['look_at'] or PointStamped(Header(frame_id=ODOM),
-                                                                    Point(*view)))
+    return PointHeadGoal(
+        userdata.memory['look_at'] or PointStamped(Header(frame_id=ODOM), Point(*view))
+    )
 
 
 def detect_goal(userdata: smach.UserData, goal: DetectTabletopGoal) -> DetectTabletopGoal:
     """Find the object that is nearest to where the trial began, and from then on that one."""
-    return DetectTabletopGoal(MIN_HEIGHT, userdata.memory['colour'], userdata.memory['size'],
-                              PointStamped(header=Header(frame_id=ODOM)))
+    return DetectTabletopGoal(
+        MIN_HEIGHT,
+        userdata.memory['colour'],
+        userdata.memory['size'],
+        PointStamped(header=Header(frame_id=ODOM)),
+    )
 
 
 def detected(userdata: smach.UserData, status: int, result: DetectTabletopResult) -> None:
@@ -88,8 +95,9 @@ def detected(userdata: smach.UserData, status: int, result: DetectTabletopResult
     memory = userdata.memory
     if status != GoalStatus.SUCCEEDED:
         known = result is not None and result.look_at.header.frame_id
-        userdata.memory = dict(memory, missed=memory['missed'] + 1,
-                               look_at=result.look_at if known else None)
+        userdata.memory = dict(
+            memory, missed=memory['missed'] + 1, look_at=result.look_at if known else None
+        )
         return
     for key in SEEN:
         setattr(userdata, key, getattr(result, key))
@@ -101,8 +109,9 @@ def pick_goal(userdata: smach.UserData, goal: PickGoal) -> PickGoal:
     """Pick the object with the right arm."""
     picks = userdata.memory['picks']
     userdata.memory = dict(userdata.memory, picks=picks + 1)
-    return PickGoal('right', userdata.objects[0], userdata.sizes[0], userdata.map_id,
-                    min(picks, 255))
+    return PickGoal(
+        'right', userdata.objects[0], userdata.sizes[0], userdata.map_id, min(picks, 255)
+    )
 
 
 def picked(userdata: smach.UserData, status: int, result: PickResult) -> None:
@@ -119,40 +128,74 @@ def object_in_reach(userdata: smach.UserData) -> bool:
 
 def make_machine() -> smach.StateMachine:
     """The state machine of Fig. 5 in the paper, and a step aside, without its oracle."""
-    sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'],
-                            input_keys=['place_pose'])
+    sm = smach.StateMachine(
+        outcomes=['succeeded', 'aborted', 'preempted'], input_keys=['place_pose']
+    )
     sm.register_start_cb(begin)
     with sm:
-        smach.StateMachine.add('MOVE_ARMS_ASIDE', action('move_arms_aside', MoveArmsAsideAction),
-                               {'succeeded': 'POINT_HEAD'})
+        smach.StateMachine.add(
+            'MOVE_ARMS_ASIDE',
+            action('move_arms_aside', MoveArmsAsideAction),
+            {'succeeded': 'POINT_HEAD'},
+        )
         smach.StateMachine.add('STEP_ASIDE', drive(ASIDE), {'succeeded': 'POINT_HEAD'})
-        smach.StateMachine.add('POINT_HEAD',
-                               action('point_head', PointHeadAction, goal_cb=head_goal, **MEMORY),
-                               {'succeeded': 'DETECT_TABLETOP'})
+        smach.StateMachine.add(
+            'POINT_HEAD',
+            action('point_head', PointHeadAction, goal_cb=head_goal, **MEMORY),
+            {'succeeded': 'DETECT_TABLETOP'},
+        )
         smach.StateMachine.add(
             'DETECT_TABLETOP',
-            action('detect_tabletop', DetectTabletopAction, goal_cb=detect_goal,
-                   result_cb=detected, input_keys=['memory'], output_keys=['memory', *SEEN]),
-            {'succeeded': 'BUILD_COLLISION_MAP'})
+            action(
+                'detect_tabletop',
+                DetectTabletopAction,
+                goal_cb=detect_goal,
+                result_cb=detected,
+                input_keys=['memory'],
+                output_keys=['memory', *SEEN],
+            ),
+            {'succeeded': 'BUILD_COLLISION_MAP'},
+        )
         smach.StateMachine.add(
             'BUILD_COLLISION_MAP',
-            action('build_collision_map', BuildCollisionMapAction,
-                   goal_slots=['table', 'objects', 'sizes'], result_slots=['map_id']),
-            {'succeeded': 'PICK'})
+            action(
+                'build_collision_map',
+                BuildCollisionMapAction,
+                goal_slots=['table', 'objects', 'sizes'],
+                result_slots=['map_id'],
+            ),
+            {'succeeded': 'PICK'},
+        )
         smach.StateMachine.add(
             'PICK',
-            action('pick', PickAction, goal_cb=pick_goal, result_cb=picked, output_keys=['memory'],
-                   input_keys=['objects', 'sizes', 'map_id', 'memory'], result_slots=['grasp']),
-            {'succeeded': 'PLACE'})
-        smach.StateMachine.add('PLACE', action('place', PlaceAction, goal_cb=place_goal,
-                                               input_keys=['place_pose', 'grasp', 'map_id']))
+            action(
+                'pick',
+                PickAction,
+                goal_cb=pick_goal,
+                result_cb=picked,
+                output_keys=['memory'],
+                input_keys=['objects', 'sizes', 'map_id', 'memory'],
+                result_slots=['grasp'],
+            ),
+            {'succeeded': 'PLACE'},
+        )
+        smach.StateMachine.add(
+            'PLACE',
+            action(
+                'place',
+                PlaceAction,
+                goal_cb=place_goal,
+                input_keys=['place_pose', 'grasp', 'map_id'],
+            ),
+        )
     return sm
 
 
 def action(name: str, spec: type, **options: Any) -> SimpleActionState:
     """An action state that does not wait for its server forever."""
-    return SimpleActionState(name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S),
-                             **options)
+    return SimpleActionState(
+        name, spec, server_wait_timeout=rospy.Duration(SERVER_WAIT_S), **options
+    )
 
 
 def drive(place: Point) -> SimpleActionState:
@@ -168,8 +211,9 @@ def place_goal(userdata: smach.UserData, goal: PlaceGoal) -> PlaceGoal:
 
 def place_pose() -> PoseStamped:
     """Return the pose at which the object should stand, m, in ODOM."""
-    return PoseStamped(Header(frame_id=ODOM),
-                       Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    return PoseStamped(
+        Header(frame_id=ODOM), Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0))
+    )
 
 
 def find_reset() -> rospy.ServiceProxy:
@@ -184,8 +228,10 @@ def find_reset() -> rospy.ServiceProxy:
     except rospy.ROSException as err:
         raise SystemExit(
             'pick_and_place: no world here: {} does not come within {:.0f} s; what starts both: '
-            'roslaunch smach_oracle pick_and_place.launch'.format(rospy.resolve_name('world/reset'),
-                                                                  SERVER_WAIT_S)) from err
+            'roslaunch smach_oracle pick_and_place.launch'.format(
+                rospy.resolve_name('world/reset'), SERVER_WAIT_S
+            )
+        ) from err
     return rospy.ServiceProxy('world/reset', ResetWorld)
 
 
@@ -214,10 +260,12 @@ def run_trials(sm: smach.StateMachine, trials: int, seed: int) -> int:
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(
-        description='Pick an object from a table and place it elsewhere.')
+        description='Pick an object from a table and place it elsewhere.'
+    )
     parser.add_argument('--trials', type=int, default=1, help='how many times (default: 1)')
-    parser.add_argument('--seed', type=int, default=1,
-                        help='of the first trial; the next has the next (default: 1)')
+    parser.add_argument(
+        '--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)'
+    )
     args = parser.parse_args(rospy.myargv(argv if argv is not None else sys.argv)[1:])
     if args.trials < 1 or args.seed < 0:
         parser.error('--trials must be 1 or more and --seed 0 or more')

@@ -8,6 +8,7 @@
 
 Without ROS, unless it is asked for. doc/testing.md has the whole of it.
 """
+
 from .bench import Bench
 from .errors import FaultError, ScriptError, TrialLimitError
 from .faults import Fault, FaultKind, crash, fail, hang, overrun
@@ -18,7 +19,31 @@ from .script_run import ScriptRun, run_script
 from .soak import soak, soak_trial
 from .soak_report import SoakReport, SoakRow, SoakTrial
 
-__all__ = ['AnswerScript', 'Bench', 'Fault', 'FaultError', 'FaultKind', 'ObservedTrial',
-           'ScriptError', 'ScriptRun', 'SoakReport', 'SoakRow', 'SoakTrial', 'TrialLimitError',
-           'crash', 'expert', 'fail', 'faults', 'give_up', 'goto', 'hang', 'no_answer', 'overrun',
-           'run_script', 'soak', 'soak_trial', 'supersede', 'use_interface']
+__all__ = [
+    'AnswerScript',
+    'Bench',
+    'Fault',
+    'FaultError',
+    'FaultKind',
+    'ObservedTrial',
+    'ScriptError',
+    'ScriptRun',
+    'SoakReport',
+    'SoakRow',
+    'SoakTrial',
+    'TrialLimitError',
+    'crash',
+    'expert',
+    'fail',
+    'faults',
+    'give_up',
+    'goto',
+    'hang',
+    'no_answer',
+    'overrun',
+    'run_script',
+    'soak',
+    'soak_trial',
+    'supersede',
+    'use_interface',
+]

@@ -1,4 +1,5 @@
 """Runs a machine under the oracle, with faults and an expert by script, and keeps what happens."""
+
 import contextlib
 import functools
 import threading
@@ -47,10 +48,17 @@ class Bench:
 
     __test__ = False  # for pytest, which collects classes by their names
 
-    def __init__(self, machine: smach.StateMachine, faults: Iterable[Fault] = (), *,
-                 expert: Optional[Expert] = None, settings: SettingsLike = None,
-                 preconditions: PreconditionLists = None, limit_s: float = LIMIT_S,
-                 ros: bool = False) -> None:
+    def __init__(
+        self,
+        machine: smach.StateMachine,
+        faults: Iterable[Fault] = (),
+        *,
+        expert: Optional[Expert] = None,
+        settings: SettingsLike = None,
+        preconditions: PreconditionLists = None,
+        limit_s: float = LIMIT_S,
+        ros: bool = False,
+    ) -> None:
         """Put a machine on the bench.
 
         :param faults: of every trial. See `fail`, `crash`, `hang` and `overrun`.
@@ -71,8 +79,11 @@ class Bench:
         self._node = _node_side(machine) if ros else None
         self._was_wrapped = isinstance(machine, OracleContainer)
         if self._was_wrapped and not oracle_of(machine).is_top:
-            raise TrialError('{} is wrapped inside another machine; put the top one on the '
-                             'bench'.format(oracle_of(machine).path))
+            raise TrialError(
+                '{} is wrapped inside another machine; put the top one on the bench'.format(
+                    oracle_of(machine).path
+                )
+            )
         self._settings_before: Optional[Settings] = None  # where others are in force now
         self._put_under(settings, preconditions)
         oracle = oracle_of(machine)
@@ -101,14 +112,19 @@ class Bench:
         """Put settings in force in a machine that is wrapped, where they are others."""
         oracle = oracle_of(self.machine)
         if settings != oracle.settings:
-            OracleContainer.wrap(self.machine, settings=settings, recover=oracle.recovers,
-                                 strict=False)
+            OracleContainer.wrap(
+                self.machine, settings=settings, recover=oracle.recovers, strict=False
+            )
 
     def __enter__(self) -> 'Bench':
         return self
 
-    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
-                 traceback: Optional[TracebackType]) -> None:
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        traceback: Optional[TracebackType],
+    ) -> None:
         self.close()
 
     def close(self) -> None:
@@ -121,9 +137,12 @@ class Bench:
                     self._node.leave()
                 unwrap(self.machine)
 
-    def run(self, faults: Optional[Iterable[Fault]] = None,
-            userdata: Optional[Mapping[str, Any]] = None,
-            parent: Optional[smach.UserData] = None) -> ObservedTrial:
+    def run(
+        self,
+        faults: Optional[Iterable[Fault]] = None,
+        userdata: Optional[Mapping[str, Any]] = None,
+        parent: Optional[smach.UserData] = None,
+    ) -> ObservedTrial:
         """Run one trial, and return what happened.
 
         What leaves the machine as an exception is in the trial (`error`), not raised. The machine
@@ -148,14 +167,16 @@ class Bench:
         if script is not None:
             script.begin()
         given = () if parent is None else (parent,)
-        call = BackgroundCall(functools.partial(self.machine.execute, *given),
-                              'smach_oracle test bench')
+        call = BackgroundCall(
+            functools.partial(self.machine.execute, *given), 'smach_oracle test bench'
+        )
         with self._watched(notes):
             in_time = self._run_within_limit(call, injection)
         trial = notes.trial(call, injection)
         if not in_time:
-            raise TrialLimitError('the trial did not end within {:g} s\n{}'.format(
-                self._limit_s, trial))
+            raise TrialLimitError(
+                'the trial did not end within {:g} s\n{}'.format(self._limit_s, trial)
+            )
         if script is not None:
             script.check(trial)
         return trial
@@ -219,22 +240,35 @@ class _TrialNotes:
         """Note what the injection saw."""
         failing = what == 'raised' or (what == 'ended' and text in self._failing)
         with self._lock:
-            self._steps.append(ProbedStep(place.path, visit, what, text, time.time(),
-                                          failing=failing))
+            self._steps.append(
+                ProbedStep(place.path, visit, what, text, time.time(), failing=failing)
+            )
 
     def trial(self, call: BackgroundCall, injection: Injection) -> ObservedTrial:
         """Return the trial, of a call that has ended or was left behind."""
         with self._lock:
             steps = list(self._steps)
-        told = {place_of(step) for step in steps
-                if isinstance(step, Event) and step.kind is EventKind.STATE_START}
-        steps = [step._replace(told=step.path in told) if isinstance(step, ProbedStep) else step
-                 for step in steps]
+        told = {
+            place_of(step)
+            for step in steps
+            if isinstance(step, Event) and step.kind is EventKind.STATE_START
+        }
+        steps = [
+            step._replace(told=step.path in told) if isinstance(step, ProbedStep) else step
+            for step in steps
+        ]
         ended = call.done.is_set() and call.error is None
-        return ObservedTrial(TrialEvidence(
-            str(call.result) if ended and call.result is not None else None, call.error, steps,
-            tuple(self.questions), [armed.fault for armed in injection.armed if not armed.happened],
-            self._states, self._failing))
+        return ObservedTrial(
+            TrialEvidence(
+                str(call.result) if ended and call.result is not None else None,
+                call.error,
+                steps,
+                tuple(self.questions),
+                [armed.fault for armed in injection.armed if not armed.happened],
+                self._states,
+                self._failing,
+            )
+        )
 
 
 class _NotingExpert(Expert):
@@ -244,18 +278,25 @@ class _NotingExpert(Expert):
         self._inner = inner
         self._questions = questions
 
-    def ask(self, question: Question, cancelled: threading.Event,
-            progress: Progress) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Progress
+    ) -> Optional[Answer]:
         self._questions.append(question)
         return self._inner.ask(question, cancelled, progress)
 
-    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
-                      progress: Progress) -> Optional[Answer]:
+    def run_interface(
+        self,
+        offer: InterfaceOffer,
+        question: Question,
+        cancelled: threading.Event,
+        progress: Progress,
+    ) -> Optional[Answer]:
         return self._inner.run_interface(offer, question, cancelled, progress)
 
 
 def _node_side(machine: smach.StateMachine) -> 'NodeSide':
     from .node_side import NodeSide
+
     return NodeSide(machine)
 
 

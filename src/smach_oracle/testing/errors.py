@@ -6,6 +6,7 @@ AssertionError
 +-- ScriptError: a question came that the script of the expert does not expect
 +-- TrialLimitError: a trial did not end in time
 """
+
 from smach_oracle.oracle.errors import OracleError
 
 

@@ -1,4 +1,5 @@
 """Faults: what goes wrong in which state, at which of its visits."""
+
 import math
 from enum import Enum
 from typing import Any, Iterable, Mapping, NamedTuple, Optional, Tuple, Union
@@ -54,9 +55,15 @@ class Fault(NamedTuple):
         return visits
 
 
-def fail(state: str, *, visit: Visits = None, outcome: str = '',
-         outputs: Optional[Mapping[str, Any]] = None, probability: float = 1.0,
-         seed: int = 0) -> Fault:
+def fail(
+    state: str,
+    *,
+    visit: Visits = None,
+    outcome: str = '',
+    outputs: Optional[Mapping[str, Any]] = None,
+    probability: float = 1.0,
+    seed: int = 0,
+) -> Fault:
     """Let a state end in an outcome without doing anything.
 
     :param state: LABEL or PATH/LABEL, the path relative to the top machine.
@@ -67,34 +74,57 @@ def fail(state: str, *, visit: Visits = None, outcome: str = '',
     :param probability: that it happens at each of these visits, drawn with `seed`.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
-    return _checked(Fault(state, FaultKind.OUTCOME, _visits(state, visit), probability, seed,
-                          outcome, outputs))
+    return _checked(
+        Fault(state, FaultKind.OUTCOME, _visits(state, visit), probability, seed, outcome, outputs)
+    )
 
 
-def crash(state: str, *, visit: Visits = None, error: Optional[BaseException] = None,
-          probability: float = 1.0, seed: int = 0) -> Fault:
+def crash(
+    state: str,
+    *,
+    visit: Visits = None,
+    error: Optional[BaseException] = None,
+    probability: float = 1.0,
+    seed: int = 0,
+) -> Fault:
     """Let a state raise an exception (default: a RuntimeError). For the rest see `fail`.
 
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
     given = RuntimeError('a fault of this test') if error is None else error
-    return _checked(Fault(state, FaultKind.EXCEPTION, _visits(state, visit), probability, seed,
-                          error=given))
+    return _checked(
+        Fault(state, FaultKind.EXCEPTION, _visits(state, visit), probability, seed, error=given)
+    )
 
 
-def hang(state: str, *, visit: Visits = None, for_good: bool = False, probability: float = 1.0,
-         seed: int = 0) -> Fault:
+def hang(
+    state: str,
+    *,
+    visit: Visits = None,
+    for_good: bool = False,
+    probability: float = 1.0,
+    seed: int = 0,
+) -> Fault:
     """Let a state wait until it is preempted. For the rest see `fail`.
 
     :param for_good: it ignores a preempt too. The end of the trial lets it go.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
-    return _checked(Fault(state, FaultKind.HANG, _visits(state, visit), probability, seed,
-                          ignores_preempt=for_good))
+    return _checked(
+        Fault(
+            state,
+            FaultKind.HANG,
+            _visits(state, visit),
+            probability,
+            seed,
+            ignores_preempt=for_good,
+        )
+    )
 
 
-def overrun(state: str, seconds: float, *, visit: Visits = None, probability: float = 1.0,
-            seed: int = 0) -> Fault:
+def overrun(
+    state: str, seconds: float, *, visit: Visits = None, probability: float = 1.0, seed: int = 0
+) -> Fault:
     """Let a state take so many seconds of wall time longer. For the rest see `fail`.
 
     It waits first, and does its work then. A preempt ends the wait, and the state does nothing.
@@ -102,26 +132,42 @@ def overrun(state: str, seconds: float, *, visit: Visits = None, probability: fl
     :raises FaultError: for a visit below 1, a probability outside 0 to 1, or a time below 0.
     """
     if not (isinstance(seconds, (int, float)) and 0 <= seconds < math.inf):
-        raise FaultError('a fault of {}: {!r} s is not a time; give seconds from 0'.format(
-            state, seconds))
-    return _checked(Fault(state, FaultKind.OVERRUN, _visits(state, visit), probability, seed,
-                          seconds=float(seconds)))
+        raise FaultError(
+            'a fault of {}: {!r} s is not a time; give seconds from 0'.format(state, seconds)
+        )
+    return _checked(
+        Fault(
+            state,
+            FaultKind.OVERRUN,
+            _visits(state, visit),
+            probability,
+            seed,
+            seconds=float(seconds),
+        )
+    )
 
 
 def _visits(state: str, visit: Visits) -> Tuple[int, ...]:
     if visit is None:
         return ()
     given = (visit,) if isinstance(visit, int) else tuple(visit)
-    wrong = [each for each in given
-             if not isinstance(each, int) or isinstance(each, bool) or each < 1]
+    wrong = [
+        each for each in given if not isinstance(each, int) or isinstance(each, bool) or each < 1
+    ]
     if wrong or not given:
-        raise FaultError('a fault of {}: visit {} is not there; the first visit is 1'.format(
-            state, ', '.join(map(repr, wrong)) or '()'))
+        raise FaultError(
+            'a fault of {}: visit {} is not there; the first visit is 1'.format(
+                state, ', '.join(map(repr, wrong)) or '()'
+            )
+        )
     return given
 
 
 def _checked(fault: Fault) -> Fault:
     if not (isinstance(fault.probability, (int, float)) and 0 <= fault.probability <= 1):
-        raise FaultError('a fault of {}: probability {!r} is not within 0 to 1'.format(
-            fault.state, fault.probability))
+        raise FaultError(
+            'a fault of {}: probability {!r} is not within 0 to 1'.format(
+                fault.state, fault.probability
+            )
+        )
     return fault

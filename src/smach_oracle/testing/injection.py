@@ -3,6 +3,7 @@
 Each state keeps its object, its class and its place. Only the attribute `execute` of the object
 stands before that of its class for a while.
 """
+
 import contextlib
 import random
 import threading
@@ -45,11 +46,9 @@ class ArmedFault:
         """Whether it happens at this visit, to be asked once for each."""
         if self.fault.visits and visit not in self.fault.visits:
             return False
-        return (self.fault.probability >= 1.0
-                or self._random.random() < self.fault.probability)
+        return self.fault.probability >= 1.0 or self._random.random() < self.fault.probability
 
-    def strike(self, userdata: Any, lifted: threading.Event,
-               work: Callable[[], object]) -> object:
+    def strike(self, userdata: Any, lifted: threading.Event, work: Callable[[], object]) -> object:
         """Go wrong in place of the state, or before its work.
 
         It raises what an EXCEPTION fault is to raise.
@@ -69,8 +68,9 @@ class ArmedFault:
         return _preempted(state)
 
 
-def _wait(state: smach.State, lifted: threading.Event, end_s: Optional[float],
-          heeds_preempt: bool) -> bool:
+def _wait(
+    state: smach.State, lifted: threading.Event, end_s: Optional[float], heeds_preempt: bool
+) -> bool:
     """Wait until `end_s` (monotonic, None means without end).
 
     Return False where something ended it before.
@@ -96,8 +96,13 @@ def _preempted(state: smach.State) -> object:
 class Injection:
     """Faults in one machine, from `put_in` until `take_out`."""
 
-    def __init__(self, machine: smach.StateMachine, faults: Iterable[Fault] = (),
-                 report: Report = _tell_nobody, failing: Optional[FailingNames] = None) -> None:
+    def __init__(
+        self,
+        machine: smach.StateMachine,
+        faults: Iterable[Fault] = (),
+        report: Report = _tell_nobody,
+        failing: Optional[FailingNames] = None,
+    ) -> None:
         """Find the places of the faults. Nothing is changed yet.
 
         :raises FaultError: where a state is not there, or has not registered an outcome.
@@ -114,7 +119,8 @@ class Injection:
     def _armed(self, fault: Fault) -> ArmedFault:
         if not isinstance(fault, Fault):
             raise FaultError(
-                '{!r} is not a fault; make one with fail, crash, hang or overrun'.format(fault))
+                '{!r} is not a fault; make one with fail, crash, hang or overrun'.format(fault)
+            )
         place = find_place(self._places, fault.state, 'a fault')
         return ArmedFault(fault, place, self._outcome(fault, place))
 
@@ -127,11 +133,18 @@ class Injection:
         named = [outcome for outcome in outcomes if outcome in self._failing]
         if not fault.outcome and len(named) == 1:
             return named[0]
-        what = ('has no outcome {!r}'.format(fault.outcome) if fault.outcome else
-                'has {} that are named like a failure'.format(
-                    '{} outcomes'.format(len(named)) if named else 'no outcomes'))
-        raise FaultError('a fault: {} {}; name one of {}'.format(
-            place.path, what, ', '.join(map(repr, outcomes)) or 'none'))
+        what = (
+            'has no outcome {!r}'.format(fault.outcome)
+            if fault.outcome
+            else 'has {} that are named like a failure'.format(
+                '{} outcomes'.format(len(named)) if named else 'no outcomes'
+            )
+        )
+        raise FaultError(
+            'a fault: {} {}; name one of {}'.format(
+                place.path, what, ', '.join(map(repr, outcomes)) or 'none'
+            )
+        )
 
     def put_in(self) -> None:
         """Let the faults happen from now on."""
@@ -176,8 +189,11 @@ class Injection:
         with self._lock:
             visit = self._visits[place.path] = self._visits.get(place.path, 0) + 1
             # each fault of the place is asked, also where another comes first: draws stay the same
-            due = [armed for armed in self.armed
-                   if armed.place.path == place.path and armed.happens_at(visit)]
+            due = [
+                armed
+                for armed in self.armed
+                if armed.place.path == place.path and armed.happens_at(visit)
+            ]
         self._report(place, visit, 'entered', '')
         try:
             if due:

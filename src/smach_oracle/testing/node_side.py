@@ -1,4 +1,5 @@
 """The ROS side of a bench. Imported where ROS is asked for, and nowhere else."""
+
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.ros.attachment import attachments

@@ -1,4 +1,5 @@
 """One trial as a test saw it, with assertions that read as sentences."""
+
 from typing import Iterable, List, NamedTuple, Optional, Sequence
 
 from smach_oracle.oracle.asking.question import Question
@@ -61,22 +62,32 @@ class ObservedTrial:
     @property
     def gave_up(self) -> bool:
         """Whether the oracle of the top machine gave up."""
-        return any(event.kind is EventKind.GIVE_UP and '/' not in event.path and not event.target
-                   for event in self.events)
+        return any(
+            event.kind is EventKind.GIVE_UP and '/' not in event.path and not event.target
+            for event in self.events
+        )
 
     @property
     def ended_well(self) -> bool:
         """Whether the machine ended in an outcome that is not named like a failure."""
-        return (self.error is None and self.outcome is not None and not self.gave_up
-                and self.outcome not in self._seen.failing and not is_preempted(self.outcome))
+        return (
+            self.error is None
+            and self.outcome is not None
+            and not self.gave_up
+            and self.outcome not in self._seen.failing
+            and not is_preempted(self.outcome)
+        )
 
     def __str__(self) -> str:
-        lines = ['The trial {}. {}, {}.'.format(
-            self.ending(), _counted(len(self.failures()), 'failure'),
-            _counted(len(self.asked_about()), 'question'))]
+        lines = [
+            'The trial {}. {}, {}.'.format(
+                self.ending(),
+                _counted(len(self.failures()), 'failure'),
+                _counted(len(self.asked_about()), 'question'),
+            )
+        ]
         lines += lines_of(self._seen.steps)
-        lines += ['  a fault that did not happen: {}'.format(fault)
-                  for fault in self.unused_faults]
+        lines += ['  a fault that did not happen: {}'.format(fault) for fault in self.unused_faults]
         return '\n'.join(lines)
 
     # -- assertions
@@ -87,9 +98,10 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(self.error is None and self.outcome == outcome,
-                             'the trial was to end in {!r}, and it {}'.format(
-                                 outcome, self.ending()))
+        return self._require(
+            self.error is None and self.outcome == outcome,
+            'the trial was to end in {!r}, and it {}'.format(outcome, self.ending()),
+        )
 
     def assert_raised(self, kind: type) -> 'ObservedTrial':
         """Fail unless an exception of this type left the machine.
@@ -97,9 +109,10 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(isinstance(self.error, kind),
-                             'the trial was to raise {}, and it {}'.format(
-                                 kind.__name__, self.ending()))
+        return self._require(
+            isinstance(self.error, kind),
+            'the trial was to raise {}, and it {}'.format(kind.__name__, self.ending()),
+        )
 
     def assert_recovered(self, state: str = '') -> 'ObservedTrial':
         """Fail unless a state (any, if left out) failed, and the trial still ended well.
@@ -111,10 +124,17 @@ class ObservedTrial:
         """
         __tracebackhide__ = True
         if not self._count(self.failures(), state):
-            self._fail('{} was to fail and to recover, and {}'.format(
-                state or 'a state', 'it did not fail' if state else 'nothing failed'))
-        return self._require(self.ended_well, 'the trial was to recover{}, and it {}'.format(
-            ' from the failure of ' + state if state else '', self.ending()))
+            self._fail(
+                '{} was to fail and to recover, and {}'.format(
+                    state or 'a state', 'it did not fail' if state else 'nothing failed'
+                )
+            )
+        return self._require(
+            self.ended_well,
+            'the trial was to recover{}, and it {}'.format(
+                ' from the failure of ' + state if state else '', self.ending()
+            ),
+        )
 
     def assert_failed(self, state: str, times: Optional[int] = None) -> 'ObservedTrial':
         """Fail unless a state failed, so many times if that is given.
@@ -122,8 +142,13 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require_count('{} was to fail'.format(state), 'it failed', 'it did not',
-                                   times, self._count(self.failures(), state))
+        return self._require_count(
+            '{} was to fail'.format(state),
+            'it failed',
+            'it did not',
+            times,
+            self._count(self.failures(), state),
+        )
 
     def assert_no_failures(self) -> 'ObservedTrial':
         """Fail where a state failed.
@@ -131,8 +156,10 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(not self.failures(), 'nothing was to fail, and these did: {}'.format(
-            ', '.join(self.failures())))
+        return self._require(
+            not self.failures(),
+            'nothing was to fail, and these did: {}'.format(', '.join(self.failures())),
+        )
 
     def assert_asked_about(self, state: str, times: Optional[int] = None) -> 'ObservedTrial':
         """Fail unless the expert was asked about a state, so many times if that is given.
@@ -140,9 +167,13 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require_count('the expert was to be asked about {}'.format(state),
-                                   'was asked', 'was not', times,
-                                   self._count(self.asked_about(), state))
+        return self._require_count(
+            'the expert was to be asked about {}'.format(state),
+            'was asked',
+            'was not',
+            times,
+            self._count(self.asked_about(), state),
+        )
 
     def assert_not_asked(self, state: str = '') -> 'ObservedTrial':
         """Fail where the expert was asked, about a state or at all.
@@ -150,10 +181,12 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(not self._count(self.asked_about(), state),
-                             'the expert was not to be asked{}, and was asked about {}'.format(
-                                 ' about ' + state if state else '',
-                                 ', '.join(self.asked_about())))
+        return self._require(
+            not self._count(self.asked_about(), state),
+            'the expert was not to be asked{}, and was asked about {}'.format(
+                ' about ' + state if state else '', ', '.join(self.asked_about())
+            ),
+        )
 
     def assert_visited(self, states: Iterable[str], exactly: bool = False) -> 'ObservedTrial':
         """Fail unless the trial entered these states in this order.
@@ -171,8 +204,11 @@ class ObservedTrial:
         return self._require(
             _same(visits, wanted) if exactly else _in_order(visits, wanted),
             'the trial was to visit {}{}, and it visited {}'.format(
-                'exactly ' if exactly else '', ', '.join(wanted) or 'nothing',
-                ', '.join(visits) or 'nothing'))
+                'exactly ' if exactly else '',
+                ', '.join(wanted) or 'nothing',
+                ', '.join(visits) or 'nothing',
+            ),
+        )
 
     def assert_not_visited(self, state: str) -> 'ObservedTrial':
         """Fail where the trial entered a state.
@@ -180,8 +216,10 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(not self._count(self.visits(), state),
-                             '{} was not to be visited, and it was'.format(state))
+        return self._require(
+            not self._count(self.visits(), state),
+            '{} was not to be visited, and it was'.format(state),
+        )
 
     def assert_jumped(self, state: str, to: str) -> 'ObservedTrial':
         """Fail unless the oracle went from a failed state to another (or the same) one.
@@ -194,10 +232,17 @@ class ObservedTrial:
         self._check_name(state)
         jumps = [event for event in self.events if event.kind is EventKind.JUMP]
         return self._require(
-            any(_is_named(jump_from(event), state) and _is_named(jump_to(event), to)
-                for event in jumps),
-            'the oracle was to go from {} to {}; its jumps: {}'.format(state, to, ', '.join(
-                '{} to {}'.format(jump_from(event), jump_to(event)) for event in jumps) or 'none'))
+            any(
+                _is_named(jump_from(event), state) and _is_named(jump_to(event), to)
+                for event in jumps
+            ),
+            'the oracle was to go from {} to {}; its jumps: {}'.format(
+                state,
+                to,
+                ', '.join('{} to {}'.format(jump_from(event), jump_to(event)) for event in jumps)
+                or 'none',
+            ),
+        )
 
     def assert_all_faults_happened(self) -> 'ObservedTrial':
         """Fail where a fault did not happen, since its state or its visit was not reached.
@@ -205,8 +250,12 @@ class ObservedTrial:
         :raises AssertionError: with the course of the trial.
         """
         __tracebackhide__ = True
-        return self._require(not self.unused_faults, 'all faults were to happen, and these did '
-                             'not: {}'.format('; '.join(map(str, self.unused_faults))))
+        return self._require(
+            not self.unused_faults,
+            'all faults were to happen, and these did not: {}'.format(
+                '; '.join(map(str, self.unused_faults))
+            ),
+        )
 
     # -- inside
 
@@ -216,13 +265,15 @@ class ObservedTrial:
             self._fail(sentence)
         return self
 
-    def _require_count(self, wanted: str, done: str, not_done: str, times: Optional[int],
-                       count: int) -> 'ObservedTrial':
+    def _require_count(
+        self, wanted: str, done: str, not_done: str, times: Optional[int], count: int
+    ) -> 'ObservedTrial':
         __tracebackhide__ = True
         if times is None:
             return self._require(count > 0, '{}, and {}'.format(wanted, not_done))
-        return self._require(count == times, '{} {}, and {} {}'.format(
-            wanted, _times(times), done, _times(count)))
+        return self._require(
+            count == times, '{} {}, and {} {}'.format(wanted, _times(times), done, _times(count))
+        )
 
     def _fail(self, sentence: str) -> None:
         __tracebackhide__ = True
@@ -238,8 +289,9 @@ class ObservedTrial:
         """Refuse a state that does not exist: nothing is ever true of it."""
         __tracebackhide__ = True
         if self._seen.states and not any(_is_named(path, state) for path in self._seen.states):
-            raise AssertionError('there is no state {!r}; there are {}'.format(
-                state, ', '.join(self._seen.states)))
+            raise AssertionError(
+                'there is no state {!r}; there are {}'.format(state, ', '.join(self._seen.states))
+            )
 
     def _states_of(self, kind: EventKind) -> List[str]:
         return [place_of(event) for event in self.events if event.kind is kind]

@@ -1,4 +1,5 @@
 """The states of a machine, at any depth, by the names that tests give them."""
+
 from typing import Dict, Iterator, List, NamedTuple, Tuple
 
 import smach
@@ -27,7 +28,8 @@ class StatePlace(NamedTuple):
         """
         container = self.container
         return not isinstance(container, smach.StateMachine) or (
-            container._current_label == self.label)
+            container._current_label == self.label
+        )
 
 
 def places_of(machine: smach.Container) -> List[StatePlace]:
@@ -35,8 +37,9 @@ def places_of(machine: smach.Container) -> List[StatePlace]:
     return list(_places_in(machine, '', (machine,)))
 
 
-def _places_in(container: smach.Container, above: str,
-               around: Tuple[smach.Container, ...]) -> Iterator[StatePlace]:
+def _places_in(
+    container: smach.Container, above: str, around: Tuple[smach.Container, ...]
+) -> Iterator[StatePlace]:
     for label, state in _children(container).items():
         path = '{}/{}'.format(above, label) if above else str(label)
         yield StatePlace(path, label, container, state)
@@ -48,8 +51,11 @@ def _children(container: smach.Container) -> Dict[str, smach.State]:
     meta = ''
     if isinstance(container, OracleContainer) and oracle_of(container).recovers:
         meta = oracle_of(container).settings.oracle_label
-    return {label: state for label, state in container.get_children().items()
-            if isinstance(state, smach.State) and (not meta or label != meta)}
+    return {
+        label: state
+        for label, state in container.get_children().items()
+        if isinstance(state, smach.State) and (not meta or label != meta)
+    }
 
 
 def find_place(places: List[StatePlace], name: str, what: str) -> StatePlace:
@@ -61,12 +67,19 @@ def find_place(places: List[StatePlace], name: str, what: str) -> StatePlace:
     """
     found = [place for place in places if place.path == name]
     found = found or [place for place in places if place.label == name]
-    found = found or [place for place in places
-                      if '/' in name and place.path == name.split('/', 1)[1]]
+    found = found or [
+        place for place in places if '/' in name and place.path == name.split('/', 1)[1]
+    ]
     if len(found) == 1:
         return found[0]
     if found:
-        raise FaultError('{}: {!r} is the label of {} states; say which: {}'.format(
-            what, name, len(found), ', '.join(place.path for place in found)))
-    raise FaultError('{}: there is no state {!r}; there are {}'.format(
-        what, name, ', '.join(place.path for place in places) or 'none'))
+        raise FaultError(
+            '{}: {!r} is the label of {} states; say which: {}'.format(
+                what, name, len(found), ', '.join(place.path for place in found)
+            )
+        )
+    raise FaultError(
+        '{}: there is no state {!r}; there are {}'.format(
+            what, name, ', '.join(place.path for place in places) or 'none'
+        )
+    )

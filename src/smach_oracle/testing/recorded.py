@@ -1,4 +1,5 @@
 """Trials that ran elsewhere, such as under `oracle_run`, from their bags. It needs rosbag."""
+
 import json
 from pathlib import Path
 from typing import Dict, Iterable, List, Optional
@@ -15,8 +16,9 @@ from .observed_trial import ObservedTrial, TrialEvidence
 _EVENTS = '/oracle/events'
 
 
-def recorded_trials(path: str, failing_outcomes: Iterable[str] = DEFAULT_FAILING_OUTCOMES
-                    ) -> List[ObservedTrial]:
+def recorded_trials(
+    path: str, failing_outcomes: Iterable[str] = DEFAULT_FAILING_OUTCOMES
+) -> List[ObservedTrial]:
     """Return the trials of a bag, or of all bags in a folder, by the time of their beginning.
 
     Bags that are still written are left out. An exception that ended a trial is a RuntimeError with
@@ -42,8 +44,9 @@ def _trials_in(path: Path, failing: FailingNames) -> List[ObservedTrial]:
     by_trial: Dict[str, List[Event]] = {}
     for event in events:
         by_trial.setdefault(event.trial_id, []).append(event)
-    return [_trial_of(sorted(each, key=lambda event: event.seq), failing)
-            for each in by_trial.values()]
+    return [
+        _trial_of(sorted(each, key=lambda event: event.seq), failing) for each in by_trial.values()
+    ]
 
 
 def _trial_of(events: List[Event], failing: FailingNames) -> ObservedTrial:
@@ -57,8 +60,21 @@ def _trial_of(events: List[Event], failing: FailingNames) -> ObservedTrial:
 
 
 def _event_of(message: OracleEvent) -> Event:
-    return Event(EventKind(message.kind), message.trial_id, message.seq, message.wall_time,
-                 message.path, message.state, message.outcome, message.target,
-                 message.failure_kind, message.failure_class, message.rate, message.continuous,
-                 message.query_id, message.by, message.text,
-                 json.loads(message.data) if message.data else None)
+    return Event(
+        EventKind(message.kind),
+        message.trial_id,
+        message.seq,
+        message.wall_time,
+        message.path,
+        message.state,
+        message.outcome,
+        message.target,
+        message.failure_kind,
+        message.failure_class,
+        message.rate,
+        message.continuous,
+        message.query_id,
+        message.by,
+        message.text,
+        json.loads(message.data) if message.data else None,
+    )

@@ -1,4 +1,5 @@
 """An expert by script: the answers to the questions of a trial, one after the other. No ROS."""
+
 import threading
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Union
 
@@ -44,31 +45,36 @@ def goto(state: str, *, about: str = '', why: str = '') -> ScriptedAnswer:
     return ScriptedAnswer(Answer(AnswerKind.GOTO, state=state, by=BY, why=why), about)
 
 
-def supersede(outcome: str, *, outputs: Optional[Mapping[str, Any]] = None, about: str = '',
-              why: str = '') -> ScriptedAnswer:
+def supersede(
+    outcome: str, *, outputs: Optional[Mapping[str, Any]] = None, about: str = '', why: str = ''
+) -> ScriptedAnswer:
     """End the failed state with this outcome, as if it had done its work.
 
     :param outputs: by the failed state's own key names.
     :param about: the failed state, LABEL or PATH/LABEL, that is expected in the question.
     """
-    return ScriptedAnswer(Answer(AnswerKind.SUPERSEDE, outcome=outcome, outputs=outputs, by=BY,
-                                 why=why), about)
+    return ScriptedAnswer(
+        Answer(AnswerKind.SUPERSEDE, outcome=outcome, outputs=outputs, by=BY, why=why), about
+    )
 
 
-def give_up(outcome: str = '', *, container: str = '', about: str = '',
-            why: str = '') -> ScriptedAnswer:
+def give_up(
+    outcome: str = '', *, container: str = '', about: str = '', why: str = ''
+) -> ScriptedAnswer:
     """End the container with this outcome. '' means as the failure would have ended it.
 
     :param container: a level above that ends so, LABEL or PATH/LABEL, or the name of the top
         machine. '' means the failed state's own. A level above needs an outcome.
     :param about: the failed state, LABEL or PATH/LABEL, that is expected in the question.
     """
-    return ScriptedAnswer(Answer(AnswerKind.GIVE_UP, outcome=outcome, container=container, by=BY,
-                                 why=why), about)
+    return ScriptedAnswer(
+        Answer(AnswerKind.GIVE_UP, outcome=outcome, container=container, by=BY, why=why), about
+    )
 
 
-def use_interface(interface: str, outcome: str, *, outputs: Optional[Mapping[str, Any]] = None,
-                  about: str = '') -> ScriptedAnswer:
+def use_interface(
+    interface: str, outcome: str, *, outputs: Optional[Mapping[str, Any]] = None, about: str = ''
+) -> ScriptedAnswer:
     """Choose an interface on offer, which then supersedes the failed state with this outcome.
 
     :param outputs: by the failed state's own key names.
@@ -125,8 +131,9 @@ class AnswerScript(Expert):
         if self.problem:
             raise ScriptError('{}\n{}'.format(self.problem, shown).rstrip())
 
-    def ask(self, question: Question, cancelled: threading.Event,
-            progress: Progress) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Progress
+    ) -> Optional[Answer]:
         """Return the next answer of the script, None where there is none."""
         try:
             said = self._said(question)
@@ -138,39 +145,53 @@ class AnswerScript(Expert):
             check_answer(answer, choices)
             return answer
         except AnswerError as err:
-            self._note('the answer of the script does not fit {}: {}'.format(
-                _about(question), err))
+            self._note('the answer of the script does not fit {}: {}'.format(_about(question), err))
         except ScriptError as err:
             self._note(str(err))
         except Exception as err:  # of the user's function
-            self._note('the script failed at {}: {}: {}'.format(_about(question),
-                                                                type(err).__name__, err))
+            self._note(
+                'the script failed at {}: {}: {}'.format(_about(question), type(err).__name__, err)
+            )
         return None
 
-    def run_interface(self, offer: InterfaceOffer, question: Question,
-                      cancelled: threading.Event, progress: Progress) -> Optional[Answer]:
+    def run_interface(
+        self,
+        offer: InterfaceOffer,
+        question: Question,
+        cancelled: threading.Event,
+        progress: Progress,
+    ) -> Optional[Answer]:
         """Hand over what the script says."""
         return None if self._chosen is None else self._chosen.done
 
     def _said(self, question: Question) -> ScriptedAnswer:
         with self._lock:
             if self._used >= len(self._replies) and not self._repeats:
-                raise ScriptError('a question that the script does not expect: {}; {}'.format(
-                    _about(question), self._in_words()))
+                raise ScriptError(
+                    'a question that the script does not expect: {}; {}'.format(
+                        _about(question), self._in_words()
+                    )
+                )
             reply = self._replies[min(self._used, len(self._replies) - 1)]
             self._used += 1
         if not isinstance(reply, (ScriptedAnswer, Answer)) and callable(reply):
             reply = reply(question)
         said = _as_scripted(reply)
         if said.about not in ('', question.failed_state) and not _path(question).endswith(
-                '/' + said.about):
-            raise ScriptError('the script expects a question about {}, and this is {}; {}'.format(
-                said.about, _about(question), self._in_words()))
+            '/' + said.about
+        ):
+            raise ScriptError(
+                'the script expects a question about {}, and this is {}; {}'.format(
+                    said.about, _about(question), self._in_words()
+                )
+            )
         return said
 
     def _in_words(self) -> str:
-        replies = [str(_as_scripted(reply)) if not callable(reply) else 'a function'
-                   for reply in self._replies]
+        replies = [
+            str(_as_scripted(reply)) if not callable(reply) else 'a function'
+            for reply in self._replies
+        ]
         return 'the script has {}'.format(', '.join(replies) or 'no answers')
 
     def _note(self, problem: str) -> None:
@@ -185,8 +206,11 @@ def _as_scripted(reply: object) -> ScriptedAnswer:
         return ScriptedAnswer(reply)
     if isinstance(reply, ScriptedAnswer):
         return reply
-    raise ScriptError('{!r} is not an answer; give goto, supersede, give_up, use_interface or '
-                      'no_answer'.format(reply))
+    raise ScriptError(
+        '{!r} is not an answer; give goto, supersede, give_up, use_interface or no_answer'.format(
+            reply
+        )
+    )
 
 
 def _placed(answer: Answer, choices: AnswerChoices) -> Answer:

@@ -1,4 +1,5 @@
 """Runs a SMACH script as it is, with each of its machines on a test bench."""
+
 import contextlib
 import runpy
 import sys
@@ -27,8 +28,11 @@ class ScriptRun:
         :raises AssertionError: where the script has executed no machine.
         """
         if not self.trials:
-            raise AssertionError('the script has executed no machine; it ended with exit code '
-                                 '{}'.format(self.exit_code))
+            raise AssertionError(
+                'the script has executed no machine; it ended with exit code {}'.format(
+                    self.exit_code
+                )
+            )
         return self.trials[-1]
 
 
@@ -36,9 +40,17 @@ class _EnoughTrials(BaseException):
     """Leaves the script from within. It never leaves this module."""
 
 
-def run_script(path: str, args: Sequence[str] = (), *, faults: Iterable[Fault] = (),
-               expert: Optional[Expert] = None, settings: SettingsLike = None,
-               most_trials: int = 0, limit_s: float = LIMIT_S, ros: bool = False) -> ScriptRun:
+def run_script(
+    path: str,
+    args: Sequence[str] = (),
+    *,
+    faults: Iterable[Fault] = (),
+    expert: Optional[Expert] = None,
+    settings: SettingsLike = None,
+    most_trials: int = 0,
+    limit_s: float = LIMIT_S,
+    ros: bool = False,
+) -> ScriptRun:
     """Run a script in this process, as `python3 PATH ARGS` would, and its machines on a bench.
 
     Each top-level `execute` of a machine is a trial. The script gets the outcome, or the error.
@@ -87,8 +99,12 @@ def _run(path: str, args: Sequence[str]) -> int:
 class _ScriptTrials:
     """Runs the machines that a script executes."""
 
-    def __init__(self, on_bench: Callable[[smach.StateMachine], Bench], most: int,
-                 stack: contextlib.ExitStack) -> None:
+    def __init__(
+        self,
+        on_bench: Callable[[smach.StateMachine], Bench],
+        most: int,
+        stack: contextlib.ExitStack,
+    ) -> None:
         self.done: List[ObservedTrial] = []
         self.under_way = False
         self._on_bench = on_bench
@@ -96,8 +112,9 @@ class _ScriptTrials:
         self._stack = stack
         self._benches: Dict[int, Bench] = {}  # by id of the machine, which they hold
 
-    def execute(self, machine: smach.StateMachine, parent: Optional[smach.UserData]
-                ) -> Optional[str]:
+    def execute(
+        self, machine: smach.StateMachine, parent: Optional[smach.UserData]
+    ) -> Optional[str]:
         """Run one trial, and return the outcome, or raise what the machine raised."""
         __tracebackhide__ = True
         self.under_way = True

@@ -1,4 +1,5 @@
 """Many trials of a machine, each with one random fault: which failures never recover."""
+
 import contextlib
 import os
 import random
@@ -38,11 +39,20 @@ class SoakPlan(NamedTuple):
     limit_s: float = LIMIT_S
 
 
-def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
-         kinds: Iterable[FaultKind] = KINDS, states: Iterable[str] = (),
-         most_in_row: Optional[int] = 3, overrun_s: float = 1.0, expert: Optional[Expert] = None,
-         settings: SettingsLike = None, preconditions: PreconditionLists = None,
-         limit_s: float = LIMIT_S) -> SoakReport:
+def soak(
+    machine: MachineOrFactory,
+    trials: int = 1000,
+    *,
+    seed: int = 0,
+    kinds: Iterable[FaultKind] = KINDS,
+    states: Iterable[str] = (),
+    most_in_row: Optional[int] = 3,
+    overrun_s: float = 1.0,
+    expert: Optional[Expert] = None,
+    settings: SettingsLike = None,
+    preconditions: PreconditionLists = None,
+    limit_s: float = LIMIT_S,
+) -> SoakReport:
     """Run many trials, each with one random fault, and report which failures never recover.
 
     Trial n of a seed is always the same. Each begins with nothing learned, and with the userdata
@@ -62,8 +72,18 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     :raises AssertionError: where the machine does not end well without a fault.
     """
     _check_count('trials', trials)
-    plan = SoakPlan(machine, seed, _kinds(kinds), _names(states),
-                    most_in_row, overrun_s, expert, settings, preconditions, limit_s)
+    plan = SoakPlan(
+        machine,
+        seed,
+        _kinds(kinds),
+        _names(states),
+        most_in_row,
+        overrun_s,
+        expert,
+        settings,
+        preconditions,
+        limit_s,
+    )
     runner = _SoakRunner(plan)
     told = []
     with runner.unchanged():
@@ -72,11 +92,20 @@ def soak(machine: MachineOrFactory, trials: int = 1000, *, seed: int = 0,
     return SoakReport(seed, told, runner.not_visited, lambda number: _alone(plan, number))
 
 
-def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
-               kinds: Iterable[FaultKind] = KINDS, states: Iterable[str] = (),
-               most_in_row: Optional[int] = 3, overrun_s: float = 1.0,
-               expert: Optional[Expert] = None, settings: SettingsLike = None,
-               preconditions: PreconditionLists = None, limit_s: float = LIMIT_S) -> ObservedTrial:
+def soak_trial(
+    machine: MachineOrFactory,
+    number: int,
+    *,
+    seed: int = 0,
+    kinds: Iterable[FaultKind] = KINDS,
+    states: Iterable[str] = (),
+    most_in_row: Optional[int] = 3,
+    overrun_s: float = 1.0,
+    expert: Optional[Expert] = None,
+    settings: SettingsLike = None,
+    preconditions: PreconditionLists = None,
+    limit_s: float = LIMIT_S,
+) -> ObservedTrial:
     """Run one trial of a soak alone, by its number from 1. The arguments are those of `soak`.
 
     :raises FaultError: for a state that is not there, where nothing can fail, and for a number
@@ -86,9 +115,21 @@ def soak_trial(machine: MachineOrFactory, number: int, *, seed: int = 0,
     :raises TrialLimitError: where the trial did not end in time.
     :raises AssertionError: where the machine does not end well without a fault.
     """
-    return _alone(SoakPlan(machine, seed, _kinds(kinds), _names(states),
-                           most_in_row, overrun_s, expert, settings, preconditions, limit_s),
-                  number)
+    return _alone(
+        SoakPlan(
+            machine,
+            seed,
+            _kinds(kinds),
+            _names(states),
+            most_in_row,
+            overrun_s,
+            expert,
+            settings,
+            preconditions,
+            limit_s,
+        ),
+        number,
+    )
 
 
 def _alone(plan: SoakPlan, number: int) -> ObservedTrial:
@@ -162,16 +203,23 @@ class _SoakRunner:
         places = self._places(machine)
         trial = self.run([], machine)
         if not trial.ended_well:
-            raise AssertionError('the machine does not end well even without a fault\n{}'.format(
-                trial))
+            raise AssertionError(
+                'the machine does not end well even without a fault\n{}'.format(trial)
+            )
         visits = trial.visits()
         self.not_visited = [place.path for place in places if place.path not in visits]
-        self._candidates = [each for place in places for each in self._candidates_of(
-            place, visits.count(place.path), failing)]
+        self._candidates = [
+            each
+            for place in places
+            for each in self._candidates_of(place, visits.count(place.path), failing)
+        ]
         if not self._candidates:
-            raise FaultError('a soak: nothing can fail by {}; the states are {}'.format(
-                ', '.join(kind.value for kind in self._plan.kinds) or 'no kind of fault',
-                ', '.join(place.path for place in places) or 'none'))
+            raise FaultError(
+                'a soak: nothing can fail by {}; the states are {}'.format(
+                    ', '.join(kind.value for kind in self._plan.kinds) or 'no kind of fault',
+                    ', '.join(place.path for place in places) or 'none',
+                )
+            )
 
     def _failing_outcomes(self, machine: smach.StateMachine) -> Tuple[str, ...]:
         if isinstance(machine, OracleContainer) and self._plan.settings is None:
@@ -184,13 +232,17 @@ class _SoakRunner:
             return [find_place(places, name, 'a soak') for name in self._plan.states]
         return [place for place in places if not place.is_container]
 
-    def _candidates_of(self, place: StatePlace, visits: int,
-                       failing: FailingNames) -> Iterator[_Candidate]:
+    def _candidates_of(
+        self, place: StatePlace, visits: int, failing: FailingNames
+    ) -> Iterator[_Candidate]:
         for kind in self._plan.kinds:
             outcomes = ['']
             if kind is FaultKind.OUTCOME:
-                outcomes = [outcome for outcome in sorted(place.state.get_registered_outcomes(),
-                                                          key=str) if outcome in failing]
+                outcomes = [
+                    outcome
+                    for outcome in sorted(place.state.get_registered_outcomes(), key=str)
+                    if outcome in failing
+                ]
             for outcome in outcomes:
                 yield _Candidate(place.path, kind, outcome, visits)
 
@@ -225,13 +277,23 @@ class _SoakRunner:
         except (ScriptError, TrialLimitError) as err:
             if machine.is_running() and machine is self._plan.machine:
                 raise
-            return SoakTrial(number, chosen.path, name, fault, True, False, False,
-                             str(err).splitlines()[0])
-        return SoakTrial(number, chosen.path, name, fault, not trial.unused_faults,
-                         trial.ended_well, bool(trial.asked_about()), trial.ending())
+            return SoakTrial(
+                number, chosen.path, name, fault, True, False, False, str(err).splitlines()[0]
+            )
+        return SoakTrial(
+            number,
+            chosen.path,
+            name,
+            fault,
+            not trial.unused_faults,
+            trial.ended_well,
+            bool(trial.asked_about()),
+            trial.ending(),
+        )
 
-    def run(self, faults: List[Fault],
-            machine: Optional[smach.StateMachine] = None) -> ObservedTrial:
+    def run(
+        self, faults: List[Fault], machine: Optional[smach.StateMachine] = None
+    ) -> ObservedTrial:
         """Run one trial.
 
         :raises ScriptError: where a question did not go with the script of the expert.
@@ -239,17 +301,23 @@ class _SoakRunner:
         """
         plan = self._plan
         self._fresh()
-        with Bench(self._machine() if machine is None else machine, faults, expert=plan.expert,
-                   settings=plan.settings, preconditions=plan.preconditions,
-                   limit_s=plan.limit_s) as bench:
+        with Bench(
+            self._machine() if machine is None else machine,
+            faults,
+            expert=plan.expert,
+            settings=plan.settings,
+            preconditions=plan.preconditions,
+            limit_s=plan.limit_s,
+        ) as bench:
             return bench.run()
 
     def _machine(self) -> smach.StateMachine:
         machine = self._plan.machine
         made = machine if isinstance(machine, smach.StateMachine) else machine()
         if not isinstance(made, smach.StateMachine):
-            raise FaultError('a soak: {!r} is no StateMachine, nor a function that builds '
-                             'one'.format(made))
+            raise FaultError(
+                'a soak: {!r} is no StateMachine, nor a function that builds one'.format(made)
+            )
         return made
 
 
@@ -265,8 +333,11 @@ def _nothing() -> None:
 def _back_to_now(machine: smach.StateMachine, rates_path: str) -> Callable[[], None]:
     """Return what brings a machine back to the userdata and the learned rates of now."""
     states = [machine] + [place.state for place in places_of(machine)]
-    kept = {id(each): (each.userdata, dict(each.userdata._data)) for each in states
-            if isinstance(each, smach.Container)}
+    kept = {
+        id(each): (each.userdata, dict(each.userdata._data))
+        for each in states
+        if isinstance(each, smach.Container)
+    }
     wrapped = machine if isinstance(machine, OracleContainer) else None
     if wrapped is not None:
         oracle_of(wrapped).rates()  # so that all states have a rate to keep

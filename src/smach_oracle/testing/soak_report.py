@@ -1,4 +1,5 @@
 """The result of a soak, as a text that people read and an object that tests assert on."""
+
 from typing import Callable, Dict, List, NamedTuple, Sequence, Tuple
 
 from .faults import Fault
@@ -34,8 +35,9 @@ class SoakRow(NamedTuple):
     def __str__(self) -> str:
         numbers = ', '.join(map(str, self.not_recovered[:_MOST_NUMBERS]))
         more = ', ...' if len(self.not_recovered) > _MOST_NUMBERS else ''
-        text = '{}: {}: {} of {} recovered'.format(self.state, self.kind, self.recovered,
-                                                   self.trials)
+        text = '{}: {}: {} of {} recovered'.format(
+            self.state, self.kind, self.recovered, self.trials
+        )
         if self.asked:
             text += ', the expert asked in {}'.format(self.asked)
         if self.not_recovered:
@@ -46,8 +48,13 @@ class SoakRow(NamedTuple):
 class SoakReport:
     """The result of a soak. `str` gives it as text."""
 
-    def __init__(self, seed: int, trials: Sequence[SoakTrial], not_visited: Sequence[str],
-                 again: Callable[[int], ObservedTrial]) -> None:
+    def __init__(
+        self,
+        seed: int,
+        trials: Sequence[SoakTrial],
+        not_visited: Sequence[str],
+        again: Callable[[int], ObservedTrial],
+    ) -> None:
         self.seed = seed
         self.trials = tuple(trials)
         self.not_visited = tuple(not_visited)  # states that no trial enters without a fault
@@ -75,8 +82,9 @@ class SoakReport:
         :raises ValueError: for a number that the soak has not.
         """
         if not any(trial.number == number for trial in self.trials):
-            raise ValueError('there is no trial {!r}; the soak has 1 to {}'.format(
-                number, len(self.trials)))
+            raise ValueError(
+                'there is no trial {!r}; the soak has 1 to {}'.format(number, len(self.trials))
+            )
         return self._again(number)
 
     def assert_every_failure_can_recover(self) -> 'SoakReport':
@@ -93,8 +101,9 @@ class SoakReport:
         :raises AssertionError: with the report.
         """
         __tracebackhide__ = True
-        return self._require(len(self.always_recovered) == len(self.rows),
-                             'some trials did not recover')
+        return self._require(
+            len(self.always_recovered) == len(self.rows), 'some trials did not recover'
+        )
 
     def _require(self, holds: bool, sentence: str) -> 'SoakReport':
         __tracebackhide__ = True
@@ -103,13 +112,19 @@ class SoakReport:
         return self
 
     def __str__(self) -> str:
-        lines = ['{} trials with one fault each, seed {}: {} recovered, {} did not.'.format(
-            sum(row.trials for row in self.rows), self.seed,
-            sum(row.recovered for row in self.rows),
-            sum(len(row.not_recovered) for row in self.rows))]
-        for title, rows in (('Never recovered', self.never_recovered),
-                            ('Sometimes recovered', self.sometimes_recovered),
-                            ('Always recovered', self.always_recovered)):
+        lines = [
+            '{} trials with one fault each, seed {}: {} recovered, {} did not.'.format(
+                sum(row.trials for row in self.rows),
+                self.seed,
+                sum(row.recovered for row in self.rows),
+                sum(len(row.not_recovered) for row in self.rows),
+            )
+        ]
+        for title, rows in (
+            ('Never recovered', self.never_recovered),
+            ('Sometimes recovered', self.sometimes_recovered),
+            ('Always recovered', self.always_recovered),
+        ):
             lines += ['{}:'.format(title)] * bool(rows) + ['  {}'.format(row) for row in rows]
         idle = sum(1 for trial in self.trials if not trial.happened)
         if idle:
@@ -118,8 +133,10 @@ class SoakReport:
             lines.append('Not visited without a fault: {}.'.format(', '.join(self.not_visited)))
         bad = next((row.not_recovered[0] for row in self.rows if row.not_recovered), None)
         if bad is not None:
-            lines.append('Run one again: report.again({0}), or soak_trial(..., {0}, seed={1}) with '
-                         'the arguments of the soak.'.format(bad, self.seed))
+            lines.append(
+                'Run one again: report.again({0}), or soak_trial(..., {0}, seed={1}) with '
+                'the arguments of the soak.'.format(bad, self.seed)
+            )
         return '\n'.join(lines)
 
 
@@ -133,6 +150,12 @@ def _rows(trials: Sequence[SoakTrial]) -> Tuple[SoakRow, ...]:
 
 def _row(state: str, kind: str, trials: Sequence[SoakTrial]) -> SoakRow:
     bad = [trial for trial in trials if not trial.recovered]
-    return SoakRow(state, kind, len(trials), len(trials) - len(bad),
-                   sum(1 for trial in trials if trial.asked), tuple(each.number for each in bad),
-                   bad[0].ending if bad else '')
+    return SoakRow(
+        state,
+        kind,
+        len(trials),
+        len(trials) - len(bad),
+        sum(1 for trial in trials if trial.asked),
+        tuple(each.number for each in bad),
+        bad[0].ending if bad else '',
+    )

@@ -1,4 +1,5 @@
 """The course of a trial as text that people read, one line for each thing that happened."""
+
 from typing import Callable, Dict, List, NamedTuple, Sequence, Union
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
@@ -40,8 +41,9 @@ def jump_from(event: Event) -> str:
 
 def jump_to(event: Event) -> str:
     """Return where a JUMP leads, which may be in a container below, as `place_of` does."""
-    return (below_top((event.data or {}).get('to', ''))
-            or place_of(event._replace(state=event.target)))
+    return below_top((event.data or {}).get('to', '')) or place_of(
+        event._replace(state=event.target)
+    )
 
 
 def lines_of(steps: Sequence[TrialStep]) -> List[str]:
@@ -49,8 +51,11 @@ def lines_of(steps: Sequence[TrialStep]) -> List[str]:
     begin = steps[0].wall_time if steps else 0.0
     told = [(step, _place(step), _text(steps, index)) for index, step in enumerate(steps)]
     width = min(30, max([len(place) for _, place, text in told if text] + [0]))
-    lines = ['  {:7.2f} s  {}  {}'.format(step.wall_time - begin, place.ljust(width), text)
-             for step, place, text in told if text]
+    lines = [
+        '  {:7.2f} s  {}  {}'.format(step.wall_time - begin, place.ljust(width), text)
+        for step, place, text in told
+        if text
+    ]
     if len(lines) <= MOST_LINES:
         return lines
     last = MOST_LINES - _FIRST_LINES
@@ -77,8 +82,11 @@ def _text(steps: Sequence[TrialStep], index: int) -> str:
 
 
 def _fails(before: TrialStep, step: Event) -> bool:
-    return (isinstance(before, Event) and before.kind is EventKind.FAILURE
-            and (before.path, before.state) == (step.path, step.state))
+    return (
+        isinstance(before, Event)
+        and before.kind is EventKind.FAILURE
+        and (before.path, before.state) == (step.path, step.state)
+    )
 
 
 def _of_probe(steps: Sequence[TrialStep], index: int, step: ProbedStep) -> str:
@@ -93,7 +101,7 @@ def _of_probe(steps: Sequence[TrialStep], index: int, step: ProbedStep) -> str:
 
 def _ends_next(steps: Sequence[TrialStep], index: int, path: str) -> bool:
     """Whether the next thing told after a state was entered is its end."""
-    for step in steps[index + 1:]:
+    for step in steps[index + 1 :]:
         if isinstance(step, ProbedStep):
             if step.what == 'fault' or step.told:
                 continue
@@ -119,8 +127,9 @@ def _by(event: Event) -> str:
 
 
 def _trial_end(event: Event) -> str:
-    return 'the trial ends{}{}'.format(' in ' + event.outcome if event.outcome else '',
-                                       _because(event.text))
+    return 'the trial ends{}{}'.format(
+        ' in ' + event.outcome if event.outcome else '', _because(event.text)
+    )
 
 
 def _leads(event: Event) -> str:
@@ -128,27 +137,38 @@ def _leads(event: Event) -> str:
 
 
 # what follows them says it all
-_SILENT = {EventKind.TRIAL_START, EventKind.CONTAINER_START, EventKind.CONTAINER_END,
-           EventKind.PRECONDITION_START, EventKind.QUERY_CLAIMED, EventKind.QUERY_RELEASED}
+_SILENT = {
+    EventKind.TRIAL_START,
+    EventKind.CONTAINER_START,
+    EventKind.CONTAINER_END,
+    EventKind.PRECONDITION_START,
+    EventKind.QUERY_CLAIMED,
+    EventKind.QUERY_RELEASED,
+}
 _TEXTS: Dict[EventKind, Callable[[Event], str]] = {
     EventKind.TRIAL_END: _trial_end,
     EventKind.TRANSITION: _leads,
     EventKind.FAILURE: _failure,
     EventKind.PRECONDITION_END: lambda event: 'precondition {}: {}{}'.format(
-        event.target, event.outcome, _because(event.text)),
+        event.target, event.outcome, _because(event.text)
+    ),
     EventKind.DECISION: lambda event: 'decision: {}'.format(event.text),
     EventKind.JUMP: lambda event: 'jump to {}{}'.format(
-        (event.data or {}).get('to', event.target), _by(event)),
+        (event.data or {}).get('to', event.target), _by(event)
+    ),
     EventKind.QUERY_OPENED: lambda event: 'question: {}'.format(event.text),
     EventKind.QUERY_ANSWERED: lambda event: 'answer{}: {}'.format(
-        _by(event), ' '.join((event.outcome, event.target)).strip()),
+        _by(event), ' '.join((event.outcome, event.target)).strip()
+    ),
     EventKind.QUERY_EXPIRED: lambda event: 'no answer: {}'.format(event.text),
     EventKind.QUERY_CANCELLED: lambda event: 'question taken back: {}'.format(event.text),
     EventKind.INTERFACE_START: lambda event: 'interface {} begins'.format(event.target),
     EventKind.INTERFACE_END: lambda event: 'interface {} ends: {}'.format(
-        event.target, event.outcome or 'failed'),
+        event.target, event.outcome or 'failed'
+    ),
     EventKind.SUPERSEDE: lambda event: 'superseded with {}{} -> {}'.format(
-        event.outcome, _by(event), event.target),
+        event.outcome, _by(event), event.target
+    ),
     EventKind.GIVE_UP: lambda event: 'gives up{}: {}'.format(_by(event), event.text),
     EventKind.PREEMPT: lambda event: 'is preempted',
     EventKind.WARNING: lambda event: 'warning: {}'.format(event.text),

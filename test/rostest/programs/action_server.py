@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """A machine behind an ActionServerWrapper; a client sends two goals, and the script then ends."""
+
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestResult
@@ -29,8 +30,15 @@ with machine:
 telling('FETCH', machine)
 # built: machine
 wrapper = ActionServerWrapper(
-    rospy.resolve_name('~fetch'), TestAction, machine, ['succeeded'], ['aborted'], ['preempted'],
-    goal_key='goal', result_key='result')
+    rospy.resolve_name('~fetch'),
+    TestAction,
+    machine,
+    ['succeeded'],
+    ['aborted'],
+    ['preempted'],
+    goal_key='goal',
+    result_key='result',
+)
 wrapper.run_server()
 assert client.wait_for_server(rospy.Duration(30.0))
 for number in (7, 8):

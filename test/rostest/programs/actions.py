@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Two SimpleActionStates with goal slots and callbacks; their server is in the same process."""
+
 import actionlib
 import rospy
 from actionlib.msg import TestAction, TestGoal, TestResult
@@ -53,12 +54,23 @@ server.start()
 machine = smach.StateMachine(OUTCOMES)
 machine.userdata.place = 1
 with machine:
-    smach.StateMachine.add('MOVE', SimpleActionState(
-        '~move', TestAction, goal_cb=goal_of, result_cb=take, input_keys=['place'],
-        output_keys=['place']), {'succeeded': 'BACK'})
-    smach.StateMachine.add('BACK', SimpleActionState(
-        '~move', TestAction, goal_slots=['goal'], result_slots=['result']),
-        remapping={'goal': 'place', 'result': 'place'})
+    smach.StateMachine.add(
+        'MOVE',
+        SimpleActionState(
+            '~move',
+            TestAction,
+            goal_cb=goal_of,
+            result_cb=take,
+            input_keys=['place'],
+            output_keys=['place'],
+        ),
+        {'succeeded': 'BACK'},
+    )
+    smach.StateMachine.add(
+        'BACK',
+        SimpleActionState('~move', TestAction, goal_slots=['goal'], result_slots=['result']),
+        remapping={'goal': 'place', 'result': 'place'},
+    )
 telling('TOP', machine)
 # built: machine
 try:

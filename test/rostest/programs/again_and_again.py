@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """One machine, executed five times; the third time something happens."""
+
 import rospy
 from working import Step, Work, line, say, telling
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Arguments and options of its own, ROS remappings, private parameters, `rospy.myargv`."""
+
 import argparse
 import sys
 
@@ -14,11 +15,15 @@ def main(args):
     parser.add_argument('--record', action='store_true')
     given = parser.parse_args(args)
     rospy.init_node('arguments', anonymous=False, disable_signals=False)
-    say('GIVEN', given.config, given.record, rospy.get_param('~speed', 1),
-        rospy.resolve_name('arm').rpartition('/')[2])
+    say(
+        'GIVEN',
+        given.config,
+        given.record,
+        rospy.get_param('~speed', 1),
+        rospy.resolve_name('arm').rpartition('/')[2],
+    )
     work = Work()
-    machine = telling('TOP', line(('FIRST', Step('FIRST')), ('WORK', work),
-                                  ('LAST', Step('LAST'))))
+    machine = telling('TOP', line(('FIRST', Step('FIRST')), ('WORK', work), ('LAST', Step('LAST'))))
     work.stop = machine.request_preempt
     machine.userdata.count = rospy.get_param('~speed', 1)
     # built: machine

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Functions as states: cb_interface, CBState with arguments, a Sequence, constants by lambda."""
+
 import rospy
 from working import OUTCOMES, Work, say, telling
 
@@ -24,8 +25,12 @@ worker = Work(stop=lambda: top.request_preempt())
 top = smach.Sequence(OUTCOMES, 'succeeded')
 counting = smach.StateMachine(['succeeded', 'aborted', 'preempted'], ['number'], ['number'])
 with counting:
-    smach.StateMachine.add('HALVE', smach.CBState(halve, [2], {'least': 3}),
-                           {'even': 'HALVE', 'odd': 'succeeded'}, remapping={'x': 'number'})
+    smach.StateMachine.add(
+        'HALVE',
+        smach.CBState(halve, [2], {'least': 3}),
+        {'even': 'HALVE', 'odd': 'succeeded'},
+        remapping={'x': 'number'},
+    )
 
 
 class Working(smach.CBState):

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """The machine lies in another module, which executes it as well."""
+
 import robot_machines
 import rospy
 from working import say

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Executed within the callback of a timer, once."""
+
 import threading
 
 import rospy

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Three machines in threads, one of which fails; an error of a thread is caught and said."""
+
 import threading
 
 import rospy
@@ -13,8 +14,9 @@ outcomes = {}
 
 def build(name, how):
     work = Work(name + '_WORK', how=how)
-    machine = telling(name, line(('LOOK', Step(name + '_LOOK')), ('WORK', work),
-                                 ('PUT', Step(name + '_PUT'))))
+    machine = telling(
+        name, line(('LOOK', Step(name + '_LOOK')), ('WORK', work), ('PUT', Step(name + '_PUT')))
+    )
     work.stop = machine.request_preempt
     machine.userdata.count = 0
     # built: machine
@@ -28,8 +30,10 @@ def run(name, machine):
         outcomes[name] = type(err).__name__
 
 
-threads = [threading.Thread(target=run, args=build(*each))
-           for each in (('LEFT', 'well'), ('RIGHT', None), ('HEAD', 'well'))]
+threads = [
+    threading.Thread(target=run, args=build(*each))
+    for each in (('LEFT', 'well'), ('RIGHT', None), ('HEAD', 'well'))
+]
 for thread in threads:
     thread.start()
 for thread in threads:

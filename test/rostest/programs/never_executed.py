@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Builds a machine and looks at it; nobody executes it, and its states are used by hand."""
+
 import sys
 
 import rospy

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Imports SMACH, and has no machine."""
+
 import os
 import signal
 import sys

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """SMACH without a node; a machine that a state executes inside its own `execute`."""
+
 from working import OUTCOMES, Step, Work, line, say, telling
 
 import smach
@@ -10,8 +11,9 @@ class Fetch(smach.State):
 
     def __init__(self):
         smach.State.__init__(self, OUTCOMES, input_keys=['first'], output_keys=['count'])
-        self.machine = line(('REACH', Step('REACH')), ('WORK', Work(stop=stop)),
-                            ('LIFT', Step('LIFT')))
+        self.machine = line(
+            ('REACH', Step('REACH')), ('WORK', Work(stop=stop)), ('LIFT', Step('LIFT'))
+        )
         telling('INNER', self.machine)
         # built: self.machine
 

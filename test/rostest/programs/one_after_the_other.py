@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """Several machines in turn: the first of other states, then a new one of the same for each item."""
+
 import rospy
 from working import Step, Work, line, say, telling
 

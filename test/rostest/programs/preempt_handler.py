@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """In a thread, with set_preempt_handler; the preempt is a Ctrl-C."""
+
 import os
 import signal
 import threading

@@ -1,4 +1,5 @@
 """The machine of `imported_machine.py`: a module that scripts import, and no script."""
+
 from working import OUTCOMES, Step, Work, telling
 
 import smach

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """A subclass that builds itself, with an `execute` of its own; another one below it."""
+
 import rospy
 from working import OUTCOMES, Step, Work, say, telling
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """A ServiceState, whose service does not always do what it is asked, and a MonitorState."""
+
 import rospy
 from std_msgs.msg import Int32
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse
@@ -34,15 +35,27 @@ ticks = rospy.Publisher('~ticks', Int32, queue_size=1, latch=True)
 ticks.publish(3)
 machine = smach.StateMachine(OUTCOMES)
 with machine:
-    smach.StateMachine.add('READY', smach_ros.MonitorState(
-        '~ticks', Int32, lambda ud, message: message.data != 3, max_checks=1),
-        {'invalid': 'GRIPPER', 'valid': 'aborted'})
-    smach.StateMachine.add('GRIPPER', smach_ros.ServiceState(
-        '~gripper', SetBool, SetBoolRequest(True), response_cb=judge, output_keys=['text']),
-        {'succeeded': 'WATCH'})
-    smach.StateMachine.add('WATCH', smach_ros.MonitorState(
-        '~ticks', Int32, lambda ud, message: message.data == 3, max_checks=1),
-        {'valid': 'succeeded', 'invalid': 'aborted'})
+    smach.StateMachine.add(
+        'READY',
+        smach_ros.MonitorState(
+            '~ticks', Int32, lambda ud, message: message.data != 3, max_checks=1
+        ),
+        {'invalid': 'GRIPPER', 'valid': 'aborted'},
+    )
+    smach.StateMachine.add(
+        'GRIPPER',
+        smach_ros.ServiceState(
+            '~gripper', SetBool, SetBoolRequest(True), response_cb=judge, output_keys=['text']
+        ),
+        {'succeeded': 'WATCH'},
+    )
+    smach.StateMachine.add(
+        'WATCH',
+        smach_ros.MonitorState(
+            '~ticks', Int32, lambda ud, message: message.data == 3, max_checks=1
+        ),
+        {'valid': 'succeeded', 'invalid': 'aborted'},
+    )
 telling('TOP', machine)
 # built: machine
 outcome = machine.execute()

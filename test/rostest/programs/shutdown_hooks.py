@@ -3,6 +3,7 @@
 
 What ends it is `rospy.signal_shutdown` in another thread, while `rospy.spin` waits.
 """
+
 import atexit
 import threading
 

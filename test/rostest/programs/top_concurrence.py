@@ -1,16 +1,28 @@
 #!/usr/bin/env python
 """A Concurrence at the top; the machine in it does the work."""
+
 import rospy
 from working import OUTCOMES, Step, Work, line, say, telling
 
 import smach
 
 rospy.init_node('top_concurrence')
-both = smach.Concurrence(OUTCOMES, 'aborted', input_keys=['count'], output_keys=['count'],
-                         outcome_map={'succeeded': {'ARM': 'succeeded', 'HEAD': 'succeeded'},
-                                      'preempted': {'ARM': 'preempted'}})
-arm = line(('REACH', Step('REACH')), ('WORK', Work(stop=both.request_preempt)),
-           ('LIFT', Step('LIFT')), input_keys=['count'])
+both = smach.Concurrence(
+    OUTCOMES,
+    'aborted',
+    input_keys=['count'],
+    output_keys=['count'],
+    outcome_map={
+        'succeeded': {'ARM': 'succeeded', 'HEAD': 'succeeded'},
+        'preempted': {'ARM': 'preempted'},
+    },
+)
+arm = line(
+    ('REACH', Step('REACH')),
+    ('WORK', Work(stop=both.request_preempt)),
+    ('LIFT', Step('LIFT')),
+    input_keys=['count'],
+)
 telling('ARM', arm)
 with both:
     smach.Concurrence.add('ARM', arm)

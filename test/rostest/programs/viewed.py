@@ -1,5 +1,6 @@
 #!/usr/bin/env python
 """With an IntrospectionServer, as the tutorial has it, and start callbacks."""
+
 import rospy
 from working import Step, Work, line, say, telling
 
@@ -8,10 +9,15 @@ import smach_ros
 
 def main():
     rospy.init_node('viewed')
-    inner = line(('WORK', Work(stop=lambda: machine.request_preempt())),
-                 ('AFTER', Step('AFTER')), input_keys=['count'], output_keys=['count'])
-    machine = line(('FIRST', Step('FIRST')), ('INNER', telling('INNER', inner)),
-                   ('LAST', Step('LAST')))
+    inner = line(
+        ('WORK', Work(stop=lambda: machine.request_preempt())),
+        ('AFTER', Step('AFTER')),
+        input_keys=['count'],
+        output_keys=['count'],
+    )
+    machine = line(
+        ('FIRST', Step('FIRST')), ('INNER', telling('INNER', inner)), ('LAST', Step('LAST'))
+    )
     machine.userdata.count = 0
     machine.register_start_cb(lambda ud, initial, word: say(word, initial, ud.count), ['START'])
     telling('TOP', machine)

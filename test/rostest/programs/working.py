@@ -3,6 +3,7 @@
 The ending is `well`, `fails`, `raises` or `preempted`; `always fails` and `always raises` mean
 every visit. Nothing here knows of an oracle.
 """
+
 import sys
 import threading
 

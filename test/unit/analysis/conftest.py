@@ -1,4 +1,5 @@
 """The analysis is tried on bags that the real recorder has written."""
+
 import pytest
 from fake_trials import play
 
@@ -8,6 +9,7 @@ from smach_oracle.ros.recorder import TrialRecorder
 @pytest.fixture
 def record(tmp_path):
     """Record trials into a sub-folder; returns its path."""
+
     def record_trials(folder, trials, **settings):
         recorder = TrialRecorder(str(tmp_path / folder), warn=pytest.fail)
         play(recorder, trials, **settings)

@@ -1,4 +1,5 @@
 """The time series: what is drawn is what was counted, and nothing is covered."""
+
 import xml.etree.ElementTree as ElementTree
 
 import pytest
@@ -21,24 +22,31 @@ def trials(count=40):
             fails = number % 4 == 1
             made.append(
                 trial(
-                    number, recovers=recovers, start_time=480.0 * number, duration_s=400.0,
+                    number,
+                    recovers=recovers,
+                    start_time=480.0 * number,
+                    duration_s=400.0,
                     recoveries=(number % 3 + 1) if fails and recovers else 0,
-                    answered=int(number % 16 == 5 and recovers), questions=int(number % 16 == 5),
-                    ending=TrialEnding.FAILURE if fails and
-                    (not recovers or number == 37) else TrialEnding.SUCCESS))
+                    answered=int(number % 16 == 5 and recovers),
+                    questions=int(number % 16 == 5),
+                    ending=TrialEnding.FAILURE
+                    if fails and (not recovers or number == 37)
+                    else TrialEnding.SUCCESS,
+                )
+            )
     return made
 
 
 def lines(axes):
     return {
-        line.get_label(): line
-        for line in axes.get_lines() if not line.get_label().startswith('_')
+        line.get_label(): line for line in axes.get_lines() if not line.get_label().startswith('_')
     }
 
 
 def bars(axes, colour):
     """(x, height) of the bars of a colour."""
     from matplotlib.colors import to_rgba
+
     (found,) = [item for item in axes.collections if tuple(item.get_color()[0]) == to_rgba(colour)]
     return [(segment[0][0], segment[1][1] - segment[0][1]) for segment in found.get_segments()]
 
@@ -46,18 +54,22 @@ def bars(axes, colour):
 def test_the_bars_are_the_counts_of_each_trial():
     drawn = figure.draw_time_series(trials())
     above = drawn.axes[0]
-    assert bars(above, figure.BLUE) == [(number + 1, number % 3 + 1) for number in range(40)
-                                        if number % 4 == 1]
-    assert bars(above,
-                figure.VERMILLION) == [(number + 1, -1) for number in range(40) if number % 16 == 5]
+    assert bars(above, figure.BLUE) == [
+        (number + 1, number % 3 + 1) for number in range(40) if number % 4 == 1
+    ]
+    assert bars(above, figure.VERMILLION) == [
+        (number + 1, -1) for number in range(40) if number % 16 == 5
+    ]
 
 
 def test_the_steps_end_at_the_tables_counts():
     below = figure.draw_time_series(trials()).axes[1]
     ends = {label: line.get_ydata()[-1] for label, line in lines(below).items()}
     assert ends == {
-        'failed, without oracle': 10, 'failed, with oracle': 1, 'with an oracle recovery': 10,
-        'with an expert assist': 3
+        'failed, without oracle': 10,
+        'failed, with oracle': 1,
+        'with an oracle recovery': 10,
+        'with an expert assist': 3,
     }
 
 
@@ -80,8 +92,10 @@ def test_nothing_is_cut_off_or_covered(columns, width_in):
         whole = axes.get_tightbbox(renderer)
         assert whole.x0 >= inside.x0 and whole.y0 >= inside.y0
         assert whole.x1 <= inside.x1 and whole.y1 <= inside.y1
-        assert axes.get_legend().get_window_extent(
-            renderer).y0 >= axes.get_window_extent(renderer).y1 - 0.5
+        assert (
+            axes.get_legend().get_window_extent(renderer).y0
+            >= axes.get_window_extent(renderer).y1 - 0.5
+        )
     upper, lower = drawn.axes
     assert upper.get_window_extent(renderer).y0 > lower.get_legend().get_window_extent(renderer).y1
 
@@ -89,15 +103,20 @@ def test_nothing_is_cut_off_or_covered(columns, width_in):
 def test_text_is_large_enough_for_print():
     drawn = figure.draw_time_series(trials())
     sizes = [
-        text.get_fontsize() for axes in drawn.axes
+        text.get_fontsize()
+        for axes in drawn.axes
         for text in axes.get_xticklabels() + axes.get_yticklabels() + axes.get_legend().get_texts()
     ]
     assert min(sizes) >= 7.0
 
 
-@pytest.mark.parametrize('recovers, expected', [
-    (True, {'with an oracle recovery', 'with an expert assist', 'failed, with oracle'}),
-    (False, {'failed, without oracle'})])
+@pytest.mark.parametrize(
+    'recovers, expected',
+    [
+        (True, {'with an oracle recovery', 'with an expert assist', 'failed, with oracle'}),
+        (False, {'failed, without oracle'}),
+    ],
+)
 def test_one_variant_alone_can_be_drawn(recovers, expected):
     drawn = figure.draw_time_series([item for item in trials() if item.recovers is recovers])
     assert set(lines(drawn.axes[1])) == expected
@@ -108,8 +127,11 @@ def test_a_single_trial_can_be_drawn():
     drawn = figure.draw_time_series([trial(0)], x_axis='time')
     drawn.canvas.draw()
     assert {max(line.get_ydata()) for line in lines(drawn.axes[1]).values()} <= {0, 1}
-    assert set(lines(drawn.axes[1])) == {'with an oracle recovery', 'with an expert assist',
-                                         'failed, with oracle'}
+    assert set(lines(drawn.axes[1])) == {
+        'with an oracle recovery',
+        'with an expert assist',
+        'failed, with oracle',
+    }
 
 
 def test_svg_and_png_are_written_and_do_not_differ_from_run_to_run(tmp_path):

@@ -1,6 +1,7 @@
 """From a real wrapped machine through the real recorder to the table: the counts are those of what
 the machine did.
 """
+
 import pytest
 
 import smach
@@ -40,11 +41,19 @@ def run_trials(folder, failures, recover=True, expert=None):
     pick = Pick()
     machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
     with machine:
-        smach.StateMachine.add('LOOK', smach.CBState(lambda _: 'succeeded', outcomes=['succeeded']),
-                               {'succeeded': 'PICK'})
+        smach.StateMachine.add(
+            'LOOK',
+            smach.CBState(lambda _: 'succeeded', outcomes=['succeeded']),
+            {'succeeded': 'PICK'},
+        )
         smach.StateMachine.add('PICK', pick)
-    OracleContainer.wrap(machine, name='TOP', recover=recover, expert=expert,
-                         settings={'max_recoveries': 3, 'memory': 100, 'policy': 'prose'})
+    OracleContainer.wrap(
+        machine,
+        name='TOP',
+        recover=recover,
+        expert=expert,
+        settings={'max_recoveries': 3, 'memory': 100, 'policy': 'prose'},
+    )
     recorder = TrialRecorder(str(folder), warn=pytest.fail)
     recorder.attach(machine)
     outcomes = []
@@ -61,8 +70,9 @@ def test_recoveries_of_a_low_failure_state_are_counted(tmp_path):
     counts = [(trial.failures, trial.recoveries, trial.questions) for trial in trials]
     assert counts == [(0, 0, 0), (1, 1, 0), (2, 2, 0)]
     assert all(trial.ending is TrialEnding.SUCCESS and trial.lost_events == 0 for trial in trials)
-    assert {trial.experiment
-            for trial in trials} == {'TOP'} and all(trial.recovers for trial in trials)
+    assert {trial.experiment for trial in trials} == {'TOP'} and all(
+        trial.recovers for trial in trials
+    )
 
 
 def test_an_answered_question_is_counted_beside_the_recoveries_before_it(tmp_path):
@@ -74,8 +84,12 @@ def test_an_answered_question_is_counted_beside_the_recoveries_before_it(tmp_pat
 def test_an_unanswered_question_ends_the_trial(tmp_path):
     outcomes, (trial,) = run_trials(tmp_path, [10], expert=FakeExpert(answers=False))
     assert outcomes == ['aborted']
-    assert (trial.recoveries, trial.questions, trial.answered,
-            trial.ending) == (3, 1, 0, TrialEnding.FAILURE)
+    assert (trial.recoveries, trial.questions, trial.answered, trial.ending) == (
+        3,
+        1,
+        0,
+        TrialEnding.FAILURE,
+    )
 
 
 def test_without_the_oracle_a_failure_ends_the_trial(tmp_path):
@@ -83,5 +97,7 @@ def test_without_the_oracle_a_failure_ends_the_trial(tmp_path):
     assert outcomes == ['succeeded', 'aborted']
     assert [trial.ending for trial in trials] == [TrialEnding.SUCCESS, TrialEnding.FAILURE]
     assert [trial.failures for trial in trials] == [0, 1]
-    assert not any(trial.recovers for trial in trials) and sum(trial.recoveries
-                                                               for trial in trials) == 0
+    assert (
+        not any(trial.recovers for trial in trials)
+        and sum(trial.recoveries for trial in trials) == 0
+    )

@@ -1,4 +1,5 @@
 """What if, for trials of a machine that was killed and went on."""
+
 import pickle
 import random
 
@@ -32,6 +33,7 @@ class ByHand(Expert):
 
 def part(folder, seed, kill_at, expert=None, **settings):
     """Run one trial, or what is left of it, in a process that is killed at an event."""
+
     def work():
         points, generator = Points(kill_at), random.Random(seed)
         inner = smach.StateMachine(['succeeded', 'aborted'])
@@ -43,8 +45,12 @@ def part(folder, seed, kill_at, expert=None, **settings):
             smach.StateMachine.add('LOOK', Chance(generator), {'succeeded': 'PICK'})
             smach.StateMachine.add('PICK', inner, {'succeeded': 'PLACE'})
             smach.StateMachine.add('PLACE', Chance(generator))
-        OracleContainer.wrap(machine, name='TOP', expert=expert, settings=dict(
-            SETTINGS, checkpoint=str(folder / 'robot.db'), **settings))
+        OracleContainer.wrap(
+            machine,
+            name='TOP',
+            expert=expert,
+            settings=dict(SETTINGS, checkpoint=str(folder / 'robot.db'), **settings),
+        )
 
         def record(event):
             with open(str(folder / 'events'), 'ab') as stream:
@@ -68,7 +74,8 @@ def events_of(folder):
 
 @pytest.mark.parametrize('kill_at', range(3, 24, 4))
 def test_a_resumed_trial_is_replayed_and_of_what_was_interrupted_nothing_is_known(
-        tmp_path, kill_at):
+    tmp_path, kill_at
+):
     part(tmp_path, kill_at, kill_at)
     part(tmp_path, kill_at + 1, 0)
     events = events_of(tmp_path)

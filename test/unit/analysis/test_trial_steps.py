@@ -1,4 +1,5 @@
 """Trials that ought to be the same are compared by what happened, not by when."""
+
 from pathlib import Path
 
 import pytest
@@ -30,8 +31,9 @@ def causes(monkeypatch):
         content = read(reader, path)
         seeds = {event.trial_id: int(event.trial_id.split('-')[1]) for event in content.events}
         return content._replace(
-            causes={trial_id: TrialCause(seed=seed)
-                    for trial_id, seed in seeds.items()})
+            causes={trial_id: TrialCause(seed=seed) for trial_id, seed in seeds.items()}
+        )
+
     monkeypatch.setattr(reading.EventReader, 'read', with_causes)
 
 
@@ -42,18 +44,23 @@ def test_the_same_trials_at_other_times_are_the_same(tmp_path, capsys):
 
 
 def test_a_trial_that_went_another_way_is_named_with_its_first_difference(tmp_path, capsys):
-    failing = next(seed for seed in range(100)
-                   if FakeMachine(lambda event: None, False).run(seed) == 'aborted')
-    fine = next(seed for seed in range(100)
-                if FakeMachine(lambda event: None, False).run(seed) == 'succeeded')
+    failing = next(
+        seed for seed in range(100) if FakeMachine(lambda event: None, False).run(seed) == 'aborted'
+    )
+    fine = next(
+        seed
+        for seed in range(100)
+        if FakeMachine(lambda event: None, False).run(seed) == 'succeeded'
+    )
     folders = [
         record(tmp_path / name, [7, 8], plays=plays)
         for name, plays in (('a', [fine, fine]), ('b', [fine, failing]))
     ]
     assert trial_steps.main(folders) == trial_steps.NOT_THE_SAME
     out = capsys.readouterr().out
-    assert out.startswith(
-        'seed 8, with oracle: step ') and "'succeeded'" in out and "'aborted'" in out
+    assert (
+        out.startswith('seed 8, with oracle: step ') and "'succeeded'" in out and "'aborted'" in out
+    )
     assert '2 trials in both, 1 of them the same' in out
 
 
@@ -61,10 +68,11 @@ def test_other_seeds_and_other_variants_are_not_compared(tmp_path, capsys):
     folders = [
         record(tmp_path / 'a', [1]),
         record(tmp_path / 'b', [2]),
-        record(tmp_path / 'c', [1], recovers=False)
+        record(tmp_path / 'c', [1], recovers=False),
     ]
-    assert trial_steps.main(folders[:2]) == trial_steps.main(
-        folders[::2]) == reading.NOTHING_COUNTED
+    assert (
+        trial_steps.main(folders[:2]) == trial_steps.main(folders[::2]) == reading.NOTHING_COUNTED
+    )
     assert 'no trial of the same experiment, variant and seed in both' in capsys.readouterr().err
     assert trial_steps.main([folders[0], str(tmp_path / 'nowhere')]) == reading.NOTHING_COUNTED
 
@@ -76,5 +84,6 @@ def test_a_bag_that_cannot_be_used_is_named_and_the_others_are_compared(tmp_path
     assert trial_steps.main(folders) == reading.SOME_SKIPPED
     out, err = capsys.readouterr()
     assert '3 trials in both, 3 of them the same' in out
-    assert 'Skipped {}: still being recorded'.format(unfinished) in err and len(
-        err.splitlines()) == 1
+    assert (
+        'Skipped {}: still being recorded'.format(unfinished) in err and len(err.splitlines()) == 1
+    )

@@ -1,4 +1,5 @@
 """What is told of a trial from its events, and which bags are used."""
+
 import io
 import os
 import shutil
@@ -22,8 +23,10 @@ from smach_oracle.ros.recording.bag_writer import BagWriter
 
 def story(*steps, trial_id='t', path='TOP'):
     """Events from (kind, fields) pairs, a second apart."""
-    return [Event(kind, trial_id, seq, 100.0 + seq, fields.pop('path', path), **fields)
-            for seq, (kind, fields) in enumerate((kind, dict(fields)) for kind, fields in steps)]
+    return [
+        Event(kind, trial_id, seq, 100.0 + seq, fields.pop('path', path), **fields)
+        for seq, (kind, fields) in enumerate((kind, dict(fields)) for kind, fields in steps)
+    ]
 
 
 START = (EventKind.TRIAL_START, {'data': {'recovers': True}})
@@ -45,10 +48,19 @@ def answered(query_id, outcome='supersede'):
 
 def test_a_quiet_trial():
     trial = summarise(story(START, END))
-    assert (trial.experiment, trial.recovers, trial.ending,
-            trial.outcome) == ('TOP', True, TrialEnding.SUCCESS, 'succeeded')
-    assert (trial.failures, trial.recoveries, trial.questions, trial.answered,
-            trial.lost_events) == (0, 0, 0, 0, 0)
+    assert (trial.experiment, trial.recovers, trial.ending, trial.outcome) == (
+        'TOP',
+        True,
+        TrialEnding.SUCCESS,
+        'succeeded',
+    )
+    assert (
+        trial.failures,
+        trial.recoveries,
+        trial.questions,
+        trial.answered,
+        trial.lost_events,
+    ) == (0, 0, 0, 0, 0)
     assert (trial.start_time, trial.duration_s) == (100.0, 1.0)
 
 
@@ -62,9 +74,11 @@ ENTERED = (EventKind.STATE_START, {'state': 'PICK'})
         ('KeyboardInterrupt: ', (ENTERED,), TrialEnding.PREEMPTED),
         (NO_OUTCOME, (ENTERED,), TrialEnding.PREEMPTED),  # a shutdown between two states
         (NO_OUTCOME, (), TrialEnding.FAILURE),  # an inconsistent machine
-    ])
+    ],
+)
 def test_a_trial_without_an_outcome_has_failed_unless_it_was_stopped_from_outside(
-        text, steps, ending):
+    text, steps, ending
+):
     assert summarise(story(START, *steps, (EventKind.TRIAL_END, {'text': text}))).ending is ending
 
 
@@ -75,16 +89,40 @@ def test_a_trial_without_an_outcome_has_failed_unless_it_was_stopped_from_outsid
         ((FAILURE, STEP_BACK, JUMP), 1, 0, 0),
         ((FAILURE, REVISIT, JUMP, FAILURE, STEP_BACK, JUMP), 2, 0, 0),
         ((FAILURE, REVISIT), 0, 0, 0),  # decided, but the machine was preempted before it jumped
-        ((FAILURE, ASK, opened('q'), answered(
-            'q', 'goto'), JUMP), 0, 1, 1),  # the expert's jump is not the oracle's
-        ((FAILURE, ASK, opened('q'),
-          (EventKind.QUERY_EXPIRED, {'query_id': 'q'}), JUMP), 0, 1, 0),  # the fallback's jump
+        (
+            (FAILURE, ASK, opened('q'), answered('q', 'goto'), JUMP),
+            0,
+            1,
+            1,
+        ),  # the expert's jump is not the oracle's
+        (
+            (FAILURE, ASK, opened('q'), (EventKind.QUERY_EXPIRED, {'query_id': 'q'}), JUMP),
+            0,
+            1,
+            0,
+        ),  # the fallback's jump
         ((FAILURE, REVISIT, opened('q'), answered('q'), JUMP), 0, 1, 1),
-        ((FAILURE, ASK, opened('q'), answered('q'), opened('r'),
-          (EventKind.QUERY_CANCELLED, {'query_id': 'r'})), 0, 2, 1),
-        ((FAILURE, ASK, opened('q'), answered('q', 'interface'), answered('q',
-                                                                          'supersede')), 0, 1, 1),
-    ])
+        (
+            (
+                FAILURE,
+                ASK,
+                opened('q'),
+                answered('q'),
+                opened('r'),
+                (EventKind.QUERY_CANCELLED, {'query_id': 'r'}),
+            ),
+            0,
+            2,
+            1,
+        ),
+        (
+            (FAILURE, ASK, opened('q'), answered('q', 'interface'), answered('q', 'supersede')),
+            0,
+            1,
+            1,
+        ),
+    ],
+)
 def test_recoveries_and_questions(steps, recoveries, questions, answers):
     trial = summarise(story(START, *steps, END))
     assert (trial.recoveries, trial.questions, trial.answered) == (recoveries, questions, answers)
@@ -93,29 +131,44 @@ def test_recoveries_and_questions(steps, recoveries, questions, answers):
 def test_decisions_of_containers_side_by_side_are_kept_apart():
     inner = dict(path='TOP/PICK')
     trial = summarise(
-        story(START, REVISIT, (EventKind.DECISION, dict(ASK[1], **inner)),
-              (opened('q')[0], dict(query_id='q', **inner)), JUMP, (EventKind.JUMP, inner), END))
+        story(
+            START,
+            REVISIT,
+            (EventKind.DECISION, dict(ASK[1], **inner)),
+            (opened('q')[0], dict(query_id='q', **inner)),
+            JUMP,
+            (EventKind.JUMP, inner),
+            END,
+        )
+    )
     assert trial.recoveries == 1
 
 
-@pytest.mark.parametrize('end, ending', [
-    ((EventKind.TRIAL_END, {'outcome': 'succeeded'}), TrialEnding.SUCCESS),
-    ((EventKind.TRIAL_END, {'outcome': 'drink_served'}), TrialEnding.SUCCESS),
-    ((EventKind.TRIAL_END, {'outcome': 'aborted'}), TrialEnding.FAILURE),
-    ((EventKind.TRIAL_END, {'outcome': 'grasp_failed'}), TrialEnding.FAILURE),
-    ((EventKind.TRIAL_END, {'outcome': 'preempted'}), TrialEnding.PREEMPTED),
-    ((EventKind.TRIAL_END, {'outcome': '', 'text': 'InvalidUserCodeError: ...'
-                            }), TrialEnding.FAILURE),
-    ((EventKind.STATE_START, {'state': 'PICK'}), TrialEnding.UNFINISHED),
-])
+@pytest.mark.parametrize(
+    'end, ending',
+    [
+        ((EventKind.TRIAL_END, {'outcome': 'succeeded'}), TrialEnding.SUCCESS),
+        ((EventKind.TRIAL_END, {'outcome': 'drink_served'}), TrialEnding.SUCCESS),
+        ((EventKind.TRIAL_END, {'outcome': 'aborted'}), TrialEnding.FAILURE),
+        ((EventKind.TRIAL_END, {'outcome': 'grasp_failed'}), TrialEnding.FAILURE),
+        ((EventKind.TRIAL_END, {'outcome': 'preempted'}), TrialEnding.PREEMPTED),
+        (
+            (EventKind.TRIAL_END, {'outcome': '', 'text': 'InvalidUserCodeError: ...'}),
+            TrialEnding.FAILURE,
+        ),
+        ((EventKind.STATE_START, {'state': 'PICK'}), TrialEnding.UNFINISHED),
+    ],
+)
 def test_how_a_trial_ended(end, ending):
     assert summarise(story(START, end)).ending is ending
 
 
 def test_failures_are_counted_by_state_and_container():
     trial = summarise(
-        story(START, FAILURE, FAILURE, (EventKind.FAILURE, {'state': 'PICK', 'path': 'TOP/SUB'}),
-              END))
+        story(
+            START, FAILURE, FAILURE, (EventKind.FAILURE, {'state': 'PICK', 'path': 'TOP/SUB'}), END
+        )
+    )
     assert trial.failures_by_state == (('TOP/PICK', 2), ('TOP/SUB/PICK', 1))
 
 
@@ -134,12 +187,15 @@ def test_gaps_in_the_numbering_are_lost_events():
 
 
 def test_the_variant_is_what_the_start_says_else_what_was_seen():
-    assert summarise(story((EventKind.TRIAL_START, {'data': {'recovers': False}}),
-                           END)).recovers is False
+    assert (
+        summarise(story((EventKind.TRIAL_START, {'data': {'recovers': False}}), END)).recovers
+        is False
+    )
     assert summarise(story(FAILURE, REVISIT, JUMP)).recovers is True
     assert summarise(story(FAILURE, END)).recovers is None
-    assert summarise(story((EventKind.TRIAL_START, {'data': ['no', 'mapping']}),
-                           END)).recovers is None
+    assert (
+        summarise(story((EventKind.TRIAL_START, {'data': ['no', 'mapping']}), END)).recovers is None
+    )
 
 
 def test_trials_come_in_the_order_of_their_beginning_whatever_their_files_are_called(record):
@@ -154,24 +210,33 @@ def test_trials_come_in_the_order_of_their_beginning_whatever_their_files_are_ca
 def test_a_trial_in_several_bags_is_one_trial(tmp_path):
     for part in range(2):
         recorder = TrialRecorder(str(tmp_path / str(part)))
-        machine = FakeMachine(lambda event, part=part, recorder=recorder: (
-            recorder(event) if (event.seq >= 6) == bool(part) else None))
+        machine = FakeMachine(
+            lambda event, part=part, recorder=recorder: (
+                recorder(event) if (event.seq >= 6) == bool(part) else None
+            )
+        )
         machine.run(seed=3)
         assert recorder.close(20.0)
     (trial,), skipped = load_trials([str(tmp_path)])
-    assert (trial.ending, trial.lost_events, len(trial.bags), skipped) == (TrialEnding.SUCCESS, 0,
-                                                                           2, [])
+    assert (trial.ending, trial.lost_events, len(trial.bags), skipped) == (
+        TrialEnding.SUCCESS,
+        0,
+        2,
+        [],
+    )
 
 
 def test_a_copied_folder_does_not_count_twice(record, tmp_path):
     folder = record('bags', 10)
     shutil.copytree(folder, str(tmp_path / 'copy'))
-    assert [trial._replace(bags=()) for trial in load_trials([str(tmp_path)]).trials] == \
-        [trial._replace(bags=()) for trial in load_trials([folder]).trials]
+    assert [trial._replace(bags=()) for trial in load_trials([str(tmp_path)]).trials] == [
+        trial._replace(bags=()) for trial in load_trials([folder]).trials
+    ]
 
 
 def test_many_trials_in_one_bag_of_rosbag_record_are_told_apart(tmp_path):
     from smach_oracle.ros.event_messages import to_msg
+
     with rosbag.Bag(str(tmp_path / 'all.bag'), 'w') as bag:
         machine = FakeMachine(lambda event: bag.write('/robot/oracle/events', to_msg(event)))
         for seed in range(4):
@@ -196,7 +261,12 @@ def test_unusable_bags_are_named_with_the_reason_and_the_others_counted(record, 
     assert len(trials) == 3
     reasons = {os.path.basename(item.path): item.reason for item in skipped}
     assert sorted(reasons) == [
-        'cut.bag', 'foreign.bag', 'nothing.bag', 'orphan.bag.active', 'text.bag', 'unindexed.bag'
+        'cut.bag',
+        'foreign.bag',
+        'nothing.bag',
+        'orphan.bag.active',
+        'text.bag',
+        'unindexed.bag',
     ]
     assert 'no events of the executive' in reasons['foreign.bag']
     assert 'rosbag reindex' in reasons['orphan.bag.active']
@@ -212,7 +282,7 @@ def test_a_bag_damaged_anywhere_is_skipped_not_fatal(record, tmp_path):
     reader, refused = EventReader(), 0
     for position in range(20, len(data), 97):
         damaged = tmp_path / 'damaged.bag'
-        damaged.write_bytes(data[:position] + b'\xa5' * 11 + data[position + 11:])
+        damaged.write_bytes(data[:position] + b'\xa5' * 11 + data[position + 11 :])
         try:
             reader.read(str(damaged))
         except BagError:
@@ -266,18 +336,20 @@ def test_a_resumed_trial_is_one_and_has_lost_nothing():
     assert trial.ending is TrialEnding.SUCCESS
 
 
-@pytest.mark.parametrize('stopped_s, down_s', [
-    (500.0, 400.0),  # what was recorded last was not stored
-    (300.0, 300.0),  # what was stored last was not recorded
-    (-3.0, 0.0),  # the clock was put back
-    (None, 400.0),
-])
+@pytest.mark.parametrize(
+    'stopped_s, down_s',
+    [
+        (500.0, 400.0),  # what was recorded last was not stored
+        (300.0, 300.0),  # what was stored last was not recorded
+        (-3.0, 0.0),  # the clock was put back
+        (None, 400.0),
+    ],
+)
 def test_the_time_in_which_its_program_was_down_is_told_apart(stopped_s, down_s):
     events = story(START, ENTERED)
     data = {'last_seq': 1} if stopped_s is None else {'last_seq': 1, 'stopped_s': stopped_s}
     later = story((EventKind.RESUMED, {'data': data}), ENTERED, END)
-    events += [event._replace(seq=event.seq + 1002, wall_time=501.0 + event.seq)
-               for event in later]
+    events += [event._replace(seq=event.seq + 1002, wall_time=501.0 + event.seq) for event in later]
     trial = summarise(events)
     assert (trial.down_s, trial.duration_s) == (down_s, 403.0)
     assert summarise(events[2:]).down_s == 0.0  # what came before is in no bag

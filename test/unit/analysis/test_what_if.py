@@ -1,4 +1,5 @@
 """What another oracle would have decided: replayed from the events of real machines."""
+
 import contextlib
 import json
 import random
@@ -58,9 +59,14 @@ def run(count, seed=1, states=None, back_to='', health=None, stopped=0, **settin
         smach.StateMachine.add('PICK', Chance(generator, 0.5), {'succeeded': 'INNER'})
         smach.StateMachine.add('INNER', inner, {'succeeded': 'PLACE'})
         smach.StateMachine.add('PLACE', Chance(generator, 0.3))
-    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator, back_to),
-                         preconditions={'PICK': ['LOOK']}, health=health,
-                         settings=dict(KEPT, states=states or {}, **settings))
+    OracleContainer.wrap(
+        machine,
+        name='TOP',
+        expert=Hand(generator, back_to),
+        preconditions={'PICK': ['LOOK']},
+        health=health,
+        settings=dict(KEPT, states=states or {}, **settings),
+    )
     events = []
     machine.events.observers.append(events.append)
     pick = machine.get_children()['PICK']
@@ -77,54 +83,86 @@ def compare(trials, settings):
 
 
 @pytest.mark.parametrize(
-    'settings', [{}, {'memory': 2}, {'policy': 'algorithm1'}, {'estimator': 'exponential'},
-                 {'policy': 'restart'}, {'policy': {'name': 'retry', 'times': 1}},
-                 {'policy': {'name': 'ladder', 'wait_s': 0}}, {'policy': 'always_ask'},
-                 {'max_recoveries': 1}, {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6}])
+    'settings',
+    [
+        {},
+        {'memory': 2},
+        {'policy': 'algorithm1'},
+        {'estimator': 'exponential'},
+        {'policy': 'restart'},
+        {'policy': {'name': 'retry', 'times': 1}},
+        {'policy': {'name': 'ladder', 'wait_s': 0}},
+        {'policy': 'always_ask'},
+        {'max_recoveries': 1},
+        {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6},
+    ],
+)
 def test_under_its_own_settings_every_decision_is_the_recorded_one(settings):
     tried = compare(run(60, **{**KEPT, **settings}), {})
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] + tried.counts['not known'] == sum(tried.counts.values())
-    assert tried.counts[
-        'not known'] == 0, 'preconditions that were not run are needed by nobody here'
+    assert tried.counts['not known'] == 0, (
+        'preconditions that were not run are needed by nobody here'
+    )
 
 
 def test_so_it_is_of_the_branches_of_concurrences_and_iterators():
     # each draws by itself, since the branches of a Concurrence run at once
     left, right, each = (Chance(random.Random(seed), 0.5) for seed in (1, 2, 3))
-    concurrence = smach.Concurrence(['succeeded', 'aborted'], 'aborted', outcome_map={
-        'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
+    concurrence = smach.Concurrence(
+        ['succeeded', 'aborted'],
+        'aborted',
+        outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
+    )
     with concurrence:
         smach.Concurrence.add('LEFT', left)
         smach.Concurrence.add('RIGHT', right)
-    iterator = smach.Iterator(['succeeded', 'aborted'], [], [], it=[1, 2, 3], it_label='item',
-                              exhausted_outcome='succeeded')
+    iterator = smach.Iterator(
+        ['succeeded', 'aborted'],
+        [],
+        [],
+        it=[1, 2, 3],
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with iterator:
         smach.Iterator.set_contained_state('EACH', each, loop_outcomes=['succeeded'])
     machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
     with machine:
         smach.StateMachine.add('BOTH', concurrence, {'succeeded': 'ALL'})
         smach.StateMachine.add('ALL', iterator)
-    OracleContainer.wrap(machine, name='TOP', expert=Hand(random.Random(4)),
-                         settings=dict(KEPT, prior=0.3))
+    OracleContainer.wrap(
+        machine, name='TOP', expert=Hand(random.Random(4)), settings=dict(KEPT, prior=0.3)
+    )
     events = []
     machine.events.observers.append(events.append)
     for _ in range(40):
         machine.execute()
     ids = list(dict.fromkeys(event.trial_id for event in events))
-    tried = compare([[event for event in events if event.trial_id == trial_id]
-                             for trial_id in ids], {})
+    tried = compare(
+        [[event for event in events if event.trial_id == trial_id] for trial_id in ids], {}
+    )
     assert sum(tried.counts.values()) > 20
     assert tried.counts['same'] == sum(tried.counts.values())
 
 
-@pytest.mark.parametrize('settings', [
-    {'on_retry': 'confirm'}, {'states': {'PICK': {'on_retry': 'never'}}},
-    {'budget': {'recoveries': 1}}, {'budget': {'recoveries': 2, 'questions': 1}}])
+@pytest.mark.parametrize(
+    'settings',
+    [
+        {'on_retry': 'confirm'},
+        {'states': {'PICK': {'on_retry': 'never'}}},
+        {'budget': {'recoveries': 1}},
+        {'budget': {'recoveries': 2, 'questions': 1}},
+    ],
+)
 def test_so_it_is_where_states_are_not_repeated_and_a_budget_is_spent(settings):
     trials = run(60, back_to='LOOK', **settings)
-    held_back = [event for trial in trials for event in trial
-                 if event.kind is EventKind.DECISION and event.data['decided_by'] == 'held_back']
+    held_back = [
+        event
+        for trial in trials
+        for event in trial
+        if event.kind is EventKind.DECISION and event.data['decided_by'] == 'held_back'
+    ]
     assert bool(held_back) == ('budget' not in settings)
     tried = compare(trials, {})
     assert sum(tried.counts.values()) > 20
@@ -141,12 +179,14 @@ def test_what_was_not_counted_changes_no_replayed_decision(author_recovers, monk
             if label == 'PICK':
                 transitions = dict(transitions, aborted='LOOK')
             return add(label, state, transitions, **more)
+
         monkeypatch.setattr(smach.StateMachine, 'add', staticmethod(add_with_recovery))
     trials = run(40, health=lambda: generator.random() < 0.6, health_settle_s=0)
     events = [event for trial in trials for event in trial]
     assert any(event.kind == EventKind.HEALTH_WAIT_START for event in events)
     assert author_recovers == any(
-        event.kind == EventKind.TRANSITION and event.data for event in events)
+        event.kind == EventKind.TRANSITION and event.data for event in events
+    )
     tried = compare(trials, {})
     assert tried.counts['same'] == sum(tried.counts.values()) > 5
 
@@ -162,8 +202,10 @@ def test_what_was_not_tried_is_not_known():
     trials = run(60, memory=1)  # every failure is HIGH: no precondition was run, if there are any
     tried = compare(trials, {'memory': 50})
     assert tried.counts['not known'] > 5 and tried.counts['would recover'] == 0
-    assert tried.other_trials <= sum(
-        tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
+    assert (
+        tried.other_trials
+        <= sum(tried.counts.values()) - tried.counts['same'] - tried.counts['not known']
+    )
 
 
 def test_an_oracle_that_forgets_nothing_recovers_where_the_recorded_one_asked():
@@ -183,9 +225,11 @@ def test_programs_that_began_with_nothing_learned_are_told_by_the_rates():
     joined = compare([trial for part in parts for trial in part], {'memory': 2})
     assert joined.programs == len(parts)
     assert joined.counts == {
-        name: sum(part.counts[name] for part in apart) for name in apart[0].counts}
+        name: sum(part.counts[name] for part in apart) for name in apart[0].counts
+    }
     assert what_if.format_tried_settings([joined]).endswith(
-        '\nat least 5 programs, each of which began with nothing learned\n')
+        '\nat least 5 programs, each of which began with nothing learned\n'
+    )
 
 
 def test_a_program_whose_first_failures_fit_a_later_beginning_is_found():
@@ -193,13 +237,15 @@ def test_a_program_whose_first_failures_fit_a_later_beginning_is_found():
     first = run(9, seed=1)
     for seed in range(200):
         second = run(30, seed=seed, stopped=1)
-        failed = [[event.state for event in trial if event.kind == EventKind.FAILURE]
-                  for trial in second]
+        failed = [
+            [event.state for event in trial if event.kind == EventKind.FAILURE] for trial in second
+        ]
         if failed[1][:1] == ['PICK'] and any('LOOK' in states for states in failed[2:9]):
             break
     joined = compare(first + second, {})
     assert joined.programs == 2 and joined.counts['same'] == sum(
-        compare(part, {}).counts['same'] for part in (first, second))
+        compare(part, {}).counts['same'] for part in (first, second)
+    )
 
 
 def record(folder, trials):
@@ -212,18 +258,26 @@ def record(folder, trials):
 
 def test_what_cannot_be_replayed_is_named_and_the_rest_is(tmp_path, capsys):
     told = run(3)
-    untold = [[
-        event._replace(data={'recovers': True}) if event.kind == EventKind.TRIAL_START else event
-        for event in trial
-    ] for trial in run(3, seed=2)]
+    untold = [
+        [
+            event._replace(data={'recovers': True})
+            if event.kind == EventKind.TRIAL_START
+            else event
+            for event in trial
+        ]
+        for trial in run(3, seed=2)
+    ]
     record(tmp_path / 'a', untold)
     record(tmp_path / 'b', told)
     (tmp_path / 'b' / 'trial.bag.active').write_bytes(b'')
     capsys.readouterr()
     assert what_if.main([str(tmp_path), '--memory', '5']) == 1
     out, err = capsys.readouterr()
-    assert out.startswith(str(tmp_path / 'b') + '\n') and ' of 3\n' in out and str(
-        tmp_path / 'a') not in out
+    assert (
+        out.startswith(str(tmp_path / 'b') + '\n')
+        and ' of 3\n' in out
+        and str(tmp_path / 'a') not in out
+    )
     assert 'Skipped {}: its trials do not tell the settings'.format(tmp_path / 'a') in err
     assert 'Skipped {}: still being'.format(tmp_path / 'b' / 'trial.bag.active') in err
     assert what_if.main([str(tmp_path / 'a')]) == 2
@@ -235,8 +289,9 @@ def test_what_cannot_be_replayed_is_named_and_the_rest_is(tmp_path, capsys):
 def test_the_command(tmp_path, capsys):
     record(tmp_path, run(40))
     capsys.readouterr()
-    assert what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose',
-                         'algorithm1']) == 0
+    assert (
+        what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose', 'algorithm1']) == 0
+    )
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == str(tmp_path) and len(lines) == 6
     row = next(line for line in lines if line.startswith('memory 10, policy prose'))
@@ -248,18 +303,26 @@ def test_the_command(tmp_path, capsys):
 def test_the_tables_as_json_are_those_that_are_printed(tmp_path, capsys):
     record(tmp_path / 'bags', run(40))
     capsys.readouterr()
-    assert what_if.main([str(tmp_path / 'bags'), '--memory', '1', '10', '--json',
-                         str(tmp_path / 'out.json')]) == 0
+    assert (
+        what_if.main(
+            [str(tmp_path / 'bags'), '--memory', '1', '10', '--json', str(tmp_path / 'out.json')]
+        )
+        == 0
+    )
     lines = capsys.readouterr().out.splitlines()[2:]
     told = json.loads((tmp_path / 'out.json').read_text())
-    folder, = told['folders']
+    (folder,) = told['folders']
     assert folder['folder'] == str(tmp_path / 'bags') and told['skipped'] == []
     assert [each['settings'] for each in folder['tried']] == [{'memory': 1}, {'memory': 10}]
     for line, tried in zip(lines, folder['tried']):
         numbers = [int(word) for word in line.split()[2:] if word.isdigit()]
         shown = [tried['outcomes'][name] for name in what_if.OUTCOMES]
-        assert numbers == [tried['decisions'], *shown, tried['trials_with_another'],
-                           tried['trials']]
+        assert numbers == [
+            tried['decisions'],
+            *shown,
+            tried['trials_with_another'],
+            tried['trials'],
+        ]
 
 
 def test_json_that_cannot_be_written_is_told_in_one_line(tmp_path, capsys):
@@ -298,7 +361,9 @@ def test_another_policy_has_the_parameters_it_comes_with():
 
 def test_the_column_of_those_who_give_up_is_there_where_some_do():
     recorded = run(60, **KEPT)
-    rows = [compare(recorded, settings) for settings in (
-        {'policy': 'always_ask'}, {'policy': 'retry', 'policy.times': 0})]
+    rows = [
+        compare(recorded, settings)
+        for settings in ({'policy': 'always_ask'}, {'policy': 'retry', 'policy.times': 0})
+    ]
     assert what_if.GIVES_UP in what_if.format_tried_settings(rows)
     assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1])

@@ -1,4 +1,5 @@
 """Borders are tried without a word from SMACH or ROS."""
+
 import logging
 
 import pytest

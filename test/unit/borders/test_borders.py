@@ -1,4 +1,5 @@
 """Whatever comes in over a border is taken, or refused with a text that says what was wrong."""
+
 import time
 
 import pytest

@@ -1,4 +1,5 @@
 """What once came past a border: each is refused now, or taken for what it is."""
+
 import io
 import math
 import sqlite3
@@ -77,7 +78,7 @@ def test_json_that_is_nested_too_deep_is_none():
 def test_a_resumed_trial_that_does_not_say_what_was_stored_is_counted(tmp_path, stored_seq):
     resumed = event(kind=EventKind.RESUMED, seq=5, data={'last_seq': stored_seq})
     (tmp_path / 't.bag').write_bytes(crafted_bag(resumed))
-    trial, = load_trials([str(tmp_path)]).trials
+    (trial,) = load_trials([str(tmp_path)]).trials
     assert trial.trial_id == resumed.trial_id
     assert that_count([event(), resumed]) == [event(), resumed]
 
@@ -90,10 +91,9 @@ def store(tmp_path):
 
     def change(name, text):
         with sqlite3.connect(str(path)) as database:
-            last, = database.execute('SELECT max(number) FROM moments').fetchone()
+            (last,) = database.execute('SELECT max(number) FROM moments').fetchone()
             database.execute("DELETE FROM facts WHERE path = 'task' AND name = ?", (name,))
-            database.execute("INSERT INTO facts VALUES (?, 'task', ?, ?, NULL)",
-                             (last, name, text))
+            database.execute("INSERT INTO facts VALUES (?, 'task', ?, ?, NULL)", (last, name, text))
         database.close()
 
     return str(path), change
@@ -135,7 +135,7 @@ def test_a_key_that_is_no_utf_8_is_kept_out_and_the_rest_is_stored(tmp_path, mon
     assert made.execute() == 'done'
     assert [text for text in said if 'udce9' in text and 'no text in UTF-8' in text]
     with_trial = StoreFile(path, read_only=True)
-    trial, = with_trial.trials()
+    (trial,) = with_trial.trials()
     assert trial.outcome == 'done'
     names = {fact.name for fact in with_trial.facts(trial.number)}
     assert 'key:cups' in names and 'out:photo\\udce9' in names
@@ -150,14 +150,15 @@ def test_json_that_is_nested_too_deep_is_not_put_into_a_store(store, capsys, giv
 
 @pytest.mark.parametrize('field', ['data.\u00b2', 'data.' + '9' * 5000])
 def test_a_field_that_is_almost_a_place_in_a_list_is_none(field):
-    condition, = checked_health({'topic': '/t', 'field': field})
+    (condition,) = checked_health({'topic': '/t', 'field': field})
     assert why_unwell_by_message(condition, Bool(True)) == '/t has no field ' + field
 
 
-@pytest.mark.parametrize('wanted, ends', [({'at_least': 0}, "x00' is no number"),
-                                          ({'equals': 'on'}, "x00'")])
+@pytest.mark.parametrize(
+    'wanted, ends', [({'at_least': 0}, "x00' is no number"), ({'equals': 'on'}, "x00'")]
+)
 def test_of_a_field_that_is_a_whole_image_only_head_and_tail_are_told(wanted, ends):
-    condition, = checked_health(dict(wanted, topic='/t'))
+    (condition,) = checked_health(dict(wanted, topic='/t'))
     why = why_unwell_by_message(condition, SimpleNamespace(data=bytes(100000)))
     assert LEFT_OUT in why and why.endswith(ends)
     assert len(why) < 300

@@ -1,4 +1,5 @@
 """Files that users of version 0.1 hold (test/data/v0_1), and how to compare old with new."""
+
 import json
 import math
 import os
@@ -66,16 +67,28 @@ def run_all(calls: Sequence[Sequence[str]], path: str = '') -> List[Result]:
     """
     lines = [[str(SCRIPTS / command), *arguments] for command, *arguments in calls]
     # as wide as it gets, so that no line of a help text is broken
-    environment = dict(os.environ, COLUMNS='400', PYTHONDONTWRITEBYTECODE='1',
-                       ROS_MASTER_URI='http://localhost:1',
-                       PATH=os.pathsep.join(filter(None, [path, os.environ['PATH']])))
+    environment = dict(
+        os.environ,
+        COLUMNS='400',
+        PYTHONDONTWRITEBYTECODE='1',
+        ROS_MASTER_URI='http://localhost:1',
+        PATH=os.pathsep.join(filter(None, [path, os.environ['PATH']])),
+    )
     # not standard output: libraries in C write there while they load
     with tempfile.NamedTemporaryFile('r') as answer:
-        subprocess.run([sys.executable, '-c', _RUN_ALL, answer.name], input=json.dumps(lines),
-                       cwd=str(DATA), env=environment, universal_newlines=True, timeout=120,
-                       check=True)
-        return [Result(code or 0, without_place(text), errors)
-                for code, text, errors in json.load(answer)]
+        subprocess.run(
+            [sys.executable, '-c', _RUN_ALL, answer.name],
+            input=json.dumps(lines),
+            cwd=str(DATA),
+            env=environment,
+            universal_newlines=True,
+            timeout=120,
+            check=True,
+        )
+        return [
+            Result(code or 0, without_place(text), errors)
+            for code, text, errors in json.load(answer)
+        ]
 
 
 def run(command: str, *arguments: str) -> Result:
@@ -90,8 +103,7 @@ def without_place(text: str) -> str:
 
 def numbers(text: str) -> List[float]:
     """The numbers of a text, in their order, except those in names. The words may change."""
-    return [float(number)
-            for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.]*[/_])', text)]
+    return [float(number) for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.]*[/_])', text)]
 
 
 def lacking(held: Any, now: Any, where: str = '') -> Iterator[str]:
@@ -119,8 +131,11 @@ def _lacking_keys(held: Dict[str, Any], now: Any, where: str) -> Iterator[str]:
 
 
 def _are_named(rows: Any) -> bool:
-    return (isinstance(rows, list) and bool(rows)
-            and all(isinstance(row, dict) and 'name' in row for row in rows))
+    return (
+        isinstance(rows, list)
+        and bool(rows)
+        and all(isinstance(row, dict) and 'name' in row for row in rows)
+    )
 
 
 def _by_name(rows: Sequence[Dict[str, Any]]) -> Dict[str, Any]:

@@ -1,4 +1,5 @@
 """The messages in a bag, read with rosbag and with rosbags, by the definitions in the bag."""
+
 import math
 from collections import Counter
 from pathlib import Path
@@ -10,8 +11,19 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 EVENT_TYPE = 'smach_oracle/OracleEvent'
 # fields that are left out where they have these values; None stands for NaN, which JSON lacks
-EMPTY = {'state': '', 'outcome': '', 'target': '', 'failure_kind': 0, 'failure_class': 0,
-         'rate': None, 'continuous': False, 'query_id': '', 'by': '', 'text': '', 'data': ''}
+EMPTY = {
+    'state': '',
+    'outcome': '',
+    'target': '',
+    'failure_kind': 0,
+    'failure_class': 0,
+    'rate': None,
+    'continuous': False,
+    'query_id': '',
+    'by': '',
+    'text': '',
+    'data': '',
+}
 FIELDS = ('kind', 'wall_time', 'trial_id', 'seq', 'path') + tuple(EMPTY)
 
 Message = Tuple[str, str, Any]  # topic, type, message
@@ -47,8 +59,11 @@ def _store(connection: Any) -> Any:
 
 def events(messages: List[Message]) -> List[Dict[str, Any]]:
     """The executive's events, with all their fields."""
-    return [{field: _plain(getattr(message, field)) for field in FIELDS}
-            for _, kind, message in messages if kind == EVENT_TYPE]
+    return [
+        {field: _plain(getattr(message, field)) for field in FIELDS}
+        for _, kind, message in messages
+        if kind == EVENT_TYPE
+    ]
 
 
 def _plain(value: Any) -> Any:
@@ -57,8 +72,11 @@ def _plain(value: Any) -> Any:
 
 def shortened(event: Mapping[str, Any]) -> Dict[str, Any]:
     """An event without its empty fields."""
-    return {field: value for field, value in event.items()
-            if field not in EMPTY or value != EMPTY[field]}
+    return {
+        field: value
+        for field, value in event.items()
+        if field not in EMPTY or value != EMPTY[field]
+    }
 
 
 def lengthened(event: Mapping[str, Any]) -> Dict[str, Any]:

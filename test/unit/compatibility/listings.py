@@ -1,4 +1,5 @@
 """Names that users hold: interface fields, launch arguments, options, members of classes."""
+
 import ast
 import inspect
 import re
@@ -12,19 +13,29 @@ from held import ROOT, SCRIPTS
 
 UNKNOWN = '--no-such-option'
 # what a command line needs beside the options
-WORDS = {'bag_statistics': ['1'], 'compare_oracles': ['1'], 'pr2_film': ['1'],
-         'same_trials': ['1', '1'], 'what_if': ['1']}
+WORDS = {
+    'bag_statistics': ['1'],
+    'compare_oracles': ['1'],
+    'pr2_film': ['1'],
+    'same_trials': ['1', '1'],
+    'what_if': ['1'],
+}
 # classes whose instances have members of their own: arguments to make one
-INSTANCES = {'smach_oracle.oracle:FailureRate': (5, 0.1),
-             'smach_oracle.oracle:ExponentialFailureRate': (5, 0.1),
-             'smach_oracle.oracle:Settings': ()}
+INSTANCES = {
+    'smach_oracle.oracle:FailureRate': (5, 0.1),
+    'smach_oracle.oracle:ExponentialFailureRate': (5, 0.1),
+    'smach_oracle.oracle:Settings': (),
+}
 _TEXT_CONSTANT = re.compile(r'string\s+\w+\s*=')
 
 
 def interface_files() -> Dict[str, Any]:
     """The parts (request, response and so on) of every msg, srv and action file."""
-    paths = [path for kind in ('msg', 'srv', 'action')
-             for path in sorted((ROOT / kind).glob('*.' + kind))]
+    paths = [
+        path
+        for kind in ('msg', 'srv', 'action')
+        for path in sorted((ROOT / kind).glob('*.' + kind))
+    ]
     return {'{}/{}'.format(path.parent.name, path.name): parts_of(_text(path)) for path in paths}
 
 
@@ -47,19 +58,27 @@ def parts_of(text: str) -> List[Dict[str, Any]]:
 
 def launch_arguments() -> Dict[str, List[str]]:
     """The arguments that can be given to each launch file."""
-    return {path.name: sorted(_settable(ElementTree.parse(str(path)).getroot()))
-            for path in sorted((ROOT / 'launch').glob('*.launch'))}
+    return {
+        path.name: sorted(_settable(ElementTree.parse(str(path)).getroot()))
+        for path in sorted((ROOT / 'launch').glob('*.launch'))
+    }
 
 
 def _settable(launch: ElementTree.Element) -> List[str]:
-    return [argument.get('name', '') for argument in launch.findall('arg')
-            if argument.get('value') is None]
+    return [
+        argument.get('name', '')
+        for argument in launch.findall('arg')
+        if argument.get('value') is None
+    ]
 
 
 def commands() -> List[str]:
     """The commands that are Python."""
-    return sorted(path.name for path in SCRIPTS.iterdir()
-                  if path.read_bytes().startswith(b'#!/usr/bin/env python3'))
+    return sorted(
+        path.name
+        for path in SCRIPTS.iterdir()
+        if path.read_bytes().startswith(b'#!/usr/bin/env python3')
+    )
 
 
 def options_of(help_text: str) -> Dict[str, List[str]]:
@@ -88,8 +107,9 @@ def with_every_option(command: str, options: Dict[str, List[str]]) -> List[str]:
 def documented_private_names() -> List[str]:
     """The private names (`~name`: parameters, topics, services) in the documentation."""
     pages = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
-    return sorted({name for page in pages
-                   for name in re.findall(r'`(~[a-z_][a-z0-9_/]*)`', _text(page))})
+    return sorted(
+        {name for page in pages for name in re.findall(r'`(~[a-z_][a-z0-9_/]*)`', _text(page))}
+    )
 
 
 def is_put_together(name: str, texts: Sequence[str]) -> bool:
@@ -101,8 +121,14 @@ def is_put_together(name: str, texts: Sequence[str]) -> bool:
 def texts_of_the_code() -> List[str]:
     """Every string in the product's code."""
     paths = sorted((ROOT / 'src/smach_oracle').rglob('*.py'))
-    return sorted({node.value for path in paths for node in ast.walk(ast.parse(_text(path)))
-                   if isinstance(node, ast.Constant) and isinstance(node.value, str)})
+    return sorted(
+        {
+            node.value
+            for path in paths
+            for node in ast.walk(ast.parse(_text(path)))
+            if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        }
+    )
 
 
 def public(place: str) -> Dict[str, Any]:
@@ -117,11 +143,16 @@ def public(place: str) -> Dict[str, Any]:
         return {'parameters': parameters(found)}
     if issubclass(found, Enum):
         return {'values': {member.name: member.value for member in found}}
-    members = [member for member in dir(found)
-               if not member.startswith('_') and not _is_of_smach(found, member)]
+    members = [
+        member
+        for member in dir(found)
+        if not member.startswith('_') and not _is_of_smach(found, member)
+    ]
     methods = [name for name in members + ['__init__'] if callable(getattr(found, name))]
-    return {'members': sorted(set(members + _kept_by_instances(found, place))),
-            'parameters': {name: parameters(getattr(found, name)) for name in methods}}
+    return {
+        'members': sorted(set(members + _kept_by_instances(found, place))),
+        'parameters': {name: parameters(getattr(found, name)) for name in methods},
+    }
 
 
 def _is_of_smach(found: type, member: str) -> bool:
@@ -141,8 +172,10 @@ def parameters(function: Any) -> List[List[Any]]:
         signature = inspect.signature(function)
     except ValueError:  # written in C, without one
         return []
-    return [[each.name, each.kind.name, each.default is not each.empty]
-            for each in signature.parameters.values()]
+    return [
+        [each.name, each.kind.name, each.default is not each.empty]
+        for each in signature.parameters.values()
+    ]
 
 
 def _text(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 Names that users import are not here: test_held_names.py looks for them where they were.
 """
+
 import importlib
 import sys
 from pathlib import Path
@@ -20,16 +21,48 @@ from smach_oracle.oracle import Settings
 from smach_oracle.ros.loaded_settings import load_settings, read_param
 from smach_oracle.scripted_operator.node import OperatorSettings
 
-__all__ = ['OracleContainer', 'from_parameter', 'joystick', 'machine', 'manipulation', 'operator',
-           'perception', 'plain', 'read_machines', 'rules', 'settings_of', 'tokens']
+__all__ = [
+    'OracleContainer',
+    'from_parameter',
+    'joystick',
+    'machine',
+    'manipulation',
+    'operator',
+    'perception',
+    'plain',
+    'read_machines',
+    'rules',
+    'settings_of',
+    'tokens',
+]
 
 # keys of the YAML files, which are attributes of Settings and of the result of its for_state
 MACHINE_KEYS = (
-    'policy', 'failing_outcomes', 'userdata', 'deep_copy_keys', 'deadline_s', 'on_no_answer',
-    'escalate', 'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested')
+    'policy',
+    'failing_outcomes',
+    'userdata',
+    'deep_copy_keys',
+    'deadline_s',
+    'on_no_answer',
+    'escalate',
+    'watch_preconditions',
+    'history_length',
+    'rates_file',
+    'oracle_label',
+    'nested',
+)
 STATE_KEYS = (
-    'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries',
-    'failure_outcomes', 'author_recoveries', 'time_limit_s', 'grace_period_s')
+    'memory',
+    'prior',
+    'moderate_from',
+    'high_from',
+    'estimator',
+    'max_recoveries',
+    'failure_outcomes',
+    'author_recoveries',
+    'time_limit_s',
+    'grace_period_s',
+)
 NOWHERE = 'A_STATE_THAT_IS_NOWHERE'  # in no file: it has the settings of every state
 
 
@@ -55,8 +88,9 @@ def _effective(given: Mapping[str, Any]) -> Dict[str, Any]:
 def _effective_of_state(settings: Settings, path: str, label: str) -> Dict[str, Any]:
     chosen = settings.for_state(path, label)
     found = {key: plain(getattr(chosen, key)) for key in STATE_KEYS}
-    found['preconditions'] = [[spec.name, spec.kind.value, list(spec.labels())]
-                              for spec in chosen.preconditions]
+    found['preconditions'] = [
+        [spec.name, spec.kind.value, list(spec.labels())] for spec in chosen.preconditions
+    ]
     found['interfaces'] = [plain(offer) for offer in settings.offers_for(path, label)]
     return found
 
@@ -68,8 +102,10 @@ def _split(name: str) -> Tuple[str, str]:
 
 def _resolve(name: str) -> Any:
     """Stands for an object of the user's own, which this machine does not have."""
+
     def check(userdata: object) -> bool:
         return bool(userdata)
+
     check.__name__ = name.rpartition(':')[2]
     return check
 
@@ -108,8 +144,10 @@ def tokens(path: Path) -> Any:
 
 def _serve(values: Mapping[str, Any], monkeypatch: Any) -> None:
     """Let the node's private parameters be these."""
+
     def get_param(key: str, default: Any = None) -> Any:
         return values.get(key.lstrip('~'), default)
+
     monkeypatch.setattr(rospy, 'get_param', get_param)
     monkeypatch.setattr(rospy, 'resolve_name', lambda name: '/node/' + name.lstrip('~'))
 

@@ -1,4 +1,5 @@
 """What the present code makes of the data. The tests compare it with what version 0.1 made."""
+
 import csv
 import json
 import shutil
@@ -25,8 +26,16 @@ TEXTS = {
     'what_if_experiment': ('what_if', 'experiment', *TRIED),
     'what_if_fetch': ('what_if', 'trials/fetch', *TRIED),
     'what_if_fetch_thresholds': (
-        'what_if', 'trials/fetch', '--moderate-from', '0.3', '--high-from', '0.6', '--prior', '0.1',
-        '0.5'),
+        'what_if',
+        'trials/fetch',
+        '--moderate-from',
+        '0.3',
+        '--high-from',
+        '0.6',
+        '--prior',
+        '0.1',
+        '0.5',
+    ),
     'what_if_kitchen': ('what_if', 'trials/kitchen', *TRIED),
     'what_if_stopped': ('what_if', 'trials/stopped', *TRIED),
 }
@@ -35,36 +44,77 @@ RATES_CASES = [
     ('fetch', {}, RATES / 'window.json'),
     ('fetch', {'memory': 3}, RATES / 'window.json'),
     ('fetch', {'estimator': 'exponential'}, RATES / 'window.json'),
-    ('fetch', {'states': {'PICK': {'memory': 2, 'moderate_from': 0.2, 'high_from': 0.5}}},
-     RATES / 'window.json'),
+    (
+        'fetch',
+        {'states': {'PICK': {'memory': 2, 'moderate_from': 0.2, 'high_from': 0.5}}},
+        RATES / 'window.json',
+    ),
     ('fetch', {}, RATES / 'window_of_three.json'),
     ('fetch', {'memory': 3, 'prior': 0.5}, RATES / 'window_of_three.json'),
     ('fetch', {'estimator': 'exponential'}, RATES / 'exponential.json'),
     ('fetch', {'prior': 0.3}, RATES / 'exponential.json'),
     ('kitchen', {}, RATES / 'window_nested.json'),
-    ('kitchen', {'estimator': 'exponential', 'memory': 4, 'prior': 0.2},
-     RATES / 'exponential_nested.json'),
+    (
+        'kitchen',
+        {'estimator': 'exponential', 'memory': 4, 'prior': 0.2},
+        RATES / 'exponential_nested.json',
+    ),
     ('fetch', {'memory': 5}, TRIALS / 'fetch/rates.json'),
     ('fetch', {'memory': 5}, TRIALS / 'by_hand/rates.json'),
     ('kitchen', {'estimator': 'exponential', 'memory': 4}, TRIALS / 'kitchen/rates.json'),
 ]
 # names that programs import, as the README and the pages of doc/ have them
-PLACES = ['smach_oracle:OracleContainer', *('smach_oracle.oracle:' + name for name in (
-    'OracleContainer', 'Settings', 'FailureRate', 'ExponentialFailureRate', 'FailureClass')),
+PLACES = [
+    'smach_oracle:OracleContainer',
+    *(
+        'smach_oracle.oracle:' + name
+        for name in (
+            'OracleContainer',
+            'Settings',
+            'FailureRate',
+            'ExponentialFailureRate',
+            'FailureClass',
+        )
+    ),
     'smach_oracle.ros.recorder:TrialRecorder',
-    'smach_oracle.expert.rules:RuleExpert', 'smach_oracle.expert.rules:Rules',
-    *('smach_oracle.expert.front_end:' + name for name in (
-        'FrontEnd', 'ServerGoneError', 'wait_for_question')),
-    *('smach_oracle.expert.interface_goal:' + name for name in (
-        'InterfaceGoal', 'SettlingServices'))]
-_FAILED = (('ROBOT', 'DETECT'), ('ROBOT', 'PICK'), ('KITCHEN', 'OPEN_FRIDGE'),
-           ('HALL', 'OPEN_FRIDGE'), ('FETCH', 'PLACE'), ('ROBOT', 'ELSE'))
+    'smach_oracle.expert.rules:RuleExpert',
+    'smach_oracle.expert.rules:Rules',
+    *(
+        'smach_oracle.expert.front_end:' + name
+        for name in ('FrontEnd', 'ServerGoneError', 'wait_for_question')
+    ),
+    *(
+        'smach_oracle.expert.interface_goal:' + name
+        for name in ('InterfaceGoal', 'SettlingServices')
+    ),
+]
+_FAILED = (
+    ('ROBOT', 'DETECT'),
+    ('ROBOT', 'PICK'),
+    ('KITCHEN', 'OPEN_FRIDGE'),
+    ('HALL', 'OPEN_FRIDGE'),
+    ('FETCH', 'PLACE'),
+    ('ROBOT', 'ELSE'),
+)
 # questions for the rules of a scripted expert: trial, container, state
-QUESTIONS = [(trial, container, state) for trial, times in (('one', 3), ('two', 1))
-             for container, state in _FAILED for _ in range(times)]
+QUESTIONS = [
+    (trial, container, state)
+    for trial, times in (('one', 3), ('two', 1))
+    for container, state in _FAILED
+    for _ in range(times)
+]
 # states that the settings of the scripted operator are read for
-OPERATED = ('DETECT_TABLETOP', 'DETECT_CUP', 'PICK', 'PICK_DRINK', 'PLACE', 'SERVE', 'HAND_OVER',
-            'MOVE_IN', 'OTHER')
+OPERATED = (
+    'DETECT_TABLETOP',
+    'DETECT_CUP',
+    'PICK',
+    'PICK_DRINK',
+    'PLACE',
+    'SERVE',
+    'HAND_OVER',
+    'MOVE_IN',
+    'OTHER',
+)
 
 
 def events() -> Dict[str, List[Dict[str, Any]]]:
@@ -151,8 +201,15 @@ def _yaml(path: Path) -> Any:
 
 
 # by how the names of the files begin; the last one is for all others
-_READERS = [('parameter', _parameter), ('manipulation', _manipulation), ('operator', _operator),
-            ('perception', _perception), ('joystick', _joystick), ('rules', _rules), ('', _oracle)]
+_READERS = [
+    ('parameter', _parameter),
+    ('manipulation', _manipulation),
+    ('operator', _operator),
+    ('perception', _perception),
+    ('joystick', _joystick),
+    ('rules', _rules),
+    ('', _oracle),
+]
 
 
 def tokens(folder: Path) -> Dict[str, Any]:
@@ -181,15 +238,16 @@ def options() -> Dict[str, Any]:
     """The options of every command."""
     commands = listings.commands()
     results = run_all([(command, '--help') for command in commands])
-    return {command: listings.options_of(result.text)
-            for command, result in zip(commands, results)}
+    return {command: listings.options_of(result.text) for command, result in zip(commands, results)}
 
 
 def private_names() -> Dict[str, List[str]]:
     """The documented private names, by whether the code has them as a whole."""
     in_code, names = listings.texts_of_the_code(), listings.documented_private_names()
-    return {'whole': [name for name in names if name in in_code],
-            'put_together': [name for name in names if name not in in_code]}
+    return {
+        'whole': [name for name in names if name in in_code],
+        'put_together': [name for name in names if name not in in_code],
+    }
 
 
 @contextmanager

@@ -1,24 +1,32 @@
 """Bags of version 0.1: every message unpacks, and the analysis gives the figures that it gave."""
+
 import held_trials
 import pytest
 import readings
 from held import DATA, EXPECTED, bags, expected, lacking, name_of, numbers, run
 
 NAMES = [name_of(path) for path in bags()]
-EVENTS = {name: [held_trials.lengthened(event) for event in events]
-          for name, events in expected('events').items()}
+EVENTS = {
+    name: [held_trials.lengthened(event) for event in events]
+    for name, events in expected('events').items()
+}
 TOPICS = expected('topics')
 MACHINES = expected('machines')
 READERS = {'rosbag': held_trials.with_rosbag, 'rosbags': held_trials.with_rosbags}
 # of OracleEvent.msg, by name
-CONSTANTS = {name: int(value) for name, (_, value)
-             in expected('interface_files')['msg/OracleEvent.msg'][0]['constants'].items()}
+CONSTANTS = {
+    name: int(value)
+    for name, (_, value) in expected('interface_files')['msg/OracleEvent.msg'][0][
+        'constants'
+    ].items()
+}
 
 
 def events_of(kind):
     """The events of one kind in all bags."""
-    return [event for events in EVENTS.values() for event in events
-            if event['kind'] == CONSTANTS[kind]]
+    return [
+        event for events in EVENTS.values() for event in events if event['kind'] == CONSTANTS[kind]
+    ]
 
 
 def values(kind, field):
@@ -45,14 +53,17 @@ def test_the_bags_have_every_failure_decision_and_answer():
     failures = range(CONSTANTS['FAILING_OUTCOME'], CONSTANTS['TIME_LIMIT'] + 1)
     assert values('FAILURE', 'failure_kind') == set(failures)
     assert values('DECISION', 'failure_class') == {
-        CONSTANTS[name] for name in ('LOW', 'MODERATE', 'HIGH')}
+        CONSTANTS[name] for name in ('LOW', 'MODERATE', 'HIGH')
+    }
     assert values('DECISION', 'outcome') == {'revisit', 'step_back', 'ask'}
     assert values('PRECONDITION_END', 'outcome') == {'met', 'not met'}
     assert values('QUERY_ANSWERED', 'outcome') == {'goto', 'supersede', 'give_up', 'interface'}
 
 
-@pytest.mark.parametrize('text', ['KeyboardInterrupt:', 'SystemExit:', 'ended without an outcome',
-                                  'InvalidTransitionError:'])
+@pytest.mark.parametrize(
+    'text',
+    ['KeyboardInterrupt:', 'SystemExit:', 'ended without an outcome', 'InvalidTransitionError:'],
+)
 def test_a_trial_has_ended_with_this_text(text):
     assert any(end.startswith(text) for end in values('TRIAL_END', 'text'))
 

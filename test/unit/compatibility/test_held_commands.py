@@ -1,4 +1,5 @@
 """The commands of version 0.1 are there, and take the options that they took."""
+
 import listings
 import pytest
 from held import expected, run_all

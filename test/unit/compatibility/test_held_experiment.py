@@ -1,12 +1,23 @@
 """An experiment's folder of version 0.1: run_trials goes on in it, from bags, rates and truth."""
+
 import shutil
 
 import pytest
 import readings
 from held import EXPERIMENT, expected, lacking, run_all
 
-COMMAND = ('run_trials', '--task', 'pick_and_place', '--trials', '1', '--seed', '2',
-           '--memory', '10', '20')
+COMMAND = (
+    'run_trials',
+    '--task',
+    'pick_and_place',
+    '--trials',
+    '1',
+    '--seed',
+    '2',
+    '--memory',
+    '10',
+    '20',
+)
 
 
 def copied(folder):
@@ -47,8 +58,10 @@ def test_its_statistics_are_those_of_then(ended, tmp_path):
     text = (folder / 'statistics.json').read_text()
     path.write_text(text.replace(str(folder), str(EXPERIMENT)))
     held = expected('statistics')['json']
-    mine = {key: [row for row in held[key] if row['experiment'] == 'PICK_AND_PLACE']
-            for key in ('causes', 'groups', 'trials')}
+    mine = {
+        key: [row for row in held[key] if row['experiment'] == 'PICK_AND_PLACE']
+        for key in ('causes', 'groups', 'trials')
+    }
     assert len(mine['trials']) == 3
     assert not list(lacking(mine, readings.statistics_in(path)))
 

@@ -1,4 +1,5 @@
 """The ROS interface of version 0.1: interface files, launch arguments and private names."""
+
 import listings
 import pytest
 from held import expected
@@ -50,14 +51,17 @@ def test_the_code_has_the_end_of_a_documented_private_name(name, texts):
 
 def test_requests_and_responses_are_parts_of_their_own():
     request, response = listings.parts_of(
-        'uint8 A=1  # one\nstring s="# no comment"\n---\nfloat64[3] x # m\nHeader header\n')
+        'uint8 A=1  # one\nstring s="# no comment"\n---\nfloat64[3] x # m\nHeader header\n'
+    )
     assert request['constants'] == {'A': ['uint8', '1'], 's': ['string', '"# no comment"']}
     assert request['fields'] == [] and response['constants'] == {}
     assert response['fields'] == [['float64[3]', 'x'], ['Header', 'header']]
 
 
-@pytest.mark.parametrize('now', [
-    [['float64', 'x']], [['float32', 'x'], ['string', 's']], [['string', 's'], ['float64', 'x']]])
+@pytest.mark.parametrize(
+    'now',
+    [[['float64', 'x']], [['float32', 'x'], ['string', 's']], [['string', 's'], ['float64', 'x']]],
+)
 def test_a_field_that_is_gone_changed_or_moved_is_noticed(now):
     held = [['float64', 'x'], ['string', 's']]
     assert without_new(held, now) != held

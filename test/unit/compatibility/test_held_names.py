@@ -1,4 +1,5 @@
 """Names that programs written for version 0.1 import, with their members and parameters."""
+
 import inspect
 
 import listings
@@ -20,9 +21,11 @@ def are_taken(held, now):
     """Whether every call that was right for the old parameters is right for the new ones."""
     positions = [name for name, kind, _ in held if kind == POSITIONAL]
     demanded = {name for name, kind, optional in now if not optional and kind not in VARIADIC}
-    return ([name for name, kind, _ in now if kind == POSITIONAL][:len(positions)] == positions
-            and {name for name, _, _ in held} <= {name for name, _, _ in now}
-            and demanded <= {name for name, _, optional in held if not optional})
+    return (
+        [name for name, kind, _ in now if kind == POSITIONAL][: len(positions)] == positions
+        and {name for name, _, _ in held} <= {name for name, _, _ in now}
+        and demanded <= {name for name, _, optional in held if not optional}
+    )
 
 
 @pytest.mark.parametrize('place', CLASSES)
@@ -50,15 +53,23 @@ def test_a_function_takes_the_parameters_that_it_took(place):
 A, B, C = ['a', POSITIONAL, False], ['b', POSITIONAL, True], ['c', KEYWORD, True]
 
 
-@pytest.mark.parametrize('now', [[A, B, C], [A, B, C, ['d', KEYWORD, True]],
-                                 [A, B, ['d', POSITIONAL, True], C]])
+@pytest.mark.parametrize(
+    'now', [[A, B, C], [A, B, C, ['d', KEYWORD, True]], [A, B, ['d', POSITIONAL, True], C]]
+)
 def test_further_parameters_do_no_harm(now):
     assert are_taken([A, B, C], now)
 
 
-@pytest.mark.parametrize('now', [[A, B], [['z', POSITIONAL, False], B, C], [B, A, C],
-                                 [A, ['b', POSITIONAL, False], C],
-                                 [A, B, C, ['d', KEYWORD, False]]])
+@pytest.mark.parametrize(
+    'now',
+    [
+        [A, B],
+        [['z', POSITIONAL, False], B, C],
+        [B, A, C],
+        [A, ['b', POSITIONAL, False], C],
+        [A, B, C, ['d', KEYWORD, False]],
+    ],
+)
 def test_a_parameter_that_is_gone_renamed_moved_or_demanded_is_noticed(now):
     assert not are_taken([A, B, C], now)
 

@@ -1,4 +1,5 @@
 """Rates files of version 0.1 are read, and the rates are those that they were."""
+
 import json
 import shutil
 
@@ -47,18 +48,25 @@ def test_a_machine_goes_on_with_the_file_in_its_settings(name, settings, tmp_pat
     path = tmp_path / 'rates.json'
     shutil.copy(str(RATES / (name + '.json')), str(path))
     before = states_in(path)
-    machine = product.OracleContainer.wrap(product.machine('fetch'),
-                                           settings=dict(settings, rates_file=str(path)))
+    machine = product.OracleContainer.wrap(
+        product.machine('fetch'), settings=dict(settings, rates_file=str(path))
+    )
     assert machine.execute() == 'succeeded'
     after = states_in(path)
     assert count(after, 'failures') == count(before, 'failures')
     assert count(after, 'successes') == {
-        label: successes + 1 for label, successes in count(before, 'successes').items()}
+        label: successes + 1 for label, successes in count(before, 'successes').items()
+    }
 
 
-@pytest.mark.parametrize('name, script, settings', [
-    ('window', 'fetch', {}), ('exponential', 'fetch', {'estimator': 'exponential'}),
-    ('window_nested', 'kitchen', {})])
+@pytest.mark.parametrize(
+    'name, script, settings',
+    [
+        ('window', 'fetch', {}),
+        ('exponential', 'fetch', {'estimator': 'exponential'}),
+        ('window_nested', 'kitchen', {}),
+    ],
+)
 def test_a_file_is_written_as_it_was(name, script, settings, tmp_path):
     held, path = RATES / (name + '.json'), tmp_path / 'rates.json'
     shutil.copy(str(held), str(path))

@@ -1,4 +1,5 @@
 """Settings files of version 0.1 are accepted, with the effective values that they had."""
+
 import pytest
 import readings
 from held import SETTINGS, expected, lacking
@@ -6,8 +7,10 @@ from held import SETTINGS, expected, lacking
 HELD = expected('settings')
 TOKENS = 'tokens.txt'
 # defaults that have changed on purpose, as the changelog says; what a file sets itself stays
-CHANGED_DEFAULTS = {'.escalate: it was True, it is False': 'escalate:',
-                    '.most_questions: it was 12, it is 6': 'most_questions:'}
+CHANGED_DEFAULTS = {
+    '.escalate: it was True, it is False': 'escalate:',
+    '.most_questions: it was 12, it is 6': 'most_questions:',
+}
 
 
 def test_every_file_is_read():
@@ -17,8 +20,11 @@ def test_every_file_is_read():
 @pytest.mark.parametrize('name', sorted(set(HELD) - {TOKENS}))
 def test_a_file_has_the_effective_values_that_it_had(name, monkeypatch):
     text = (SETTINGS / name).read_text()
-    wrong = [each for each in lacking(HELD[name], readings.settings(name, monkeypatch))
-             if each not in CHANGED_DEFAULTS or CHANGED_DEFAULTS[each] in text]
+    wrong = [
+        each
+        for each in lacking(HELD[name], readings.settings(name, monkeypatch))
+        if each not in CHANGED_DEFAULTS or CHANGED_DEFAULTS[each] in text
+    ]
     assert not wrong
 
 

@@ -1,6 +1,7 @@
 """A job and what can happen to its launches: trials that hang or die, what is tried again and what
 is lost.
 """
+
 from types import SimpleNamespace
 
 import pytest
@@ -30,12 +31,11 @@ class FakeRecords:
 
     def tidy_up(self, kept):
         left = [
-            number for number in range(self._trials)
+            number
+            for number in range(self._trials)
             if number not in self.done and number not in self.lost
         ]
-        done = [
-            recorded(path) for path in self.closed_bags()
-        ]
+        done = [recorded(path) for path in self.closed_bags()]
         return JobProgress(done, dict(self.lost), (), left[0] if left else self._trials)
 
     def closed_bags(self):
@@ -83,6 +83,7 @@ def run(monkeypatch, tmp_path):
     """Run a job of six trials with launches that do as told; returns it, and how each launch was
     started.
     """
+
     def run_job(*script):
         FakeLaunch.script, FakeLaunch.started = list(script), []
         monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
@@ -93,8 +94,11 @@ def run(monkeypatch, tmp_path):
         job.start()
         while not job.over:
             job.watch()
-        return job, [(arguments['seed'] - FIRST_SEED, arguments['trials'])
-                     for arguments in FakeLaunch.started]
+        return job, [
+            (arguments['seed'] - FIRST_SEED, arguments['trials'])
+            for arguments in FakeLaunch.started
+        ]
+
     return run_job
 
 
@@ -114,10 +118,12 @@ def test_a_trial_that_hangs_or_dies_is_tried_once_more(run, hangs):
     assert job.messages[0].endswith('started again')
 
 
-@pytest.mark.parametrize('signs, why', [(4, 'nothing has happened for 100 s'),
-                                        (6, 'no trial has ended for 500 s')])
+@pytest.mark.parametrize(
+    'signs, why', [(4, 'nothing has happened for 100 s'), (6, 'no trial has ended for 500 s')]
+)
 def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(
-        monkeypatch, tmp_path, signs, why):
+    monkeypatch, tmp_path, signs, why
+):
     now = [0.0]
     monkeypatch.setattr(job_module, 'time', SimpleNamespace(monotonic=lambda: now[0]))
     monkeypatch.setattr(job_module, 'Launch', FakeLaunch)
@@ -142,8 +148,11 @@ def test_a_trial_that_goes_on_is_not_taken_for_hung_but_must_end_some_day(
 def test_a_trial_that_hangs_twice_is_lost_and_the_next_one_begins(run):
     job, started = run((2, True), (0, True), (3, False))
     assert started == [(0, 6), (2, 4), (3, 3)]
-    assert list(job.lost) == [FIRST_SEED + 2
-                              ] and job.messages[-1].endswith('LOST') and job.finished == 6
+    assert (
+        list(job.lost) == [FIRST_SEED + 2]
+        and job.messages[-1].endswith('LOST')
+        and job.finished == 6
+    )
 
 
 def test_each_trial_has_its_own_second_attempt(run):
@@ -163,10 +172,19 @@ def test_too_many_lost_trials_in_a_row_are_an_error(run):
 
 def test_where_trials_have_rows_alone_the_next_one_that_hangs_is_lost(run, monkeypatch):
     def tidy_up(records, kept):
-        left = [number for number in range(2, 6)
-                if number not in records.done and number not in records.lost]
-        return JobProgress([recorded(path) for path in records.closed_bags()], dict(records.lost),
-                           (), left[0] if left else 6, kept=2)
+        left = [
+            number
+            for number in range(2, 6)
+            if number not in records.done and number not in records.lost
+        ]
+        return JobProgress(
+            [recorded(path) for path in records.closed_bags()],
+            dict(records.lost),
+            (),
+            left[0] if left else 6,
+            kept=2,
+        )
+
     monkeypatch.setattr(FakeRecords, 'tidy_up', tidy_up)
     job, started = run((0, True), (0, True), (3, False))
     assert started == [(2, 4), (2, 4), (3, 3)] and list(job.lost) == [FIRST_SEED + 2]

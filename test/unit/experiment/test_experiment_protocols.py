@@ -1,4 +1,5 @@
 """Experiments of several parts: what they consist of, and how they are run and gone on with."""
+
 import contextlib
 import io
 import json
@@ -22,8 +23,9 @@ TASKS = ('pick_and_place', 'drink_retrieval')
 
 def by_name(protocol=ALL, **choice):
     seeds = choice.pop('seeds', dict.fromkeys(BLOCKS, 700))
-    return {part.name: part.plan
-            for part in parts_of(protocol, ProtocolChoice(seeds, 15.0, **choice))}
+    return {
+        part.name: part.plan for part in parts_of(protocol, ProtocolChoice(seeds, 15.0, **choice))
+    }
 
 
 def names_of(plan):
@@ -33,15 +35,20 @@ def names_of(plan):
 def test_the_main_protocol_has_the_replicates_and_trials_that_it_should_have():
     compared = {name: plan for name, plan in by_name('main').items() if name.endswith('_compared')}
     assert {name: (plan.replicates, plan.trials) for name, plan in compared.items()} == {
-        'pick_and_place_compared': (3, 150), 'drink_retrieval_compared': (4, 100)}
+        'pick_and_place_compared': (3, 150),
+        'drink_retrieval_compared': (4, 100),
+    }
     assert all(names_of(plan) == list(COMPARED) for plan in compared.values())
 
 
 def test_every_policy_is_run_in_the_main_protocol_on_the_same_seeds():
     parts = by_name('main')
     for task in TASKS:
-        ran = {name for part in ('compared', 'others')
-               for name in names_of(parts['{}_{}'.format(task, part)])}
+        ran = {
+            name
+            for part in ('compared', 'others')
+            for name in names_of(parts['{}_{}'.format(task, part)])
+        }
         assert ran == (set(POLICIES) - {'prose'}) | {'bare', 'default'}  # the default is prose
     assert {plan.seed for plan in parts.values()} == {700}
 
@@ -49,20 +56,27 @@ def test_every_policy_is_run_in_the_main_protocol_on_the_same_seeds():
 @pytest.mark.parametrize('task, trials', [('pick_and_place', 100), ('drink_retrieval', 60)])
 def test_the_sweeps_have_a_part_for_each_share_and_a_variant_for_each_memory(task, trials):
     parts = by_name('persistence')
-    shares = {parts['{}_persistence_{}'.format(task, share)].lasting: share
-              for share in (0, 50, 100)}
+    shares = {
+        parts['{}_persistence_{}'.format(task, share)].lasting: share for share in (0, 50, 100)
+    }
     assert shares == {0.0: 0, 0.5: 50, 1.0: 100}
     assert all(names_of(plan) == list(COMPARED) for plan in parts.values())
     memory = by_name('memory')[task + '_memory']
     assert [variant.settings for variant in memory.variants] == [
-        {'memory': number} for number in MEMORIES]
-    assert {plan.trials for name, plan in {**parts, **by_name('memory')}.items()
-            if name.startswith(task)} == {trials} and memory.replicates == 1
+        {'memory': number} for number in MEMORIES
+    ]
+    assert {
+        plan.trials
+        for name, plan in {**parts, **by_name('memory')}.items()
+        if name.startswith(task)
+    } == {trials} and memory.replicates == 1
 
 
 def test_continuous_operation_takes_the_hours_of_the_paper_and_fewer_for_fewer_trials():
     assert {plan.task: (plan.trials, plan.hours) for plan in by_name('continuous').values()} == {
-        'pick_and_place': (150, 20.0), 'drink_retrieval': (100, 16.0)}
+        'pick_and_place': (150, 20.0),
+        'drink_retrieval': (100, 16.0),
+    }
     fewer = by_name('continuous', trials=50)
     assert fewer['pick_and_place_continuous'].hours == pytest.approx(20 / 3)
     assert fewer['drink_retrieval_continuous'].hours == 8.0
@@ -78,30 +92,70 @@ def test_the_seeds_of_a_freeze_go_to_their_parts(monkeypatch, tmp_path):
     for part in protocol_run.chosen_parts(args):
         found.setdefault((part.plan.seed - 2_000_000) // BLOCK, []).append(part.name)
     assert [found[number][0] for number in range(5)] == [
-        'pick_and_place_compared', 'drink_retrieval_compared', 'drink_retrieval_persistence_0',
-        'drink_retrieval_memory', 'drink_retrieval_continuous']
+        'pick_and_place_compared',
+        'drink_retrieval_compared',
+        'drink_retrieval_persistence_0',
+        'drink_retrieval_memory',
+        'drink_retrieval_continuous',
+    ]
     assert len(found) == 5
-    monkeypatch.setattr(protocol_run, 'frozen_seeds',
-                        lambda root: freeze._replace(first_seed=3_000_000))
+    monkeypatch.setattr(
+        protocol_run, 'frozen_seeds', lambda root: freeze._replace(first_seed=3_000_000)
+    )
     with pytest.raises(ExperimentError, match='not what was frozen at commit c0ffee'):
         protocol_run.chosen_parts(args)
 
 
 def test_variants_tasks_and_numbers_are_chosen_by_options():
-    parts = protocol_run.chosen_parts(command.parse([
-        '--protocol', 'all', '--task', 'drink_retrieval', '--variants', 'prose', 'ladder',
-        '--trials', '2', '--replicates', '1', '--seed', '9']))
-    assert [part.name for part in parts] == ['drink_retrieval_' + each for each in (
-        'compared', 'persistence_0', 'persistence_50', 'persistence_100', 'memory', 'continuous')]
+    parts = protocol_run.chosen_parts(
+        command.parse(
+            [
+                '--protocol',
+                'all',
+                '--task',
+                'drink_retrieval',
+                '--variants',
+                'prose',
+                'ladder',
+                '--trials',
+                '2',
+                '--replicates',
+                '1',
+                '--seed',
+                '9',
+            ]
+        )
+    )
+    assert [part.name for part in parts] == [
+        'drink_retrieval_' + each
+        for each in (
+            'compared',
+            'persistence_0',
+            'persistence_50',
+            'persistence_100',
+            'memory',
+            'continuous',
+        )
+    ]
     assert {(part.plan.trials, part.plan.replicates, part.plan.seed) for part in parts} == {
-        (2, 1, 9)}
+        (2, 1, 9)
+    }
     assert names_of(parts[0].plan) == ['prose', 'ladder']
 
 
-@pytest.mark.parametrize('argv', [
-    ['--protocol', 'guess'], ['--frozen'], ['--protocol', 'main', '--benign'],
-    ['--protocol', 'main', '--lasting', '0.5'], ['--protocol', 'main', '--variants', 'with'],
-    ['--protocol', 'memory', '--memory', '5'], ['--lasting', '1.5'], ['--hours', '0']])
+@pytest.mark.parametrize(
+    'argv',
+    [
+        ['--protocol', 'guess'],
+        ['--frozen'],
+        ['--protocol', 'main', '--benign'],
+        ['--protocol', 'main', '--lasting', '0.5'],
+        ['--protocol', 'main', '--variants', 'with'],
+        ['--protocol', 'memory', '--memory', '5'],
+        ['--lasting', '1.5'],
+        ['--hours', '0'],
+    ],
+)
 def test_wrong_options_end_with_usage(argv, capsys):
     with pytest.raises(SystemExit) as ended:
         command.parse(argv)
@@ -122,8 +176,9 @@ class FakeRunner:
         self.variant, self.trials, self.lost, self.messages = variant, plan.trials, {}, []
         self._plan, self._replicate, self._rows = plan, replicate, output / 'results.csv'
         kept = read_rows(self._rows) if self._rows.exists() else []
-        self.finished = sum((row.variant, row.replicate) == (variant.name, replicate)
-                            for row in kept)
+        self.finished = sum(
+            (row.variant, row.replicate) == (variant.name, replicate) for row in kept
+        )
         self.running = False
 
     @property
@@ -140,11 +195,20 @@ class FakeRunner:
     def watch(self):
         if any(each in self.name for each in self.breaks):
             raise ExperimentError(self.name + ': nothing has happened for 300 s')
-        append_rows(self._rows, [TrialRow(
-            self._plan.task, self.variant.name, self._replicate,
-            self._plan.first_seed(self._replicate) + self.finished, 'success',
-            lasting_share=self._plan.lasting,
-            hour=None if self._plan.hours is None else float(self.finished))])
+        append_rows(
+            self._rows,
+            [
+                TrialRow(
+                    self._plan.task,
+                    self.variant.name,
+                    self._replicate,
+                    self._plan.first_seed(self._replicate) + self.finished,
+                    'success',
+                    lasting_share=self._plan.lasting,
+                    hour=None if self._plan.hours is None else float(self.finished),
+                )
+            ],
+        )
         self.finished += 1
         FakeRunner.ended += 1
 
@@ -187,9 +251,21 @@ def run(monkeypatch, tmp_path):
         FakeRunner.started, FakeRunner.ended = [], 0
         told = io.StringIO()
         with contextlib.redirect_stdout(told), contextlib.redirect_stderr(told):
-            code = command.main(['--protocol', 'all', '--trials', '2', '--seed', '7', '--output',
-                                 str(tmp_path), *options])
+            code = command.main(
+                [
+                    '--protocol',
+                    'all',
+                    '--trials',
+                    '2',
+                    '--seed',
+                    '7',
+                    '--output',
+                    str(tmp_path),
+                    *options,
+                ]
+            )
         return code, told.getvalue()
+
     return run_command
 
 
@@ -213,8 +289,11 @@ def test_the_one_command_compares_all_variants_and_draws_figures_and_tables(run,
     for name in ('bare', 'restart', 'ladder', 'always_ask'):
         assert 'interventions, default against {}: '.format(name) in told
     names = {path.name for path in (tmp_path / 'figures').iterdir()}
-    assert names == {'tables.md'} | {stem + end for stem in (
-        'main', 'same_seeds', 'persistence', 'memory', 'continuous') for end in ('.svg', '.png')}
+    assert names == {'tables.md'} | {
+        stem + end
+        for stem in ('main', 'same_seeds', 'persistence', 'memory', 'continuous')
+        for end in ('.svg', '.png')
+    }
     assert '| default against ladder | 2 |' in (tmp_path / 'figures' / 'tables.md').read_text()
     assert str(tmp_path / 'figures' / 'tables.md') in told
 
@@ -222,6 +301,7 @@ def test_the_one_command_compares_all_variants_and_draws_figures_and_tables(run,
 def test_trials_are_kept_where_figures_cannot_be_drawn(run, monkeypatch):
     def without(stem, output):
         raise ModuleNotFoundError("No module named 'matplotlib'", name='matplotlib')
+
     monkeypatch.setattr(looks, 'save', without)
     code, told = run('--jobs', '3', draws=True)
     assert code == 0 and 'Figures were not drawn: ' in told and 'matplotlib' in told
@@ -246,8 +326,9 @@ def test_stopped_it_goes_on_where_it_was(run, tmp_path):
     assert code == 0 and 'Going on in' in told
     rows = [row for path in tmp_path.glob('*/results.csv') for row in read_rows(path)]
     assert done + FakeRunner.ended == len(rows)
-    assert len({(row.task, row.variant, row.replicate, row.seed, row.lasting_share)
-                for row in rows}) < len(rows), 'main table and sweeps share variants'
+    assert len(
+        {(row.task, row.variant, row.replicate, row.seed, row.lasting_share) for row in rows}
+    ) < len(rows), 'main table and sweeps share variants'
 
 
 def test_a_replicate_that_breaks_costs_no_other(run, tmp_path):
@@ -256,11 +337,15 @@ def test_a_replicate_that_breaks_costs_no_other(run, tmp_path):
     assert 'restart/replicate_1: nothing has happened' in told
     rows = read_rows(tmp_path / 'pick_and_place_compared' / 'results.csv')
     assert sorted({(row.variant, row.replicate) for row in rows}) == [
-        (name, number) for name in ('bare', 'default', 'restart') for number in range(3)
-        if (name, number) != ('restart', 1)]
+        (name, number)
+        for name in ('bare', 'default', 'restart')
+        for number in range(3)
+        if (name, number) != ('restart', 1)
+    ]
     code, told = run('--jobs', '2')
     assert code == 0 and [name for name, _ in FakeRunner.started] == [
-        'pick_and_place_compared/restart/replicate_1'], 'the same command tries it again'
+        'pick_and_place_compared/restart/replicate_1'
+    ], 'the same command tries it again'
 
 
 def test_where_job_after_job_breaks_the_experiment_ends(run):
@@ -288,19 +373,33 @@ def test_the_plan_of_one_experiment_needs_no_protocol(capsys):
 
 
 def test_the_time_left_goes_by_what_trials_took_and_by_the_longest_job():
-    works = [JobWork('pick_and_place', 10, [5.0, 7.0]), JobWork('pick_and_place', 10, []),
-             JobWork('pick_and_place', 0, [6.0])]
+    works = [
+        JobWork('pick_and_place', 10, [5.0, 7.0]),
+        JobWork('pick_and_place', 10, []),
+        JobWork('pick_and_place', 0, [6.0]),
+    ]
     assert seconds_left(works, 1) == pytest.approx(2 * seconds_left(works, 2))
     assert seconds_left(works, 2) == seconds_left(works, 20), 'no job is split'
     assert seconds_left(works, 2) == pytest.approx(10 * 6.0, abs=20.0)
     assert seconds_left([works[2]], 2) == 0.0
     assert [duration(each) for each in (5.0, 119.0, 120.0, 3600.0, 11160.0)] == [
-        '5 s', '119 s', '2 min', '1 h 00 min', '3 h 06 min']
+        '5 s',
+        '119 s',
+        '2 min',
+        '1 h 00 min',
+        '3 h 06 min',
+    ]
 
 
 def test_the_line_of_a_pool_counts_trials_and_replicates():
     stream = io.StringIO()
-    job = SimpleNamespace(finished=3, trials=9, over=False, lost={5: 'hung'}, messages=[],
-                          work=lambda: JobWork('pick_and_place', 6, [10.0]))
+    job = SimpleNamespace(
+        finished=3,
+        trials=9,
+        over=False,
+        lost={5: 'hung'},
+        messages=[],
+        work=lambda: JobWork('pick_and_place', 6, [10.0]),
+    )
     PoolProgress(stream, 2).show([job])
     assert stream.getvalue().startswith('3/9 trials, 0/1 replicates over, 1 lost   about ')

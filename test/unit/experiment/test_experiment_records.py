@@ -1,4 +1,5 @@
 """The folder of a job: what is kept of it after whatever interrupted it, and where it goes on."""
+
 import json
 from pathlib import Path
 
@@ -35,8 +36,12 @@ class RecordedJob:
             source.begin_trial('trial-{}'.format(self.number))
             source.emit(EventKind.TRIAL_START, 'TOP', data={'recovers': True})
             if end:
-                source.emit(EventKind.TRIAL_END, 'TOP', outcome=outcome,
-                            data={'learned': self.learned(trial)})
+                source.emit(
+                    EventKind.TRIAL_END,
+                    'TOP',
+                    outcome=outcome,
+                    data={'learned': self.learned(trial)},
+                )
             assert recorder.close(20.0)
             if truth:
                 self.tell(trial, outcome == 'succeeded')
@@ -44,8 +49,14 @@ class RecordedJob:
 
     def tell(self, trial: int, success: bool) -> None:
         line = {
-            'seed': FIRST_SEED + trial, 'task': 't', 'success': success, 'why': '', 'causes': [],
-            'sim_s': 1.0, 'wall_s': 1.0, 'share': {}
+            'seed': FIRST_SEED + trial,
+            'task': 't',
+            'success': success,
+            'why': '',
+            'causes': [],
+            'sim_s': 1.0,
+            'wall_s': 1.0,
+            'share': {},
         }
         with (self.folder / 'truth.jsonl').open('a') as file:
             file.write(json.dumps(line) + '\n')
@@ -81,21 +92,26 @@ def test_complete_trials_are_kept_with_the_rates_as_the_last_left_them(job: Reco
     job.record('succeeded', 'aborted', 'succeeded')
     progress = job.tidy_up()
     assert (progress.next_trial, progress.dropped, progress.lost) == (3, (), {})
-    assert [trial.summary.ending for trial in progress.done
-            ] == [TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.SUCCESS]
+    assert [trial.summary.ending for trial in progress.done] == [
+        TrialEnding.SUCCESS,
+        TrialEnding.FAILURE,
+        TrialEnding.SUCCESS,
+    ]
     assert job.kept_rates() == job.learned(2)
 
 
 @pytest.mark.parametrize('how', [{'end': False}, {'truth': False}, {}])
-def test_an_interrupted_trial_is_dropped_with_its_truth_and_its_rates(job: RecordedJob,
-                                                                      how: dict) -> None:
+def test_an_interrupted_trial_is_dropped_with_its_truth_and_its_rates(
+    job: RecordedJob, how: dict
+) -> None:
     job.record('succeeded', 'succeeded')
     job.record('succeeded' if how else 'preempted', start=2, **how)
     for _ in range(2):
         progress = job.tidy_up()
         assert (progress.next_trial, len(progress.done)) == (2, 2)
         assert job.kept_rates() == job.learned(1) and job.seeds_told() == [
-            FIRST_SEED, FIRST_SEED + 1
+            FIRST_SEED,
+            FIRST_SEED + 1,
         ]
     job.record('aborted', start=2)  # run again
     assert job.tidy_up().next_trial == 3 and job.kept_rates() == job.learned(2)
@@ -106,8 +122,9 @@ def test_a_recorder_that_was_killed_leaves_a_trial_to_run_anew(job: RecordedJob)
     bag = sorted(job.folder.glob('*.bag'))[1]
     bag.rename(str(bag) + '.active')
     progress = job.tidy_up()
-    assert progress.next_trial == 1 and len(
-        progress.dropped) == 2, 'what was learned after it does not count either'
+    assert progress.next_trial == 1 and len(progress.dropped) == 2, (
+        'what was learned after it does not count either'
+    )
     assert job.kept_rates() == job.learned(0) and not list(job.folder.glob('*.active'))
 
 

@@ -1,4 +1,5 @@
 """The rows of an experiment: written as trials end, and gone on from without the bags."""
+
 import json
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,20 +30,29 @@ def trial(number, success=True):
     """A trial that has come to its end, with the truth on it."""
     outcome = 'succeeded' if success else 'aborted'
     trial_id = str(number)
-    summary = summarise([Event(EventKind.TRIAL_START, trial_id, 0, 1.0, 'TOP'),
-                         Event(EventKind.TRIAL_END, trial_id, 1, 2.0, 'TOP', outcome=outcome)],
-                        ('/b/{}.bag'.format(number),))
+    summary = summarise(
+        [
+            Event(EventKind.TRIAL_START, trial_id, 0, 1.0, 'TOP'),
+            Event(EventKind.TRIAL_END, trial_id, 1, 2.0, 'TOP', outcome=outcome),
+        ],
+        ('/b/{}.bag'.format(number),),
+    )
     seed = FIRST_SEED + number
-    return RecordedTrial(summary._replace(
-        cause=RecordedCause(seed, 'pick', ('glare',), ('light',)),
-        truth=Truth(seed, 'pick', success, 'judged', (), 30.0, 9.0, {})), learned(number))
+    return RecordedTrial(
+        summary._replace(
+            cause=RecordedCause(seed, 'pick', ('glare',), ('light',)),
+            truth=Truth(seed, 'pick', success, 'judged', (), 30.0, 9.0, {}),
+        ),
+        learned(number),
+    )
 
 
 @pytest.fixture
 def results(tmp_path):
     """Opens the rows of a job in the test's folder."""
-    return lambda variant='restart', replicate=0: JobResults(tmp_path, 'pick', variant, replicate,
-                                                             FIRST_SEED)
+    return lambda variant='restart', replicate=0: JobResults(
+        tmp_path, 'pick', variant, replicate, FIRST_SEED
+    )
 
 
 def test_a_row_is_written_once_and_tells_of_the_trial(results, tmp_path):
@@ -52,8 +62,10 @@ def test_a_row_is_written_once_and_tells_of_the_trial(results, tmp_path):
     results().add([trial(1)], {}, tmp_path / 'none')
     rows = read_rows(tmp_path / RESULTS_FILE)
     assert [(row.seed, row.variant, row.ending, row.true_success) for row in rows] == [
-        (100, 'restart', 'success', True), (101, 'restart', 'failure', False),
-        (102, 'restart', 'success', True)]
+        (100, 'restart', 'success', True),
+        (101, 'restart', 'failure', False),
+        (102, 'restart', 'success', True),
+    ]
     assert (rows[0].causes, rows[0].why, rows[0].sim_s) == ('glare', 'judged', 30.0)
     assert json.loads(rows[2].learned) == learned(2)
     assert (tmp_path / RESULTS_FILE).read_text().count('\n') == 4
@@ -61,25 +73,49 @@ def test_a_row_is_written_once_and_tells_of_the_trial(results, tmp_path):
 
 def test_what_the_truth_tells_beyond_the_end_is_in_the_row(results, tmp_path):
     truth = tmp_path / 'truth.jsonl'
-    truth.write_text('{"seed": 100, "wrong_object": "cup", "damage": {"dropped": ["cup"]}, '
-                     '"passed_s": {"expert": 20.5}}\n')
+    truth.write_text(
+        '{"seed": 100, "wrong_object": "cup", "damage": {"dropped": ["cup"]}, '
+        '"passed_s": {"expert": 20.5}}\n'
+    )
     results().add([trial(0)], {}, truth)
-    row, = read_rows(tmp_path / RESULTS_FILE)
+    (row,) = read_rows(tmp_path / RESULTS_FILE)
     assert (row.wrong_object, row.damage, row.expert_s) == ('cup', 1, 20.5)
     assert not row.succeeded
 
 
 def test_a_row_tells_the_worlds_log_and_the_tries_in_the_worlds_time(results, tmp_path):
     truth = tmp_path / 'truth.jsonl'
-    truth.write_text(json.dumps({
-        'seed': 100, 'causes': [{'kind': 'glare', 'text': 'low sun', 'lasting': True,
-                                 'began_s': 4.25, 'ended_s': None}],
-        'clock_s': 50.0, 'pauses': [[55.0, 2.0]]}) + '\n')
+    truth.write_text(
+        json.dumps(
+            {
+                'seed': 100,
+                'causes': [
+                    {
+                        'kind': 'glare',
+                        'text': 'low sun',
+                        'lasting': True,
+                        'began_s': 4.25,
+                        'ended_s': None,
+                    }
+                ],
+                'clock_s': 50.0,
+                'pauses': [[55.0, 2.0]],
+            }
+        )
+        + '\n'
+    )
     told = trial(0)
-    results().add([told._replace(
-        tries=(StateTry('PICK', 54.0, 60.0, 0), StateTry('PICK', 61.0, None, 1)),
-        summary=told.summary._replace(settings=(('memory', 10), ('prior', 0.1))))], {}, truth)
-    row, = read_rows(tmp_path / RESULTS_FILE)
+    results().add(
+        [
+            told._replace(
+                tries=(StateTry('PICK', 54.0, 60.0, 0), StateTry('PICK', 61.0, None, 1)),
+                summary=told.summary._replace(settings=(('memory', 10), ('prior', 0.1))),
+            )
+        ],
+        {},
+        truth,
+    )
+    (row,) = read_rows(tmp_path / RESULTS_FILE)
     assert row.cause_log == '[["glare",true,4.25,null]]'
     assert row.tries == '[["PICK",4.0,8.0,0],["PICK",9.0,null,1]]'
     assert (row.memory, row.prior) == (10, 0.1)
@@ -89,8 +125,9 @@ def test_a_row_tells_the_worlds_log_and_the_tries_in_the_worlds_time(results, tm
 
 
 @pytest.mark.parametrize('questions, expert_s', [(0, 0.0), (2, None)])
-def test_what_nobody_was_told_of_the_experts_time_is_not_known(results, tmp_path, questions,
-                                                               expert_s):
+def test_what_nobody_was_told_of_the_experts_time_is_not_known(
+    results, tmp_path, questions, expert_s
+):
     truth = tmp_path / 'truth.jsonl'
     truth.write_text('{"seed": 100, "passed_s": {"planning": 3.0}}\n')
     asked = trial(0)
@@ -104,8 +141,11 @@ def test_a_job_goes_on_behind_its_rows_with_the_rates_of_the_last(results, tmp_p
     progress = records.tidy_up(results().kept())
     assert (progress.next_trial, progress.kept, progress.lost) == (3, 2, {1: 'it hung'})
     assert json.loads(records.rates.read_text())['containers'] == learned(2)
-    assert [row.ending for row in read_rows(tmp_path / RESULTS_FILE)] == ['success', 'success',
-                                                                          LOST]
+    assert [row.ending for row in read_rows(tmp_path / RESULTS_FILE)] == [
+        'success',
+        'success',
+        LOST,
+    ]
 
 
 def test_rows_behind_a_gap_do_not_count(results, tmp_path):
@@ -132,9 +172,21 @@ def test_trials_with_bags_come_behind_those_that_have_rows_alone(results, tmp_pa
     records = ReplicateRecords(tmp_path / 'job', FIRST_SEED, 6)
     (records.folder / 'a.bag').touch()
     monkeypatch.setattr(records, 'read', lambda path: trial(2))
-    (records.folder / 'truth.jsonl').write_text(json.dumps({
-        'seed': 102, 'task': 't', 'success': True, 'why': '', 'causes': [], 'sim_s': 1.0,
-        'wall_s': 1.0, 'share': {}}) + '\n')
+    (records.folder / 'truth.jsonl').write_text(
+        json.dumps(
+            {
+                'seed': 102,
+                'task': 't',
+                'success': True,
+                'why': '',
+                'causes': [],
+                'sim_s': 1.0,
+                'wall_s': 1.0,
+                'share': {},
+            }
+        )
+        + '\n'
+    )
     progress = records.tidy_up(results().kept())
     assert (progress.kept, len(progress.done), progress.next_trial) == (2, 1, 3)
 
@@ -157,17 +209,31 @@ def test_a_torn_bag_before_others_costs_no_row(results, tmp_path, monkeypatch):
     for name in ('a.bag', 'b.bag'):
         (records.folder / name).touch()
     monkeypatch.setattr(records, 'read', lambda path: trial(3) if path.endswith('b.bag') else None)
-    (records.folder / 'truth.jsonl').write_text(json.dumps({
-        'seed': 103, 'task': 't', 'success': True, 'why': '', 'causes': [], 'sim_s': 1.0,
-        'wall_s': 1.0, 'share': {}}) + '\n')
+    (records.folder / 'truth.jsonl').write_text(
+        json.dumps(
+            {
+                'seed': 103,
+                'task': 't',
+                'success': True,
+                'why': '',
+                'causes': [],
+                'sim_s': 1.0,
+                'wall_s': 1.0,
+                'share': {},
+            }
+        )
+        + '\n'
+    )
     progress = records.tidy_up(results().kept())
     assert (progress.kept, len(progress.done), progress.next_trial) == (3, 1, 4)
     assert progress.dropped == ('a.bag',)
 
 
 def test_rows_that_do_not_tell_the_rates_are_refused(results, tmp_path):
-    append_rows(tmp_path / RESULTS_FILE, [
-        read._replace(learned='') for read in _rows_of(results(), tmp_path)])
+    append_rows(
+        tmp_path / RESULTS_FILE,
+        [read._replace(learned='') for read in _rows_of(results(), tmp_path)],
+    )
     with pytest.raises(ExperimentError, match='restart, seed 100: .*what was learned'):
         results().kept()
 
@@ -185,7 +251,8 @@ def test_a_whole_job_goes_on_without_its_bags(tmp_path):
     arguments = ('--variants', 'bare', 'restart')
     variant = plan(*arguments).variants[1]
     JobResults(tmp_path, 'pick_and_place', 'restart', 0, FIRST_SEED).add(
-        [trial(0), trial(1)], {}, tmp_path / 'none')
+        [trial(0), trial(1)], {}, tmp_path / 'none'
+    )
     job = ExperimentJob(plan(*arguments), variant, 0, tmp_path, 300.0)
     assert (job.finished, job.over) == (2, False)
     told = job._arguments()
@@ -200,34 +267,53 @@ def test_the_share_of_lasting_causes_is_given_to_the_world_and_told_by_the_rows(
     job._results.add([trial(0)], {1: 'hung'}, tmp_path / 'none')
     assert [row.lasting_share for row in read_rows(tmp_path / RESULTS_FILE)] == [0.5] * 2
     usual = plan('--variants', 'bare')
-    assert 'lasting' not in ExperimentJob(usual, usual.variants[0], 0, tmp_path / 'other',
-                                          300.0)._arguments()
+    assert (
+        'lasting'
+        not in ExperimentJob(usual, usual.variants[0], 0, tmp_path / 'other', 300.0)._arguments()
+    )
 
 
 def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatch):
     given = plan('--variants', 'bare', '--hours', '3')
     truth = tmp_path / 'truth.jsonl'
-    truth.write_text(''.join(json.dumps({
-        'seed': FIRST_SEED + number, 'hour': 0.5 * number, 'left': {'ended': 0.5 * number + 0.1}
-    }) + '\n' for number in range(3)))
+    truth.write_text(
+        ''.join(
+            json.dumps(
+                {
+                    'seed': FIRST_SEED + number,
+                    'hour': 0.5 * number,
+                    'left': {'ended': 0.5 * number + 0.1},
+                }
+            )
+            + '\n'
+            for number in range(3)
+        )
+    )
     JobResults(tmp_path, 'pick_and_place', 'bare', 0, FIRST_SEED).add(
-        [trial(0), trial(1)], {2: 'hung'}, truth)
+        [trial(0), trial(1)], {2: 'hung'}, truth
+    )
     started = []
     monkeypatch.setattr(job_module, 'Launch', lambda *launched: started.append(launched))
     job = ExperimentJob(given, given.variants[0], 0, tmp_path, 300.0)
     job.start()
-    (_, _, arguments, _), = started
+    ((_, _, arguments, _),) = started
     assert arguments['seed'] == FIRST_SEED + 3
     assert json.loads(Path(arguments['lab']).read_text()) == {
-        'seed': FIRST_SEED, 'slot_h': 0.5, 'left': {'ended': 0.6}}, 'a lost trial leaves nothing'
+        'seed': FIRST_SEED,
+        'slot_h': 0.5,
+        'left': {'ended': 0.6},
+    }, 'a lost trial leaves nothing'
 
 
 def test_a_lost_trial_of_a_world_that_goes_on_has_its_hour(tmp_path):
     """One begins every half hour. The third took until hour 1.7, so the fourth was late."""
     truth = tmp_path / 'truth.jsonl'
-    truth.write_text(''.join(json.dumps({
-        'seed': FIRST_SEED + number, 'hour': hour, 'left': {'ended': ended}}) + '\n'
-        for number, hour, ended in ((0, 0.0, 0.1), (2, 1.0, 1.7))))
+    truth.write_text(
+        ''.join(
+            json.dumps({'seed': FIRST_SEED + number, 'hour': hour, 'left': {'ended': ended}}) + '\n'
+            for number, hour, ended in ((0, 0.0, 0.1), (2, 1.0, 1.7))
+        )
+    )
     job = JobResults(tmp_path, 'pick_and_place', 'bare', 0, FIRST_SEED, None, 0.5)
     job.add([trial(0), trial(2)], {}, truth)
     job.add([], {1: 'hung', 3: 'hung'}, truth)
@@ -240,9 +326,10 @@ def test_a_lost_trial_of_a_world_that_goes_on_has_its_hour(tmp_path):
 
 
 def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path):
-    variant, = plan('--variants', 'random').variants
+    (variant,) = plan('--variants', 'random').variants
     JobResults(tmp_path, 'pick_and_place', 'random', 0, FIRST_SEED).add(
-        [trial(0)], {}, tmp_path / 'none')
+        [trial(0)], {}, tmp_path / 'none'
+    )
     job = ExperimentJob(plan('--variants', 'random'), variant, 0, tmp_path, 300.0)
     assert json.loads(job._arguments()['oracle'])['policy'] == {'name': 'random', 'seed': 101}
 
@@ -250,15 +337,23 @@ def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path)
 def test_variants_are_chosen_by_their_names():
     found = plan('--variants', 'bare', 'default', 'restart', '--max-recoveries', '3').variants
     assert [(each.name, each.recovers, dict(each.settings)) for each in found] == [
-        ('bare', False, {}), ('default', True, {'max_recoveries': 3}),
-        ('restart', True, {'max_recoveries': 3, 'policy': 'restart'})]
+        ('bare', False, {}),
+        ('default', True, {'max_recoveries': 3}),
+        ('restart', True, {'max_recoveries': 3, 'policy': 'restart'}),
+    ]
     swept = plan('--variants', 'bare', 'prose', '--memory', '2', '50').variants
     assert [each.name for each in swept] == ['bare', 'prose_memory_2', 'prose_memory_50']
 
 
-@pytest.mark.parametrize('options', [
-    ['--variants', 'both', 'restart'], ['--variants', 'restart', '--policy', 'prose'],
-    ['--variants', 'guess'], ['--arms', 'restart']])
+@pytest.mark.parametrize(
+    'options',
+    [
+        ['--variants', 'both', 'restart'],
+        ['--variants', 'restart', '--policy', 'prose'],
+        ['--variants', 'guess'],
+        ['--arms', 'restart'],
+    ],
+)
 def test_wrong_variants_end_with_usage(options, capsys):
     with pytest.raises(SystemExit) as ended:
         plan(*options)
@@ -270,6 +365,10 @@ def test_a_job_without_git_has_no_version(monkeypatch):
 
     def gone(*args, **more):
         raise OSError
-    monkeypatch.setattr(module, 'subprocess', SimpleNamespace(
-        run=gone, CalledProcessError=ValueError, PIPE=-1, DEVNULL=-3))
+
+    monkeypatch.setattr(
+        module,
+        'subprocess',
+        SimpleNamespace(run=gone, CalledProcessError=ValueError, PIPE=-1, DEVNULL=-3),
+    )
     assert module.code_version() == ''

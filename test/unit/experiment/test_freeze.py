@@ -1,4 +1,5 @@
 """Evaluation seeds come from the protocol and the code, as committed; every freeze is logged."""
+
 import csv
 import subprocess
 
@@ -21,8 +22,12 @@ PAGE = '# Protocol\n\n```frozen\ncode/one\ncode/two\n```\n'
 
 
 def git(root, *arguments):
-    subprocess.run(['git', '-c', 'user.name=a', '-c', 'user.email=a@b', *arguments], cwd=root,
-                   check=True, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        ['git', '-c', 'user.name=a', '-c', 'user.email=a@b', *arguments],
+        cwd=root,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def commit(root):
@@ -32,8 +37,12 @@ def commit(root):
 
 @pytest.fixture
 def root(tmp_path):
-    for name, text in (('doc/protocol.md', PAGE), ('code/one/a.py', '1'), ('code/two/b.py', '2'),
-                       ('code/three/c.py', '3')):
+    for name, text in (
+        ('doc/protocol.md', PAGE),
+        ('code/one/a.py', '1'),
+        ('code/two/b.py', '2'),
+        ('code/three/c.py', '3'),
+    ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     git(tmp_path, 'init', '-q')
@@ -75,8 +84,9 @@ def test_a_folder_that_is_not_there_is_named(root):
         frozen_seeds(root)
 
 
-@pytest.mark.parametrize('page', ['nothing', '```frozen\n```\n', PAGE + PAGE,
-                                  '```frozen\na\na\n```\n'])
+@pytest.mark.parametrize(
+    'page', ['nothing', '```frozen\n```\n', PAGE + PAGE, '```frozen\na\na\n```\n']
+)
 def test_a_page_must_name_folders_once(page):
     with pytest.raises(ExperimentError, match='must name folders'):
         frozen_folders(page)
@@ -92,9 +102,12 @@ def test_every_freeze_is_logged_and_an_abandoned_one_too(root):
         run_freeze(root, ABANDONED, 'again')
     rows = list(csv.DictReader((root / freeze.LOG).open()))
     assert [(row['what'], row['note']) for row in rows] == [
-        (FROZEN, 'the first'), (ABANDONED, 'a fault of the judge')]
+        (FROZEN, 'the first'),
+        (ABANDONED, 'a fault of the judge'),
+    ]
     assert {(row['commit'], int(row['first_seed'])) for row in rows} == {
-        (first.commit, first.first_seed)}
+        (first.commit, first.first_seed)
+    }
 
 
 def test_a_freeze_says_why(root):

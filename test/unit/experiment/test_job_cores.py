@@ -1,4 +1,5 @@
 """Where there is a core for each job, the processes of a job stay on one."""
+
 import os
 import subprocess
 import sys
@@ -11,11 +12,21 @@ from smach_oracle.experiment import launching, pool
 PRINT_CORES = 'import os, sys; sys.stdout.write(repr(sorted(os.sched_getaffinity(0))))'
 
 
-@pytest.mark.parametrize('cores, taken, at_a_time, core', [
-    ({0, 1}, [], 2, 0), ({0, 1}, [0], 2, 1), ({0, 1}, [1], 2, 0), ({4, 6}, [4], 2, 6),
-    ({0, 1}, [], 1, None), ({0, 1}, [], 3, None), ({0, 1, 2, 3}, [0], 2, None)])
-def test_a_job_gets_a_free_core_where_there_is_one_for_each(monkeypatch, cores, taken, at_a_time,
-                                                            core):
+@pytest.mark.parametrize(
+    'cores, taken, at_a_time, core',
+    [
+        ({0, 1}, [], 2, 0),
+        ({0, 1}, [0], 2, 1),
+        ({0, 1}, [1], 2, 0),
+        ({4, 6}, [4], 2, 6),
+        ({0, 1}, [], 1, None),
+        ({0, 1}, [], 3, None),
+        ({0, 1, 2, 3}, [0], 2, None),
+    ],
+)
+def test_a_job_gets_a_free_core_where_there_is_one_for_each(
+    monkeypatch, cores, taken, at_a_time, core
+):
     monkeypatch.setattr(os, 'sched_getaffinity', lambda pid: cores)
     active = [SimpleNamespace(core=each) for each in taken]
     assert pool._free_core(active, at_a_time) == core

@@ -1,6 +1,7 @@
 """Servers come and go: a front end that finds them forgets those that are gone for good; no
 master.
 """
+
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -47,8 +48,10 @@ class FakeServer:
 @pytest.fixture(name='clock')
 def make_clock(monkeypatch):
     """A clock to be set; nothing looks by itself."""
+
     class Clock:
         now_s = 0.0
+
     monkeypatch.setattr(module, 'FollowedServer', FakeServer)
     monkeypatch.setattr(module.time, 'monotonic', lambda: Clock.now_s)
     monkeypatch.setattr(FrontEnd, '_keep_connected', lambda self: None)
@@ -82,8 +85,12 @@ def test_one_that_was_away_for_a_while_begins_anew(clock):
     front_end = FrontEnd('ann')
     look_after(front_end, clock, 0.0, LIST)
     FakeServer.made.connected = False
-    for seconds, published in ((1.0, []), (module._FORGET_S - 10.0, [LIST]), (20.0, []), (20.0,
-                                                                                          [])):
+    for seconds, published in (
+        (1.0, []),
+        (module._FORGET_S - 10.0, [LIST]),
+        (20.0, []),
+        (20.0, []),
+    ):
         look_after(front_end, clock, seconds, *published)
     assert front_end.servers == ['/robot/expert_query']
 
@@ -97,8 +104,9 @@ def test_one_that_was_named_is_followed_for_ever(clock):
 
 
 def listed(key, status, holder=''):
-    goal = SimpleNamespace(query_id=key, failed_state='PICK',
-                           choices=[SimpleNamespace(state='DETECT')])
+    goal = SimpleNamespace(
+        query_id=key, failed_state='PICK', choices=[SimpleNamespace(state='DETECT')]
+    )
     return ListedQuestion('/robot/expert_query', goal, status, holder, 0.0, float('inf'))
 
 
@@ -106,8 +114,9 @@ OTHERS = [listed('held', OpenQuery.CLAIMED, 'bob'), listed('by hand', OpenQuery.
 
 
 @pytest.mark.parametrize('missed, renewed', [(MOST_MISSED, True), (MOST_MISSED + 1, False)])
-def test_a_claim_is_dropped_after_renewals_in_which_its_question_is_not_listed(clock, missed,
-                                                                               renewed):
+def test_a_claim_is_dropped_after_renewals_in_which_its_question_is_not_listed(
+    clock, missed, renewed
+):
     front_end = FrontEnd('ann', ['/robot/expert_query'])
     server, question = FakeServer.made, listed('ours', OpenQuery.PENDING)
     assert front_end.claim(question).ok
@@ -158,7 +167,8 @@ def test_a_question_that_somebody_works_on_is_not_waited_for(free, found):
 
 
 def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_outlives_a_server(
-        monkeypatch):
+    monkeypatch,
+):
     page = (Path(__file__).resolve().parents[3] / 'doc' / 'expert.md').read_text(encoding='utf-8')
     program = page.split('## A front end in')[1].split('```python\n')[1].split('```')[0]
     front_end = Asking('first', 'second', 'third', fails=1)
@@ -169,13 +179,18 @@ def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_out
         if answer is None:
             raise KeyboardInterrupt
         return answer
+
     monkeypatch.setattr(module, 'FrontEnd', lambda _expert: front_end)
-    monkeypatch.setattr(module, 'wait_for_question',
-                        lambda each, timeout_s: wait_for_question(each, 0.0) or type_in(''))
+    monkeypatch.setattr(
+        module,
+        'wait_for_question',
+        lambda each, timeout_s: wait_for_question(each, 0.0) or type_in(''),
+    )
     monkeypatch.setattr(module.rospy, 'init_node', lambda *_, **__: None)
     monkeypatch.setattr(module.rospy.rostime, 'wallsleep', lambda _s: None)
     with pytest.raises(KeyboardInterrupt):
         exec(compile(program, 'expert.md', 'exec'), {'input': type_in})
     assert front_end.answers == [('first', 'DETECT'), ('second', 'DETECT')]
-    assert front_end.claimed == ['first', 'second', 'third'
-                                 ] and front_end.released[-1] == 'third', 'left by Ctrl-C'
+    assert (
+        front_end.claimed == ['first', 'second', 'third'] and front_end.released[-1] == 'third'
+    ), 'left by Ctrl-C'

@@ -1,4 +1,5 @@
 """Robots come and go: the latest are listened to, whoever else was."""
+
 import pytest
 
 from smach_oracle.expert import robot_topics
@@ -13,7 +14,6 @@ def listened_to(monkeypatch):
     topics = []
 
     class FakeTopic:
-
         def __init__(self, robot, topic, *_):
             self._topic = robot + topic
             topics.append(self._topic)
@@ -60,7 +60,8 @@ def test_what_robots_print_is_kept_of_the_latest_only():
     outputs = InterfaceOutputs()
     for number in range(100):
         outputs.taker('/robot_{}'.format(number))(
-            InterfaceOutput(query_id='q{}'.format(number), lines=['hello']))
+            InterfaceOutput(query_id='q{}'.format(number), lines=['hello'])
+        )
     assert outputs.newest('q99').lines == ['hello'] and outputs.newest('q0') is None
 
 

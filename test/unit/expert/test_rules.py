@@ -1,4 +1,5 @@
 """Experts without a person: what rules answer, and how wrong rules are refused."""
+
 import threading
 import time
 
@@ -25,8 +26,14 @@ def test_the_most_specific_rule_answers():
 
 
 def test_a_rule_for_a_machine_that_had_no_name_holds_now_that_it_has_its_nodes():
-    rules = Rules.parse({'SM_ROOT/PICK': GOTO, 'SM_ROOT/ARM/PICK': ASSIST, 'task/PICK': ASSIST,
-                         'default': {'kind': 'give_up'}})
+    rules = Rules.parse(
+        {
+            'SM_ROOT/PICK': GOTO,
+            'SM_ROOT/ARM/PICK': ASSIST,
+            'task/PICK': ASSIST,
+            'default': {'kind': 'give_up'},
+        }
+    )
     assert rules.next('/task', 't', 'task', 'PICK').kind == 'interface'
     assert rules.next('/robot', 't', 'robot', 'PICK').kind == 'goto'
     assert rules.next('/robot', 't', 'robot/ARM', 'PICK').kind == 'interface'
@@ -48,24 +55,42 @@ def test_robots_do_not_use_up_each_other_s_rules():
     assert [rules.next(robot, 't', 'P', 'PICK').kind for robot in ('/a', '/b')] == ['goto', 'goto']
 
 
-@pytest.mark.parametrize('settings, text', [
-    ('PICK', "rules: 'PICK' is not allowed; allowed: a mapping"),
-    ({'PICK': []}, 'PICK: .* is not allowed; allowed: a rule'),
-    ({'PICK': 'goto DETECT'}, "PICK: 'goto DETECT' is not allowed; allowed: a mapping with a kind"),
-    ({'PICK': {'kind': 'go'}
-      }, "PICK.kind: 'go' is not allowed; .*: give_up, goto, interface, supersede or ignore"),
-    ({'PICK': {'state': 'DETECT'}}, 'PICK.kind: None is not allowed'),
-    ({'PICK': [GOTO, {'kind': 'goto'}]
-      }, r'PICK\[1\].state: None is not allowed; allowed: a name; goto needs one'),
-    ({'PICK': dict(GOTO, delay=3)}, 'PICK.delay: .* allowed: the keys kind, state'),
-    ({'PICK': dict(GOTO, delay_s=-1)}, 'PICK.delay_s: -1 is not allowed; allowed: seconds from 0'),
-    ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
-    ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
-    ({'PICK': dict(GOTO, confirm='yes')}, "PICK.confirm: 'yes' is not allowed; allowed: true or"),
-    ({'PICK': dict(GOTO, why=3)}, 'PICK.why: 3 is not allowed. YAML reads 3 as a number: '
-     'write "3"; allowed: a string'),
-    ({3: GOTO}, 'allowed: labels of states as keys')
-])
+@pytest.mark.parametrize(
+    'settings, text',
+    [
+        ('PICK', "rules: 'PICK' is not allowed; allowed: a mapping"),
+        ({'PICK': []}, 'PICK: .* is not allowed; allowed: a rule'),
+        (
+            {'PICK': 'goto DETECT'},
+            "PICK: 'goto DETECT' is not allowed; allowed: a mapping with a kind",
+        ),
+        (
+            {'PICK': {'kind': 'go'}},
+            "PICK.kind: 'go' is not allowed; .*: give_up, goto, interface, supersede or ignore",
+        ),
+        ({'PICK': {'state': 'DETECT'}}, 'PICK.kind: None is not allowed'),
+        (
+            {'PICK': [GOTO, {'kind': 'goto'}]},
+            r'PICK\[1\].state: None is not allowed; allowed: a name; goto needs one',
+        ),
+        ({'PICK': dict(GOTO, delay=3)}, 'PICK.delay: .* allowed: the keys kind, state'),
+        (
+            {'PICK': dict(GOTO, delay_s=-1)},
+            'PICK.delay_s: -1 is not allowed; allowed: seconds from 0',
+        ),
+        ({'PICK': dict(GOTO, delay_s=True)}, 'PICK.delay_s: True'),
+        ({'PICK': dict(GOTO, outputs=[1])}, r'PICK.outputs: \[1\]'),
+        (
+            {'PICK': dict(GOTO, confirm='yes')},
+            "PICK.confirm: 'yes' is not allowed; allowed: true or",
+        ),
+        (
+            {'PICK': dict(GOTO, why=3)},
+            'PICK.why: 3 is not allowed. YAML reads 3 as a number: write "3"; allowed: a string',
+        ),
+        ({3: GOTO}, 'allowed: labels of states as keys'),
+    ],
+)
 def test_wrong_rules_are_refused_with_what_is_allowed(settings, text):
     with pytest.raises(SettingsError, match=text):
         Rules.parse(settings)
@@ -83,8 +108,16 @@ def test_rules_come_from_a_file(tmp_path):
             load_rules(None, wrong)
 
 
-@pytest.mark.parametrize('value, names', [('all', []), ('', []), ('/a/q /b/q', ['/a/q', '/b/q']),
-                                          (['all'], []), (['/a/q', '/b/q'], ['/a/q', '/b/q'])])
+@pytest.mark.parametrize(
+    'value, names',
+    [
+        ('all', []),
+        ('', []),
+        ('/a/q /b/q', ['/a/q', '/b/q']),
+        (['all'], []),
+        (['/a/q', '/b/q'], ['/a/q', '/b/q']),
+    ],
+)
 def test_servers_are_a_text_or_a_list(value, names):
     assert servers_of(value) == names
 
@@ -96,19 +129,29 @@ def test_servers_that_are_none_are_refused(value):
 
 
 def ask(rules, cancelled=None, **changes):
-    return RuleExpert(Rules.parse(rules)).ask(make_question(**changes), cancelled
-                                              or threading.Event(), lambda *_: None)
+    return RuleExpert(Rules.parse(rules)).ask(
+        make_question(**changes), cancelled or threading.Event(), lambda *_: None
+    )
 
 
 def test_an_expert_by_rules_answers_in_the_same_process():
-    answer = ask({
-        'PICK': {
-            'kind': 'supersede', 'outcome': 'succeeded', 'outputs': {'grasped': 'mug'},
-            'why': 'test'
+    answer = ask(
+        {
+            'PICK': {
+                'kind': 'supersede',
+                'outcome': 'succeeded',
+                'outputs': {'grasped': 'mug'},
+                'why': 'test',
+            }
         }
-    })
-    assert answer == Answer(AnswerKind.SUPERSEDE, outcome='succeeded', outputs={'grasped': 'mug'},
-                            by='scripted', why='test')
+    )
+    assert answer == Answer(
+        AnswerKind.SUPERSEDE,
+        outcome='succeeded',
+        outputs={'grasped': 'mug'},
+        by='scripted',
+        why='test',
+    )
 
 
 def test_an_answer_that_comes_after_the_deadline_is_none():
@@ -118,14 +161,21 @@ def test_an_answer_that_comes_after_the_deadline_is_none():
     assert 0.2 <= time.monotonic() - begun_s < 10.0
 
 
-POURED = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR',)),
-          StateChoice('DETECT', 0.9, 1, 1, (), (), repeats=('POUR',)))
+POURED = (
+    StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR',)),
+    StateChoice('DETECT', 0.9, 1, 1, (), (), repeats=('POUR',)),
+)
 
 
-@pytest.mark.parametrize('rule, answered', [
-    ({'kind': 'goto', 'state': 'POUR'}, None),
-    ({'kind': 'goto', 'state': 'POUR', 'confirm': False}, None),
-    ({'kind': 'goto', 'state': 'POUR', 'confirm': True}, 'POUR'), (GOTO, 'DETECT')])
+@pytest.mark.parametrize(
+    'rule, answered',
+    [
+        ({'kind': 'goto', 'state': 'POUR'}, None),
+        ({'kind': 'goto', 'state': 'POUR', 'confirm': False}, None),
+        ({'kind': 'goto', 'state': 'POUR', 'confirm': True}, 'POUR'),
+        (GOTO, 'DETECT'),
+    ],
+)
 def test_a_rule_has_a_state_repeated_only_where_it_confirms_that(rule, answered):
     answer = ask({'PICK': rule}, choices=POURED, deadline_s=0.1)
     assert (answer and answer.state) == answered
@@ -134,7 +184,8 @@ def test_a_rule_has_a_state_repeated_only_where_it_confirms_that(rule, answered)
 def test_a_rule_that_does_not_confirm_says_so():
     rule = Rules.parse({'PICK': {'kind': 'goto', 'state': 'POUR'}}).next('/r', 't', 'P', 'PICK')
     assert rule.why_not(POURED) == (
-        'POUR was done in this trial, and only a rule with confirm: true has it repeated')
+        'POUR was done in this trial, and only a rule with confirm: true has it repeated'
+    )
     assert rule.why_not(POURED[1:]) == '' == rule.why_not([POURED[0]._replace(repeats=())])
 
 
@@ -155,6 +206,7 @@ def test_a_question_taken_back_is_not_waited_for():
         def wait(self, timeout=None):
             self.waited_for = True
             return super().wait(timeout)
+
     cancelled = Cancelled()
     asker = Once(lambda: cancelled.waited_for, cancelled.set)
     assert ask({'PICK': {'kind': 'ignore'}}, cancelled) is None
@@ -165,8 +217,19 @@ def test_an_expert_by_rules_runs_the_interfaces_it_was_given():
     done = Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='assist')
     expert = RuleExpert(Rules({}), interfaces={'assist': lambda question: done})
     told = []
-    run = [expert.run_interface(InterfaceOffer(name, '/x'), make_question(), threading.Event(),
-                                lambda *what: told.append(what)) for name in ('assist', 'other')]
+    run = [
+        expert.run_interface(
+            InterfaceOffer(name, '/x'),
+            make_question(),
+            threading.Event(),
+            lambda *what: told.append(what),
+        )
+        for name in ('assist', 'other')
+    ]
     assert run == [done, None]
-    assert told == [('interface_start', 'assist', ''), ('interface_end', 'assist', 'succeeded'),
-                    ('interface_start', 'other', ''), ('interface_end', 'other', '')]
+    assert told == [
+        ('interface_start', 'assist', ''),
+        ('interface_end', 'assist', 'succeeded'),
+        ('interface_start', 'other', ''),
+        ('interface_end', 'other', ''),
+    ]

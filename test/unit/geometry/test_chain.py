@@ -1,6 +1,7 @@
 """Serial chains: positions, Jacobians, limits and inverse kinematics, on an arm with the PR2's
 proportions.
 """
+
 import time
 
 import numpy as np
@@ -9,15 +10,17 @@ import pytest
 from smach_oracle.geometry.chain import JointChain
 from smach_oracle.geometry.transforms import from_rpy, rotation_vector
 
-LINKS = [('lift', 'prismatic', '0 0 0.7', '0 0 0', '0 0 1', 0.0, 0.3),
-         ('pan', 'revolute', '0 -0.19 0.1', '0 0 0', '0 0 1', -2.28, 0.71),
-         ('shoulder', 'revolute', '0.1 0 0', '0 0 0', '0 1 0', -0.52, 1.39),
-         ('roll', 'revolute', '0 0 0', '0 0 0', '1 0 0', -3.9, 0.8),
-         ('elbow', 'revolute', '0.4 0 0', '0 0 0', '0 1 0', -2.32, 0.0),
-         ('forearm', 'continuous', '0 0 0', '0 0 0', '1 0 0', 0.0, -1.0),
-         ('wrist', 'revolute', '0.321 0 0', '0.1 0.2 -0.1', '0 1 0', -2.09, 0.0),
-         ('hand', 'continuous', '0 0 0', '0 0 0', '1 0 0', 0.0, -1.0),
-         ('tool', 'fixed', '0.18 0 0', '0 0 0', '1 0 0', 0.0, 0.0)]
+LINKS = [
+    ('lift', 'prismatic', '0 0 0.7', '0 0 0', '0 0 1', 0.0, 0.3),
+    ('pan', 'revolute', '0 -0.19 0.1', '0 0 0', '0 0 1', -2.28, 0.71),
+    ('shoulder', 'revolute', '0.1 0 0', '0 0 0', '0 1 0', -0.52, 1.39),
+    ('roll', 'revolute', '0 0 0', '0 0 0', '1 0 0', -3.9, 0.8),
+    ('elbow', 'revolute', '0.4 0 0', '0 0 0', '0 1 0', -2.32, 0.0),
+    ('forearm', 'continuous', '0 0 0', '0 0 0', '1 0 0', 0.0, -1.0),
+    ('wrist', 'revolute', '0.321 0 0', '0.1 0.2 -0.1', '0 1 0', -2.09, 0.0),
+    ('hand', 'continuous', '0 0 0', '0 0 0', '1 0 0', 0.0, -1.0),
+    ('tool', 'fixed', '0.18 0 0', '0 0 0', '1 0 0', 0.0, 0.0),
+]
 SEED = np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0])
 
 
@@ -30,7 +33,8 @@ def arm_urdf() -> str:
             'link="{0}_link"/>'
             '<origin xyz="{3}" rpy="{4}"/><axis xyz="{5}"/><limit lower="{6}" upper="{7}" '
             'velocity="2"/>'
-            '</joint>'.format(name, kind, parent, xyz, rpy, axis, lower, upper))
+            '</joint>'.format(name, kind, parent, xyz, rpy, axis, lower, upper)
+        )
         parent = name + '_link'
     return ''.join(text) + '</robot>'
 
@@ -64,7 +68,8 @@ def test_jacobian_is_the_derivative_also_of_a_lift():
         there = arm.forward(q + step * np.eye(8)[k])
         assert np.allclose((there[:3, 3] - here[:3, 3]) / step, jacobian[:3, k], atol=1e-5)
         assert np.allclose(
-            rotation_vector(there @ np.linalg.inv(here)) / step, jacobian[3:, k], atol=1e-5)
+            rotation_vector(there @ np.linalg.inv(here)) / step, jacobian[3:, k], atol=1e-5
+        )
 
 
 def test_inverse_reaches_what_can_be_reached_fast_and_within_limits(arm):
@@ -127,11 +132,15 @@ def test_continuous_joints_stay_within_half_a_turn_of_the_seed(arm):
     assert np.all(np.abs(solved - seed)[[4, 6]] <= np.pi)
 
 
-@pytest.mark.parametrize('root, tip, fixed, text', [
-    ('base', 'nowhere', {}, "no link 'nowhere'"),
-    ('tool_link', 'base', {}, "'base' does not hang below 'tool_link'"),
-    ('base', 'tool_link', {'knee': 0.0}, 'no joint knee'),
-    ('hand_link', 'tool_link', {}, 'no joint moves')])
+@pytest.mark.parametrize(
+    'root, tip, fixed, text',
+    [
+        ('base', 'nowhere', {}, "no link 'nowhere'"),
+        ('tool_link', 'base', {}, "'base' does not hang below 'tool_link'"),
+        ('base', 'tool_link', {'knee': 0.0}, 'no joint knee'),
+        ('hand_link', 'tool_link', {}, 'no joint moves'),
+    ],
+)
 def test_chain_that_is_not_there_is_named(root, tip, fixed, text):
     with pytest.raises(ValueError, match=text):
         JointChain.from_urdf(arm_urdf(), root, tip, fixed)

@@ -1,6 +1,7 @@
 """How joints move: as matrices, one by one and many at once, and as tf has it; held against
 rotation vectors.
 """
+
 import xml.etree.ElementTree as ElementTree
 
 import numpy as np
@@ -12,8 +13,9 @@ from smach_oracle.geometry.joints import Joint, moved, origin_of, placed_parts, 
 from smach_oracle.geometry.transform_tree import TransformTree
 from smach_oracle.geometry.transforms import from_quaternion, from_rpy, rotation_about
 
-TILTED = arm_urdf().replace('rpy="0 0 0"/><axis xyz="0 0 1"',
-                            'rpy="0.3 -0.5 0.7"/><axis xyz="0.2 -1 3"')
+TILTED = arm_urdf().replace(
+    'rpy="0 0 0"/><axis xyz="0 0 1"', 'rpy="0.3 -0.5 0.7"/><axis xyz="0.2 -1 3"'
+)
 
 
 def by_rotation_vector(joint: Joint, position: float) -> np.ndarray:
@@ -34,19 +36,23 @@ def test_a_joint_moves_about_its_axis_or_along_it(position):
     one_by_one = np.array([joint.origin @ joint.motion(position) for joint in joints])
     np.testing.assert_allclose(one_by_one, expected, rtol=0, atol=1e-12)
     moving = [joint for joint in joints if joint.moves]
-    together = moved(placed_parts(moving, [joint.origin for joint in moving]),
-                     np.array([joint.turns for joint in moving]), np.full((2, len(moving)),
-                                                                          position))
+    together = moved(
+        placed_parts(moving, [joint.origin for joint in moving]),
+        np.array([joint.turns for joint in moving]),
+        np.full((2, len(moving)), position),
+    )
     for found in together:
-        np.testing.assert_allclose(found, expected[[joint.moves for joint in joints]], rtol=0,
-                                   atol=1e-12)
+        np.testing.assert_allclose(
+            found, expected[[joint.moves for joint in joints]], rtol=0, atol=1e-12
+        )
 
 
 def test_as_tf_has_them_links_are_at_the_same_places():
     joints = read_joints(TILTED)
     positions = {
         joint.name: 0.1 * number - 0.3
-        for number, joint in enumerate(joints.values()) if joint.moves
+        for number, joint in enumerate(joints.values())
+        if joint.moves
     }
     tree = TransformTree(TILTED, list(positions))
     links = tree.moving(positions) + tree.fixed
@@ -54,9 +60,12 @@ def test_as_tf_has_them_links_are_at_the_same_places():
     for link in links:
         joint = joints[link.child]
         assert link.parent == joint.parent
-        np.testing.assert_allclose(from_quaternion(link.position, link.turn),
-                                   joint.origin @ joint.motion(positions.get(joint.name, 0.0)),
-                                   rtol=0, atol=1e-12)
+        np.testing.assert_allclose(
+            from_quaternion(link.position, link.turn),
+            joint.origin @ joint.motion(positions.get(joint.name, 0.0)),
+            rtol=0,
+            atol=1e-12,
+        )
 
 
 def test_a_joint_that_is_not_measured_counts_as_fixed_at_zero():
@@ -66,8 +75,9 @@ def test_a_joint_that_is_not_measured_counts_as_fixed_at_zero():
 
 def test_a_turn_about_an_axis():
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
-    np.testing.assert_allclose(rotation_about(axis, 0.8),
-                               Rotation.from_rotvec(0.8 * axis).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(
+        rotation_about(axis, 0.8), Rotation.from_rotvec(0.8 * axis).as_matrix(), atol=1e-12
+    )
 
 
 def test_an_origin_is_read_or_the_identity():

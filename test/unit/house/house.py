@@ -1,4 +1,5 @@
 """The source tree, for the tests that hold the house rules."""
+
 import ast
 import functools
 import subprocess
@@ -13,14 +14,17 @@ def is_python(path: Path) -> bool:
     """Whether `path` is Python by its suffix or, in scripts/, by its first line."""
     if path.suffix == '.py':
         return True
-    return not path.suffix and path.is_file() and b'python' in path.read_bytes()[:40].split(
-        b'\n')[0]
+    return (
+        not path.suffix and path.is_file() and b'python' in path.read_bytes()[:40].split(b'\n')[0]
+    )
 
 
 def python_files(*folders: str) -> List[Path]:
     """Every Python file of the checkout, or of the folders given."""
     found = [
-        path for folder in folders or SOURCES for path in sorted((ROOT / folder).rglob('*'))
+        path
+        for folder in folders or SOURCES
+        for path in sorted((ROOT / folder).rglob('*'))
         if is_python(path)
     ]
     assert found, 'no Python files in {}'.format(folders)
@@ -29,14 +33,17 @@ def python_files(*folders: str) -> List[Path]:
 
 def tracked_text() -> List[Path]:
     """Every text file of the checkout that git knows."""
-    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE,
-                            check=False).stdout
+    listed = subprocess.run(
+        ['git', 'ls-files', '-z'], cwd=str(ROOT), stdout=subprocess.PIPE, check=False
+    ).stdout
     names = [name for name in listed.decode().split('\0') if name]
     # an unpacked archive has no git; its sources have the same rule
-    paths = [ROOT / name for name in names
-             ] or [path for folder in SOURCES for path in (ROOT / folder).rglob('*')]
+    paths = [ROOT / name for name in names] or [
+        path for folder in SOURCES for path in (ROOT / folder).rglob('*')
+    ]
     return [
-        path for path in paths
+        path
+        for path in paths
         if path.is_file() and path.suffix not in ('.png', '.svg', '.bag', '.pyc')
     ]
 
@@ -65,7 +72,7 @@ def imports(path: Path) -> Iterator[Tuple[int, str]]:
             for alias in node.names:
                 yield node.lineno, alias.name
         elif isinstance(node, ast.ImportFrom):
-            base = '.'.join(parts[:len(parts) - node.level]) if node.level else ''
+            base = '.'.join(parts[: len(parts) - node.level]) if node.level else ''
             module = '.'.join(filter(None, [base, node.module]))
             for alias in node.names:
                 yield node.lineno, '{}.{}'.format(module, alias.name)

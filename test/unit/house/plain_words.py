@@ -3,6 +3,7 @@
 ``python3 test/unit/house/plain_words.py [FILE]...`` prints what it and proselint find in files.
 Without names it reads all files.
 """
+
 import ast
 import io
 import re
@@ -40,7 +41,8 @@ SENTENCE = re.compile(r'(?<=[.?!:])\s+(?=[A-Z`*"(])')
 INVERTED = re.compile(
     r'(?:\* +|\d+\. +)?\**'
     r'(?:What|Who|Whoever|Whom|Whose|Of (?:an?|the|what|such|more|less|each|its|which|two|those)) '
-    r'(?![^.?]*\?)')
+    r'(?![^.?]*\?)'
+)
 NOT_A = re.compile(r'(?<!there )(?<!There )\b(?:is|are|was|were) none\b(?! of)')
 CODE = re.compile(r'``.*?``|`[^`]*`|"[^"]*"|(?<=\]\()[^)]*(?=\))', re.DOTALL)
 
@@ -49,8 +51,10 @@ def terms() -> List[Pattern[str]]:
     """The phrases in code font in the last column of the table of terms."""
     rows = re.findall(r'^\|.*\|(.*)\|$', (ROOT / STYLE).read_text(encoding='utf-8'), re.MULTILINE)
     phrases = [phrase for row in rows for phrase in re.findall('`([^`]+)`', row)]
-    return [re.compile(r'(?<!there )\b{}\b(?! as\b)'.format(re.escape(phrase)), re.IGNORECASE)
-            for phrase in phrases]
+    return [
+        re.compile(r'(?<!there )\b{}\b(?! as\b)'.format(re.escape(phrase)), re.IGNORECASE)
+        for phrase in phrases
+    ]
 
 
 TERMS = terms()
@@ -81,8 +85,11 @@ def page_prose(text: str) -> Iterator[Prose]:
 def python_prose(text: str) -> Iterator[Prose]:
     """Docstrings, comments, and strings of at least four words."""
     for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and len(
-                node.value.split()) >= 4:
+        if (
+            isinstance(node, ast.Constant)
+            and isinstance(node.value, str)
+            and len(node.value.split()) >= 4
+        ):
             yield Prose(node.lineno, node.value)
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT:
@@ -123,13 +130,14 @@ def faults(piece: Prose) -> Iterator[Fault]:
     if not piece.page or piece.table:
         return
     if '; ' in text:
-        yield Fault(piece.line, 'semicolon', text[max(0, text.index('; ') - 40):][:60])
+        yield Fault(piece.line, 'semicolon', text[max(0, text.index('; ') - 40) :][:60])
     for sentence in SENTENCE.split(text):
         if INVERTED.match(sentence):
             yield Fault(piece.line, 'inverted', sentence[:60])
         if len(sentence.split()) > MOST_WORDS:
-            yield Fault(piece.line, 'long', '{} words: {}'.format(len(sentence.split()),
-                                                                  sentence[:60]))
+            yield Fault(
+                piece.line, 'long', '{} words: {}'.format(len(sentence.split()), sentence[:60])
+            )
 
 
 def faults_of(path: Path) -> List[Fault]:
@@ -140,8 +148,13 @@ def faults_of(path: Path) -> List[Fault]:
 def proselint_faults(path: Path) -> Iterator[Fault]:
     """What proselint finds in a page: its words, for typography is the browser's matter."""
     from proselint.tools import lint
-    text = re.sub(r'^```.*?^```', lambda block: re.sub(r'[^\n]', '', block.group()),
-                  path.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL)
+
+    text = re.sub(
+        r'^```.*?^```',
+        lambda block: re.sub(r'[^\n]', '', block.group()),
+        path.read_text(encoding='utf-8'),
+        flags=re.MULTILINE | re.DOTALL,
+    )
     for found in lint(quotations_out(text)):
         if not found[0].startswith('typography'):
             yield Fault(found[2] + 1, found[0], found[1])
@@ -157,8 +170,7 @@ def is_checked(path: Path) -> bool:
 
 def checked_files() -> List[Path]:
     """The files for which the rules hold today."""
-    return [path for path in tracked_text()
-            if is_checked(path)]
+    return [path for path in tracked_text() if is_checked(path)]
 
 
 def main() -> int:

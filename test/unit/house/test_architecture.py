@@ -1,4 +1,5 @@
 """doc/architecture.md: its picture is drawn from the imports, its ways are there."""
+
 import ast
 import collections
 import functools
@@ -24,8 +25,7 @@ MEANINGS = {
     'front ends': lambda name: below(name, ['smach_oracle.expert']),
     'the robot': lambda name: below(name, ['smach_oracle.pr2']),
     'the simulation': lambda name: below(name, ['smach_oracle.simulation']),
-    'the executive\'s inside': lambda name: below(name, ['smach_oracle.' + each
-                                                         for each in INSIDE]),
+    "the executive's inside": lambda name: below(name, ['smach_oracle.' + each for each in INSIDE]),
     'other rooms': lambda name: below(name, ['smach_oracle.' + each for each in ROOMS]),
 }
 
@@ -42,8 +42,11 @@ def bodies(name, function):
     if name.endswith('.js'):
         found = re.findall(r'^  (?:async )?%s\(.*?^  }$' % function, text, re.MULTILINE | re.DOTALL)
         return found
-    return [ast.get_source_segment(text, node) for node in ast.walk(ast.parse(text))
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.name == function]
+    return [
+        ast.get_source_segment(text, node)
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)) and node.name == function
+    ]
 
 
 STEPS = [step for way in ways() for step in way]
@@ -61,22 +64,30 @@ def is_value(function, name):
         return bool(re.search(r'=> this\.%s\(' % function, text_of(name)))
     nodes = list(ast.walk(ast.parse(text_of(name))))
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
-    return any(isinstance(node, (ast.Attribute, ast.Name)) and id(node) not in called
-               and function == getattr(node, 'attr', getattr(node, 'id', None)) for node in nodes)
+    return any(
+        isinstance(node, (ast.Attribute, ast.Name))
+        and id(node) not in called
+        and function == getattr(node, 'attr', getattr(node, 'id', None))
+        for node in nodes
+    )
 
 
 def types(name, folder):
     """The messages, services or actions whose parts a file imports."""
     parts = re.compile('(Action|Goal|Result|Feedback|Request|Response)+$')
-    return {parts.sub('', alias.name) for node in ast.walk(ast.parse(text_of(name)))
-            if isinstance(node, ast.ImportFrom) and (node.module or '').endswith('.' + folder)
-            for alias in node.names} - {'Header'}
+    return {
+        parts.sub('', alias.name)
+        for node in ast.walk(ast.parse(text_of(name)))
+        if isinstance(node, ast.ImportFrom) and (node.module or '').endswith('.' + folder)
+        for alias in node.names
+    } - {'Header'}
 
 
 def calls(step, after):
     """Whether the step's function names the next."""
-    return any(re.search(r'\b_?{}\b'.format(after[1].lstrip('_')), body)
-               for body in bodies(*step[:2]))
+    return any(
+        re.search(r'\b_?{}\b'.format(after[1].lstrip('_')), body) for body in bodies(*step[:2])
+    )
 
 
 @functools.lru_cache(maxsize=None)
@@ -88,15 +99,18 @@ def functions():
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 uses[name, node.name] |= {
                     inner.attr if isinstance(inner, ast.Attribute) else inner.func.id
-                    for inner in ast.walk(node) if isinstance(inner, ast.Attribute)
-                    or isinstance(inner, ast.Call) and isinstance(inner.func, ast.Name)}
+                    for inner in ast.walk(node)
+                    if isinstance(inner, ast.Attribute)
+                    or isinstance(inner, ast.Call)
+                    and isinstance(inner.func, ast.Name)
+                }
     return uses
 
 
 @functools.lru_cache(maxsize=None)
 def knows(name, other):
     """Whether one file of the page imports something from another."""
-    module = 'smach_oracle.' + other[:-len('.py')].replace('/', '.')
+    module = 'smach_oracle.' + other[: -len('.py')].replace('/', '.')
     return any(below(target, [module]) for _, target in imports(SOURCES / name))
 
 
@@ -126,16 +140,22 @@ def returns(step, after):
 
 def queued(step, after):
     """Whether the next function's file uses the class that the step's function puts into."""
-    classes = [node.name for node in ast.parse(text_of(step[0])).body
-               if isinstance(node, ast.ClassDef)
-               and step[1] in {getattr(each, 'name', None) for each in node.body}]
+    classes = [
+        node.name
+        for node in ast.parse(text_of(step[0])).body
+        if isinstance(node, ast.ClassDef)
+        and step[1] in {getattr(each, 'name', None) for each in node.body}
+    ]
     return any(re.search(r'\b{}\('.format(name), text_of(after[0])) for name in classes)
 
 
 def sent(step, after):
     """Whether one sends on a web socket, and the other is what a web socket calls."""
-    return after[1] == 'on_message' and 'WebSocketHandler' in text_of(after[0]) and any(
-        'socket.send(' in body for body in bodies(*step[:2]))
+    return (
+        after[1] == 'on_message'
+        and 'WebSocketHandler' in text_of(after[0])
+        and any('socket.send(' in body for body in bodies(*step[:2]))
+    )
 
 
 # how one function hands over to the next
@@ -147,15 +167,20 @@ WORDS = {
     'thread': lambda step, after: is_value(after[1], step[0]),
     'queue': queued,
     'socket': sent,
-    'topic': lambda step, after: (types(step[0], 'msg') & types(after[0], 'msg')
-                                  and 'Publisher(' in text_of(step[0])
-                                  and 'Subscriber(' in text_of(after[0])),
-    'service': lambda step, after: (types(step[0], 'srv') & types(after[0], 'srv')
-                                    and is_value(after[1], after[0])),
-    'action': lambda step, after: (types(step[0], 'msg') & types(after[0], 'msg')
-                                   and any('.set_succeeded(' in body for body in bodies(*step[:2]))
-                                   and 'GoalLink(' in text_of(after[0])),
-    'expert': lambda step, after: is_value(after[1], after[0])  # a command of the page's
+    'topic': lambda step, after: (
+        types(step[0], 'msg') & types(after[0], 'msg')
+        and 'Publisher(' in text_of(step[0])
+        and 'Subscriber(' in text_of(after[0])
+    ),
+    'service': lambda step, after: (
+        types(step[0], 'srv') & types(after[0], 'srv') and is_value(after[1], after[0])
+    ),
+    'action': lambda step, after: (
+        types(step[0], 'msg') & types(after[0], 'msg')
+        and any('.set_succeeded(' in body for body in bodies(*step[:2]))
+        and 'GoalLink(' in text_of(after[0])
+    ),
+    'expert': lambda step, after: is_value(after[1], after[0]),  # a command of the page's
 }
 
 
@@ -170,8 +195,7 @@ def test_a_step_is_there(name, function, then):
 
 @pytest.mark.parametrize('step, after', PAIRS, ids=lambda step: '{}:{}'.format(*step))
 def test_a_step_hands_over_to_the_next(step, after):
-    assert WORDS[step[2]](step, after), '{}:{} {} {}:{}? It does not'.format(
-        *step, *after[:2])
+    assert WORDS[step[2]](step, after), '{}:{} {} {}:{}? It does not'.format(*step, *after[:2])
 
 
 def test_each_way_ends():
@@ -179,10 +203,15 @@ def test_each_way_ends():
 
 
 def test_the_picture_is_drawn_from_the_imports():
-    drawn = subprocess.run([sys.executable, str(ROOT / 'doc/draw_rooms.py'), '--print'],
-                           stdout=subprocess.PIPE, timeout=60, check=True).stdout.decode()
-    assert PICTURE.with_suffix('.dot').read_text(encoding='utf-8') == drawn, \
+    drawn = subprocess.run(
+        [sys.executable, str(ROOT / 'doc/draw_rooms.py'), '--print'],
+        stdout=subprocess.PIPE,
+        timeout=60,
+        check=True,
+    ).stdout.decode()
+    assert PICTURE.with_suffix('.dot').read_text(encoding='utf-8') == drawn, (
         'draw it again: python3 doc/draw_rooms.py'
+    )
     shown = PICTURE.with_suffix('.svg').read_text(encoding='utf-8')
     arrows = re.findall(r'^  (\w+) -> (\w+);$', drawn, re.MULTILINE)
     titles = set(re.findall(r'<title>(\w+)&#45;&gt;(\w+)</title>', shown))
@@ -198,15 +227,16 @@ def test_a_room_does_not_know_what_the_page_says(room):
     own = ['smach_oracle.' + room]
     for what in ROWS[room].split(', '):
         knows = MEANINGS[what]
-        assert not told((where, name) for where, name in found(room)
-                        if knows(name) and not below(name, own)), what
+        assert not told(
+            (where, name) for where, name in found(room) if knows(name) and not below(name, own)
+        ), what
 
 
 def test_the_page_says_what_the_inside_is():
-    said, = re.findall(r'^The executive\'s inside is (.*)\. ', PAGE, re.MULTILINE)
+    (said,) = re.findall(r'^The executive\'s inside is (.*)\. ', PAGE, re.MULTILINE)
     assert {'oracle.' + name for name in re.findall('`(.*?)`', said)} == INSIDE
 
 
 def test_the_executive_has_the_layers_of_the_page():
-    table = PAGE[PAGE.index('Inside `oracle`'):].split('\n\n')[1]
+    table = PAGE[PAGE.index('Inside `oracle`') :].split('\n\n')[1]
     assert re.findall(r'^\| `(\w+)(?:\.py)?` \|', table, re.MULTILINE) == LAYERS['oracle']

@@ -1,6 +1,7 @@
 """Who may import whom: the executive is free of ROS, the use cases are free of us, the analysis
 runs anywhere.
 """
+
 import ast
 import collections
 import re
@@ -33,16 +34,29 @@ from house import ROOT, imports, parse, python_files, shown
 
 INTROSPECTION = 'smach_oracle.ros.introspection'
 MAX_MODULES = 20  # in a package, its __init__ not counted
-ROS = {'rospy', 'actionlib', 'rosbag', 'rosgraph', 'roslib', 'genpy', 'rospkg', 'smach_ros',
-       'smach_msgs'}
+ROS = {
+    'rospy',
+    'actionlib',
+    'rosbag',
+    'rosgraph',
+    'roslib',
+    'genpy',
+    'rospkg',
+    'smach_ros',
+    'smach_msgs',
+}
 STAND_INS = {'smach', 'smach_ros', 'smach_msgs', 'control_msgs'}
 PINNED = {
-    'cv2': 'opencv-python-headless', 'ompl': 'ompl', 'pybullet': 'pybullet', 'rosbags': 'rosbags'
+    'cv2': 'opencv-python-headless',
+    'ompl': 'ompl',
+    'pybullet': 'pybullet',
+    'rosbags': 'rosbags',
 }
 STDLIB = getattr(sys, 'stdlib_module_names', frozenset())
 
-without_stdlib_names = pytest.mark.skipif(not STDLIB,
-                                          reason='Python before 3.10 cannot list its own modules')
+without_stdlib_names = pytest.mark.skipif(
+    not STDLIB, reason='Python before 3.10 cannot list its own modules'
+)
 
 
 def imported_by(room: str) -> Set[str]:
@@ -69,22 +83,29 @@ def test_the_executive_keeps_its_inside_to_itself(room):
 def test_the_second_robots_nodes_do_not_see_what_is_true(node):
     place = 'inspection_robot/nodes/' + node
     assert list(found(place))
-    assert not told((where, name) for where, name in ours(place)
-                    if below(name, ['inspection_robot.world']))
+    assert not told(
+        (where, name) for where, name in ours(place) if below(name, ['inspection_robot.world'])
+    )
 
 
 @pytest.mark.parametrize('folder', ROS_FREE)
 def test_what_is_free_of_ros_imports_none(folder):
     # SMACH itself needs no ROS
-    assert not told((where, name) for where, name in found(folder)
-                    if needs_ros(name) and not (folder == 'oracle' and below(name, ['smach'])))
+    assert not told(
+        (where, name)
+        for where, name in found(folder)
+        if needs_ros(name) and not (folder == 'oracle' and below(name, ['smach']))
+    )
 
 
 @pytest.mark.parametrize('room', [room for room in ROOMS if room not in WITH_SMACH])
 def test_smach_is_known_where_machines_are_run_alone(room):
     # the console shows the machines that smach_msgs speak of
-    assert not told((where, name) for where, name in found(room) if needs_engine(name)
-                    and not (room == 'expert' and below(name, ['smach_msgs'])))
+    assert not told(
+        (where, name)
+        for where, name in found(room)
+        if needs_engine(name) and not (room == 'expert' and below(name, ['smach_msgs']))
+    )
 
 
 @pytest.mark.parametrize('room', sorted(LAYERS))
@@ -100,35 +121,53 @@ def test_the_packages_and_modules_of_a_room_import_downwards_alone(room):
     base = room.replace('/', '.')
     wrong = []
     for height, layer in enumerate(LAYERS[room]):
-        lower = members(LAYERS[room][height + 1:])
+        lower = members(LAYERS[room][height + 1 :])
         for unit in members([layer]):
             may = {'{}.{}'.format(base, each) for each in lower | {unit}}
-            wrong += [(where, name) for where, name in ours('{}/{}'.format(room, unit))
-                      if below(name, [base]) and not below(name, may)]
+            wrong += [
+                (where, name)
+                for where, name in ours('{}/{}'.format(room, unit))
+                if below(name, [base]) and not below(name, may)
+            ]
     assert not told(wrong)
 
 
 def test_no_package_has_too_many_modules():
-    counts = collections.Counter(path.parent for path in python_files('src')
-                                 if path.name != '__init__.py')
+    counts = collections.Counter(
+        path.parent for path in python_files('src') if path.name != '__init__.py'
+    )
     assert not {str(folder): count for folder, count in counts.items() if count > MAX_MODULES}
 
 
-@pytest.mark.parametrize('room',
-                         ['oracle', 'ros', 'tasks', 'expert', 'geometry', 'interfaces', 'pr2',
-                          'inspection_robot/robot', 'scripted_operator'])
+@pytest.mark.parametrize(
+    'room',
+    [
+        'oracle',
+        'ros',
+        'tasks',
+        'expert',
+        'geometry',
+        'interfaces',
+        'pr2',
+        'inspection_robot/robot',
+        'scripted_operator',
+    ],
+)
 def test_neither_executive_nor_task_nor_subsystem_nor_expert_asks_for_the_truth_or_its_causes(room):
     for path in python_files('src/smach_oracle/' + room):
         found = re.findall(
             r'\b(?:Reveal|RevealedBody|Judge|TrialCause)\b|world/(?:reveal|judge|cause)|truth_file',
-            path.read_text(encoding='utf-8'))
+            path.read_text(encoding='utf-8'),
+        )
         assert not found, '{} speaks of {}'.format(shown(path), found)
 
 
 def modules_of(room: str) -> Dict[str, Path]:
     """The modules of a room by dotted name; a package goes by its own."""
-    named = {path.relative_to(ROOT / 'src').with_suffix('').parts: path
-             for path in python_files('src/smach_oracle/' + room)}
+    named = {
+        path.relative_to(ROOT / 'src').with_suffix('').parts: path
+        for path in python_files('src/smach_oracle/' + room)
+    }
     return {
         '.'.join(parts[:-1] if parts[-1] == '__init__' else parts): path
         for parts, path in named.items()
@@ -146,8 +185,10 @@ def for_types_alone(path: Path) -> Set[int]:
     """The lines under `if TYPE_CHECKING`, which are not run."""
     return {
         inner.lineno
-        for node in ast.walk(parse(path)) if isinstance(node, ast.If)
-        and isinstance(node.test, ast.Name) and node.test.id == 'TYPE_CHECKING'
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.If)
+        and isinstance(node.test, ast.Name)
+        and node.test.id == 'TYPE_CHECKING'
         for inner in node.body
     }
 
@@ -168,8 +209,10 @@ def test_no_modules_of_a_room_import_each_other_in_a_circle(room):
     graph = {
         name: {
             module_of(target, modules)
-            for line, target in imports(path) if line not in for_types_alone(path)
-        } - {'', name}
+            for line, target in imports(path)
+            if line not in for_types_alone(path)
+        }
+        - {'', name}
         for name, path in modules.items()
     }
     assert not circle_in(graph)
@@ -181,9 +224,12 @@ def test_a_circle_of_imports_is_noticed():
 
 def test_the_executive_imports_at_the_top_of_its_files_alone():
     late = [
-        '{}:{}'.format(shown(path), node.lineno) for path in python_files('src/smach_oracle/oracle')
-        for function in ast.walk(parse(path)) if isinstance(function, (ast.FunctionDef, ast.Lambda))
-        for node in ast.walk(function) if isinstance(node, (ast.Import, ast.ImportFrom))
+        '{}:{}'.format(shown(path), node.lineno)
+        for path in python_files('src/smach_oracle/oracle')
+        for function in ast.walk(parse(path))
+        if isinstance(function, (ast.FunctionDef, ast.Lambda))
+        for node in ast.walk(function)
+        if isinstance(node, (ast.Import, ast.ImportFrom))
     ]
     # the lazy names of the package itself keep its pure parts free of smach
     assert [place.split(':')[0] for place in late] == ['src/smach_oracle/oracle/__init__.py']
@@ -202,16 +248,18 @@ def test_the_executive_needs_smach_and_python_alone():
 
 @without_stdlib_names
 def test_the_engine_needs_python_alone():
-    assert {name.split('.')[0]
-            for path in python_files('src/smach')
-            for _, name in imports(path)} - STDLIB <= {'smach'}
+    assert {
+        name.split('.')[0] for path in python_files('src/smach') for _, name in imports(path)
+    } - STDLIB <= {'smach'}
 
 
 def test_the_engine_knows_of_the_oracle_only_its_introspection():
     for package, allowed in (('smach', ()), ('smach_ros', (INTROSPECTION,))):
         for path in python_files('src/' + package):
             assert not [
-                name for _, name in imports(path) if name.startswith('smach_oracle')
+                name
+                for _, name in imports(path)
+                if name.startswith('smach_oracle')
                 and not (name + '.').startswith(tuple(each + '.' for each in allowed))
             ], shown(path)
 
@@ -219,7 +267,8 @@ def test_the_engine_knows_of_the_oracle_only_its_introspection():
 def test_the_introspection_knows_nothing_of_the_oracle():
     for path in python_files('src/smach_oracle/ros/introspection'):
         assert not [
-            name for _, name in imports(path)
+            name
+            for _, name in imports(path)
             if name.startswith('smach_oracle')
             and not below(name, [INTROSPECTION, 'smach_oracle.foreign'])
         ], shown(path)
@@ -240,11 +289,17 @@ def test_the_analysis_runs_where_neither_ros_nor_smach_is_installed():
         '.'.join(path.relative_to(ROOT / 'src').with_suffix('').parts).replace('.__init__', '')
         for path in python_files('src/smach_oracle/analysis')
     ]
-    program = ('import sys\nsys.path.insert(0, {!r})\n'
-               'for name in {!r}: sys.modules[name] = None\nimport {}\n').format(
-        str(ROOT / 'src'), sorted(ROS | {'smach'}), ', '.join(modules))
-    result = subprocess.run([sys.executable, '-c', program], stdout=subprocess.PIPE,
-                            stderr=subprocess.STDOUT, timeout=60, check=False)
+    program = (
+        'import sys\nsys.path.insert(0, {!r})\n'
+        'for name in {!r}: sys.modules[name] = None\nimport {}\n'
+    ).format(str(ROOT / 'src'), sorted(ROS | {'smach'}), ', '.join(modules))
+    result = subprocess.run(
+        [sys.executable, '-c', program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=60,
+        check=False,
+    )
     assert result.returncode == 0, result.stdout.decode()
 
 
@@ -264,13 +319,15 @@ def test_every_ros_package_that_is_imported_is_a_declared_dependency():
 def test_everything_that_is_imported_is_set_up_on_debian():
     lists = [ROOT / name for name in ('debian-packages.txt', 'requirements.txt')]
     there = {
-        re.split('[=<]',
-                 line.split()[0])[0]
+        re.split('[=<]', line.split()[0])[0]
         for path in lists
         for line in path.read_text(encoding='utf-8').splitlines()
         if line and not line.startswith('#')
     }
     used = {name.split('.')[0] for path in python_files('src') for _, name in imports(path)}
-    missing = {name for name in used - STDLIB - STAND_INS - {'smach_oracle'}
-               if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there}
+    missing = {
+        name
+        for name in used - STDLIB - STAND_INS - {'smach_oracle'}
+        if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there
+    }
     assert not missing

@@ -22,17 +22,30 @@ def too_long(text):
 def test_every_line_of_code_and_settings_has_at_most_100_columns():
     held = {path: path.read_bytes() for path in tracked_text() if is_held(path)}
     assert not [
-        '{}:{}'.format(shown(path), number) for path, content in held.items()
-        if b'\0' not in content for number in too_long(content.decode('utf-8'))
+        '{}:{}'.format(shown(path), number)
+        for path, content in held.items()
+        if b'\0' not in content
+        for number in too_long(content.decode('utf-8'))
     ]
 
 
-@pytest.mark.parametrize('name', [
-    'CMakeLists.txt', 'cmake/stand_ins.cmake', 'launch/oracle.yaml', 'launch/pr2.launch',
-    'msg/OracleEvent.msg', 'package.xml', 'pyproject.toml', 'scripts/setup',
-    'src/smach_oracle/tasks/pick_and_place.yaml', 'srv/AnswerQuery.srv', 'action/OpenDoor.action',
-    'test/rostest/expert_paused.test'
-])
+@pytest.mark.parametrize(
+    'name',
+    [
+        'CMakeLists.txt',
+        'cmake/stand_ins.cmake',
+        'launch/oracle.yaml',
+        'launch/pr2.launch',
+        'msg/OracleEvent.msg',
+        'package.xml',
+        'pyproject.toml',
+        'scripts/setup',
+        'src/smach_oracle/tasks/pick_and_place.yaml',
+        'srv/AnswerQuery.srv',
+        'action/OpenDoor.action',
+        'test/rostest/expert_paused.test',
+    ],
+)
 def test_each_kind_of_file_is_held(name):
     assert ROOT / name in {path for path in tracked_text() if is_held(path)}
 

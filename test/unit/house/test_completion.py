@@ -1,4 +1,5 @@
 """Tab behind the commands: what it offers is what their parsers know."""
+
 import subprocess
 import sys
 
@@ -7,34 +8,47 @@ from house import ROOT
 
 WORDS = ROOT / 'env-hooks/60.completion_words.bash'
 FILE = ROOT / 'env-hooks/61.completion.bash'
-ASK = '''{before}
+ASK = """{before}
 source "{words_file}"
 source "{file}"
 COMP_WORDS=({words})
 COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1))
 {function} {first}
 printf '%s\\n' "${{COMPREPLY[@]}}"
-complete -p rosrun'''
+complete -p rosrun"""
 ROSBASH = 'theirs() { COMPREPLY=(theirs); }; complete -F theirs rosrun'
 
 
 def offered(words, function='_smach_oracle_rosrun', before=':'):
     """What Tab offers for the last of the words."""
-    script = ASK.format(before=before, words_file=WORDS, file=FILE, words=words, function=function,
-                        first=words.split()[0])
-    done = subprocess.run(['bash', '-euc', script], stdout=subprocess.PIPE, check=True,
-                          timeout=30).stdout.decode().splitlines()
+    script = ASK.format(
+        before=before,
+        words_file=WORDS,
+        file=FILE,
+        words=words,
+        function=function,
+        first=words.split()[0],
+    )
+    done = (
+        subprocess.run(['bash', '-euc', script], stdout=subprocess.PIPE, check=True, timeout=30)
+        .stdout.decode()
+        .splitlines()
+    )
     assert done[-1].endswith('-F _smach_oracle_rosrun rosrun')
     return [line for line in done[:-1] if line]
 
 
-@pytest.mark.parametrize('words, first', [
-    ("rosrun sma", 'smach_oracle'), ("rosrun smach_oracle bag_st", 'bag_statistics'),
-    ("rosrun smach_oracle bag_statistics --js", '--json'),
-    ("rosrun smach_oracle bag_statistics bags --js", '--json'),
-    ("rosrun smach_oracle bag_statistics --x-axis ti", 'time'),
-    ("rosrun smach_oracle run_trials --task pick", 'pick_and_place')
-])
+@pytest.mark.parametrize(
+    'words, first',
+    [
+        ('rosrun sma', 'smach_oracle'),
+        ('rosrun smach_oracle bag_st', 'bag_statistics'),
+        ('rosrun smach_oracle bag_statistics --js', '--json'),
+        ('rosrun smach_oracle bag_statistics bags --js', '--json'),
+        ('rosrun smach_oracle bag_statistics --x-axis ti', 'time'),
+        ('rosrun smach_oracle run_trials --task pick', 'pick_and_place'),
+    ],
+)
 def test_one_word_is_offered(words, first):
     assert offered(words) == [first]
 
@@ -56,7 +70,13 @@ def test_other_packages_are_completed_as_before():
 
 def test_the_file_is_what_the_parsers_say_now():
     code = 'import write_completion; print(write_completion.text(), end="")'
-    told = subprocess.run([sys.executable, '-c', code], cwd=str(ROOT / 'env-hooks'), timeout=500,
-                          stdout=subprocess.PIPE, check=True).stdout.decode()
-    assert WORDS.read_text(encoding='utf-8') == told[told.index('# The words'):], \
+    told = subprocess.run(
+        [sys.executable, '-c', code],
+        cwd=str(ROOT / 'env-hooks'),
+        timeout=500,
+        stdout=subprocess.PIPE,
+        check=True,
+    ).stdout.decode()
+    assert WORDS.read_text(encoding='utf-8') == told[told.index('# The words') :], (
         'run env-hooks/write_completion.py'
+    )

@@ -1,6 +1,7 @@
 """The commands in the documentation: each is there, knows its options, and takes its launch
 arguments.
 """
+
 import re
 import shlex
 import subprocess
@@ -15,7 +16,8 @@ PAGES = sorted((ROOT / 'doc').glob('*.md'))
 # on lines of their own, also continued ones, or within a line of text
 COMMAND = re.compile(
     r'^ *(ros(?:run|launch) smach_oracle (?:.*\\\n)*.*)$|`(ros(?:run|launch) smach_oracle [^`]+)`',
-    re.MULTILINE)
+    re.MULTILINE,
+)
 SCRIPT = re.compile(r'SCRIPT|.*\.py')
 
 
@@ -36,8 +38,11 @@ LAUNCHED = [words for words in COMMANDS if words[0] == 'roslaunch']
 def options_of(command):
     """What a command says of its options."""
     told = subprocess.run(
-        [sys.executable, str(ROOT / 'scripts' / command), '--help'], timeout=60, check=True,
-        stdout=subprocess.PIPE).stdout.decode()
+        [sys.executable, str(ROOT / 'scripts' / command), '--help'],
+        timeout=60,
+        check=True,
+        stdout=subprocess.PIPE,
+    ).stdout.decode()
     return set(re.findall(r'--[a-z][a-z-]*', told))
 
 
@@ -50,15 +55,17 @@ def test_what_is_run_is_there_and_knows_the_options(words):
     command, rest = words[2], words[3:]
     assert (ROOT / 'scripts' / command).is_file()
     scripts = [
-        place for place, word in enumerate(rest)
+        place
+        for place, word in enumerate(rest)
         if command == 'oracle_run' and SCRIPT.fullmatch(word)
     ]
-    own = rest[:scripts[0]] if scripts else rest
+    own = rest[: scripts[0]] if scripts else rest
     given = {word for word in own if word.startswith('--')}
     assert not given or given <= options_of(command)
-    behind = {word for word in rest[len(own):] if word.startswith('--')}
-    assert not behind or not behind & options_of(
-        command), 'options behind the script are the script\'s own'
+    behind = {word for word in rest[len(own) :] if word.startswith('--')}
+    assert not behind or not behind & options_of(command), (
+        "options behind the script are the script's own"
+    )
 
 
 @pytest.mark.parametrize('words', LAUNCHED, ids=' '.join)
@@ -66,6 +73,5 @@ def test_what_is_launched_is_there_and_takes_the_arguments(words):
     arguments = ElementTree.parse(str(ROOT / 'launch' / words[2])).getroot().findall('arg')
     given = {word.split(':=')[0] for word in words[3:] if ':=' in word}
     assert given <= {
-        argument.get('name')
-        for argument in arguments if argument.get('value') is None
+        argument.get('name') for argument in arguments if argument.get('value') is None
     }

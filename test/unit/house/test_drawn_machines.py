@@ -1,4 +1,5 @@
 """doc/draw_machines.py: its pictures show what a machine has, and what a trial did."""
+
 import sys
 
 import pytest
@@ -11,8 +12,9 @@ draw = pytest.importorskip('draw_machines')
 def test_the_wrapped_machine_is_drawn_with_the_oracles_transitions():
     drawn = '\n'.join(draw.wrapping())
     for label in draw.LABELS:
-        assert 'b_ORACLE -> b_{}'.format(label) in drawn or 'b_{} -> b_ORACLE'.format(
-            label) in drawn
+        assert (
+            'b_ORACLE -> b_{}'.format(label) in drawn or 'b_{} -> b_ORACLE'.format(label) in drawn
+        )
         assert 'a_ORACLE' not in drawn
         assert 'a_{} -> a_failed'.format(label) in drawn
 
@@ -22,7 +24,13 @@ def test_the_drawn_trial_has_a_revisit_and_a_step_back_and_ends_well():
     decided = [event.outcome for event in events if event.kind == draw.EventKind.DECISION]
     assert decided == ['revisit', 'step_back']
     assert [event.state for event in events if event.kind == draw.EventKind.STATE_START] == [
-        'LOOK', 'PICK', 'PICK', 'LOOK', 'PICK', 'PLACE']
+        'LOOK',
+        'PICK',
+        'PICK',
+        'LOOK',
+        'PICK',
+        'PLACE',
+    ]
 
 
 def test_the_pictures_are_there_and_name_what_they_show():

@@ -1,4 +1,5 @@
 """doc/draw_trial.py: from the film of a trial it draws the failure, the recovery and the end."""
+
 import sys
 
 import cv2
@@ -14,11 +15,16 @@ draw = pytest.importorskip('draw_trial')
 pytest.importorskip('PIL')
 
 PICTURES = ('drink_failure', 'drink_recovered', 'drink_handed_over')
-STORY = [(Caption(''), 3), (Caption('PICK_DRINK'), 6),
-         (Caption('PICK_DRINK failed', 'gone', RED), 8),
-         (Caption('Oracle', 'trying it again', BLUE), 8), (Caption('PICK_DRINK'), 6),
-         (Caption('MOVE_OUT'), 3), (Caption('HAND_OVER'), 6),
-         (Caption('End of the trial', 'succeeded', GREEN), 8)]
+STORY = [
+    (Caption(''), 3),
+    (Caption('PICK_DRINK'), 6),
+    (Caption('PICK_DRINK failed', 'gone', RED), 8),
+    (Caption('Oracle', 'trying it again', BLUE), 8),
+    (Caption('PICK_DRINK'), 6),
+    (Caption('MOVE_OUT'), 3),
+    (Caption('HAND_OVER'), 6),
+    (Caption('End of the trial', 'succeeded', GREEN), 8),
+]
 
 
 def film_of(story, path):
@@ -28,7 +34,7 @@ def film_of(story, path):
         for _ in range(count):
             x += 0 if caption.detail else 8
             image = np.full((320, 480, 3), 120, np.uint8)
-            image[100:180, x:x + 80] = (200, 30, 30)
+            image[100:180, x : x + 80] = (200, 30, 30)
             video.add(captioned(image, caption))
     video.close()
     return str(path)
@@ -36,6 +42,7 @@ def film_of(story, path):
 
 def test_a_film_gives_the_pictures_and_what_stands_still_is_shown_as_long(tmp_path):
     from PIL import Image
+
     draw.draw(film_of(STORY, tmp_path / '5.mp4'), str(tmp_path))
     failed, recovered, ended = (cv2.imread(str(tmp_path / (name + '.png'))) for name in PICTURES)
     for image, colour in ((failed, RED), (ended, GREEN)):
@@ -53,7 +60,7 @@ def test_a_film_gives_the_pictures_and_what_stands_still_is_shown_as_long(tmp_pa
 
 @pytest.mark.parametrize('left_out', [2, 5, 6, 7])
 def test_a_trial_that_went_otherwise_is_not_drawn(left_out, tmp_path):
-    story = STORY[:left_out] + STORY[left_out + 1:]
+    story = STORY[:left_out] + STORY[left_out + 1 :]
     with pytest.raises(AssertionError, match='no failure, or|no recovery, or'):
         draw.draw(film_of(story, tmp_path / '5.mp4'), str(tmp_path))
     assert not list(tmp_path.glob('*.png'))

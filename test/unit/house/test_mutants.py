@@ -1,4 +1,5 @@
 """benchmarks/mutants.py: the faults that it puts in, and what becomes of them."""
+
 import ast
 import csv
 import random
@@ -20,24 +21,46 @@ def changes(source):
     return {(mutant.before, mutant.after) for mutant in mutants_of(source, 'module.py')}
 
 
-@pytest.mark.parametrize('source, after', [
-    ('a < b', {'a <= b', 'a >= b'}), ('a is b', {'a is not b'}), ('a in b', {'a not in b'}),
-    ('a == (b or c)', {'a != (b or c)', '(b and c)', '(b)', '(c)'}),
-    ('not a', {'(a)'}), ('a + b', {'(a - b)'}), ('"a" + b', set()), ('"%s" % b', set()),
-    ('(a + b) * c', {'((a + b) / c)', '(a - b)'}), ('a < b < c', set()),
-    ('x = True', {'False'}), ('x = 3', {'(3 + 1)'}), ('x = "text"', set()),
-    ('x.y = z', {'pass'}), ('x = z', set()), ('x += z', {'pass'}),
-    ('f(a)', {'pass'}), ('a', set()), ('"""a docstring"""', set()),
-    ('a if b else c', {'(a)', '(c)'}),
-    ('if a: b', {'(not (a))'}), ('if not a: b', {'(a)'}), ('if a < b: c', {'a <= b', 'a >= b'}),
-    ('while a:\n  break', {'(not (a))', 'continue'}), ('while a:\n  continue', {
-        '(not (a))', 'pass'}),
-    ('[a for a in b if a]', {'(not (a))'}), ('raise Fault', {'pass'}),
-    ('raise NotImplementedError', set()),
-    ('def f() -> 3: return a', {'None'}), ('def f(): return False', {'True'}),
-    ('def f(a: 3 = 4): pass', {'(4 + 1)'}), ('x: 3 = 4', {'(4 + 1)'}),
-    ('class A(Protocol):\n  x = 3', set()), ('class A(Base):\n  x = 3', {'(3 + 1)'}),
-    ('f"{a + b}"', set())])
+@pytest.mark.parametrize(
+    'source, after',
+    [
+        ('a < b', {'a <= b', 'a >= b'}),
+        ('a is b', {'a is not b'}),
+        ('a in b', {'a not in b'}),
+        ('a == (b or c)', {'a != (b or c)', '(b and c)', '(b)', '(c)'}),
+        ('not a', {'(a)'}),
+        ('a + b', {'(a - b)'}),
+        ('"a" + b', set()),
+        ('"%s" % b', set()),
+        ('(a + b) * c', {'((a + b) / c)', '(a - b)'}),
+        ('a < b < c', set()),
+        ('x = True', {'False'}),
+        ('x = 3', {'(3 + 1)'}),
+        ('x = "text"', set()),
+        ('x.y = z', {'pass'}),
+        ('x = z', set()),
+        ('x += z', {'pass'}),
+        ('f(a)', {'pass'}),
+        ('a', set()),
+        ('"""a docstring"""', set()),
+        ('a if b else c', {'(a)', '(c)'}),
+        ('if a: b', {'(not (a))'}),
+        ('if not a: b', {'(a)'}),
+        ('if a < b: c', {'a <= b', 'a >= b'}),
+        ('while a:\n  break', {'(not (a))', 'continue'}),
+        ('while a:\n  continue', {'(not (a))', 'pass'}),
+        ('[a for a in b if a]', {'(not (a))'}),
+        ('raise Fault', {'pass'}),
+        ('raise NotImplementedError', set()),
+        ('def f() -> 3: return a', {'None'}),
+        ('def f(): return False', {'True'}),
+        ('def f(a: 3 = 4): pass', {'(4 + 1)'}),
+        ('x: 3 = 4', {'(4 + 1)'}),
+        ('class A(Protocol):\n  x = 3', set()),
+        ('class A(Base):\n  x = 3', {'(3 + 1)'}),
+        ('f"{a + b}"', set()),
+    ],
+)
 def test_each_kind_of_part_has_its_faults(source, after):
     assert {new for _, new in changes(source)} == after
 
@@ -46,7 +69,8 @@ def test_a_fault_is_put_where_it_belongs_and_nothing_else_changes():
     source = 'a = "\u00e9"; b = (c +\n     d)  # \u00e9\nf(b)\n'
     sums = [mutant for mutant in mutants_of(source, 'module.py') if mutant.after == '(c - d)']
     assert [each.applied(source) for each in sums] == [
-        'a = "\u00e9"; b = ((c - d))  # \u00e9\nf(b)\n']
+        'a = "\u00e9"; b = ((c - d))  # \u00e9\nf(b)\n'
+    ]
 
 
 def test_a_mutant_has_a_name_a_place_and_the_lines_of_its_statement():
@@ -54,8 +78,11 @@ def test_a_mutant_has_a_name_a_place_and_the_lines_of_its_statement():
     found = [mutant for mutant in mutants_of(source, 'm.py') if mutant.before == 'a < b']
     assert [mutant.name for mutant in found] == ['m.py:5:6:0', 'm.py:5:6:1']
     assert {(mutant.place, mutant.statement) for mutant in found} == {('A.f', (3, 5))}
-    condition, = [each for each in mutants_of('if (a and\n    b):\n  f()\n', 'm.py')
-                  if each.after == '(a or b)' or each.after == '((a) or (b))']
+    (condition,) = [
+        each
+        for each in mutants_of('if (a and\n    b):\n  f()\n', 'm.py')
+        if each.after == '(a or b)' or each.after == '((a) or (b))'
+    ]
     assert condition.statement == (1, 2), 'without the block below it'
 
 
@@ -78,17 +105,22 @@ def test_what_is_listed_as_equivalent_is_a_mutant_and_has_a_reason():
     assert equivalents() - {change_of(mutant) for mutant in EXECUTIVE.mutants()} == set()
 
 
-@pytest.mark.parametrize('killed, survived, status', [
-    (95, 5, 0), (94, 6, 1), (94, 5, 1), (0, 0, 0), (18, 1, 1), (19, 1, 0)])
+@pytest.mark.parametrize(
+    'killed, survived, status',
+    [(95, 5, 0), (94, 6, 1), (94, 5, 1), (0, 0, 0), (18, 1, 1), (19, 1, 0)],
+)
 def test_the_exit_status_says_whether_enough_were_killed(killed, survived, status, capsys):
     mutant = mutants_of('a < b', 'branches/m.py')[0]
-    trials = [trying.Trial(mutant, verdict, '', 1, 0.0) for verdict, count in (
-        ('killed', killed), ('survived', survived)) for _ in range(count)]
+    trials = [
+        trying.Trial(mutant, verdict, '', 1, 0.0)
+        for verdict, count in (('killed', killed), ('survived', survived))
+        for _ in range(count)
+    ]
     assert summarise(trials) == status
     assert 'killed: {} of {}'.format(killed, killed + survived) in capsys.readouterr().out
 
 
-MODULE = '''
+MODULE = """
 import os, subprocess, sys
 
 def at_least(a, b):
@@ -121,8 +153,8 @@ def left():
 def waits(event):
     while not event.is_set():
         event.wait(0.01)
-'''
-TEST = '''
+"""
+TEST = """
 import m, threading
 
 def test_at_least():
@@ -141,7 +173,7 @@ def test_waits():
     event = threading.Event()
     event.set()
     m.waits(event)
-'''
+"""
 
 CODE, CHECKS = 'src', 'test'  # the folders of a small project
 
@@ -169,26 +201,33 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         '5': {'(5 + 1)': 'killed'},  # so does one that it forks
         'len(found) < to': {'len(found) >= to': 'killed'},
         'found.append(bytes(1 << 22))': {'pass': 'hung'},
-        'not event.is_set()': {'(event.is_set())': 'hung'}}
-    mutants = [mutant for mutant in project.mutants()
-               if mutant.after in wanted.get(mutant.before, ())]
+        'not event.is_set()': {'(event.is_set())': 'hung'},
+    }
+    mutants = [
+        mutant for mutant in project.mutants() if mutant.after in wanted.get(mutant.before, ())
+    ]
     before = {path: path.read_text() for path in project.root.rglob('*.*')}
     trials = list(shop.try_all(mutants, list(shop.look())))
     assert [(trial.mutant.before, trial.mutant.after, trial.verdict) for trial in trials] == [
-        (each.before, each.after, wanted[each.before][each.after]) for each in mutants]
+        (each.before, each.after, wanted[each.before][each.after]) for each in mutants
+    ]
     assert len(trials) == sum(map(len, wanted.values()))
     assert {path: path.read_text() for path in project.root.rglob('*.*')} == before
-    left = subprocess.run(['pgrep', '-f', str(project.root.parent)], stdout=subprocess.PIPE,
-                          check=False).stdout.decode()
+    left = subprocess.run(
+        ['pgrep', '-f', str(project.root.parent)], stdout=subprocess.PIPE, check=False
+    ).stdout.decode()
     assert left == '', 'a process of a test is left'
 
 
 def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop):
     project, shop = workshop
-    endless, = [mutant for mutant in project.mutants() if mutant.before == 'len(found) < to'
-                and mutant.after == 'len(found) <= to']
+    (endless,) = [
+        mutant
+        for mutant in project.mutants()
+        if mutant.before == 'len(found) < to' and mutant.after == 'len(found) <= to'
+    ]
     endless = endless._replace(text='True')
-    trial, = shop.try_all([endless], list(shop.look()))
+    (trial,) = shop.try_all([endless], list(shop.look()))
     assert trial.verdict == 'killed', 'by a MemoryError'
 
 
@@ -204,8 +243,10 @@ def test_a_test_that_fails_once_does_not_kill(workshop):
     project, shop = workshop
     reaches = list(shop.look())
     for path in project.root.parent.glob('0/{}/test_m.py'.format(CHECKS)):
-        path.write_text('import os, m\ndef test_it():\n  if not os.path.exists("been"):\n'
-                        '    open("been", "w")\n    assert False')
-    alive, = [mutant for mutant in project.mutants() if mutant.after == 'a > b']
-    trial, = shop.try_all([alive], reaches)
+        path.write_text(
+            'import os, m\ndef test_it():\n  if not os.path.exists("been"):\n'
+            '    open("been", "w")\n    assert False'
+        )
+    (alive,) = [mutant for mutant in project.mutants() if mutant.after == 'a > b']
+    (trial,) = shop.try_all([alive], reaches)
     assert trial.verdict == 'survived'

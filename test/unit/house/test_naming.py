@@ -1,4 +1,5 @@
 """One name for one thing, one thing for one name."""
+
 import ast
 import collections
 import re
@@ -8,16 +9,35 @@ from house import ROOT, parse, python_files, shown
 PACKAGE = python_files('src/smach_oracle')
 # the one in ros/ extends the bare one of the executive, and stands for it in ROS programs
 SHARED = {'OracleContainer'}
-STATIC, = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
+(STATIC,) = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
 SCRIPTS = sorted((STATIC / 'js').rglob('*.js'))
 # a class, or a function of a module or a class
 IN_SCRIPT = re.compile(
     r'^(?:export )?(?:async )?(?:function|class) (\w+)|^  (?:async |get |set |static )*(\w+)\(',
-    re.MULTILINE)
+    re.MULTILINE,
+)
 # names that do not say what a thing is
 VAGUE = {
-    'quicken', 'Face', 'Desk', 'Office', 'Eye', 'Hands', 'Tally', 'standing', 'course', 'settling',
-    'Thing', 'Item', 'Given', 'Kept', 'Freshness', 'tend', 'lap', 'apart', 'who', 'letting_be'
+    'quicken',
+    'Face',
+    'Desk',
+    'Office',
+    'Eye',
+    'Hands',
+    'Tally',
+    'standing',
+    'course',
+    'settling',
+    'Thing',
+    'Item',
+    'Given',
+    'Kept',
+    'Freshness',
+    'tend',
+    'lap',
+    'apart',
+    'who',
+    'letting_be',
 }
 VAGUE_SECTIONS = {'eye', 'hand', 'output', 'stills', 'conditions'}
 
@@ -25,8 +45,9 @@ VAGUE_SECTIONS = {'eye', 'hand', 'output', 'stills', 'conditions'}
 def definitions(paths=PACKAGE):
     """Every class and function of these files, as (file, node)."""
     kinds = (ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    return [(path, node) for path in paths for node in ast.walk(parse(path))
-            if isinstance(node, kinds)]
+    return [
+        (path, node) for path in paths for node in ast.walk(parse(path)) if isinstance(node, kinds)
+    ]
 
 
 def names_in_script(path):
@@ -40,19 +61,27 @@ def test_a_class_name_occurs_once():
     for path, node in definitions(python_files('src')):
         if isinstance(node, ast.ClassDef):
             places[node.name.lstrip('_')].append('{}:{}'.format(shown(path), node.lineno))
-    assert not {name: found for name, found in places.items()
-                if len(found) > 1 and name not in SHARED}
+    assert not {
+        name: found for name, found in places.items() if len(found) > 1 and name not in SHARED
+    }
 
 
 def test_nothing_has_a_name_that_does_not_say_what_it_is():
     vague = {name.lower() for name in VAGUE}
-    found = ['{}:{} {}'.format(shown(path), node.lineno, node.name) for path, node in definitions()
-             if node.name.lstrip('_') in VAGUE
-             or isinstance(node, ast.ClassDef) and node.name.lstrip('_').lower() in vague]
-    found += [shown(path) for path in PACKAGE + SCRIPTS
-              if path.stem in vague]
-    found += ['{} {}'.format(shown(path), name) for path in SCRIPTS
-              for name in names_in_script(path) if name in VAGUE]
+    found = [
+        '{}:{} {}'.format(shown(path), node.lineno, node.name)
+        for path, node in definitions()
+        if node.name.lstrip('_') in VAGUE
+        or isinstance(node, ast.ClassDef)
+        and node.name.lstrip('_').lower() in vague
+    ]
+    found += [shown(path) for path in PACKAGE + SCRIPTS if path.stem in vague]
+    found += [
+        '{} {}'.format(shown(path), name)
+        for path in SCRIPTS
+        for name in names_in_script(path)
+        if name in VAGUE
+    ]
     assert not found
 
 
@@ -71,34 +100,48 @@ def test_every_section_of_the_page_says_what_it_holds():
 
 def test_errors_are_documented_in_one_style():
     loose = re.compile(r'(?:^|[.;] )[Rr]aises \w*(?:Error|Exception)', re.MULTILINE)
-    wrong = ['{}:{}'.format(shown(path), node.lineno) for path, node in definitions()
-             if loose.search(ast.get_docstring(node) or '')]
+    wrong = [
+        '{}:{}'.format(shown(path), node.lineno)
+        for path, node in definitions()
+        if loose.search(ast.get_docstring(node) or '')
+    ]
     assert not wrong, 'write a line of its own, `:raises X: when`'
 
 
 # openings that say nothing: the thing itself is the better subject, or what it does
-EMPTY = re.compile(r'The (?:part|parts|thing|things|data) (?:that|which|of which)\b|Of '
-                   r'|Returns? (?:by|of|in) ')
+EMPTY = re.compile(
+    r'The (?:part|parts|thing|things|data) (?:that|which|of which)\b|Of '
+    r'|Returns? (?:by|of|in) '
+)
 
 
 def documented():
     """Every module, class and function with a docstring, as (place, node, docstring)."""
     found = [(path, parse(path)) for path in PACKAGE] + definitions()
-    return [('{}:{}'.format(shown(path), getattr(node, 'lineno', 1)), node, ast.get_docstring(node))
-            for path, node in found if ast.get_docstring(node)]
+    return [
+        ('{}:{}'.format(shown(path), getattr(node, 'lineno', 1)), node, ast.get_docstring(node))
+        for path, node in found
+        if ast.get_docstring(node)
+    ]
 
 
 def test_a_docstring_begins_with_what_the_thing_is_or_does():
-    assert not ['{} {}'.format(place, text.split('\n')[0]) for place, _, text in documented()
-                if EMPTY.match(text)]
+    assert not [
+        '{} {}'.format(place, text.split('\n')[0])
+        for place, _, text in documented()
+        if EMPTY.match(text)
+    ]
 
 
 def test_a_docstring_of_a_function_that_returns_nothing_returns_nothing():
     silent = {'None', 'NoReturn'}
-    assert not [place for place, node, text in documented()
-                if isinstance(node, ast.FunctionDef) and text.startswith('Return ')
-                and getattr(node.returns, 'id', getattr(node.returns, 'value', '')) in
-                silent | {None}]
+    assert not [
+        place
+        for place, node, text in documented()
+        if isinstance(node, ast.FunctionDef)
+        and text.startswith('Return ')
+        and getattr(node.returns, 'id', getattr(node.returns, 'value', '')) in silent | {None}
+    ]
 
 
 def test_a_docstring_names_parameters_and_attributes_that_there_are():
@@ -108,8 +151,12 @@ def test_a_docstring_names_parameters_and_attributes_that_there_are():
             continue
         named = re.findall(r'(?:^|\n|[.] )`([a-z_]\w*)`:', text)
         named += re.findall(r':param (\w+):', text)
-        there = {getattr(each, field) for each in ast.walk(node)
-                 for field in ('arg', 'attr', 'id', 'name') if hasattr(each, field)}
+        there = {
+            getattr(each, field)
+            for each in ast.walk(node)
+            for field in ('arg', 'attr', 'id', 'name')
+            if hasattr(each, field)
+        }
         wrong += ['{} {}'.format(place, name) for name in named if name not in there]
     assert not wrong
 
@@ -121,6 +168,9 @@ def is_long(docstring):
 
 def test_the_summary_of_a_docstring_is_one_line():
     documented = [(path, parse(path)) for path in PACKAGE] + definitions()
-    wrong = ['{}:{}'.format(shown(path), getattr(node, 'lineno', 1)) for path, node in documented
-             if is_long(ast.get_docstring(node) or '')]
+    wrong = [
+        '{}:{}'.format(shown(path), getattr(node, 'lineno', 1))
+        for path, node in documented
+        if is_long(ast.get_docstring(node) or '')
+    ]
     assert not wrong

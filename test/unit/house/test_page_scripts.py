@@ -1,11 +1,12 @@
 """The page's scripts and styles: lines, lengths, folders, types, and who may import whom."""
+
 import json
 import re
 
 import pytest
 from house import ROOT, shown
 
-STATIC, = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
+(STATIC,) = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
 SCRIPTS = sorted((STATIC / 'js').rglob('*.js'))
 DECLARATIONS = sorted((STATIC / 'js').rglob('*.d.ts'))
 FILES = SCRIPTS + DECLARATIONS + sorted(STATIC.rglob('*.css')) + sorted(STATIC.rglob('*.html'))
@@ -42,7 +43,7 @@ def functions(path):
     """Name and lines of each function and method, from its head to the brace that ends it."""
     head, begun = '', 0
     for number, line in enumerate(text_of(path).splitlines()):
-        indent = line[:len(line) - len(line.lstrip())]
+        indent = line[: len(line) - len(line.lstrip())]
         if not head and HEAD.match(line) and not line.endswith((';', '}')):
             head, begun, end = line.strip(), number, indent + '}'
         elif head and line == end:
@@ -52,8 +53,10 @@ def functions(path):
 
 def imports(path):
     """The scripts that one needs to run; not those of which it names types alone."""
-    return [(path.parent / name).resolve()
-            for name in re.findall(r"^(?:import|\}).* from '(.*)';$", text_of(path), re.MULTILINE)]
+    return [
+        (path.parent / name).resolve()
+        for name in re.findall(r"^(?:import|\}).* from '(.*)';$", text_of(path), re.MULTILINE)
+    ]
 
 
 def folder_of(path):
@@ -65,16 +68,22 @@ def test_there_are_scripts():
 
 
 def test_every_line_has_at_most_100_columns():
-    lines = [(len(line), '{}:{}'.format(shown(path), number)) for path in FILES
-             for number, line in enumerate(text_of(path).splitlines(), 1)]
+    lines = [
+        (len(line), '{}:{}'.format(shown(path), number))
+        for path in FILES
+        for number, line in enumerate(text_of(path).splitlines(), 1)
+    ]
     assert not [place for length, place in lines if length > MOST_COLUMNS]
 
 
 def test_no_script_asks_which_words_a_text_has():
     """Texts for people change now and then. Scripts ask for a name or a flag."""
     words = re.compile(r"(?:startsWith\('[A-Z]|includes\('[A-Z]|[!=]== '[A-Z]\w* )[^'\n]*'")
-    found = ['{}: {}'.format(shown(path), match.group())
-             for path in SCRIPTS for match in words.finditer(text_of(path))]
+    found = [
+        '{}: {}'.format(shown(path), match.group())
+        for path in SCRIPTS
+        for match in words.finditer(text_of(path))
+    ]
     assert not found
 
 
@@ -111,8 +120,11 @@ def test_the_compiler_looks_at_all_of_them_and_is_strict():
 
 def test_a_folder_imports_only_those_that_it_may():
     assert {folder_of(path) for path in SCRIPTS} == set(ARROWS) | {''}
-    found = [(folder_of(path), folder_of(other), shown(path)) for path in SCRIPTS
-             for other in imports(path)]
+    found = [
+        (folder_of(path), folder_of(other), shown(path))
+        for path in SCRIPTS
+        for other in imports(path)
+    ]
     assert not [each for each in found if each[0] and each[1] not in ARROWS[each[0]] | {each[0]}]
 
 

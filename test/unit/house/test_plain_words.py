@@ -60,11 +60,15 @@ def test_the_list_of_terms_is_there():
 
 
 def test_a_page_is_read_without_its_code_and_by_paragraphs():
-    page = ('# Of a title\n\nOne line\nand one more.\n* a point\n\n'
-            '```\ncode; more\n```\n| a | b; c |\n')
+    page = (
+        '# Of a title\n\nOne line\nand one more.\n* a point\n\n```\ncode; more\n```\n| a | b; c |\n'
+    )
     pieces = [(piece.line, piece.text, piece.table) for piece in page_prose(page)]
-    assert pieces == [(3, 'One line and one more.', False), (5, '* a point', False),
-                      (10, '| a | b; c |', True)]
+    assert pieces == [
+        (3, 'One line and one more.', False),
+        (5, '* a point', False),
+        (10, '| a | b; c |', True),
+    ]
 
 
 def test_code_is_read_by_docstrings_comments_and_longer_strings():

@@ -1,6 +1,7 @@
 """What the README and the documentation claim is true: commands, options, files, types, and the
 example runs.
 """
+
 import os
 import re
 import shlex
@@ -33,8 +34,9 @@ def run_python(*arguments):
     path = [os.environ.get('SMACH_UPSTREAM'), os.environ.get('PYTHONPATH'), str(ROOT / 'src')]
     env = dict(os.environ, PYTHONPATH=os.pathsep.join(filter(None, path)))
     command = [sys.executable] + [str(argument) for argument in arguments]
-    result = subprocess.run(command, env=env, timeout=60, check=False,
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    result = subprocess.run(
+        command, env=env, timeout=60, check=False, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    )
     assert result.returncode == 0, result.stdout.decode()
     return result.stdout.decode()
 
@@ -58,8 +60,11 @@ def test_every_option_in_the_readme_is_one_that_its_command_knows():
         if words[0] != 'rosrun':
             continue
         # what follows a script belongs to the script
-        own = words[3:next((index for index, word in enumerate(words)
-                            if word.endswith('.py')), len(words))]
+        own = words[
+            3 : next(
+                (index for index, word in enumerate(words) if word.endswith('.py')), len(words)
+            )
+        ]
         options = [word for word in own if word.startswith('--')]
         known = run_python(ROOT / 'scripts' / words[2], '--help') if options else ''
         assert all(option in known for option in options), (words[2], options)
@@ -72,7 +77,8 @@ def test_every_launch_argument_in_the_readme_is_one_that_the_file_takes():
             given = {word.split(':=')[0] for word in words[3:]}
             assert given <= {
                 argument.get('name')
-                for argument in arguments if argument.get('default') is not None
+                for argument in arguments
+                if argument.get('default') is not None
             }
 
 
@@ -81,11 +87,12 @@ def test_every_command_named_in_the_text_is_there():
     prefixes = r'(expert|scripted|bag|oracle|run|pr2|perception|manipulation)_'
     commands = {name for name in names if re.match(prefixes, name)}
     assert commands and all(
-        (ROOT / 'scripts' / name).is_file() for name in commands - {'oracle_run.launch'}), commands
+        (ROOT / 'scripts' / name).is_file() for name in commands - {'oracle_run.launch'}
+    ), commands
 
 
 def test_the_example_runs(tmp_path):
-    example, = blocks('python')
+    (example,) = blocks('python')
     script = tmp_path / 'example.py'
     script.write_text(example)
     run_python(script)
@@ -100,8 +107,9 @@ def test_every_type_in_the_table_of_the_ros_interface_is_there():
 
 @pytest.mark.parametrize('path', DOCUMENTS, ids=shown)
 def test_every_file_that_a_document_links_to_is_there(path):
-    text = re.sub(r'^```.*?^```', '', path.read_text(encoding='utf-8'),
-                  flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(
+        r'^```.*?^```', '', path.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL
+    )
     links = [
         link.split('#')[0] for link in re.findall(r'\]\(([^)\s]+)\)', text) if '://' not in link
     ]
@@ -116,12 +124,13 @@ def test_every_folder_and_file_named_in_the_readme_is_there():
 
 
 def test_every_folder_of_the_checkout_is_among_the_rooms():
-    listed = subprocess.run(['git', 'ls-files'], cwd=str(ROOT), stdout=subprocess.PIPE,
-                            check=False).stdout.decode()
+    listed = subprocess.run(
+        ['git', 'ls-files'], cwd=str(ROOT), stdout=subprocess.PIPE, check=False
+    ).stdout.decode()
     folders = {name.split('/')[0] for name in listed.splitlines() if '/' in name}
     if not folders:
         pytest.skip('no git checkout')
-    rooms = README[README.index('## Rooms'):]
+    rooms = README[README.index('## Rooms') :]
     assert not [
         name for name in sorted(folders) if not re.search(r'`{}[/`]'.format(re.escape(name)), rooms)
     ]
@@ -130,6 +139,7 @@ def test_every_folder_of_the_checkout_is_among_the_rooms():
 def test_every_document_is_in_the_index():
     index = (ROOT / 'doc/index.md').read_text(encoding='utf-8')
     listed = set(re.findall(r'\]\(([\w./-]+)\)', index))
-    documents = {str(path.relative_to(ROOT / 'doc'))
-                 for path in (ROOT / 'doc').glob('**/*.md')} - {'index.md'}
+    documents = {str(path.relative_to(ROOT / 'doc')) for path in (ROOT / 'doc').glob('**/*.md')} - {
+        'index.md'
+    }
     assert documents <= listed

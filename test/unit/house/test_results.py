@@ -1,4 +1,5 @@
 """The page of results says what the rows of the experiment say, and the rows are all there."""
+
 import re
 
 import pytest
@@ -20,15 +21,19 @@ PARTS = parts_of(ALL, ProtocolChoice(last_freeze(ROOT).blocks(), 15.0))
 def test_each_part_has_all_its_trials_on_the_seeds_of_the_freeze(part):
     plan, path = part.plan, TRIALS / part.name / 'results.csv'
     found = [(row.variant, row.replicate, row.seed) for row in read_rows(path)]
-    planned = {(variant.name, replicate, plan.first_seed(replicate) + number)
-               for variant in plan.variants for replicate in range(plan.replicates)
-               for number in range(plan.trials)}
+    planned = {
+        (variant.name, replicate, plan.first_seed(replicate) + number)
+        for variant in plan.variants
+        for replicate in range(plan.replicates)
+        for number in range(plan.trials)
+    }
     assert len(set(found)) == len(found) and set(found) == planned
 
 
 def test_no_other_rows_lie_there():
     assert {path.parent.name for path in TRIALS.rglob('results.csv')} == {
-        part.name for part in PARTS}
+        part.name for part in PARTS
+    }
 
 
 def test_the_page_of_tables_is_made_of_the_rows():
@@ -41,17 +46,28 @@ def test_each_line_of_a_table_of_the_page_stands_in_the_page_of_tables():
     assert [line for line in lines if line not in TABLES.splitlines()] == []
 
 
-@pytest.mark.parametrize('task, without, words', [
-    ('pick_and_place', {'glare', 'goal_occupied', 'edge_of_reach', 'slippery_object'},
-     r'In the (\d+) without, it was (\d+), (\d+) and (\d+)'),
-    ('drink_retrieval', {'glare', 'slippery_drink'},
-     r'There are (\d+) trials without these two. '
-     r'A person was needed in (\d+), (\d+) and (\d+) of them')])
+@pytest.mark.parametrize(
+    'task, without, words',
+    [
+        (
+            'pick_and_place',
+            {'glare', 'goal_occupied', 'edge_of_reach', 'slippery_object'},
+            r'In the (\d+) without, it was (\d+), (\d+) and (\d+)',
+        ),
+        (
+            'drink_retrieval',
+            {'glare', 'slippery_drink'},
+            r'There are (\d+) trials without these two. '
+            r'A person was needed in (\d+), (\d+) and (\d+) of them',
+        ),
+    ],
+)
 def test_the_page_tells_how_it_is_without_a_few_causes(task, without, words):
     rows = on_common_seeds(read_rows(TRIALS / (task + '_compared') / 'results.csv'))
     kept = [row for row in rows if not without & set(row.causes.split())]
-    counts = {name: sum(row.intervened for row in kept if row.variant == name)
-              for name in COMPARED}
+    counts = {name: sum(row.intervened for row in kept if row.variant == name) for name in COMPARED}
     told = re.search(words, ' '.join(PAGE.split()))
     assert told and tuple(map(int, told.groups())) == (
-        len(kept) // len(COMPARED), *(counts[name] for name in COMPARED))
+        len(kept) // len(COMPARED),
+        *(counts[name] for name in COMPARED),
+    )

@@ -1,4 +1,5 @@
 """The site: its table of contents, and the reference that is made from comments."""
+
 import sys
 
 from house import ROOT
@@ -45,11 +46,15 @@ def test_every_page_is_in_the_table_of_contents():
 
 
 def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
-    for name, text in (('styles/furo.css', '@import url(/javascript/normalize.css/normalize.css);\n'
-                        'p {margin: 1px}'), ('normalize.css', 'body {margin: 0}\n'),
-                       ('./scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
-                       ('./scripts/furo.js',
-                        'import Gumshoe from "./gumshoe-patched.js";\nmain()')):
+    for name, text in (
+        (
+            'styles/furo.css',
+            '@import url(/javascript/normalize.css/normalize.css);\np {margin: 1px}',
+        ),
+        ('normalize.css', 'body {margin: 0}\n'),
+        ('./scripts/gumshoe-patched.js', 'window.Gumshoe = 1;\n'),
+        ('./scripts/furo.js', 'import Gumshoe from "./gumshoe-patched.js";\nmain()'),
+    ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(theme, 'NORMALIZE', tmp_path / 'normalize.css')
@@ -60,20 +65,25 @@ def test_the_theme_works_without_a_web_server(tmp_path, monkeypatch):
 
 
 def test_the_site_is_dark_where_the_system_is():
-    style = ('@media not print {\n  body[data-theme="dark"] {\n    --color: #fff; }\n'
-             '    body[data-theme="dark"] .only-dark {\n      display: block } }\nbody {}\n')
+    style = (
+        '@media not print {\n  body[data-theme="dark"] {\n    --color: #fff; }\n'
+        '    body[data-theme="dark"] .only-dark {\n      display: block } }\nbody {}\n'
+    )
     added = theme.followed(style)
-    assert added == ('\n@media not print {\n@media (prefers-color-scheme: dark) {\n'
-                     'body:not([data-theme="light"]) {\n    --color: #fff; }\n'
-                     '    body:not([data-theme="light"]) .only-dark {\n'
-                     '      display: block }\n}\n}\n')
+    assert added == (
+        '\n@media not print {\n@media (prefers-color-scheme: dark) {\n'
+        'body:not([data-theme="light"]) {\n    --color: #fff; }\n'
+        '    body:not([data-theme="light"]) .only-dark {\n'
+        '      display: block }\n}\n}\n'
+    )
     assert not theme.followed(style + added)
 
 
 def test_a_link_shows_the_title_of_a_page(tmp_path):
     build.write_sources(tmp_path / 'source', quick=True)
-    pages = {page.stem: page.read_text(encoding='utf-8')
-             for page in (tmp_path / 'source').glob('*.md')}
+    pages = {
+        page.stem: page.read_text(encoding='utf-8') for page in (tmp_path / 'source').glob('*.md')
+    }
     assert '[Troubleshooting](troubleshooting.md)' in pages['index']
     assert '[Settings](settings.md)' in pages['readme']
     assert not [name for name, text in pages.items() if build.NAMED.search(text)]

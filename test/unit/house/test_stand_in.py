@@ -1,4 +1,5 @@
 """Upstream's smach is used where it is, ours where it is not: which stand-ins go on the paths."""
+
 import os
 import shlex
 import subprocess
@@ -31,16 +32,25 @@ def make_package(tmp_path):
             if marked:
                 (folder / MARKER).write_text('')
         return str(tmp_path / place)
+
     return make
 
 
 def exports(prefix, python_path=(), package_path=()):
     """PYTHONPATH and ROS_PACKAGE_PATH, as lists, that the hook sets."""
-    env = dict(os.environ, PYTHONPATH=os.pathsep.join(python_path),
-               ROS_PACKAGE_PATH=os.pathsep.join(package_path))
+    env = dict(
+        os.environ,
+        PYTHONPATH=os.pathsep.join(python_path),
+        ROS_PACKAGE_PATH=os.pathsep.join(package_path),
+    )
     # -S: whatever this system has installed must not matter here
-    told = subprocess.run([sys.executable, '-S', str(prefix / 'paths.py')], env=env, check=True,
-                          stdout=subprocess.PIPE, timeout=30).stdout.decode()
+    told = subprocess.run(
+        [sys.executable, '-S', str(prefix / 'paths.py')],
+        env=env,
+        check=True,
+        stdout=subprocess.PIPE,
+        timeout=30,
+    ).stdout.decode()
     words = [shlex.split(line)[1].split('=') for line in told.splitlines()]
     assert [name for name, _ in words] == ['PYTHONPATH', 'ROS_PACKAGE_PATH']
     return [[entry for entry in value.split(os.pathsep) if entry] for _, value in words]

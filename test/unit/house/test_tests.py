@@ -1,4 +1,5 @@
 """The tests themselves: each asserts something, and waits for what it means."""
+
 import ast
 import io
 import tokenize
@@ -24,8 +25,9 @@ FEWEST_WORDS = 3  # of a comment that gives a reason
 
 def functions(tree):
     """All functions of a module, methods and inner ones too."""
-    return [node for node in ast.walk(tree)
-            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
+    return [
+        node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+    ]
 
 
 def calls(node):
@@ -42,16 +44,22 @@ def asserts(node, helpers, seen=frozenset()):
     if any(name in ASSERTING or name.startswith('assert') for name in calls(node)):
         return True
     named = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)} | set(calls(node))
-    return any(asserts(helpers[name], helpers, seen | {name})
-               for name in named & set(helpers) - seen)
+    return any(
+        asserts(helpers[name], helpers, seen | {name}) for name in named & set(helpers) - seen
+    )
 
 
 def helpers_of(path):
     """By name: functions that are no tests, of a module and of those next to it that it imports."""
     modules = {name.split('.')[0] for _, name in imports(path)} | {path.stem}
     beside = [path.with_name(name + '.py') for name in sorted(modules)]
-    return {node.name: node for each in beside if each.is_file()
-            for node in functions(parse(each)) if not node.name.startswith('test_')}
+    return {
+        node.name: node
+        for each in beside
+        if each.is_file()
+        for node in functions(parse(each))
+        if not node.name.startswith('test_')
+    }
 
 
 def without_assertion(path):
@@ -70,10 +78,21 @@ def test_every_test_asserts_something():
     assert found_in_files(without_assertion) == {}
 
 
-@pytest.mark.parametrize('body, fine', [
-    ('x = 1', False), ('run(x)', False), ('subprocess.check_output(x)', False), ('quiet()', False),
-    ('assert x', True), ('self.assertTrue(x)', True), ('with pytest.raises(E): f()', True),
-    ('good()', True), ('in_child(good)', True), ('self.outer()', True)])
+@pytest.mark.parametrize(
+    'body, fine',
+    [
+        ('x = 1', False),
+        ('run(x)', False),
+        ('subprocess.check_output(x)', False),
+        ('quiet()', False),
+        ('assert x', True),
+        ('self.assertTrue(x)', True),
+        ('with pytest.raises(E): f()', True),
+        ('good()', True),
+        ('in_child(good)', True),
+        ('self.outer()', True),
+    ],
+)
 def test_an_assertion_is_found_in_a_test_and_in_its_helpers(body, fine):
     text = 'def quiet(): quiet()\ndef good(): assert 1\ndef outer(): good()'
     helpers = {node.name: node for node in functions(ast.parse(text))}
@@ -83,9 +102,14 @@ def test_an_assertion_is_found_in_a_test_and_in_its_helpers(body, fine):
 
 def made_empty(path):
     """Lines of calls of `__new__`, other than that of a class above the one at hand."""
-    return [node.lineno for node in ast.walk(parse(path)) if isinstance(node, ast.Call)
-            and isinstance(node.func, ast.Attribute) and node.func.attr == '__new__'
-            and not isinstance(node.func.value, ast.Call)]
+    return [
+        node.lineno
+        for node in ast.walk(parse(path))
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == '__new__'
+        and not isinstance(node.func.value, ast.Call)
+    ]
 
 
 def test_objects_are_made_by_their_constructors():
@@ -119,9 +143,11 @@ def comments(text):
 def unexplained(path):
     """Lines of sleeps outside the helpers that poll, without a comment that says why."""
     reasons = comments(path.read_text(encoding='utf-8'))
-    return [line for line, function in sleeps(parse(path))
-            if (path.name, function) not in POLLS
-            and len(reasons.get(line, '').split()) <= FEWEST_WORDS]
+    return [
+        line
+        for line, function in sleeps(parse(path))
+        if (path.name, function) not in POLLS and len(reasons.get(line, '').split()) <= FEWEST_WORDS
+    ]
 
 
 def test_a_fixed_sleep_says_why_nothing_can_be_awaited():
@@ -134,8 +160,10 @@ def test_every_helper_that_polls_is_there_and_does():
 
 
 def test_a_sleep_is_found_wherever_it_hides():
-    text = ('time.sleep(1)\nsleep(1)\nasync def work():\n  await asyncio.sleep(1)\n'
-            'f(lambda: rospy.sleep(2))  # so\nthreading.Timer(1, f)\n'
-            'time.sleep(1)  # the robot takes its time\nrospy.Timer(1, f)\n')
+    text = (
+        'time.sleep(1)\nsleep(1)\nasync def work():\n  await asyncio.sleep(1)\n'
+        'f(lambda: rospy.sleep(2))  # so\nthreading.Timer(1, f)\n'
+        'time.sleep(1)  # the robot takes its time\nrospy.Timer(1, f)\n'
+    )
     assert [line for line, _ in sleeps(ast.parse(text))] == [1, 2, 4, 5, 6, 7]
     assert comments(text) == {5: '# so', 7: '# the robot takes its time'}

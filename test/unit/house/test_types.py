@@ -1,6 +1,7 @@
 """Types that say something: few are `Any`, and nothing is ignored without a reason that mypy
 names.
 """
+
 import ast
 import re
 
@@ -25,15 +26,22 @@ def annotations(tree):
 
 
 def test_few_annotations_are_any():
-    found = [annotation for path in PACKAGE for annotation in annotations(parse(path))
-             if annotation is not None]
+    found = [
+        annotation
+        for path in PACKAGE
+        for annotation in annotations(parse(path))
+        if annotation is not None
+    ]
     bare = [each for each in found if isinstance(each, ast.Name) and each.id == 'Any']
     assert len(bare) / len(found) < MOST_ANY, '{} of {} are Any'.format(len(bare), len(found))
 
 
 def test_every_ignored_error_of_types_is_named():
-    lines = ['{}:{} {}'.format(shown(path), number, line.strip()) for path in PACKAGE
-             for number, line in enumerate(path.read_text(encoding='utf-8').splitlines(), 1)
-             if 'type: ignore' in line]
+    lines = [
+        '{}:{} {}'.format(shown(path), number, line.strip())
+        for path in PACKAGE
+        for number, line in enumerate(path.read_text(encoding='utf-8').splitlines(), 1)
+        if 'type: ignore' in line
+    ]
     assert len(lines) <= MOST_IGNORES
     assert not [line for line in lines if not re.search(r'type: ignore\[[a-z-]+', line)]

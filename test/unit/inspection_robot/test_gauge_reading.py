@@ -1,4 +1,5 @@
 """The gauge is read from what the camera sees, and every reason why not is told."""
+
 import math
 
 import numpy as np
@@ -35,13 +36,16 @@ def test_from_where_the_robot_stands_a_gauge_is_read(panel, seed):
     assert found.bar == pytest.approx(draw(seed).readings[panel.number], abs=0.15)
 
 
-@pytest.mark.parametrize('pose, twist, why', [
-    (before_panel(PANELS[0], 4.0), None, 'too far off'),
-    (around(PANELS[0], math.radians(55)), None, 'at a slant'),
-    (before_panel(PANELS[0], 1.5, 1.0), None, 'as a whole'),
-    (before_panel(PANELS[0], 1.5), Twist(0.0, 0.7), 'blurred'),
-    ((5.0, 3.5, math.pi / 2), None, 'as a whole')
-])
+@pytest.mark.parametrize(
+    'pose, twist, why',
+    [
+        (before_panel(PANELS[0], 4.0), None, 'too far off'),
+        (around(PANELS[0], math.radians(55)), None, 'at a slant'),
+        (before_panel(PANELS[0], 1.5, 1.0), None, 'as a whole'),
+        (before_panel(PANELS[0], 1.5), Twist(0.0, 0.7), 'blurred'),
+        ((5.0, 3.5, math.pi / 2), None, 'as a whole'),
+    ],
+)
 def test_why_it_cannot_be_read_is_told(pose, twist, why):
     with pytest.raises(ReadingError, match=why):
         read(seen(pose, twist=twist))
@@ -71,7 +75,8 @@ def test_the_reading_stays_true_at_a_slant():
     true = draw(3).readings[1]
     for degrees in (-35, -20, 20, 35):
         assert read(seen(around(PANELS[0], math.radians(degrees)))).bar == pytest.approx(
-            true, abs=0.2)
+            true, abs=0.2
+        )
 
 
 def test_noise_alone_shows_no_panel():

@@ -1,4 +1,5 @@
 """What the checks make of the robot's messages."""
+
 import math
 
 import pytest
@@ -15,8 +16,9 @@ from smach_oracle.inspection_robot.world.inspection_world import BEAMS, Inspecti
 
 
 def scan(world):
-    return LaserScan(angle_min=BEAMS[0], angle_increment=BEAMS[1] - BEAMS[0],
-                     ranges=world.scan().tolist())
+    return LaserScan(
+        angle_min=BEAMS[0], angle_increment=BEAMS[1] - BEAMS[0], ranges=world.scan().tolist()
+    )
 
 
 def image(world):
@@ -30,6 +32,7 @@ def odometry(v, w):
 @pytest.fixture
 def hears(monkeypatch):
     """Gives a message to whoever subscribes; time stands, as that of a paused simulation."""
+
     def install(message):
         class Subscription:
             def __init__(self, topic, spec, callback, **options):
@@ -38,7 +41,9 @@ def hears(monkeypatch):
 
             def unregister(self):
                 pass
+
         monkeypatch.setattr(rospy, 'Subscriber', Subscription)
+
     monkeypatch.setattr(rospy, 'get_time', lambda: 5.0)
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     return install
@@ -96,6 +101,7 @@ def test_where_no_message_comes_the_check_does_not_hold(monkeypatch):
 
         def unregister(self):
             pass
+
     monkeypatch.setattr(rospy, 'Subscriber', Silence)
     monkeypatch.setattr(rospy, 'get_time', lambda: 5.0)
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)

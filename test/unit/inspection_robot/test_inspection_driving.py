@@ -1,4 +1,5 @@
 """Routes keep clear of walls, a scan tells where the robot is, and steering brings it there."""
+
 import math
 
 import numpy as np
@@ -50,8 +51,11 @@ def test_a_scan_tells_where_the_robot_is(seed):
     x, y, yaw = PLACES[seed % 3]
     world = world_at((x + rng.uniform(-0.5, 0.5), y + rng.uniform(-0.3, 0.3), yaw + 0.3))
     true = world.base.pose
-    believed = (true[0] + rng.uniform(-0.6, 0.6), true[1] + rng.uniform(-0.6, 0.6),
-                true[2] + rng.uniform(-0.6, 0.6))
+    believed = (
+        true[0] + rng.uniform(-0.6, 0.6),
+        true[1] + rng.uniform(-0.6, 0.6),
+        true[2] + rng.uniform(-0.6, 0.6),
+    )
     found = Localiser().locate(believed, world.scan(), BEAMS, SCANNER_RANGE)
     assert np.hypot(found[0] - true[0], found[1] - true[1]) < 0.03
     assert abs(math.remainder(found[2] - true[2], 2 * math.pi)) < 0.02

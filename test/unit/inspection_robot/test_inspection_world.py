@@ -1,4 +1,5 @@
 """The second robot's world: what is drawn from a seed, how the base moves, how people walk."""
+
 import math
 
 import numpy as np
@@ -27,8 +28,9 @@ def test_rays_end_at_walls_and_at_people():
     angles = np.array([0.0, math.pi / 2, math.pi])
     assert to_walls((0.0, 0.0), angles, box) == pytest.approx([2.0, np.inf, np.inf])
     assert to_circle((0.0, 0.0), angles, (0.0, 3.0, 0.5)) == pytest.approx([np.inf, 2.5, np.inf])
-    assert ranges((0.0, 0.0), angles, box,
-                  [(1.0, 0.0, 0.25)]) == pytest.approx([0.75, np.inf, np.inf])
+    assert ranges((0.0, 0.0), angles, box, [(1.0, 0.0, 0.25)]) == pytest.approx(
+        [0.75, np.inf, np.inf]
+    )
 
 
 def test_the_clearance_is_that_to_the_nearest_wall():
@@ -126,8 +128,9 @@ def test_who_looks_at_a_panel_stands_before_it_when_the_robot_comes(seed):
         world.step(DT_S)
         for panel in PANELS:
             if abs(world.time_s - AT_PANEL_S[panel.number]) < 0.5 * DT_S:
-                gaps[panel.number] = min(math.hypot(x - panel.x, y - panel.y)
-                                         for x, y, _ in world.people)
+                gaps[panel.number] = min(
+                    math.hypot(x - panel.x, y - panel.y) for x, y, _ in world.people
+                )
     assert sum(gap < 0.5 for gap in gaps.values()) == 1, gaps
 
 

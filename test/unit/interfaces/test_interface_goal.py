@@ -1,4 +1,5 @@
 """What a person may end the goal of an interface with; no master."""
+
 import threading
 
 import pytest
@@ -58,11 +59,14 @@ def test_an_output_that_is_given_overrides_what_the_interface_knows(active):
     assert goal.goal is None
 
 
-@pytest.mark.parametrize('outcome, given, why', [
-    ('dropped', [], "no outcome 'dropped'"),
-    ('grasped', [encode('arm', 'left')], 'no output keys arm'),
-    ('grasped', [encode('object', 'cup'), encode('object', 'mug')], 'come twice: object'),
-])
+@pytest.mark.parametrize(
+    'outcome, given, why',
+    [
+        ('dropped', [], "no outcome 'dropped'"),
+        ('grasped', [encode('arm', 'left')], 'no output keys arm'),
+        ('grasped', [encode('object', 'cup'), encode('object', 'mug')], 'come twice: object'),
+    ],
+)
 def test_what_does_not_fit_is_refused_and_the_goal_stays_open(active, outcome, given, why):
     goal, handle = active
     with pytest.raises(InterfaceGoalError, match=why):

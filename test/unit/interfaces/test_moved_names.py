@@ -1,4 +1,5 @@
 """Names that users import stay importable from where they were, with a warning."""
+
 import importlib
 import sys
 

@@ -1,4 +1,5 @@
 """Machines whose Iterators and Concurrences hold plain states, for tests of branches."""
+
 from machines import OUTCOMES
 
 import smach
@@ -26,12 +27,19 @@ class Item(smach.State):
         return step
 
 
-def iterator_over(state, items=(1, 2, 3, 4), outcomes=('done', 'aborted', 'preempted'),
-                  **contained):
+def iterator_over(
+    state, items=(1, 2, 3, 4), outcomes=('done', 'aborted', 'preempted'), **contained
+):
     """An Iterator whose state is EACH; 'ok' leads to the next item."""
     contained = contained or {'loop_outcomes': ['ok']}
-    iterator = smach.Iterator(outcomes=list(outcomes), input_keys=['done'], output_keys=['done'],
-                              it=items, it_label='item', exhausted_outcome='done')
+    iterator = smach.Iterator(
+        outcomes=list(outcomes),
+        input_keys=['done'],
+        output_keys=['done'],
+        it=items,
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with iterator:
         smach.Iterator.set_contained_state('EACH', state, **contained)
     return iterator
@@ -48,8 +56,12 @@ def inside(container, label='ALL', transitions=None, outcomes=('done', 'aborted'
 
 def both(left, right, **options):
     """A Concurrence of the states LEFT and RIGHT, 'done' where both end with 'ok'."""
-    given = {'outcomes': ['done', 'aborted', 'preempted'], 'default_outcome': 'aborted',
-             'outcome_map': {'done': {'LEFT': 'ok', 'RIGHT': 'ok'}}, **options}
+    given = {
+        'outcomes': ['done', 'aborted', 'preempted'],
+        'default_outcome': 'aborted',
+        'outcome_map': {'done': {'LEFT': 'ok', 'RIGHT': 'ok'}},
+        **options,
+    }
     concurrence = smach.Concurrence(**given)
     with concurrence:
         smach.Concurrence.add('LEFT', left)

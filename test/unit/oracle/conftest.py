@@ -1,4 +1,5 @@
 """Fixtures for tests of the executive; the states and fakes they use are in machines.py."""
+
 import os
 import sys
 import tempfile
@@ -16,8 +17,10 @@ def log(monkeypatch):
     """Everything that is logged, as (level, text); the shutdown check is put back afterwards."""
     lines = []
     for level in ('info', 'warn', 'debug', 'err'):
+
         def logger(text, level=level):
             lines.append((level, str(text)))
+
         monkeypatch.setattr(smach, 'log' + level, logger)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     return lines

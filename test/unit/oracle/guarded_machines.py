@@ -1,4 +1,5 @@
 """Machines in which POUR is not repeated by itself."""
+
 from machines import FakeExpert, Scripted, Watched
 
 import smach
@@ -26,8 +27,11 @@ def chain(**states):
 
 def both(**branches):
     """A Concurrence of these, which ends with 'done' where all of them do."""
-    concurrence = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted',
-                                    outcome_map={'done': {label: 'done' for label in branches}})
+    concurrence = smach.Concurrence(
+        outcomes=OUTCOMES,
+        default_outcome='aborted',
+        outcome_map={'done': {label: 'done' for label in branches}},
+    )
     with concurrence:
         for label, branch in branches.items():
             smach.Concurrence.add(label, branch)

@@ -1,4 +1,5 @@
 """Machines that run in a thread, and an operator who holds them."""
+
 import threading
 import time
 from typing import Any, Callable, List, Optional
@@ -85,8 +86,11 @@ class Held(Watched):
 
     def held(self) -> List[str]:
         """PATH/STATE before which its containers wait now."""
-        return ['{}/{}'.format(each.path, each.state) for each in self.hand.status().active
-                if each.held_by]
+        return [
+            '{}/{}'.format(each.path, each.state)
+            for each in self.hand.status().active
+            if each.held_by
+        ]
 
     def waits_before(self, *places: str) -> None:
         """Wait until it waits before these, and no others."""
@@ -105,11 +109,14 @@ class Trail:
 
     def state(self, label, *script, outcomes=('ok', 'aborted', 'preempted')):
         """A state that does as told, and looks at no preempt unless its script does."""
+
         def noted(step):
             def run(state, ud):
                 self.ran.append(label)
                 return step(state, ud) if callable(step) else step
+
             return run
+
         return Scripted(*map(noted, script or ['ok'] * 9), outcomes=outcomes)
 
     def cleaned(self, *work, clean=None, ends='preempted'):
@@ -127,5 +134,7 @@ class Trail:
 
     def _ways(self, state, good):
         outcomes = state.get_registered_outcomes()
-        return {**{each: good for each in ('ok', 'done') if each in outcomes},
-                **({'preempted': 'CLEAN'} if 'preempted' in outcomes else {})}
+        return {
+            **{each: good for each in ('ok', 'done') if each in outcomes},
+            **({'preempted': 'CLEAN'} if 'preempted' in outcomes else {}),
+        }

@@ -1,4 +1,5 @@
 """States that do as they are told, a fake expert, and machines made of them."""
+
 import threading
 from typing import Any, Callable, Dict, List, Optional
 
@@ -34,8 +35,9 @@ class FakeExpert(Expert):
     all.
     """
 
-    def __init__(self, *answers: Any,
-                 interface: Optional[Callable[..., Optional[Answer]]] = None) -> None:
+    def __init__(
+        self, *answers: Any, interface: Optional[Callable[..., Optional[Answer]]] = None
+    ) -> None:
         self.answers = list(answers)
         self.questions: List[Question] = []
         self._interface = interface
@@ -95,8 +97,12 @@ def interface(name: str) -> Answer:
     return Answer(AnswerKind.INTERFACE, interface=name, by='eva')
 
 
-def chain_of(*states: Any, outcomes=('done', 'aborted', 'preempted'),
-             machine_class=smach.StateMachine, **keys: Any):
+def chain_of(
+    *states: Any,
+    outcomes=('done', 'aborted', 'preempted'),
+    machine_class=smach.StateMachine,
+    **keys: Any,
+):
     """A machine of states A, B, C, ...: 'ok' leads to the next, from the last to 'done'; all else
     falls through.
     """
@@ -105,8 +111,11 @@ def chain_of(*states: Any, outcomes=('done', 'aborted', 'preempted'),
     with machine:
         for index, (label, state) in enumerate(zip(labels, states)):
             target = labels[index + 1] if index + 1 < len(labels) else 'done'
-            first = 'ok' if 'ok' in state.get_registered_outcomes() else sorted(
-                state.get_registered_outcomes())[0]
+            first = (
+                'ok'
+                if 'ok' in state.get_registered_outcomes()
+                else sorted(state.get_registered_outcomes())[0]
+            )
             smach.StateMachine.add(label, state, {first: target})
     return machine
 

@@ -3,6 +3,7 @@
 The policy and the level above ask, the expert is there and does not answer, and without an answer
 the machine goes to AWAY. So each phase that there is runs. `Options` give one of them a verdict.
 """
+
 import threading
 from typing import Any, Callable, Dict, List, NamedTuple, Optional
 
@@ -17,8 +18,13 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, Expert, Question
 from smach_oracle.oracle.records.events import Event, EventKind
 
-ALL_ASK = {'policy': 'always_ask', 'escalate': True, 'on_no_answer': {'goto': 'AWAY'},
-           'health_settle_s': 0.01, 'memory': 1000}
+ALL_ASK = {
+    'policy': 'always_ask',
+    'escalate': True,
+    'on_no_answer': {'goto': 'AWAY'},
+    'health_settle_s': 0.01,
+    'memory': 1000,
+}
 SOON = {'still_running_s': 0.05, 'still_running_factor': 1}
 GUARDED = {'states': {'B': {'on_retry': 'confirm'}}}
 ENDS = (EventKind.JUMP, EventKind.SUPERSEDE, EventKind.CONTAINER_END)
@@ -66,18 +72,27 @@ class Occasion(NamedTuple):
 
     def questions(self) -> List[Question]:
         """The questions about the state, those from before the occasion among them."""
-        return [each for each in self.expert.questions
-                if (each.container_path, each.failed_state) == (self.path, self.state)]
+        return [
+            each
+            for each in self.expert.questions
+            if (each.container_path, each.failed_state) == (self.path, self.state)
+        ]
 
     def run(self) -> List[str]:
         """Run the trial. Return what the container tells, from the occasion to its verdict."""
         self.runs(self.machine)
         told = [event for event in self.machine.events if event.path == self.path]
         begin = next(index for index, event in enumerate(told) if self.begins(event))
-        end = next(index for index, event in enumerate(told) if index > begin and (
-            event.kind in ENDS or event.kind is EventKind.STATE_START))
-        told = [event for event in told[begin:end + 1] if event.kind not in (
-            EventKind.CONTAINER_END, EventKind.STATE_START)]
+        end = next(
+            index
+            for index, event in enumerate(told)
+            if index > begin and (event.kind in ENDS or event.kind is EventKind.STATE_START)
+        )
+        told = [
+            event
+            for event in told[begin : end + 1]
+            if event.kind not in (EventKind.CONTAINER_END, EventKind.STATE_START)
+        ]
         return [event.kind.name for event in told]
 
 
@@ -135,22 +150,39 @@ def chain(**states: Any) -> smach.StateMachine:
     return machine
 
 
-def told_of(kind: EventKind, state: str = 'B', target: str = '',
-            outcome: str = '') -> Callable[[Event], bool]:
-    return lambda event: (event.kind is kind and event.state == state
-                          and target in ('', event.target) and outcome in ('', event.outcome))
+def told_of(
+    kind: EventKind, state: str = 'B', target: str = '', outcome: str = ''
+) -> Callable[[Event], bool]:
+    return lambda event: (
+        event.kind is kind
+        and event.state == state
+        and target in ('', event.target)
+        and outcome in ('', event.outcome)
+    )
 
 
-def of_b(options: Options, b: smach.State, begins: Callable[[Event], bool],
-         settings: Dict[str, Any], first: Any = (), c: Optional[smach.State] = None,
-         health: Optional[FakeHealth] = None, **more: Any) -> Occasion:
+def of_b(
+    options: Options,
+    b: smach.State,
+    begins: Callable[[Event], bool],
+    settings: Dict[str, Any],
+    first: Any = (),
+    c: Optional[smach.State] = None,
+    health: Optional[FakeHealth] = None,
+    **more: Any,
+) -> Occasion:
     """An occasion of B in TOP/WORK."""
     expert = Answers(*first, options.answer)
     work = chain(A=Scripted(), B=b, C=c or Scripted())
     own = {**ALL_ASK, **settings, 'policy': options.policy, 'escalate': options.escalate}
     OracleContainer.wrap(work, settings=own)  # it keeps its policy below the other machine
-    machine = Watched(chain(HOME=Scripted(), WORK=work), name='TOP', expert=expert, health=health,
-                      settings={**own, 'policy': options.above})
+    machine = Watched(
+        chain(HOME=Scripted(), WORK=work),
+        name='TOP',
+        expert=expert,
+        health=health,
+        settings={**own, 'policy': options.above},
+    )
     return Occasion(machine, expert, 'TOP/WORK', 'B', begins, **more)
 
 
@@ -159,14 +191,25 @@ def failed(folder, options):
 
 
 def overran(folder, options):
-    return of_b(options, Heeds(False), told_of(EventKind.FAILURE), {
-        'states': {'B': {'time_limit_s': 0.05, 'grace_period_s': 20}}})
+    return of_b(
+        options,
+        Heeds(False),
+        told_of(EventKind.FAILURE),
+        {'states': {'B': {'time_limit_s': 0.05, 'grace_period_s': 20}}},
+    )
 
 
 def held_back(folder, options):
     """C fails, and the expert goes back to A without a word on B, which is guarded."""
-    return of_b(options, Scripted(), told_of(EventKind.TRANSITION, 'B', 'ORACLE'), GUARDED,
-                first=[goto('A')], c=Scripted('aborted'), visits_before=['SUCCESS'])
+    return of_b(
+        options,
+        Scripted(),
+        told_of(EventKind.TRANSITION, 'B', 'ORACLE'),
+        GUARDED,
+        first=[goto('A')],
+        c=Scripted('aborted'),
+        visits_before=['SUCCESS'],
+    )
 
 
 def stopped_in_b(machine: Watched) -> None:
@@ -178,9 +221,17 @@ def stopped_in_b(machine: Watched) -> None:
 
 
 def interrupted(folder, options, on_resume='recover'):
-    return of_b(options, Scripted(KeyboardInterrupt()), told_of(EventKind.FAILURE), {
-        'checkpoint': str(folder / 'robot.db'), 'checkpoint_synchronous': 'OFF',
-        'on_resume': on_resume}, runs=stopped_in_b)
+    return of_b(
+        options,
+        Scripted(KeyboardInterrupt()),
+        told_of(EventKind.FAILURE),
+        {
+            'checkpoint': str(folder / 'robot.db'),
+            'checkpoint_synchronous': 'OFF',
+            'on_resume': on_resume,
+        },
+        runs=stopped_in_b,
+    )
 
 
 def interrupted_and_asked(folder, options):
@@ -213,8 +264,15 @@ def often_unwell(folder, options):
     return unwell(options, 2, EventKind.FAILURE, {'max_recoveries': 1})
 
 
-def beside(options: Options, b: smach.State, first: List[Answer], path: str, state: str,
-           outcome: str = '', **more: Any) -> Occasion:
+def beside(
+    options: Options,
+    b: smach.State,
+    first: List[Answer],
+    path: str,
+    state: str,
+    outcome: str = '',
+    **more: Any,
+) -> Occasion:
     """B is in WORK, and the expert goes from there to TOP/C.
 
     A branch beside WORK closes C while the machine is on its way there.
@@ -223,15 +281,24 @@ def beside(options: Options, b: smach.State, first: List[Answer], path: str, sta
     both = smach.Concurrence(outcomes=OUTCOMES, default_outcome='done')
     with both:
         smach.Concurrence.add('WORK', chain(B=b))
-        smach.Concurrence.add('BESIDE', chain(
-            WAIT=WaitsForIt(told), HANG=hangs if options.closes else Scripted()))
+        smach.Concurrence.add(
+            'BESIDE', chain(WAIT=WaitsForIt(told), HANG=hangs if options.closes else Scripted())
+        )
     expert = Answers(*first, options.answer)
-    machine = Watched(chain(HOME=Scripted(), BOTH=both, C=hangs), name='TOP', expert=expert,
-                      settings={**ALL_ASK, **SOON, 'states': {
-                          'HANG': {'time_limit_s': 0.05, 'grace_period_s': 0}}})
+    machine = Watched(
+        chain(HOME=Scripted(), BOTH=both, C=hangs),
+        name='TOP',
+        expert=expert,
+        settings={
+            **ALL_ASK,
+            **SOON,
+            'states': {'HANG': {'time_limit_s': 0.05, 'grace_period_s': 0}},
+        },
+    )
     if options.closes and isinstance(b, Heeds):
-        b.until = lambda: wait_for(lambda: any(
-            event.state == 'HANG' for event in machine.of(EventKind.FAILURE)))
+        b.until = lambda: wait_for(
+            lambda: any(event.state == 'HANG' for event in machine.of(EventKind.FAILURE))
+        )
 
     def runs(machine: Watched) -> None:
         if not options.closes:
@@ -241,13 +308,28 @@ def beside(options: Options, b: smach.State, first: List[Answer], path: str, sta
         finally:
             hangs.lets_go.set()
 
-    return Occasion(machine, expert, path, state, told_of(
-        EventKind.TRANSITION, state, 'ORACLE', outcome), runs=runs, **more)
+    return Occasion(
+        machine,
+        expert,
+        path,
+        state,
+        told_of(EventKind.TRANSITION, state, 'ORACLE', outcome),
+        runs=runs,
+        **more,
+    )
 
 
 def taken_out(folder, options):
-    return beside(options, Heeds(True), [goto('B'), goto('C', container='TOP')], 'TOP/BOTH/WORK',
-                  'B', 'preempted', visits_before=['FAILURE'], failures_before=1)
+    return beside(
+        options,
+        Heeds(True),
+        [goto('B'), goto('C', container='TOP')],
+        'TOP/BOTH/WORK',
+        'B',
+        'preempted',
+        visits_before=['FAILURE'],
+        failures_before=1,
+    )
 
 
 def arrived(folder, options):
@@ -255,6 +337,13 @@ def arrived(folder, options):
 
 
 OCCASIONS: Dict[str, Callable[..., Occasion]] = {
-    'failed': failed, 'overran': overran, 'held back': held_back, 'interrupted': interrupted,
-    'interrupted, asked first': interrupted_and_asked, 'taken out': taken_out,
-    'arrived from elsewhere': arrived, 'robot unwell': robot_unwell, 'often unwell': often_unwell}
+    'failed': failed,
+    'overran': overran,
+    'held back': held_back,
+    'interrupted': interrupted,
+    'interrupted, asked first': interrupted_and_asked,
+    'taken out': taken_out,
+    'arrived from elsewhere': arrived,
+    'robot unwell': robot_unwell,
+    'often unwell': often_unwell,
+}

@@ -1,4 +1,5 @@
 """A nested machine whose state overran its limit and was abandoned: it stops, and tells nothing."""
+
 import threading
 
 import pytest
@@ -42,17 +43,25 @@ def drawn(label, child, *others):
 
 
 def iterator_of(child):
-    iterator = smach.Iterator(outcomes=['done', 'aborted', 'preempted'], input_keys=[],
-                              output_keys=[], it=[1, 2, 3], it_label='item',
-                              exhausted_outcome='done')
+    iterator = smach.Iterator(
+        outcomes=['done', 'aborted', 'preempted'],
+        input_keys=[],
+        output_keys=[],
+        it=[1, 2, 3],
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with iterator:
         smach.Iterator.set_contained_state('EACH', child, loop_outcomes=['done', 'aborted'])
     return iterator
 
 
 def concurrence_of(child):
-    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                                    outcome_map={'done': {'ONE': 'done'}})
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'ONE': 'done'}},
+    )
     with concurrence:
         smach.Concurrence.add('ONE', child)
     return concurrence
@@ -67,8 +76,11 @@ def abandoned(monkeypatch, deaf, child, *others, observed=True, **settings):
     clock = Clock()
     clock.end(2, deaf.stuck)
     monkeypatch.setattr(workers, 'wait', clock.wait)
-    machine = Watched(drawn('X', child, *others), expert=FakeExpert(goto('OTHER')),
-                      settings=dict(settings, states=LIMITS))
+    machine = Watched(
+        drawn('X', child, *others),
+        expert=FakeExpert(goto('OTHER')),
+        settings=dict(settings, states=LIMITS),
+    )
     if not observed:
         machine.machine.events.observers.remove(machine.events.append)
     return machine
@@ -90,8 +102,7 @@ def test_it_stops_at_its_next_state_boundary(monkeypatch, end, services, observe
         smach.StateMachine.add('A', deaf, {'ok': 'B', 'aborted': 'aborted', 'preempted': 'C'})
         smach.StateMachine.add('B', after, {'ok': 'done'})
         smach.StateMachine.add('C', repaired, {'ok': 'done'})
-    machine = abandoned(monkeypatch, deaf, inner, observed=observed,
-                        author_recoveries=recovering)
+    machine = abandoned(monkeypatch, deaf, inner, observed=observed, author_recoveries=recovering)
     assert machine.run() == 'done'
     assert inner.is_running()
     let_go(deaf)
@@ -112,8 +123,15 @@ def test_the_way_it_has_learned_is_no_longer_taken(monkeypatch):
     assert (deaf.runs, after.runs) == (2, 1)
 
 
-@pytest.mark.parametrize('wrap', [lambda inner: drawn('DEEP', inner), iterator_of, concurrence_of,
-                                  lambda inner: iterator_of(concurrence_of(inner))])
+@pytest.mark.parametrize(
+    'wrap',
+    [
+        lambda inner: drawn('DEEP', inner),
+        iterator_of,
+        concurrence_of,
+        lambda inner: iterator_of(concurrence_of(inner)),
+    ],
+)
 def test_machines_below_it_stop_too(monkeypatch, wrap):
     deaf, after = Deaf('aborted'), Scripted()
     inner = chain_of(deaf, after)
@@ -128,8 +146,10 @@ def test_a_machine_that_the_state_executes_itself_stops_and_begins_no_trial(monk
     deaf, after = Deaf(), Scripted()
     own = Watched(chain_of(deaf, after))
     outcomes = []
-    state = Scripted(lambda state, ud: outcomes.extend([own.run(), own.run()]) or 'done',
-                     outcomes=('done', 'aborted', 'preempted'))
+    state = Scripted(
+        lambda state, ud: outcomes.extend([own.run(), own.run()]) or 'done',
+        outcomes=('done', 'aborted', 'preempted'),
+    )
     machine = abandoned(monkeypatch, deaf, state)
     assert machine.run() == 'done'
     let_go(deaf)
@@ -143,9 +163,18 @@ def test_it_writes_no_event_into_an_ended_trial_nor_into_the_next(monkeypatch, e
     deaf = Deaf(end)
     inner = chain_of(deaf, Scripted())
     in_second = threading.Event()
-    machine = abandoned(monkeypatch, deaf, inner, 'ok',
-                        lambda state, ud: in_second.set() or deaf.let_go.wait(20) and wait_for(
-                            lambda: not threads_of_x()) and 'ok')
+    machine = abandoned(
+        monkeypatch,
+        deaf,
+        inner,
+        'ok',
+        lambda state, ud: (
+            in_second.set()
+            or deaf.let_go.wait(20)
+            and wait_for(lambda: not threads_of_x())
+            and 'ok'
+        ),
+    )
     assert machine.run() == 'done'
     machine.machine.expert = FakeExpert(goto('OTHER'), goto('OTHER'))
     second = in_thread(machine.run)
@@ -198,15 +227,23 @@ def test_a_bare_machine_stops_too(monkeypatch):
 
 def test_a_machine_within_its_grace_may_still_clean_up(monkeypatch):
     cleaned = Scripted()
-    polls = Scripted(lambda state, ud: wait_for(state.preempt_requested) and (
-        state.service_preempt() or 'preempted'))
+    polls = Scripted(
+        lambda state, ud: (
+            wait_for(state.preempt_requested) and (state.service_preempt() or 'preempted')
+        )
+    )
     inner = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with inner:
         smach.StateMachine.add('A', polls, {'ok': 'done', 'preempted': 'CLEAN'})
         smach.StateMachine.add('CLEAN', cleaned, {'ok': 'preempted'})
-    machine = Watched(drawn('X', inner), expert=FakeExpert(supersede('done')),
-                      settings={'max_recoveries': 0, 'states': {
-                          'X': {'time_limit_s': 0.1, 'grace_period_s': 20.0}}})
+    machine = Watched(
+        drawn('X', inner),
+        expert=FakeExpert(supersede('done')),
+        settings={
+            'max_recoveries': 0,
+            'states': {'X': {'time_limit_s': 0.1, 'grace_period_s': 20.0}},
+        },
+    )
     assert machine.run() == 'done'
     assert cleaned.runs == 1
 

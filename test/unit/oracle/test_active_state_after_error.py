@@ -1,4 +1,5 @@
 """After an error `get_active_states` names the state that failed, as it does without an oracle."""
+
 import pytest
 from machines import FakeExpert, Scripted, chain_of, give_up
 
@@ -6,9 +7,11 @@ import smach
 from smach_oracle.oracle import OracleContainer
 
 ASKS = {'max_recoveries': 0, 'deadline_s': 20.0}
-ENDS = {'exception': (ValueError('broken'), smach.InvalidUserCodeError),
-        'unregistered outcome': ('nonsense', smach.InvalidTransitionError),
-        'outcome that leads nowhere': ('unbound', smach.InvalidTransitionError)}
+ENDS = {
+    'exception': (ValueError('broken'), smach.InvalidUserCodeError),
+    'unregistered outcome': ('nonsense', smach.InvalidTransitionError),
+    'outcome that leads nowhere': ('unbound', smach.InvalidTransitionError),
+}
 
 
 def machine_that(*ends):
@@ -35,8 +38,11 @@ def test_the_failed_state_is_the_active_one_after_an_error(end, expert, settings
     for is_wrapped in (False, True):
         machine = machine_that(*[returned] * 20)
         if is_wrapped:
-            OracleContainer.wrap(machine, settings=settings, expert=FakeExpert(
-                *[expert] * 20) if expert is not None else None)
+            OracleContainer.wrap(
+                machine,
+                settings=settings,
+                expert=FakeExpert(*[expert] * 20) if expert is not None else None,
+            )
         with pytest.raises(kind):
             machine.execute()
         active.append(machine.get_active_states())

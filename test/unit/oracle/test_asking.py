@@ -1,6 +1,7 @@
 """Questions to the expert: what is asked, what may be answered, and what happens where nobody
 answers.
 """
+
 import threading
 import time
 
@@ -29,8 +30,9 @@ def asking(*answers, b=None, **settings):
     """A, B, C, where B fails and the expert is asked at once."""
     expert = FakeExpert(*answers)
     settings.setdefault('max_recoveries', 0)
-    machine = watched(Scripted(), b or Scripted('aborted'), Scripted(), expert=expert,
-                      settings=settings)
+    machine = watched(
+        Scripted(), b or Scripted('aborted'), Scripted(), expert=expert, settings=settings
+    )
     return machine, expert
 
 
@@ -75,28 +77,44 @@ def test_giving_up_without_an_outcome_ends_as_the_failure_would_have():
 def test_the_question_tells_everything():
     machine = watched(
         Scripted(outcomes=('ok', 'aborted')),
-        Scripted('aborted', input_keys=['k'], output_keys=['o']), expert=FakeExpert(give_up()),
-        preconditions={'B': [lambda ud: True]}, settings={
-            'max_recoveries': 1, 'deadline_s': 60, 'interfaces': {
+        Scripted('aborted', input_keys=['k'], output_keys=['o']),
+        expert=FakeExpert(give_up()),
+        preconditions={'B': [lambda ud: True]},
+        settings={
+            'max_recoveries': 1,
+            'deadline_s': 60,
+            'interfaces': {
                 'hand': {'action': 'hand/assist', 'states': ['B']},
-                'eye': {'action': 'eye/assist', 'states': ['A']}
-            }
-        })
+                'eye': {'action': 'eye/assist', 'states': ['A']},
+            },
+        },
+    )
     machine.machine['B'].script = ['aborted', 'aborted']
     machine.machine.userdata.k = 3
     machine.run()
     question = machine.machine.expert.questions[0]
-    assert (question.failed_state, question.container_path, question.outcome) == ('B', 'SM_ROOT',
-                                                                                  'aborted')
+    assert (question.failed_state, question.container_path, question.outcome) == (
+        'B',
+        'SM_ROOT',
+        'aborted',
+    )
     assert question.trial_id == machine.machine.trial_id
     assert [(visit.state, visit.outcome) for visit in question.history] == [
-        ('A', 'ok'), ('B', 'aborted'), ('B', 'aborted')]
+        ('A', 'ok'),
+        ('B', 'aborted'),
+        ('B', 'aborted'),
+    ]
     assert {choice.state: (choice.visits, choice.preconditions) for choice in question.choices} == {
-        'A': (1, ()), 'B': (2, ('<lambda>',))}
+        'A': (1, ()),
+        'B': (2, ('<lambda>',)),
+    }
     assert abs(question.rate - 0.28) < 1e-9
     assert question.continuous and question.recoveries == 1
     assert [(choice.outcome, choice.target) for choice in question.supersede_outcomes] == [
-        ('aborted', 'aborted'), ('ok', 'done'), ('preempted', 'preempted')]
+        ('aborted', 'aborted'),
+        ('ok', 'done'),
+        ('preempted', 'preempted'),
+    ]
     assert question.output_keys == ('o',)
     assert question.give_up_outcomes == ('aborted', 'done', 'preempted')
     assert [offer.name for offer in question.interfaces] == ['hand']
@@ -108,17 +126,32 @@ def test_the_question_tells_everything():
 
 def test_preconditions_that_ran_before_are_told():
     expert = FakeExpert(give_up())
-    machine = watched(Scripted('aborted', 'aborted'), expert=expert,
-                      preconditions={'A': [lambda ud: False]}, settings={'prior': 0.5})
+    machine = watched(
+        Scripted('aborted', 'aborted'),
+        expert=expert,
+        preconditions={'A': [lambda ud: False]},
+        settings={'prior': 0.5},
+    )
     machine.run()
     assert expert.questions[0].tried == (
-        'precondition <lambda>: not met (<lambda> returned False)',)
+        'precondition <lambda>: not met (<lambda> returned False)',
+    )
 
 
-@pytest.mark.parametrize('wrong', [goto('NOWHERE'), goto('ORACLE'), goto(''), supersede('nonsense'),
-                                   give_up('nonsense'), interface('none'),
-                                   supersede('ok', outputs={'k': 1}), AnswerError('cannot decode'),
-                                   InterfaceError('gone before it was chosen')])
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        goto('NOWHERE'),
+        goto('ORACLE'),
+        goto(''),
+        supersede('nonsense'),
+        give_up('nonsense'),
+        interface('none'),
+        supersede('ok', outputs={'k': 1}),
+        AnswerError('cannot decode'),
+        InterfaceError('gone before it was chosen'),
+    ],
+)
 def test_an_answer_that_does_not_fit_is_warned_of_and_asked_again_under_a_new_id(wrong):
     machine, expert = asking(wrong, goto('C'))
     assert machine.run() == 'done'
@@ -126,14 +159,16 @@ def test_an_answer_that_does_not_fit_is_warned_of_and_asked_again_under_a_new_id
     first, second = expert.questions
     assert first.question_id != second.question_id
     assert second.deadline_s <= first.deadline_s
-    assert [event.query_id for event in machine.of(EventKind.QUERY_OPENED)
-            ] == [first.question_id, second.question_id]
+    assert [event.query_id for event in machine.of(EventKind.QUERY_OPENED)] == [
+        first.question_id,
+        second.question_id,
+    ]
 
 
 def test_the_id_of_a_question_keeps_its_old_name_with_a_warning():
     machine, expert = asking(goto('C'))
     machine.run()
-    question, = expert.questions
+    (question,) = expert.questions
     with pytest.warns(FutureWarning, match='query_id is now called question_id'):
         assert question.query_id == question.question_id
 
@@ -152,36 +187,49 @@ def test_without_an_expert_the_machine_stops_at_once_with_the_original_outcome()
     assert [event.outcome for event in machine.of(EventKind.GIVE_UP)] == ['aborted']
 
 
-@pytest.mark.parametrize('fallback, outcome, visits', [
-    ('stop', 'aborted', ['A', 'B']), ({'goto': 'C'}, 'done', ['A', 'B', 'C']),
-    ('give_up:preempted', 'preempted', ['A', 'B']), ('goto:NOWHERE', 'aborted', ['A', 'B']),
-    ({'give_up': 'nonsense'}, 'aborted', ['A', 'B'])])
+@pytest.mark.parametrize(
+    'fallback, outcome, visits',
+    [
+        ('stop', 'aborted', ['A', 'B']),
+        ({'goto': 'C'}, 'done', ['A', 'B', 'C']),
+        ('give_up:preempted', 'preempted', ['A', 'B']),
+        ('goto:NOWHERE', 'aborted', ['A', 'B']),
+        ({'give_up': 'nonsense'}, 'aborted', ['A', 'B']),
+    ],
+)
 def test_a_question_nobody_answers_falls_back(fallback, outcome, visits):
     machine, expert = asking(on_no_answer=fallback, deadline_s=5)
     assert machine.run() == outcome
     assert machine.visits() == visits
     assert len(machine.of(EventKind.QUERY_EXPIRED)) == 1
-    assert bool(machine.of(EventKind.WARNING)) is (fallback
-                                                   in ('goto:NOWHERE', {'give_up': 'nonsense'}))
+    assert bool(machine.of(EventKind.WARNING)) is (
+        fallback in ('goto:NOWHERE', {'give_up': 'nonsense'})
+    )
 
 
-@pytest.mark.parametrize('settings, told',
-                         [({'deadline_s': 7}, 'within 7 s: stop'),
-                          ({'deadline_s': 7, 'on_no_answer': 'goto:C'}, 'within 7 s: goto C'),
-                          ({'deadline_s': 0}, 'it waits on')])
+@pytest.mark.parametrize(
+    'settings, told',
+    [
+        ({'deadline_s': 7}, 'within 7 s: stop'),
+        ({'deadline_s': 7, 'on_no_answer': 'goto:C'}, 'within 7 s: goto C'),
+        ({'deadline_s': 0}, 'it waits on'),
+    ],
+)
 def test_the_log_says_that_the_machine_waits_and_for_how_long(log, settings, told):
     machine, _ = asking(goto('C'), **settings)
     machine.run()
     asked = machine.of(EventKind.QUERY_OPENED)[0]
     assert [text for level, text in log if level == 'warn' and 'the expert is asked' in text] == [
         'SM_ROOT/B: the expert is asked (question {}); without an answer {}'.format(
-            asked.query_id, told)
+            asked.query_id, told
+        )
     ]
 
 
 def test_falling_back_to_a_state_has_an_end_when_nobody_ever_answers():
-    machine = watched(Scripted(*['aborted'] * 100),
-                      settings={'on_no_answer': 'goto:A', 'max_recoveries': 2})
+    machine = watched(
+        Scripted(*['aborted'] * 100), settings={'on_no_answer': 'goto:A', 'max_recoveries': 2}
+    )
     assert machine.run() == 'aborted'
     assert 'gone there 2 times' in machine.of(EventKind.WARNING)[-1].text
     assert machine.run() == 'aborted'  # the next trial begins again
@@ -209,6 +257,7 @@ def test_claims_are_told():
         progress('claimed', 'eva', '')
         progress('released', 'eva', 'lunch')
         return goto('C')
+
     machine, _ = asking(claims)
     machine.run()
     claimed, released = machine.of(EventKind.QUERY_CLAIMED, EventKind.QUERY_RELEASED)
@@ -218,10 +267,13 @@ def test_claims_are_told():
 
 def test_an_interface_supersedes_the_state_with_what_it_returns():
     machine = watched(
-        Scripted('aborted', output_keys=['pose']), Scripted(),
+        Scripted('aborted', output_keys=['pose']),
+        Scripted(),
         settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
-        expert=FakeExpert(interface('hand'),
-                          interface=lambda *args: supersede('ok', outputs={'pose': 1})))
+        expert=FakeExpert(
+            interface('hand'), interface=lambda *args: supersede('ok', outputs={'pose': 1})
+        ),
+    )
     assert machine.run() == 'done'
     assert machine.machine.userdata.pose == 1
     start, end = machine.of(EventKind.INTERFACE_START, EventKind.INTERFACE_END)
@@ -232,8 +284,11 @@ def test_an_interface_supersedes_the_state_with_what_it_returns():
 def test_after_an_interface_that_fails_the_expert_is_asked_again_and_told():
     expert = FakeExpert(interface('hand'), goto('B'))
     machine = watched(
-        Scripted('aborted'), Scripted(), expert=expert,
-        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}})
+        Scripted('aborted'),
+        Scripted(),
+        expert=expert,
+        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
+    )
     assert machine.run() == 'done'
     assert expert.questions[1].tried == ('interface hand: failed',)
 
@@ -241,17 +296,22 @@ def test_after_an_interface_that_fails_the_expert_is_asked_again_and_told():
 def test_beyond_its_recoveries_a_state_asks_whatever_the_policy_says():
     ran = []
     expert = FakeExpert(supersede('ok'))
-    machine = watched(Scripted(), Scripted(*['aborted'] * 3), expert=expert,
-                      settings={'memory': 1000, 'max_recoveries': 2},
-                      preconditions={'B': [lambda ud: ran.append(1) or True]})
+    machine = watched(
+        Scripted(),
+        Scripted(*['aborted'] * 3),
+        expert=expert,
+        settings={'memory': 1000, 'max_recoveries': 2},
+        preconditions={'B': [lambda ud: ran.append(1) or True]},
+    )
     assert machine.run() == 'done'
     assert len(ran) == 2, 'nothing is run for the third'
     assert [action for action, _ in machine.decisions()] == ['revisit', 'step_back', 'ask']
 
 
 def test_recoveries_are_counted_anew_in_each_trial():
-    machine = watched(Scripted('aborted', 'ok', 'aborted', 'ok'),
-                      settings={'max_recoveries': 1, 'memory': 1000})
+    machine = watched(
+        Scripted('aborted', 'ok', 'aborted', 'ok'), settings={'max_recoveries': 1, 'memory': 1000}
+    )
     assert [machine.run(), machine.run()] == ['done', 'done']
     assert machine.rate('A').recoveries == 1
 
@@ -260,7 +320,8 @@ def test_a_preempt_takes_the_question_back():
     machine, _ = asking(waits, deadline_s=0)
     asked = threading.Event()
     machine.machine.events.observers.append(
-        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
+        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     machine.machine.request_preempt()
@@ -274,7 +335,8 @@ def test_a_shutdown_takes_the_question_back(monkeypatch):
     machine, _ = asking(waits, deadline_s=0)
     asked = threading.Event()
     machine.machine.events.observers.append(
-        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
+        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
@@ -290,8 +352,10 @@ def test_an_interface_is_cancelled_by_a_preempt():
         assert cancelled.wait(10)
 
     machine = watched(
-        Scripted('aborted'), expert=FakeExpert(interface('hand'), interface=works),
-        settings={'max_recoveries': 0, 'deadline_s': 0, 'interfaces': {'hand': {'action': 'a'}}})
+        Scripted('aborted'),
+        expert=FakeExpert(interface('hand'), interface=works),
+        settings={'max_recoveries': 0, 'deadline_s': 0, 'interfaces': {'hand': {'action': 'a'}}},
+    )
     run = in_thread(machine.run)
     assert running.wait(10)
     machine.machine.request_preempt()

@@ -1,4 +1,5 @@
 """The autonomy of states: run, announce, confirm; by settings and at run time."""
+
 import pytest
 from held_machines import Gate, Held, eventually
 from machines import Scripted, chain_of
@@ -21,8 +22,9 @@ def test_a_state_that_is_to_be_confirmed_waits_for_that_alone() -> None:
         status = held.hand.status()
         assert not status.paused
         assert status.active == (ActiveState('SM_ROOT', 'B', 'confirm', True),)
-        assert held.hand.resume() == ('SM_ROOT goes on; nothing has waited for that; still to be '
-                                      'confirmed: B in SM_ROOT')
+        assert held.hand.resume() == (
+            'SM_ROOT goes on; nothing has waited for that; still to be confirmed: B in SM_ROOT'
+        )
         assert second.runs == 0
         assert held.hand.confirm('SM_ROOT', 'eva') == 'runs now: B in SM_ROOT'
         assert held.end() == 'done'
@@ -63,8 +65,9 @@ def test_a_step_is_a_confirmation_too() -> None:
 
 
 def test_a_state_is_announced_before_it_begins(log) -> None:
-    held = Held(chain_of(Scripted(), Scripted()), settings={'states': {'B': {'autonomy':
-                                                                            'announce'}}})
+    held = Held(
+        chain_of(Scripted(), Scripted()), settings={'states': {'B': {'autonomy': 'announce'}}}
+    )
     with held.begin():
         assert held.end() == 'done'
     kinds = [(event.kind, event.state) for event in held.events]
@@ -116,8 +119,10 @@ def test_at_most_ten_states_are_named(states: int, more: str) -> None:
 
 def test_a_state_to_be_confirmed_is_confirmed_as_a_precondition_too() -> None:
     look, failing = Scripted(), Scripted('aborted')
-    held = Held(chain_of(look, failing), settings={'states': {
-        'A': {'autonomy': 'confirm'}, 'B': {'preconditions': ['A']}}})
+    held = Held(
+        chain_of(look, failing),
+        settings={'states': {'A': {'autonomy': 'confirm'}, 'B': {'preconditions': ['A']}}},
+    )
     with held.begin():
         for runs in (0, 1):
             eventually(lambda runs=runs: failing.runs == runs)
@@ -129,8 +134,9 @@ def test_a_state_to_be_confirmed_is_confirmed_as_a_precondition_too() -> None:
 
 
 def test_a_preempt_while_nothing_runs_leaves_the_next_trial_to_be_confirmed() -> None:
-    held = Held(chain_of(Scripted(), Scripted()), settings={'states': {'B': {
-        'autonomy': 'confirm'}}})
+    held = Held(
+        chain_of(Scripted(), Scripted()), settings={'states': {'B': {'autonomy': 'confirm'}}}
+    )
     assert held.hand.preempt() == 'SM_ROOT does not run'
     with held.begin():
         held.waits_before('SM_ROOT/B')
@@ -151,8 +157,10 @@ def test_a_state_to_which_the_oracle_goes_is_confirmed_again() -> None:
 
 
 def test_wrong_levels_and_patterns_are_refused() -> None:
-    with pytest.raises(SettingsError, match="states.A.autonomy: 'never' is not allowed; allowed: "
-                                            'run, announce, confirm'):
+    with pytest.raises(
+        SettingsError,
+        match="states.A.autonomy: 'never' is not allowed; allowed: run, announce, confirm",
+    ):
         Held(chain_of(Scripted()), settings={'states': {'A': {'autonomy': 'never'}}})
     hand = Held(chain_of(Scripted())).hand
     with pytest.raises(OperatorError, match="no autonomy 'full'; allowed: run, announce, confirm"):
@@ -178,12 +186,17 @@ def test_after_an_operators_preempt_what_comes_behind_the_clean_up_is_confirmed(
     gate, tidy, last = Gate(), Scripted(), Scripted()
     machine = smach.StateMachine(['done', 'aborted'])
     with machine:
-        smach.StateMachine.add('A', Scripted(gate, outcomes=('ok', 'aborted', 'preempted')),
-                               {'ok': 'B', 'preempted': 'TIDY_UP'})
+        smach.StateMachine.add(
+            'A',
+            Scripted(gate, outcomes=('ok', 'aborted', 'preempted')),
+            {'ok': 'B', 'preempted': 'TIDY_UP'},
+        )
         smach.StateMachine.add('TIDY_UP', tidy, {'ok': 'B', 'preempted': 'aborted'})
         smach.StateMachine.add('B', last, {'ok': 'done', 'preempted': 'aborted'})
-    held = Held(machine, settings={'states': {'B': {'autonomy': 'confirm'},
-                                              'TIDY_UP': {'autonomy': 'confirm'}}})
+    held = Held(
+        machine,
+        settings={'states': {'B': {'autonomy': 'confirm'}, 'TIDY_UP': {'autonomy': 'confirm'}}},
+    )
     with held.begin():
         eventually(gate.entered.is_set)
         held.hand.preempt()

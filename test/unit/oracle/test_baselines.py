@@ -1,4 +1,5 @@
 """The policies that go by no rates, against the table of doc/policies.md and in machines."""
+
 import itertools
 import os
 import threading
@@ -38,13 +39,19 @@ FAILS = ['aborted'] * 20
 def table_of_the_page():
     """{(policy, recoveries before): action} as doc/policies.md has it."""
     with open(os.path.join(ROOT, 'doc', 'policies.md'), encoding='utf-8') as page:
-        rows = [[cell.strip() for cell in line.strip().strip('|').split('|')] for line in page
-                if line.startswith('|')]
+        rows = [
+            [cell.strip() for cell in line.strip().strip('|').split('|')]
+            for line in page
+            if line.startswith('|')
+        ]
     begin = next(index for index, row in enumerate(rows) if row[0] == 'recoveries before')
     names = rows[begin][1:]
-    body = itertools.takewhile(lambda row: row[0].isdigit(), rows[begin + 2:])
-    return {(name, int(row[0])): action.replace(' ', '_')
-            for row in body for name, action in zip(names, row[1:])}
+    body = itertools.takewhile(lambda row: row[0].isdigit(), rows[begin + 2 :])
+    return {
+        (name, int(row[0])): action.replace(' ', '_')
+        for row in body
+        for name, action in zip(names, row[1:])
+    }
 
 
 TABLE = table_of_the_page()
@@ -64,15 +71,21 @@ class FakeWaiting:
 
 def failing(policy, *more, fails=FAILS, **settings):
     """A chain A, B, C whose B fails; waits take no time."""
-    machine = watched(Scripted(), Scripted(*fails), Scripted(), *more,
-                      settings={'policy': policy, 'max_recoveries': 50, **settings})
+    machine = watched(
+        Scripted(),
+        Scripted(*fails),
+        Scripted(),
+        *more,
+        settings={'policy': policy, 'max_recoveries': 50, **settings},
+    )
     oracle_of(machine.machine).waiting = FakeWaiting()
     return machine
 
 
 def situation(recoveries=0, restarts=0, **past):
-    return Situation(FailureClass.LOW, Preconditions.NONE, False,
-                     Past(recoveries, restarts, **past))
+    return Situation(
+        FailureClass.LOW, Preconditions.NONE, False, Past(recoveries, restarts, **past)
+    )
 
 
 def test_the_page_covers_each_baseline_but_the_one_that_draws():
@@ -116,35 +129,43 @@ def test_step_back_leads_to_the_state_that_succeeded_last():
 
 
 def test_retry_counts_for_each_state_alone():
-    machine = watched(Scripted('aborted', 'aborted'), Scripted('aborted', 'aborted'),
-                      settings={'policy': 'retry'})
+    machine = watched(
+        Scripted('aborted', 'aborted'), Scripted('aborted', 'aborted'), settings={'policy': 'retry'}
+    )
     assert machine.run() == 'done'
     assert machine.visits() == ['A', 'A', 'A', 'B', 'B', 'B']
 
 
 # -- parameters
 
-@pytest.mark.parametrize('given, name, parameters', [
-    ('ladder', 'ladder', {}),
-    ({'name': 'ladder'}, 'ladder', {}),
-    ({'name': 'ladder', 'wait_s': 5}, 'ladder', {}),  # as the default
-    ({'name': 'ladder', 'wait_s': 2, 'tries': 3}, 'ladder', {'wait_s': 2.0, 'tries': 3}),
-    ({'name': 'restart', 'times': 1}, 'restart', {'times': 1}),
-])
+
+@pytest.mark.parametrize(
+    'given, name, parameters',
+    [
+        ('ladder', 'ladder', {}),
+        ({'name': 'ladder'}, 'ladder', {}),
+        ({'name': 'ladder', 'wait_s': 5}, 'ladder', {}),  # as the default
+        ({'name': 'ladder', 'wait_s': 2, 'tries': 3}, 'ladder', {'wait_s': 2.0, 'tries': 3}),
+        ({'name': 'restart', 'times': 1}, 'restart', {'times': 1}),
+    ],
+)
 def test_a_policy_is_set_by_its_name_or_with_parameters(given, name, parameters):
     settings = Settings.from_dict({'policy': given})
     assert (settings.policy, settings.policy_parameters) == (name, parameters)
 
 
-@pytest.mark.parametrize('given, match', [
-    ({'times': 2}, 'policy: .*with its name'),
-    ({'name': 'guess'}, 'policy.name: .*always_ask'),
-    ({'name': 'prose', 'times': 2}, 'policy.times: .*one of the keys name'),
-    ({'name': 'restart', 'wait_s': 2}, 'policy.wait_s: .*name, times'),
-    ({'name': 'restart', 'times': -1}, 'policy.times: .*whole number from 0'),
-    ({'name': 'restart', 'times': 1.5}, 'policy.times: .*whole number'),
-    ({'name': 'ladder', 'wait_s': float('inf')}, 'policy.wait_s: .*3600'),
-])
+@pytest.mark.parametrize(
+    'given, match',
+    [
+        ({'times': 2}, 'policy: .*with its name'),
+        ({'name': 'guess'}, 'policy.name: .*always_ask'),
+        ({'name': 'prose', 'times': 2}, 'policy.times: .*one of the keys name'),
+        ({'name': 'restart', 'wait_s': 2}, 'policy.wait_s: .*name, times'),
+        ({'name': 'restart', 'times': -1}, 'policy.times: .*whole number from 0'),
+        ({'name': 'restart', 'times': 1.5}, 'policy.times: .*whole number'),
+        ({'name': 'ladder', 'wait_s': float('inf')}, 'policy.wait_s: .*3600'),
+    ],
+)
 def test_what_is_wrong_with_a_policy_is_told_with_its_key(given, match):
     with pytest.raises(SettingsError, match=match):
         Settings.from_dict({'policy': given})
@@ -157,8 +178,9 @@ def test_parameters_are_told_at_the_start_of_a_trial_where_they_are_not_the_defa
     assert (told['policy'], told['policy.wait_s'], 'policy.tries' in told) == ('ladder', 2.0, False)
 
 
-@pytest.mark.parametrize('name', [name for name in sorted(POLICIES)
-                                  if 'times' in POLICIES[name].parameters])
+@pytest.mark.parametrize(
+    'name', [name for name in sorted(POLICIES) if 'times' in POLICIES[name].parameters]
+)
 def test_a_policy_does_it_as_often_as_its_parameters_say(name):
     assert policy_named(name).times == POLICIES[name].parameters['times']
 
@@ -172,9 +194,13 @@ def test_times_is_how_often(times):
 
 # -- those that ask nobody
 
+
 @pytest.mark.parametrize('name', NEVER_ASK)
-@pytest.mark.parametrize('settings', [
-    {'max_recoveries': 0}, {'budget': {'recoveries': 0}}, {'on_retry': 'confirm'}], ids=str)
+@pytest.mark.parametrize(
+    'settings',
+    [{'max_recoveries': 0}, {'budget': {'recoveries': 0}}, {'on_retry': 'confirm'}],
+    ids=str,
+)
 def test_who_asks_nobody_gives_up_where_others_ask(name, settings):
     expert = FakeExpert(supersede('ok'))
     machine = failing(name, **settings)
@@ -198,13 +224,15 @@ def test_no_level_above_recovers_from_what_was_given_up(name):
 
 
 def test_an_exception_that_is_given_up_is_raised():
-    machine = watched(Scripted(*[KeyError('no')] * 3), settings={'policy': {'name': 'retry',
-                                                                            'times': 1}})
+    machine = watched(
+        Scripted(*[KeyError('no')] * 3), settings={'policy': {'name': 'retry', 'times': 1}}
+    )
     with pytest.raises(smach.InvalidUserCodeError, match='no'):
         machine.run()
 
 
 # -- ladder
+
 
 def test_the_ladder_waits_through_the_clock_that_was_handed_in():
     machine = failing('ladder', fails=['aborted', 'aborted'])
@@ -220,7 +248,8 @@ def test_a_preempt_ends_the_wait():
     waiting = threading.Event()
     machine = watched(Scripted('aborted'), settings={'policy': {'name': 'ladder', 'wait_s': 3600}})
     machine.machine.events.observers.append(
-        lambda event: waiting.set() if event.kind == EventKind.DECISION else None)
+        lambda event: waiting.set() if event.kind == EventKind.DECISION else None
+    )
     call = in_thread(machine.run)
     assert waiting.wait(20)
     machine.machine.request_preempt()
@@ -236,17 +265,21 @@ def test_a_preempt_while_time_passes_elsewhere_ends_the_recovery():
 
 
 def test_the_last_minute_of_a_trial_ends_the_wait():
-    machine = watched(Scripted('aborted'), settings={
-        'policy': {'name': 'ladder', 'wait_s': 3600}, 'budget': {'minutes': 0.002}})
+    machine = watched(
+        Scripted('aborted'),
+        settings={'policy': {'name': 'ladder', 'wait_s': 3600}, 'budget': {'minutes': 0.002}},
+    )
     assert in_thread(machine.run).result() == 'aborted'
     assert machine.visits() == ['A']
 
 
 # -- random
 
+
 def drawn(seed, trials=1):
-    machine = failing({'name': 'random', 'seed': seed}, on_no_answer={'goto': 'B'},
-                      fails=['aborted'] * 2000)
+    machine = failing(
+        {'name': 'random', 'seed': seed}, on_no_answer={'goto': 'B'}, fails=['aborted'] * 2000
+    )
     machine.machine.execute()
     for _ in range(trials - 1):
         machine.machine.execute()
@@ -257,8 +290,11 @@ def test_random_draws_alike_under_one_seed_and_otherwise_under_another():
     one = drawn(3)
     assert one == drawn(3)
     assert len({tuple(drawn(seed)) for seed in range(8)}) == 8
-    assert set(itertools.chain(*(drawn(seed) for seed in range(8)))) == {'revisit', 'step_back',
-                                                                         'ask'}
+    assert set(itertools.chain(*(drawn(seed) for seed in range(8)))) == {
+        'revisit',
+        'step_back',
+        'ask',
+    }
 
 
 def test_the_second_trial_draws_as_the_first_one_under_the_next_seed():

@@ -1,4 +1,5 @@
 """Random trees of Iterators and Concurrences without failures run as without an oracle."""
+
 import random
 
 import pytest
@@ -16,8 +17,9 @@ class Leaf(smach.State):
     """Notes what it reads, adds to it, and ends with the next outcome of its own."""
 
     def __init__(self, name, seed, course):
-        smach.State.__init__(self, outcomes=['ok', 'other', 'preempted'], io_keys=['sum'],
-                             input_keys=['item'])
+        smach.State.__init__(
+            self, outcomes=['ok', 'other', 'preempted'], io_keys=['sum'], input_keys=['item']
+        )
         self._name, self._random, self._course = name, random.Random(seed), course
 
     def execute(self, ud):
@@ -48,36 +50,51 @@ class Maker:
         return Leaf('L{}'.format(self._number), self._random.random(), course)
 
     def _machine(self, depth, course):
-        machine = smach.StateMachine(['ok', 'other', 'preempted'], input_keys=['sum', 'item'],
-                                     output_keys=['sum'])
+        machine = smach.StateMachine(
+            ['ok', 'other', 'preempted'], input_keys=['sum', 'item'], output_keys=['sum']
+        )
         count = self._random.randint(1, 3)
         with machine:
             for index in range(count):
                 following = 'S{}'.format(index + 1) if index + 1 < count else 'ok'
-                smach.StateMachine.add('S{}'.format(index), self.make(depth - 1, course),
-                                       {'ok': following})
+                smach.StateMachine.add(
+                    'S{}'.format(index), self.make(depth - 1, course), {'ok': following}
+                )
         return machine
 
     def _iterator(self, depth, course):
-        iterator = smach.Iterator(['ok', 'other', 'preempted'], input_keys=['sum'],
-                                  output_keys=['sum'], exhausted_outcome='ok', it_label='item',
-                                  it=list(range(self._random.randint(0, 4))))
+        iterator = smach.Iterator(
+            ['ok', 'other', 'preempted'],
+            input_keys=['sum'],
+            output_keys=['sum'],
+            exhausted_outcome='ok',
+            it_label='item',
+            it=list(range(self._random.randint(0, 4))),
+        )
         loops = self._random.choice([['ok'], ['ok', 'other']])
         with iterator:
-            smach.Iterator.set_contained_state('EACH', self.make(depth - 1, course),
-                                               loop_outcomes=loops)
+            smach.Iterator.set_contained_state(
+                'EACH', self.make(depth - 1, course), loop_outcomes=loops
+            )
         return iterator
 
     def _concurrence(self, depth, course):
         concurrence = smach.Concurrence(
-            ['ok', 'other', 'preempted'], default_outcome='other', input_keys=['sum', 'item'],
-            output_keys=[], outcome_map={'ok': {'B0': 'ok'}})
+            ['ok', 'other', 'preempted'],
+            default_outcome='other',
+            input_keys=['sum', 'item'],
+            output_keys=[],
+            outcome_map={'ok': {'B0': 'ok'}},
+        )
         with concurrence:
             for index in range(self._random.randint(1, 3)):
                 own = self.courses.setdefault((self._number, index), [])
                 # each has keys of its own: which of several writes last is not told
-                smach.Concurrence.add('B{}'.format(index), self.make(depth - 1, own),
-                                      remapping={'sum': 'sum{}'.format(index)})
+                smach.Concurrence.add(
+                    'B{}'.format(index),
+                    self.make(depth - 1, own),
+                    remapping={'sum': 'sum{}'.format(index)},
+                )
                 concurrence.userdata['sum{}'.format(index)] = 0
         return concurrence
 
@@ -109,8 +126,9 @@ class Fails(smach.State):
     """Ends an item well after as many failures as were drawn for it; notes each try."""
 
     def __init__(self, failures, tried):
-        smach.State.__init__(self, ['ok', 'aborted', 'stuck', 'preempted'], input_keys=['item'],
-                             io_keys=['done'])
+        smach.State.__init__(
+            self, ['ok', 'aborted', 'stuck', 'preempted'], input_keys=['item'], io_keys=['done']
+        )
         self._left, self._tried = dict(failures), tried
 
     def execute(self, ud):
@@ -126,21 +144,39 @@ def test_each_item_is_finished_once_in_its_turn_whatever_fails(seed):
     draw = random.Random(seed)
     count, tried = draw.randint(1, 6), []
     # an abort is its own oracle's affair, stuck that of the oracle of the machine around
-    failures = {item: [draw.choice(['aborted', 'stuck']) for _ in range(draw.choice([0, 0, 1, 2]))]
-                for item in range(count)}
+    failures = {
+        item: [draw.choice(['aborted', 'stuck']) for _ in range(draw.choice([0, 0, 1, 2]))]
+        for item in range(count)
+    }
     planned = {item: len(each) + 1 for item, each in failures.items()}
     items = draw.choice([list, tuple, iter, lambda given: lambda: list(given)])(range(count))
-    iterator = smach.Iterator(['done', 'aborted', 'preempted'], ['done'], ['done'], it=items,
-                              it_label='item', exhausted_outcome='done')
+    iterator = smach.Iterator(
+        ['done', 'aborted', 'preempted'],
+        ['done'],
+        ['done'],
+        it=items,
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with iterator:
-        smach.Iterator.set_contained_state('EACH', Fails(failures, tried), loop_outcomes=['ok'],
-                                           final_outcome_map={'stuck': 'aborted'})
+        smach.Iterator.set_contained_state(
+            'EACH',
+            Fails(failures, tried),
+            loop_outcomes=['ok'],
+            final_outcome_map={'stuck': 'aborted'},
+        )
     machine = smach.StateMachine(['done', 'aborted', 'preempted'])
     machine.userdata.done = []
     with machine:
         smach.StateMachine.add('ALL', iterator)
-    OracleContainer.wrap(machine, settings={
-        'max_recoveries': 100, 'memory': 1000, 'userdata': draw.choice(['restore', 'keep'])})
+    OracleContainer.wrap(
+        machine,
+        settings={
+            'max_recoveries': 100,
+            'memory': 1000,
+            'userdata': draw.choice(['restore', 'keep']),
+        },
+    )
     assert machine.execute() == 'done'
     assert machine.userdata.done == list(range(count))
     assert tried == [item for item in range(count) for _ in range(planned[item])]

@@ -1,4 +1,5 @@
 """Concurrences and Iterators of a wrapped tree stay what their user holds."""
+
 import copy
 import pickle
 
@@ -38,11 +39,18 @@ def test_the_handles_stay_the_users_objects_at_rest_and_while_it_runs():
     held = Held()
 
     def looks(state, ud):
-        seen.append((concurrence['LEFT'], concurrence.get_children()['LEFT'],
-                     concurrence.get_active_states(), concurrence.get_initial_states()))
+        seen.append(
+            (
+                concurrence['LEFT'],
+                concurrence.get_children()['LEFT'],
+                concurrence.get_active_states(),
+                concurrence.get_initial_states(),
+            )
+        )
         seen.append(isinstance(concurrence._states['LEFT'], Held))
         seen.append(concurrence._states['LEFT'].answer)
         return 'ok'
+
     concurrence = both(held, Scripted(looks))
     machine = Watched(inside(concurrence))
     assert isinstance(concurrence, smach.Concurrence)
@@ -59,9 +67,17 @@ def test_the_handles_of_an_iterator_stay_too():
     seen = []
 
     def looks(state, ud):
-        seen.append((iterator['EACH'], iterator.get_children(), iterator.get_active_states(),
-                     list(iterator._items), len(iterator._items)))
+        seen.append(
+            (
+                iterator['EACH'],
+                iterator.get_children(),
+                iterator.get_active_states(),
+                list(iterator._items),
+                len(iterator._items),
+            )
+        )
         return 'ok'
+
     each = Item(item1=[looks])
     items = [1, 2]
     iterator = iterator_over(each, items=items)
@@ -97,9 +113,11 @@ def test_a_class_of_the_users_keeps_its_methods():
     assert machine.run() == 'done' and left.runs == 2
 
 
-@pytest.mark.parametrize('make', [
-    lambda left: both(left, Scripted()), lambda left: iterator_over(left, items=[1, 2])],
-    ids=['concurrence', 'iterator'])
+@pytest.mark.parametrize(
+    'make',
+    [lambda left: both(left, Scripted()), lambda left: iterator_over(left, items=[1, 2])],
+    ids=['concurrence', 'iterator'],
+)
 def test_unwrapped_it_is_as_before(make):
     left = Scripted('aborted', 'aborted')
     container = make(left)
@@ -173,11 +191,16 @@ def _can_be_pickled(container):
     return True
 
 
-@pytest.mark.parametrize('copied', [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))],
-                         ids=['deep copy', 'pickle'])
-@pytest.mark.parametrize('make', [
-    lambda: both(Held(), Held()),
-    lambda: iterator_over(Held(), items=[1, 2])], ids=['concurrence', 'iterator'])
+@pytest.mark.parametrize(
+    'copied',
+    [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))],
+    ids=['deep copy', 'pickle'],
+)
+@pytest.mark.parametrize(
+    'make',
+    [lambda: both(Held(), Held()), lambda: iterator_over(Held(), items=[1, 2])],
+    ids=['concurrence', 'iterator'],
+)
 def test_a_copy_recovers_inside_its_own_branches(copied, make):
     if not _can_be_pickled(inside(make())):
         pytest.skip('this engine cannot copy a machine')
@@ -202,6 +225,7 @@ def test_copied_while_it_runs_it_is_as_at_rest():
         def execute(self, ud):
             taken.append(copy.copy(iterator))
             return 'ok'
+
     iterator = iterator_over(Takes(), items=[1, 2])
     assert Watched(inside(iterator)).run() == 'done'
     assert isinstance(taken[0]._state, Takes) and taken[0]._items == [1, 2]
@@ -214,6 +238,7 @@ def test_a_concurrence_that_is_copied_while_it_runs_is_as_at_rest():
     def take(state, ud):
         taken.append(copy.copy(concurrence))
         return 'ok'
+
     left, right = Scripted(take), Scripted()
     concurrence = both(left, right)
     assert Watched(inside(concurrence)).run() == 'done'
@@ -223,8 +248,11 @@ def test_a_concurrence_that_is_copied_while_it_runs_is_as_at_rest():
 
 def test_rates_of_the_branches_of_one_concurrence_are_kept_in_one_file(tmp_path):
     file = str(tmp_path / 'rates.json')
-    machine = Watched(inside(both(Scripted('aborted'), Scripted('aborted', 'aborted'))),
-                      settings={'rates_file': file}, name='TOP')
+    machine = Watched(
+        inside(both(Scripted('aborted'), Scripted('aborted', 'aborted'))),
+        settings={'rates_file': file},
+        name='TOP',
+    )
     assert machine.run() == 'done'
     other = Watched(inside(both(Scripted(), Scripted())), settings={'rates_file': file}, name='TOP')
     assert other.run() == 'done'

@@ -1,4 +1,5 @@
 """A machine that obeys a preempt ends as its author drew it: it takes up its work no more."""
+
 import pytest
 from guarded_machines import OUTCOMES, both
 from held_machines import LIMIT_S, Gate, Held, Trail, eventually
@@ -64,8 +65,11 @@ def while_it_runs(held, path):
 def stopped(trail, inner, around, wait, preempt):
     """The machine around, which was preempted and has come to its end; the states that ran."""
     machine, path = around(trail, inner)
-    held = Held(machine, expert=FakeExpert(*[waits] * 9),
-                settings={'max_recoveries': 0 if wait is while_asked else 9})
+    held = Held(
+        machine,
+        expert=FakeExpert(*[waits] * 9),
+        settings={'max_recoveries': 0 if wait is while_asked else 9},
+    )
     with held:
         wait(held, path)
         preempt(held)
@@ -80,15 +84,19 @@ def recovers_from_nothing(held):
 
 
 @pytest.mark.parametrize('around', [flat, nested, in_a_concurrence])
-@pytest.mark.parametrize('wait, preempt, ran', [
-    (at_a_breakpoint, by_operator, ['A', 'CLEAN']),
-    (at_a_confirmation, by_operator, ['A', 'CLEAN']),
-    (at_a_confirmation, by_script, ['A', 'CLEAN']),
-    (at_the_first_state, by_script, ['CLEAN']),
-    (while_asked, by_operator, ['A', 'B', 'CLEAN']),
-    (while_asked, by_script, ['A', 'B', 'CLEAN']),
-    (while_it_runs, by_operator, ['A', 'B', 'CLEAN']),
-    (while_it_runs, by_script, ['A', 'B', 'CLEAN'])])
+@pytest.mark.parametrize(
+    'wait, preempt, ran',
+    [
+        (at_a_breakpoint, by_operator, ['A', 'CLEAN']),
+        (at_a_confirmation, by_operator, ['A', 'CLEAN']),
+        (at_a_confirmation, by_script, ['A', 'CLEAN']),
+        (at_the_first_state, by_script, ['CLEAN']),
+        (while_asked, by_operator, ['A', 'B', 'CLEAN']),
+        (while_asked, by_script, ['A', 'B', 'CLEAN']),
+        (while_it_runs, by_operator, ['A', 'B', 'CLEAN']),
+        (while_it_runs, by_script, ['A', 'B', 'CLEAN']),
+    ],
+)
 def test_a_clean_up_that_leads_to_a_failing_outcome_ends_the_machine(around, wait, preempt, ran):
     trail = Trail()
     work = 'aborted' if wait is while_asked else Gate()
@@ -136,8 +144,9 @@ def test_a_nested_machine_that_is_held_at_its_door_ends_so_too():
 
 def test_the_next_execution_recovers_again():
     trail = Trail()
-    inner = trail.cleaned(trail.state('A'), trail.state('B', Gate(), 'aborted', 'ok'),
-                          ends='aborted')
+    inner = trail.cleaned(
+        trail.state('A'), trail.state('B', Gate(), 'aborted', 'ok'), ends='aborted'
+    )
     held, _ = stopped(trail, inner, flat, while_it_runs, by_operator)
     assert held.end() == 'aborted'
     held.begin()
@@ -150,16 +159,18 @@ def works_on(trail, after_b):
     machine = smach.StateMachine(OUTCOMES)
     with machine:
         smach.StateMachine.add('A', trail.state('A'), {'ok': 'B'})
-        smach.StateMachine.add('B', trail.state('B', Gate(), 'ok'),
-                               {'ok': 'C', 'preempted': after_b})
+        smach.StateMachine.add(
+            'B', trail.state('B', Gate(), 'ok'), {'ok': 'C', 'preempted': after_b}
+        )
         smach.StateMachine.add('C', trail.state('C', 'aborted', 'ok'), {'ok': 'done'})
         smach.StateMachine.add('CLEAN', trail.state('CLEAN'), {'ok': 'A'})
     return machine
 
 
-@pytest.mark.parametrize('after_b, ran', [
-    ('A', ['A', 'B', 'A', 'B', 'C', 'C']),
-    ('CLEAN', ['A', 'B', 'CLEAN', 'A', 'B', 'C', 'C'])])
+@pytest.mark.parametrize(
+    'after_b, ran',
+    [('A', ['A', 'B', 'A', 'B', 'C', 'C']), ('CLEAN', ['A', 'B', 'CLEAN', 'A', 'B', 'C', 'C'])],
+)
 def test_where_the_author_leads_back_to_the_work_the_oracle_recovers_again(after_b, ran):
     trail = Trail()
     held, has_run = stopped(trail, works_on(trail, after_b), flat, while_it_runs, by_operator)

@@ -1,4 +1,5 @@
 """Concurrences of plain states: a branch that fails recovers inside itself, the others go on."""
+
 import threading
 
 import pytest
@@ -27,9 +28,11 @@ def watched(concurrence, **wrap):
 
 def waiting_for(event):
     """A step of a state that waits until something has happened."""
+
     def step(state, ud):
         assert event.wait(20)
         return 'ok'
+
     return step
 
 
@@ -39,7 +42,8 @@ def test_a_branch_that_fails_is_done_again_and_no_other_one():
     assert machine.run() == 'done'
     assert (left.runs, right.runs) == (3, 1)
     assert {(event.path, event.state) for event in machine.of(EventKind.FAILURE)} == {
-        ('TOP/ALL', 'LEFT')}
+        ('TOP/ALL', 'LEFT')
+    }
     assert (machine.rate('LEFT').failures, machine.rate('RIGHT').failures) == (2, 0)
 
 
@@ -61,12 +65,13 @@ def test_the_others_go_on_while_a_branch_asks():
         def ask(self, *args):
             asked.set()
             return super().ask(*args)
+
     expert = Expert(waits_for_the_other)
     left = Scripted('aborted')
     machine = watched(both(left, Scripted(right)), expert=expert, settings=ASKS)
     assert machine.run() == 'done'
     assert left.runs == 2
-    question, = expert.questions
+    (question,) = expert.questions
     assert (question.container_path, question.failed_state) == ('TOP/ALL', 'LEFT')
     assert dict(question.supersede_outcomes)['ok'] == 'the end of this branch'
 
@@ -75,8 +80,11 @@ def test_the_others_go_on_while_a_branch_asks():
 def test_what_an_expert_decides_is_the_outcome_of_the_branch_in_map_and_callback(answer):
     told = []
     left, right = Scripted('aborted'), Scripted()
-    machine = watched(both(left, right, child_termination_cb=lambda ended: told.append(
-        dict(ended)) and False), expert=FakeExpert(answer), settings=ASKS)
+    machine = watched(
+        both(left, right, child_termination_cb=lambda ended: told.append(dict(ended)) and False),
+        expert=FakeExpert(answer),
+        settings=ASKS,
+    )
     assert machine.run() == 'done'
     assert told[-1] == {'LEFT': 'ok', 'RIGHT': 'ok'} and len(told) == 2
     assert left.runs == 1
@@ -84,15 +92,23 @@ def test_what_an_expert_decides_is_the_outcome_of_the_branch_in_map_and_callback
 
 def test_the_termination_callback_is_not_called_for_a_branch_that_recovers():
     told = []
-    machine = watched(both(Scripted('aborted', 'aborted'), Scripted(),
-                           child_termination_cb=lambda ended: told.append(dict(ended)) and False))
+    machine = watched(
+        both(
+            Scripted('aborted', 'aborted'),
+            Scripted(),
+            child_termination_cb=lambda ended: told.append(dict(ended)) and False,
+        )
+    )
     assert machine.run() == 'done'
     assert len(told) == 2 and all('aborted' not in ended.values() for ended in told)
 
 
 def test_a_branch_that_gives_up_ends_the_concurrence_as_its_author_has_mapped_it():
-    machine = watched(both(Scripted('aborted'), Scripted()), settings=ASKS,
-                      expert=FakeExpert(give_up(), give_up()))
+    machine = watched(
+        both(Scripted('aborted'), Scripted()),
+        settings=ASKS,
+        expert=FakeExpert(give_up(), give_up()),
+    )
     assert machine.run() == 'aborted'
 
 
@@ -100,8 +116,10 @@ def test_a_branch_that_gives_up_ends_the_concurrence_as_its_author_has_mapped_it
 def test_an_outcome_that_the_map_leads_to_a_good_end_is_the_authors(good):
     left = Scripted('aborted')
     mapped = {'done' if good else 'aborted': {'LEFT': 'aborted'}}
-    machine = watched(both(left, Scripted(), outcome_map=mapped, default_outcome='done'),
-                      settings={'max_recoveries': 1})
+    machine = watched(
+        both(left, Scripted(), outcome_map=mapped, default_outcome='done'),
+        settings={'max_recoveries': 1},
+    )
     assert machine.run() == 'done'
     assert left.runs == (1 if good else 2)
     assert len(machine.of(EventKind.DECISION)) == (0 if good else 1)
@@ -114,10 +132,18 @@ def test_a_callback_that_ends_the_others_ends_one_that_is_asked_about():
     def waits(question, cancelled, progress):
         asked.set()
         assert cancelled.wait(20)
-    machine = watched(both(Scripted('aborted'), Scripted(waiting_for(asked)),
-                           default_outcome='done', outcome_map={},
-                           child_termination_cb=lambda ended: ended['RIGHT'] == 'ok'),
-                      expert=FakeExpert(waits), settings=ASKS)
+
+    machine = watched(
+        both(
+            Scripted('aborted'),
+            Scripted(waiting_for(asked)),
+            default_outcome='done',
+            outcome_map={},
+            child_termination_cb=lambda ended: ended['RIGHT'] == 'ok',
+        ),
+        expert=FakeExpert(waits),
+        settings=ASKS,
+    )
     assert machine.run() == 'done'
     assert machine.of(EventKind.QUERY_CANCELLED)
 
@@ -128,9 +154,13 @@ def test_a_preempt_of_the_machine_ends_a_branch_that_is_asked_about_and_one_that
     def waits(question, cancelled, progress):
         asked.set()
         assert cancelled.wait(20)
+
     left, right = Scripted('aborted'), Scripted(gate)
-    machine = watched(both(left, right, outcome_map={'preempted': {
-        'LEFT': 'preempted', 'RIGHT': 'preempted'}}), expert=FakeExpert(waits), settings=ASKS)
+    machine = watched(
+        both(left, right, outcome_map={'preempted': {'LEFT': 'preempted', 'RIGHT': 'preempted'}}),
+        expert=FakeExpert(waits),
+        settings=ASKS,
+    )
     call = in_thread(machine.run)
     assert asked.wait(20) and gate.entered.wait(20)
     machine.machine.request_preempt()
@@ -158,8 +188,7 @@ def test_what_a_branch_writes_is_seen_by_one_that_runs_and_by_a_recovery():
 
     class Reader(smach.State):
         def __init__(self):
-            smach.State.__init__(self, ['ok', 'aborted'], input_keys=['beat'],
-                                 output_keys=['mine'])
+            smach.State.__init__(self, ['ok', 'aborted'], input_keys=['beat'], output_keys=['mine'])
 
         def execute(self, ud):
             assert wrote.wait(20)
@@ -169,6 +198,7 @@ def test_what_a_branch_writes_is_seen_by_one_that_runs_and_by_a_recovery():
                 return 'aborted'
             read.set()
             return 'ok'
+
     concurrence = both(Reader(), Writer(wrote, read))
     concurrence.userdata.beat = 'none'
     machine = watched(concurrence)
@@ -185,6 +215,7 @@ def test_a_precondition_that_is_not_met_takes_back_its_own_writes_alone():
         wrote.set()
         assert other.wait(20)
         return False
+
     other = threading.Event()
 
     class Right(smach.State):
@@ -196,6 +227,7 @@ def test_a_precondition_that_is_not_met_takes_back_its_own_writes_alone():
             ud.beat = 'written'
             other.set()
             return 'ok'
+
     concurrence = both(Scripted('aborted'), Right())
     machine = watched(concurrence, preconditions={'ALL/LEFT': [fails]})
     machine.run()
@@ -211,6 +243,7 @@ def test_what_a_precondition_that_was_met_wrote_stays_where_the_next_one_is_not_
     def fails(ud):
         ud.mine = 'half'
         return False
+
     concurrence = both(Scripted('aborted'), Scripted())
     machine = watched(concurrence, preconditions={'ALL/LEFT': [met, fails]})
     machine.run()
@@ -234,9 +267,14 @@ def test_remappings_of_branches_hold():
         def execute(self, ud):
             ud.count = ud.count + 1
             return self.script.pop() if self.script else 'ok'
-    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                                    input_keys=[], output_keys=[],
-                                    outcome_map={'done': {'ONE': 'ok', 'TWO': 'ok'}})
+
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        input_keys=[],
+        output_keys=[],
+        outcome_map={'done': {'ONE': 'ok', 'TWO': 'ok'}},
+    )
     concurrence.userdata.a, concurrence.userdata.b = 0, 10
     with concurrence:
         smach.Concurrence.add('ONE', Adds(), remapping={'count': 'a'})
@@ -254,20 +292,28 @@ def test_one_state_in_two_branches_and_in_the_machine_itself():
     machine = Watched(machine, name='TOP')
     assert machine.run() == 'done'
     assert shared.runs == 4
-    failure, = machine.of(EventKind.FAILURE)
+    (failure,) = machine.of(EventKind.FAILURE)
     assert failure.path == 'TOP/ALL' and failure.state in ('LEFT', 'RIGHT')
 
 
 def test_an_iterator_in_a_concurrence_recovers_its_items():
-    iterator = smach.Iterator(outcomes=['ok', 'aborted'], input_keys=[], output_keys=[],
-                              it=[1, 2], it_label='item', exhausted_outcome='ok')
+    iterator = smach.Iterator(
+        outcomes=['ok', 'aborted'],
+        input_keys=[],
+        output_keys=[],
+        it=[1, 2],
+        it_label='item',
+        exhausted_outcome='ok',
+    )
     each = Scripted('ok', 'aborted')
     with iterator:
         smach.Iterator.set_contained_state('EACH', each, loop_outcomes=['ok'])
     machine = watched(both(iterator, Scripted('aborted')))
     assert machine.run() == 'done'
     assert {(event.path, event.state) for event in machine.of(EventKind.FAILURE)} == {
-        ('TOP/ALL/LEFT', 'EACH'), ('TOP/ALL', 'RIGHT')}
+        ('TOP/ALL/LEFT', 'EACH'),
+        ('TOP/ALL', 'RIGHT'),
+    }
     assert each.runs == 3
 
 
@@ -296,11 +342,18 @@ def test_the_question_says_what_runs_again_if_a_single_branch_is_gone_to():
 
 def test_the_question_says_so_of_a_concurrence_in_an_iterator():
     expert = FakeExpert(give_up())
-    iterator = smach.Iterator(outcomes=['done', 'aborted'], input_keys=[], output_keys=[],
-                              it=[1], it_label='item', exhausted_outcome='done')
+    iterator = smach.Iterator(
+        outcomes=['done', 'aborted'],
+        input_keys=[],
+        output_keys=[],
+        it=[1],
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with iterator:
-        smach.Iterator.set_contained_state('BOTH', both(Scripted(), Scripted()),
-                                           loop_outcomes=['done'])
+        smach.Iterator.set_contained_state(
+            'BOTH', both(Scripted(), Scripted()), loop_outcomes=['done']
+        )
     machine = inside(iterator, transitions={'done': 'AFTER'})
     with machine:
         smach.StateMachine.add('AFTER', Scripted('aborted'), {'ok': 'done'})
@@ -322,16 +375,22 @@ def test_an_error_of_a_branch_that_gives_up_is_that_of_the_bare_concurrence():
     bare = inside(both(Scripted(KeyError('lost')), Scripted()))
     with pytest.raises(smach.InvalidUserCodeError, match='InvalidStateError'):
         bare.execute()
-    machine = watched(both(Scripted(KeyError('lost')), Scripted()), settings=ASKS,
-                      expert=FakeExpert(give_up(), give_up()))
+    machine = watched(
+        both(Scripted(KeyError('lost')), Scripted()),
+        settings=ASKS,
+        expert=FakeExpert(give_up(), give_up()),
+    )
     with pytest.raises(smach.InvalidUserCodeError, match='InvalidStateError'):
         machine.run()
 
 
 def test_an_outcome_that_is_not_registered_is_a_failure_and_given_up_is_as_bare():
     left = Scripted('odd')
-    machine = watched(both(left, Scripted(), default_outcome='done', outcome_map={}), settings=ASKS,
-                      expert=FakeExpert(give_up()))
+    machine = watched(
+        both(left, Scripted(), default_outcome='done', outcome_map={}),
+        settings=ASKS,
+        expert=FakeExpert(give_up()),
+    )
     assert machine.run() == 'done'
     assert machine.of(EventKind.FAILURE)[0].state == 'LEFT'
     again = Scripted('odd')
@@ -343,16 +402,21 @@ def test_an_outcome_that_is_not_registered_is_a_failure_and_given_up_is_as_bare(
 def test_an_overrun_of_a_branch_is_recovered_inside_it():
     gate = Gate()
     left = Scripted(gate)
-    machine = watched(both(left, Scripted()), settings={'states': {'ALL/LEFT': {
-        'time_limit_s': 0.2, 'grace_period_s': 5.0}}})
+    machine = watched(
+        both(left, Scripted()),
+        settings={'states': {'ALL/LEFT': {'time_limit_s': 0.2, 'grace_period_s': 5.0}}},
+    )
     assert machine.run() == 'done'
     assert left.runs == 2
 
 
 def test_each_branch_has_a_chain_of_its_own_and_many_fail_at_once():
     states = {'S{}'.format(index): Scripted(*['aborted', 'ok'] * 10) for index in range(6)}
-    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                                    outcome_map={'done': dict.fromkeys(states, 'ok')})
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': dict.fromkeys(states, 'ok')},
+    )
     with concurrence:
         for label, state in states.items():
             smach.Concurrence.add(label, state)
@@ -364,13 +428,17 @@ def test_each_branch_has_a_chain_of_its_own_and_many_fail_at_once():
         by_trial.setdefault(event.trial_id, []).append(event.seq)
     assert all(seqs == list(range(len(seqs))) for seqs in by_trial.values())
     assert not any(event.continuous for event in machine.of(EventKind.FAILURE))
-    assert {(row.state, row.failures, row.successes) for row in machine.machine.rates()
-            if row.path == 'TOP/ALL'} == {(label, 10, 10) for label in states}
+    assert {
+        (row.state, row.failures, row.successes)
+        for row in machine.machine.rates()
+        if row.path == 'TOP/ALL'
+    } == {(label, 10, 10) for label in states}
 
 
 def test_a_machine_beside_a_plain_branch_is_wrapped_and_both_recover():
     inner = chain_of(Scripted('aborted'), outcomes=('ok', 'done', 'aborted', 'preempted'))
-    machine = watched(both(inner, Scripted('aborted'), outcome_map={
-        'done': {'LEFT': 'done', 'RIGHT': 'ok'}}))
+    machine = watched(
+        both(inner, Scripted('aborted'), outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'ok'}})
+    )
     assert machine.run() == 'done'
     assert {event.path for event in machine.of(EventKind.FAILURE)} == {'TOP/ALL/LEFT', 'TOP/ALL'}

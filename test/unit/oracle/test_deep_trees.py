@@ -1,4 +1,5 @@
 """Containers that lie in each other: as many as the stack holds, and one clear error beyond."""
+
 import os
 import re
 import sys
@@ -115,5 +116,5 @@ def test_a_state_whose_functions_call_each_other_without_end_has_failed_as_by_an
     machine = chain_of(Scripted(endless, 'ok'))
     seen = watched(machine)
     assert executed(machine) == 'done'
-    failed, = [event for event in seen if event.kind is EventKind.FAILURE]
+    (failed,) = [event for event in seen if event.kind is EventKind.FAILURE]
     assert 'RecursionError' in failed.text

@@ -1,4 +1,5 @@
 """A trial that ends early: the first reason stays."""
+
 from smach_oracle.oracle.records.early_end import EarlyEnd
 from smach_oracle.oracle.records.facts import TrialEnd
 

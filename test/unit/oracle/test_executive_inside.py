@@ -1,4 +1,5 @@
 """doc/executive_inside.md: threads and lock of a container, what an execution leaves, and more."""
+
 import threading
 
 import pytest
@@ -24,8 +25,11 @@ from smach_oracle.oracle.machine.tree_node import node_of
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import is_counted
 
-MAKES = [(row, options) for row in sorted(OCCASIONS) for options in (
-    Options(), Options(goto('AWAY')), Options(above='retry'), Options(closes=False))]
+MAKES = [
+    (row, options)
+    for row in sorted(OCCASIONS)
+    for options in (Options(), Options(goto('AWAY')), Options(above='retry'), Options(closes=False))
+]
 # of a question about a state that still runs; of a wait that the last one of several ends
 ELSEWHERE = {EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.HEALTH_WAIT_END}
 
@@ -40,8 +44,11 @@ class Noted:
         self._threads = {}
         machine.events.observers.append(self._take)
         self._set = smach.StateMachine._set_current_state
-        monkeypatch.setattr(smach.StateMachine, '_set_current_state',
-                            lambda machine, label: self._move(machine, label))
+        monkeypatch.setattr(
+            smach.StateMachine,
+            '_set_current_state',
+            lambda machine, label: self._move(machine, label),
+        )
 
     def _is_own(self, path):
         return self._threads.get(path) == threading.get_ident()
@@ -68,7 +75,8 @@ class Noted:
 
 @pytest.mark.parametrize('row, options', MAKES, ids=lambda value: str(value)[:60])
 def test_a_container_moves_and_tells_in_its_own_thread_with_its_lock_held(
-        row, options, tmp_path, monkeypatch):
+    row, options, tmp_path, monkeypatch
+):
     occasion = OCCASIONS[row](tmp_path, options)
     noted = Noted(occasion.machine.machine, monkeypatch)
     occasion.run()
@@ -88,6 +96,7 @@ def test_the_lock_is_free_while_others_code_runs():
             if taken:
                 lock.release()
             return taken
+
         free.append((of, in_thread(try_it).result()))
 
     def fails(state, ud):
@@ -103,9 +112,16 @@ def test_the_lock_is_free_while_others_code_runs():
         return goto('B')
 
     machine = watched(
-        Scripted(fails), Scripted(), expert=FakeExpert(answers), health=is_well,
-        settings={'prior': 0.5, 'health_settle_s': 0, 'states': {'A': {
-            'preconditions': [lambda ud: look('precondition')]}}})
+        Scripted(fails),
+        Scripted(),
+        expert=FakeExpert(answers),
+        health=is_well,
+        settings={
+            'prior': 0.5,
+            'health_settle_s': 0,
+            'states': {'A': {'preconditions': [lambda ud: look('precondition')]}},
+        },
+    )
     assert machine.run() == 'done'
     assert {of for of, _ in free} == {'state', 'precondition', 'expert', 'health'}
     assert [of for of, is_free in free if not is_free] == []
@@ -113,7 +129,8 @@ def test_the_lock_is_free_while_others_code_runs():
 
 @pytest.mark.parametrize('row, options', MAKES, ids=lambda value: str(value)[:60])
 def test_a_trial_is_numbered_without_a_gap_and_each_container_that_begins_ends(
-        row, options, tmp_path):
+    row, options, tmp_path
+):
     occasion = OCCASIONS[row](tmp_path, options)
     occasion.run()
     events = occasion.machine.events
@@ -121,8 +138,10 @@ def test_a_trial_is_numbered_without_a_gap_and_each_container_that_begins_ends(
     assert [event.seq for event in events] == list(range(first, first + len(events)))
     assert events[0].kind is (EventKind.RESUMED if first else EventKind.TRIAL_START)
     assert [event.kind for event in events].index(EventKind.TRIAL_END) == len(events) - 1
-    begun, ended = (sorted(event.path for event in occasion.machine.of(kind)) for kind in (
-        EventKind.CONTAINER_START, EventKind.CONTAINER_END))
+    begun, ended = (
+        sorted(event.path for event in occasion.machine.of(kind))
+        for kind in (EventKind.CONTAINER_START, EventKind.CONTAINER_END)
+    )
     assert begun == ended and 'TOP' in begun
 
 
@@ -133,14 +152,28 @@ def test_an_execution_leaves_no_snapshot_and_no_entry_behind(row, options, tmp_p
     left = []
     for node in nodes_of(occasion.machine.machine):
         machine = node.machine
-        left += [(node.path, name) for name, is_left in (
-            ('running', machine.is_running()), ('entry', node.entry),
-            ('resuming', node.resuming), ('asked', node.asked_next),
-            ('ended', node.ended_before), ('precondition', node.as_preconditions),
-            ('runs around', node.runs_around)) if is_left]
-        left += [(node.path, record.label) for record in node.records.by_label.values()
-                 if record.snapshot is not None or record.way_down or record.entered_by_oracle
-                 or record.unfinished is not None or record.open_question]
+        left += [
+            (node.path, name)
+            for name, is_left in (
+                ('running', machine.is_running()),
+                ('entry', node.entry),
+                ('resuming', node.resuming),
+                ('asked', node.asked_next),
+                ('ended', node.ended_before),
+                ('precondition', node.as_preconditions),
+                ('runs around', node.runs_around),
+            )
+            if is_left
+        ]
+        left += [
+            (node.path, record.label)
+            for record in node.records.by_label.values()
+            if record.snapshot is not None
+            or record.way_down
+            or record.entered_by_oracle
+            or record.unfinished is not None
+            or record.open_question
+        ]
     assert left == []
 
 
@@ -153,20 +186,31 @@ def test_a_state_that_was_held_back_finds_the_userdata_with_which_the_machine_ca
             seen.append(ud.x)
             ud.x = value
             return outcome
+
         return write
 
-    machine = watched(*(Scripted(*steps, io_keys=['x']) for steps in (
-        [writes('first A'), writes('second A')], [writes('B'), writes('B')],
-        [writes('C', 'aborted'), writes('C')])), expert=FakeExpert(goto('A'), goto('B')),
-        settings={'policy': 'always_ask', **GUARDED})
+    machine = watched(
+        *(
+            Scripted(*steps, io_keys=['x'])
+            for steps in (
+                [writes('first A'), writes('second A')],
+                [writes('B'), writes('B')],
+                [writes('C', 'aborted'), writes('C')],
+            )
+        ),
+        expert=FakeExpert(goto('A'), goto('B')),
+        settings={'policy': 'always_ask', **GUARDED},
+    )
     machine.machine.userdata.x = 'start'
     assert machine.run() == 'done'
     assert seen == ['start', 'first A', 'B', 'start', 'second A', 'B']
 
 
 def test_the_next_trial_has_the_rates_and_not_the_latest_failure_of_the_one_before():
-    machine = watched(Scripted('aborted', 'ok', 'aborted', 'ok'), settings={
-        'policy': 'algorithm1', 'memory': 1000})
+    machine = watched(
+        Scripted('aborted', 'ok', 'aborted', 'ok'),
+        settings={'policy': 'algorithm1', 'memory': 1000},
+    )
     assert (machine.run(), machine.run()) == ('done', 'done')
     assert [event.continuous for event in machine.of(EventKind.FAILURE)] == [False, False]
     row = machine.rate('A')
@@ -177,9 +221,12 @@ def test_a_jump_to_a_state_of_an_earlier_execution_alone_restores_nothing():
     """C was entered in the first trial, with another userdata, and not yet in the second."""
     seen = []
     machine = watched(
-        Scripted('ok', 'aborted'), Scripted(), Scripted(
-            *[lambda state, ud: seen.append(ud.x) or 'ok'] * 2, input_keys=['x']),
-        expert=FakeExpert(goto('C')), settings={'policy': 'always_ask'})
+        Scripted('ok', 'aborted'),
+        Scripted(),
+        Scripted(*[lambda state, ud: seen.append(ud.x) or 'ok'] * 2, input_keys=['x']),
+        expert=FakeExpert(goto('C')),
+        settings={'policy': 'always_ask'},
+    )
     for x in ('first', 'second'):
         machine.machine.userdata.x = x
         assert machine.run() == 'done'
@@ -206,18 +253,23 @@ def test_a_question_that_is_put_again_costs_one_question():
 
 # -- what the code does not keep yet: strict, so that a change that mends one is told
 
+
 def preempts(machine):
     def preempt(ud):
         machine[0].machine.request_preempt()
         return True
+
     return preempt
 
 
 @pytest.mark.xfail(strict=True, reason='it is taken as the policy decides')
 def test_a_recovery_that_a_preempt_ends_spends_no_recovery_of_the_trial():
     machine = []
-    machine.append(watched(Scripted('aborted'), settings={
-        'states': {'A': {'preconditions': [preempts(machine)]}}}))
+    machine.append(
+        watched(
+            Scripted('aborted'), settings={'states': {'A': {'preconditions': [preempts(machine)]}}}
+        )
+    )
     assert machine[0].run() == 'preempted'
     assert machine[0].machine._oracle.tree.spent()['budget'][0] == 0
 
@@ -225,22 +277,33 @@ def test_a_recovery_that_a_preempt_ends_spends_no_recovery_of_the_trial():
 @pytest.mark.xfail(strict=True, reason='the level does not look again once it has decided')
 def test_no_level_above_has_failed_where_a_preempt_ends_the_recovery():
     machine = []
-    work = OracleContainer.wrap(chain(A=Scripted('aborted')), settings={
-        'policy': 'always_ask', 'escalate': True})
-    machine.append(Watched(chain(WORK=work), settings={
-        'states': {'WORK': {'preconditions': [preempts(machine)]}}}))
+    work = OracleContainer.wrap(
+        chain(A=Scripted('aborted')), settings={'policy': 'always_ask', 'escalate': True}
+    )
+    machine.append(
+        Watched(
+            chain(WORK=work), settings={'states': {'WORK': {'preconditions': [preempts(machine)]}}}
+        )
+    )
     assert machine[0].run() == 'preempted'
     assert [event.state for event in machine[0].of(EventKind.FAILURE)] == ['A']
 
 
 @pytest.mark.xfail(strict=True, reason='the next question takes its place without a word')
 def test_each_question_that_is_opened_is_closed():
-    machine = watched(Scripted('aborted'), expert=FakeExpert(goto('NOWHERE'), goto('A')), settings={
-        'policy': 'always_ask'})
+    machine = watched(
+        Scripted('aborted'),
+        expert=FakeExpert(goto('NOWHERE'), goto('A')),
+        settings={'policy': 'always_ask'},
+    )
     assert machine.run() == 'done'
-    opened, closed = ([event.query_id for event in machine.of(*kinds)] for kinds in (
-        (EventKind.QUERY_OPENED,), (EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
-                                    EventKind.QUERY_CANCELLED)))
+    opened, closed = (
+        [event.query_id for event in machine.of(*kinds)]
+        for kinds in (
+            (EventKind.QUERY_OPENED,),
+            (EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED),
+        )
+    )
     assert opened == closed and len(opened) == 2
 
 
@@ -250,8 +313,10 @@ def test_a_record_counts_no_success_of_a_state_that_was_taken_out():
         assert wait_for(state.preempt_requested)
         state.service_preempt()
         return 'ok'
-    machine = watched(Scripted('aborted', ends_well), Scripted(), expert=FakeExpert(goto('B')),
-                      settings=SOON)
+
+    machine = watched(
+        Scripted('aborted', ends_well), Scripted(), expert=FakeExpert(goto('B')), settings=SOON
+    )
     assert machine.run() == 'done' and machine.rate('A').successes == 0
     left = [event for event in machine.of(EventKind.TRANSITION) if event.target == 'ORACLE'][-1]
     assert left.outcome == 'ok' and not is_counted(left)
@@ -259,8 +324,9 @@ def test_a_record_counts_no_success_of_a_state_that_was_taken_out():
 
 @pytest.mark.xfail(strict=True, reason='passing_by.py tells it, and counts nothing')
 def test_each_transition_that_is_told_is_counted():
-    machine = Held(chain(A=Scripted(outcomes=('ok', 'preempted'))), settings={
-        'autonomy': 'confirm'})
+    machine = Held(
+        chain(A=Scripted(outcomes=('ok', 'preempted'))), settings={'autonomy': 'confirm'}
+    )
     machine.machine._transitions['A']['preempted'] = 'AWAY'
     with machine.begin():
         machine.waits_before('SM_ROOT/A')
@@ -273,13 +339,21 @@ def test_each_transition_that_is_told_is_counted():
 @pytest.mark.xfail(strict=True, reason='nobody looks again after the wait')
 def test_no_failure_is_counted_of_a_state_that_has_closed_while_the_robot_was_not_well():
     hangs, health = Hangs(), FakeHealth()
-    machine = watched(hangs, health=health, expert=FakeExpert(supersede('ok')), settings={
-        'health_settle_s': 0.01, 'states': {'A': {'time_limit_s': 0.05, 'grace_period_s': 0}}})
+    machine = watched(
+        hangs,
+        health=health,
+        expert=FakeExpert(supersede('ok')),
+        settings={
+            'health_settle_s': 0.01,
+            'states': {'A': {'time_limit_s': 0.05, 'grace_period_s': 0}},
+        },
+    )
     health.now = 'run-stop'
 
     def heals(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
             health.now = ''
+
     machine.machine.events.observers.append(heals)
     try:
         machine.run()
@@ -301,15 +375,20 @@ def test_no_jump_arrives_while_the_robot_is_not_well():
     with both:
         smach.Concurrence.add('WORK', chain(B=Scripted('aborted')))
         smach.Concurrence.add('BESIDE', chain(D=Scripted(ends_unwell)))
-    machine = Watched(chain(BOTH=both, C=Scripted()), name='TOP', health=health,
-                      expert=FakeExpert(goto('C', container='TOP')),
-                      settings={'policy': 'always_ask', 'health_settle_s': 0.01})
+    machine = Watched(
+        chain(BOTH=both, C=Scripted()),
+        name='TOP',
+        health=health,
+        expert=FakeExpert(goto('C', container='TOP')),
+        settings={'policy': 'always_ask', 'health_settle_s': 0.01},
+    )
 
     def looks(event):
         if event.kind is EventKind.JUMP:
             at_jump.append(health.now)
         if event.kind is EventKind.HEALTH_WAIT_START:
             health.now = ''
+
     machine.machine.events.observers.append(looks)
     assert machine.run() == 'done'
     assert at_jump == ['']

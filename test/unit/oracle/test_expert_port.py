@@ -1,6 +1,7 @@
 """What an expert's port may do wrong: not come back, or come back with something else than an
 answer.
 """
+
 import contextvars
 import threading
 
@@ -24,8 +25,13 @@ from smach_oracle.oracle.records.events import EventKind
 def asking(*answers, **settings):
     """A, B, C, where B fails and the expert is asked at once."""
     expert = FakeExpert(*answers)
-    machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=expert,
-                      settings=dict(settings, max_recoveries=0))
+    machine = watched(
+        Scripted(),
+        Scripted('aborted'),
+        Scripted(),
+        expert=expert,
+        settings=dict(settings, max_recoveries=0),
+    )
     return machine, expert
 
 
@@ -41,31 +47,65 @@ class Strange:
         raise ValueError('nothing to show')
 
 
-@pytest.mark.parametrize('wrong', [
-    'text', {'state': 'C'}, 0, (), Strange(), Answer(99), Answer('goto', state='C'), Answer(None),
-    Answer(1, state='C'), goto(['A']), goto({}), goto(Strange()), goto(None), supersede(['ok']),
-    supersede('ok', outputs=['k']), supersede('ok', outputs='k'), supersede('ok', outputs=5),
-    give_up({'done'}), interface(['hand']), goto('C', why=5),
-    Answer(AnswerKind.GOTO, 'C', by=None)])
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        'text',
+        {'state': 'C'},
+        0,
+        (),
+        Strange(),
+        Answer(99),
+        Answer('goto', state='C'),
+        Answer(None),
+        Answer(1, state='C'),
+        goto(['A']),
+        goto({}),
+        goto(Strange()),
+        goto(None),
+        supersede(['ok']),
+        supersede('ok', outputs=['k']),
+        supersede('ok', outputs='k'),
+        supersede('ok', outputs=5),
+        give_up({'done'}),
+        interface(['hand']),
+        goto('C', why=5),
+        Answer(AnswerKind.GOTO, 'C', by=None),
+    ],
+)
 def test_an_answer_of_the_wrong_type_is_refused_and_asked_again(wrong):
     machine, expert = asking(wrong, goto('C'))
     assert machine.run() == 'done'
-    warning, = machine.of(EventKind.WARNING)
+    (warning,) = machine.of(EventKind.WARNING)
     assert 'an answer does not fit' in warning.text
     assert len(expert.questions) == 2
     assert [event.by for event in machine.of(EventKind.QUERY_ANSWERED)] == ['eva']
 
 
-@pytest.mark.parametrize('wrong', ['text', {}, 0, Strange(), Answer(99), supersede(['ok']),
-                                   supersede('ok', outputs=['k']), goto('C')])
+@pytest.mark.parametrize(
+    'wrong',
+    [
+        'text',
+        {},
+        0,
+        Strange(),
+        Answer(99),
+        supersede(['ok']),
+        supersede('ok', outputs=['k']),
+        goto('C'),
+    ],
+)
 def test_an_interface_that_gives_something_else_than_an_answer_has_failed(wrong):
     expert = FakeExpert(interface('hand'), goto('B'), interface=lambda *args: wrong)
     machine = watched(
-        Scripted('aborted'), Scripted(), expert=expert,
-        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}})
+        Scripted('aborted'),
+        Scripted(),
+        expert=expert,
+        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
+    )
     assert machine.run() == 'done'
     assert len(expert.questions) == 2
-    tried, = expert.questions[1].tried
+    (tried,) = expert.questions[1].tried
     assert tried.startswith('interface hand: ')
     assert [event.text for event in machine.of(EventKind.WARNING)] == [tried]
 
@@ -123,9 +163,9 @@ def test_an_interface_that_ignores_its_cancellation_does_not_outlast_the_deadlin
     deaf = Deaf()
     machine = watched(
         Scripted('aborted'),
-        expert=FakeExpert(interface('hand'),
-                          interface=lambda offer, *args: deaf(*args)), settings={
-            'max_recoveries': 0, 'deadline_s': 0.1, 'interfaces': {'hand': {'action': 'a'}}})
+        expert=FakeExpert(interface('hand'), interface=lambda offer, *args: deaf(*args)),
+        settings={'max_recoveries': 0, 'deadline_s': 0.1, 'interfaces': {'hand': {'action': 'a'}}},
+    )
     assert in_thread(machine.run).result() == 'aborted'
     assert len(machine.of(EventKind.INTERFACE_END)) == 1
     assert len(machine.of(EventKind.QUERY_EXPIRED)) == 1
@@ -144,6 +184,7 @@ def test_the_expert_is_asked_with_the_context_of_the_machine():
 def test_what_ends_a_program_passes_through_the_experts_port(stop):
     def stops(*args):
         raise stop()
+
     machine, _ = asking(stops)
     with pytest.raises(stop):
         machine.run()

@@ -1,4 +1,5 @@
 """What events say of a trial for those who count: who decided, and why the trial ended."""
+
 import pytest
 from machines import Scripted, watched
 
@@ -21,7 +22,9 @@ def test_a_decision_says_that_the_limit_made_it():
     machine = watched(Scripted('aborted', 'aborted'), settings={'max_recoveries': 1})
     machine.run()
     assert [decided_by(event) for event in machine.of(EventKind.DECISION)] == [
-        Decider.POLICY, Decider.MAX_RECOVERIES]
+        Decider.POLICY,
+        Decider.MAX_RECOVERIES,
+    ]
 
 
 def test_a_trial_that_ends_with_an_outcome_says_so():
@@ -30,9 +33,14 @@ def test_a_trial_that_ends_with_an_outcome_says_so():
     assert end_of(machine) is TrialEnd.OUTCOME
 
 
-@pytest.mark.parametrize('raised, end', [
-    (KeyboardInterrupt(), TrialEnd.STOPPED), (SystemExit(3), TrialEnd.STOPPED),
-    (GeneratorExit(), TrialEnd.ERROR)])
+@pytest.mark.parametrize(
+    'raised, end',
+    [
+        (KeyboardInterrupt(), TrialEnd.STOPPED),
+        (SystemExit(3), TrialEnd.STOPPED),
+        (GeneratorExit(), TrialEnd.ERROR),
+    ],
+)
 def test_a_trial_says_what_ended_it(raised, end):
     machine = watched(Scripted(raised))
     with pytest.raises(type(raised)):
@@ -50,31 +58,57 @@ def test_a_shutdown_is_no_inconsistent_machine():
     assert end_of(machine) is TrialEnd.SHUTDOWN
 
 
-@pytest.mark.parametrize('text, entered, end', [
-    ('KeyboardInterrupt: ', True, TrialEnd.STOPPED), ('SystemExit: 1', False, TrialEnd.STOPPED),
-    (NO_OUTCOME, True, TrialEnd.SHUTDOWN), (NO_OUTCOME, False, TrialEnd.INCONSISTENT),
-    ('ValueError: no', True, TrialEnd.ERROR)])
+@pytest.mark.parametrize(
+    'text, entered, end',
+    [
+        ('KeyboardInterrupt: ', True, TrialEnd.STOPPED),
+        ('SystemExit: 1', False, TrialEnd.STOPPED),
+        (NO_OUTCOME, True, TrialEnd.SHUTDOWN),
+        (NO_OUTCOME, False, TrialEnd.INCONSISTENT),
+        ('ValueError: no', True, TrialEnd.ERROR),
+    ],
+)
 def test_a_bag_from_before_is_read_by_its_text(text, entered, end):
     event = Event(EventKind.TRIAL_END, 'trial', 9, 0.0, 'TOP', text=text)
     assert ended_by(event, entered) is end
 
 
 def test_a_decision_from_before_is_read_by_its_text():
-    old = Event(EventKind.DECISION, 'trial', 5, 0.0, 'TOP',
-                text='5 recoveries of this trial are spent on it')
+    old = Event(
+        EventKind.DECISION,
+        'trial',
+        5,
+        0.0,
+        'TOP',
+        text='5 recoveries of this trial are spent on it',
+    )
     assert decided_by(old) is Decider.MAX_RECOVERIES
     assert decided_by(old._replace(text='prose: LOW, not continuous')) is Decider.POLICY
 
 
 def test_what_is_stated_counts_more_than_words():
-    event = Event(EventKind.TRIAL_END, 'trial', 9, 0.0, 'TOP', text='KeyboardInterrupt: ',
-                  data={'ended_by': 'error'})
+    event = Event(
+        EventKind.TRIAL_END,
+        'trial',
+        9,
+        0.0,
+        'TOP',
+        text='KeyboardInterrupt: ',
+        data={'ended_by': 'error'},
+    )
     assert ended_by(event, True) is TrialEnd.ERROR
 
 
-@pytest.mark.parametrize('data, branches', [
-    ({'branches': ['LEFT', 'RIGHT']}, ('LEFT', 'RIGHT')), ({'branches': ()}, ()),
-    ({'branches': 'LEFT'}, ()), ({}, ()), (None, ())])
+@pytest.mark.parametrize(
+    'data, branches',
+    [
+        ({'branches': ['LEFT', 'RIGHT']}, ('LEFT', 'RIGHT')),
+        ({'branches': ()}, ()),
+        ({'branches': 'LEFT'}, ()),
+        ({}, ()),
+        (None, ()),
+    ],
+)
 def test_the_start_of_a_container_names_its_branches(data, branches):
     event = Event(EventKind.CONTAINER_START, 'trial', 9, 0.0, 'TOP/BOTH', data=data)
     assert branches_of(event) == branches

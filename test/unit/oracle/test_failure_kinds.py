@@ -1,4 +1,5 @@
 """What counts as a failure, and what ends as it did without an oracle."""
+
 import pytest
 from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
 
@@ -38,6 +39,7 @@ def test_where_nothing_more_can_be_said_of_a_failure_the_log_says_why(log):
 
     def describe(state):
         raise OSError('no link')
+
     oracle_of(machine.machine).describe_failure = describe
     assert machine.run() == 'done' and machine.of(EventKind.FAILURE)[0].text == ''
     assert ('warn', "SM_ROOT/A: cannot say more of its failure: OSError('no link')") in log
@@ -61,16 +63,21 @@ def test_an_outcome_registered_too_late_to_lead_anywhere_is_recovered_from():
 def test_a_listed_outcome_is_a_failure_though_it_would_end_the_machine_well():
     machine = Watched(
         chain_of(Scripted('empty', outcomes=('ok', 'empty')), outcomes=('done', 'empty')),
-        settings={'states': {'A': {'failure_outcomes': ['empty']}}})
+        settings={'states': {'A': {'failure_outcomes': ['empty']}}},
+    )
     assert machine.run() == 'done'
     assert kinds_of(machine) == [FailureKind.FAILING_OUTCOME]
 
 
 def test_an_outcome_listed_for_the_whole_machine_is_a_failure_of_every_state():
     machine = Watched(
-        chain_of(Scripted('empty', outcomes=('ok', 'empty')),
-                 Scripted('empty', outcomes=('ok', 'empty')), outcomes=('done', 'empty')),
-        settings={'failure_outcomes': ['empty']})
+        chain_of(
+            Scripted('empty', outcomes=('ok', 'empty')),
+            Scripted('empty', outcomes=('ok', 'empty')),
+            outcomes=('done', 'empty'),
+        ),
+        settings={'failure_outcomes': ['empty']},
+    )
     assert machine.run() == 'done'
     assert [event.state for event in machine.of(EventKind.FAILURE)] == ['A', 'B']
 
@@ -85,8 +92,9 @@ def test_preempted_is_never_a_failure():
 def author_recovers(settings=None):
     machine = smach.StateMachine(outcomes=['done', 'aborted'])
     with machine:
-        smach.StateMachine.add('PICK', Scripted('aborted'),
-                               {'ok': 'done', 'aborted': 'RESET', 'preempted': 'aborted'})
+        smach.StateMachine.add(
+            'PICK', Scripted('aborted'), {'ok': 'done', 'aborted': 'RESET', 'preempted': 'aborted'}
+        )
         smach.StateMachine.add('RESET', Scripted(outcomes=('ok',)), {'ok': 'PICK'})
     return Watched(machine, settings=settings)
 
@@ -100,8 +108,10 @@ def test_the_authors_own_recovery_stays_and_counts_in_the_rate():
     assert machine.rate('PICK').recoveries == 0
 
 
-@pytest.mark.parametrize('settings', [{'author_recoveries': 'override'},
-                                      {'states': {'PICK': {'author_recoveries': 'override'}}}])
+@pytest.mark.parametrize(
+    'settings',
+    [{'author_recoveries': 'override'}, {'states': {'PICK': {'author_recoveries': 'override'}}}],
+)
 def test_the_authors_recovery_is_overridden_where_told(settings):
     machine = author_recovers(settings)
     assert machine.run() == 'done'
@@ -122,17 +132,38 @@ def test_a_listed_failure_with_a_transition_to_another_state_stays_with_its_auth
     assert machine.visits() == ['PICK', 'RESET', 'PICK']
 
 
-@pytest.mark.parametrize('name', [
-    'aborted', 'ABORTED', 'Failed', 'grasp_failed', 'grasp-failure', 'graspFailed', 'IOError',
-    'pick_ERROR', 'place2Failed'
-])
+@pytest.mark.parametrize(
+    'name',
+    [
+        'aborted',
+        'ABORTED',
+        'Failed',
+        'grasp_failed',
+        'grasp-failure',
+        'graspFailed',
+        'IOError',
+        'pick_ERROR',
+        'place2Failed',
+    ],
+)
 def test_names_that_sound_like_a_failure(name):
     assert name in FailingNames()
 
 
-@pytest.mark.parametrize('name', [
-    'preempted', 'Preempted', 'done', 'unfailed', 'terror', 'failed_over', '', 'aborted2', 'TERROR'
-])
+@pytest.mark.parametrize(
+    'name',
+    [
+        'preempted',
+        'Preempted',
+        'done',
+        'unfailed',
+        'terror',
+        'failed_over',
+        '',
+        'aborted2',
+        'TERROR',
+    ],
+)
 def test_names_that_do_not_sound_like_a_failure(name):
     assert name not in FailingNames()
 
@@ -146,7 +177,8 @@ def test_preempted_is_no_failure_even_where_it_is_named():
 def test_other_failing_outcomes_of_the_machine_can_be_named():
     machine = Watched(
         chain_of(Scripted('lost', outcomes=('ok', 'lost')), outcomes=('done', 'lost')),
-        settings={'failing_outcomes': ['lost']})
+        settings={'failing_outcomes': ['lost']},
+    )
     assert machine.run() == 'done'
     assert kinds_of(machine) == [FailureKind.FELL_THROUGH]
 
@@ -162,12 +194,16 @@ def test_without_recovery_a_failure_is_counted_and_ends_the_machine_as_ever():
 
 def test_when_the_oracle_gives_up_on_an_exception_the_machine_raises_as_ever():
     machine = watched(Scripted(ValueError('no grasp')), settings={'max_recoveries': 0})
-    with pytest.raises(smach.InvalidUserCodeError,
-                       match=r"(?s)Could not execute state 'A'.*Traceback.*no grasp"):
+    with pytest.raises(
+        smach.InvalidUserCodeError, match=r"(?s)Could not execute state 'A'.*Traceback.*no grasp"
+    ):
         machine.run()
     assert machine.machine.is_running() is False
     assert [event.kind for event in machine.events[-3:]] == [
-        EventKind.GIVE_UP, EventKind.CONTAINER_END, EventKind.TRIAL_END]
+        EventKind.GIVE_UP,
+        EventKind.CONTAINER_END,
+        EventKind.TRIAL_END,
+    ]
     assert 'no grasp' in machine.events[-1].text
 
 
@@ -229,6 +265,7 @@ def test_what_a_state_says_of_its_failing_outcome_is_told(log):
 def test_a_description_that_breaks_costs_only_itself(log):
     def broken(state):
         raise AttributeError('no status')
+
     machine = watched(Scripted('aborted'), Scripted())
     oracle_of(machine.machine).describe_failure = broken
     assert machine.run() == 'done'
@@ -247,8 +284,9 @@ def test_outcomes_need_not_be_strings():
 
 def test_an_outcome_registered_after_its_state_was_added_has_no_way_to_go():
     late = Scripted('late')
-    machine = Watched(chain_of(late, outcomes=('done', 'aborted', 'preempted', 'late')),
-                      recover=False)
+    machine = Watched(
+        chain_of(late, outcomes=('done', 'aborted', 'preempted', 'late')), recover=False
+    )
     late.register_outcomes(['late'])
     with pytest.raises(smach.InvalidTransitionError, match="'late' of state 'A'"):
         machine.run()

@@ -1,4 +1,5 @@
 """A robot that is well at every other moment is not well, however quickly it changes."""
+
 import pytest
 
 import smach
@@ -45,8 +46,10 @@ def clock(monkeypatch):
 
 def flapping(clock, hertz, share, until_s):
     """A health function: well for `share` of each period until then, and for good from then on."""
+
     def is_well():
         return clock.now_s > until_s or clock.now_s * hertz % 1.0 < share
+
     return is_well
 
 

@@ -1,4 +1,5 @@
 """An operator who commands at random: nothing hangs, no thread is left, every pause ends."""
+
 import random
 import threading
 import time
@@ -65,13 +66,21 @@ def command(rng: random.Random, held: Held) -> None:
     active = hand.status().active
     place = rng.choice(active) if active else None
     labels = list(held.machine._oracle.labels())
-    choices = [hand.pause, hand.pause, hand.resume, hand.step, hand.step, hand.confirm,
-               lambda: hand.set_breakpoint(rng.choice(('*', 'A', '**/L/*'))),
-               lambda: hand.remove_breakpoint(rng.choice(('*', 'A', '**/L/*'))),
-               lambda: hand.set_autonomy(rng.choice(('B', '**/R/*')),
-                                         rng.choice(('run', 'announce', 'confirm', ''))),
-               lambda: hand.go_to('', rng.choice(labels)),
-               lambda: hand.go_to(place.path if place else '', 'A')]
+    choices = [
+        hand.pause,
+        hand.pause,
+        hand.resume,
+        hand.step,
+        hand.step,
+        hand.confirm,
+        lambda: hand.set_breakpoint(rng.choice(('*', 'A', '**/L/*'))),
+        lambda: hand.remove_breakpoint(rng.choice(('*', 'A', '**/L/*'))),
+        lambda: hand.set_autonomy(
+            rng.choice(('B', '**/R/*')), rng.choice(('run', 'announce', 'confirm', ''))
+        ),
+        lambda: hand.go_to('', rng.choice(labels)),
+        lambda: hand.go_to(place.path if place else '', 'A'),
+    ]
     if rng.random() < 0.03:
         choices = [hand.preempt, held.machine.request_preempt]
     try:
@@ -96,7 +105,8 @@ def test_whatever_is_asked_the_machine_ends(seed: int) -> None:
     eventually(lambda: threading.active_count() <= before)
     starts, ends = held.of(EventKind.HOLD_START), held.of(EventKind.HOLD_END)
     assert sorted((each.path, each.state) for each in starts) == sorted(
-        (each.path, each.state) for each in ends)
+        (each.path, each.state) for each in ends
+    )
     assert not held.held()
 
 

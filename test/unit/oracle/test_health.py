@@ -1,4 +1,5 @@
 """Failures while the robot is not well: nothing is counted, and the machine waits."""
+
 import threading
 
 import pytest
@@ -27,9 +28,11 @@ SETTINGS = {'health_settle_s': SETTLE_S}
 
 def fails_unwell(health, why='motors: off', outcome='aborted'):
     """A step of a Scripted: the robot is not well, and so the state fails."""
+
     def fail(state, ud):
         health.now = why
         return outcome
+
     return fail
 
 
@@ -44,9 +47,11 @@ def awaits(machine):
 
 def heals_at_once(machine, health):
     """Make the robot well as soon as the machine waits."""
+
     def heal(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
             health.now = ''
+
     machine.machine.events.observers.append(heal)
 
 
@@ -78,7 +83,8 @@ def test_a_failure_while_unwell_is_not_counted_and_the_state_runs_again(health, 
     assert end.data['waited_s'] >= SETTLE_S
     assert [text for level, text in log if level == 'warn'] == [
         'SM_ROOT/B failed while the robot is not well (FakeHealth: motors: off): waiting; no '
-        'failure is counted']
+        'failure is counted'
+    ]
 
 
 @pytest.mark.parametrize('end', ['aborted', ValueError('x'), None])
@@ -115,8 +121,7 @@ def test_a_plain_success_asks_nobody(health):
 
 def test_failures_while_unwell_use_up_no_recovery(health):
     script = [fails_unwell(health)] * 4
-    machine = watched(Scripted(*script), health=health,
-                      settings=dict(SETTINGS, max_recoveries=4))
+    machine = watched(Scripted(*script), health=health, settings=dict(SETTINGS, max_recoveries=4))
     heals_at_once(machine, health)
     assert machine.run() == 'done'
     assert machine.visits() == ['A'] * 5
@@ -135,13 +140,14 @@ def test_userdata_is_what_it_was_when_the_state_was_entered(health):
     def writes(state, ud):
         ud.count = 2
         return fails_unwell(health)(state, ud)
+
     seen = []
 
     def reads(state, ud):
         seen.append(ud.count)
         return 'ok'
-    machine = watched(Scripted(writes, reads, io_keys=['count']), health=health,
-                      settings=SETTINGS)
+
+    machine = watched(Scripted(writes, reads, io_keys=['count']), health=health, settings=SETTINGS)
     machine.machine.userdata.count = 1
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
@@ -156,8 +162,12 @@ def test_one_notice_stands_for_all_branches_and_levels(health, log):
         health.now = 'battery: low'
         both.wait(10)
         return 'aborted'
-    split = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                              outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}})
+
+    split = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}},
+    )
     with split:
         smach.Concurrence.add('LEFT', chain_of(Scripted(fails)))
         smach.Concurrence.add('RIGHT', chain_of(Scripted(fails)))
@@ -182,8 +192,10 @@ def test_a_wait_ends_once_health_has_been_good_for_the_settle_time(health):
     assert health.asked > 17
 
 
-@pytest.mark.parametrize('outcomes, ends', [(('done', 'aborted', 'preempted'), 'preempted'),
-                                            (('done', 'aborted'), 'aborted')])
+@pytest.mark.parametrize(
+    'outcomes, ends',
+    [(('done', 'aborted', 'preempted'), 'preempted'), (('done', 'aborted'), 'aborted')],
+)
 def test_a_preempt_ends_the_wait(health, outcomes, ends):
     failing = Scripted(fails_unwell(health), outcomes=('ok',) + outcomes[1:])
     machine = watched(failing, outcomes=outcomes, health=health, settings=SETTINGS)
@@ -205,6 +217,7 @@ def test_a_preempt_while_it_is_looked_for_health_ends_the_machine():
     def look():
         looking.set()
         return True
+
     machine = watched(Scripted('aborted'), health=look, settings={'health_settle_s': 30})
     run = in_thread(machine.run)
     assert looking.wait(10)
@@ -232,6 +245,7 @@ def test_ctrl_c_ends_the_wait(health):
         if notices(machine):
             raise KeyboardInterrupt
         return real(stopped, since_s)
+
     watch.why_unwell = look
     with pytest.raises(KeyboardInterrupt):
         machine.run()
@@ -241,11 +255,18 @@ def test_ctrl_c_ends_the_wait(health):
 
 def answered_while_unwell(health):
     """A machine that waits, since the robot was no longer well when the expert answered."""
+
     def answers(question, cancelled, progress):
         health.now = 'run-stop'
         return goto('B')
-    machine = watched(Scripted('aborted'), Scripted(), health=health, expert=FakeExpert(answers),
-                      settings=dict(SETTINGS, max_recoveries=0))
+
+    machine = watched(
+        Scripted('aborted'),
+        Scripted(),
+        health=health,
+        expert=FakeExpert(answers),
+        settings=dict(SETTINGS, max_recoveries=0),
+    )
     run = in_thread(machine.run)
     awaits(machine)
     return machine, run
@@ -274,12 +295,14 @@ def test_the_policys_own_jump_waits(health, log):
     def decided(event):
         if event.kind is EventKind.DECISION:
             health.now = 'run-stop'
+
     machine.machine.events.observers.append(decided)
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
     assert machine.rate('A').recoveries == 1
     assert [text for level, text in log if 'not well' in text] == [
-        'SM_ROOT/A is left for A while the robot is not well (FakeHealth: run-stop): waiting']
+        'SM_ROOT/A is left for A while the robot is not well (FakeHealth: run-stop): waiting'
+    ]
 
 
 def test_an_open_question_stays_open(health):
@@ -290,8 +313,13 @@ def test_an_open_question_stays_open(health):
         asked.set()
         assert go.wait(10)
         return None if cancelled.is_set() else supersede('ok')
-    machine = watched(Scripted('aborted'), health=health, expert=FakeExpert(answers),
-                      settings=dict(SETTINGS, max_recoveries=0, deadline_s=0))
+
+    machine = watched(
+        Scripted('aborted'),
+        health=health,
+        expert=FakeExpert(answers),
+        settings=dict(SETTINGS, max_recoveries=0, deadline_s=0),
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     health.now = 'run-stop'
@@ -310,24 +338,31 @@ def test_a_precondition_that_was_not_met_while_unwell_is_not_judged(health, log)
             health.now = 'motors: off'
             return False
         return True
-    machine = watched(Scripted('aborted'), health=health,
-                      settings=SETTINGS, preconditions={'A': [check]})
+
+    machine = watched(
+        Scripted('aborted'), health=health, settings=SETTINGS, preconditions={'A': [check]}
+    )
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
     ends = machine.of(EventKind.PRECONDITION_END)
     assert [event.outcome for event in ends] == ['met'] and len(calls) == 2
     assert [text for level, text in log if 'not well' in text] == [
         'SM_ROOT/A did not get its precondition check while the robot is not well '
-        '(FakeHealth: motors: off): waiting']
+        '(FakeHealth: motors: off): waiting'
+    ]
 
 
 def test_an_authors_own_recovery_goes_on_and_is_not_counted(health):
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('DRIVE', Scripted(fails_unwell(health)),
-                               {'ok': 'done', 'aborted': 'ENABLE'})
-        smach.StateMachine.add('ENABLE', Scripted(lambda state, ud: setattr(health, 'now', '')
-                                                  or 'ok'), {'ok': 'DRIVE'})
+        smach.StateMachine.add(
+            'DRIVE', Scripted(fails_unwell(health)), {'ok': 'done', 'aborted': 'ENABLE'}
+        )
+        smach.StateMachine.add(
+            'ENABLE',
+            Scripted(lambda state, ud: setattr(health, 'now', '') or 'ok'),
+            {'ok': 'DRIVE'},
+        )
     machine = Watched(machine, health=health, settings=SETTINGS)
     assert machine.run() == 'done'
     assert machine.visits() == ['DRIVE', 'ENABLE', 'DRIVE']
@@ -338,8 +373,9 @@ def test_an_authors_own_recovery_goes_on_and_is_not_counted(health):
 
 
 def test_without_recovery_nothing_waits(health):
-    machine = watched(Scripted(fails_unwell(health)), health=health, settings=SETTINGS,
-                      recover=False)
+    machine = watched(
+        Scripted(fails_unwell(health)), health=health, settings=SETTINGS, recover=False
+    )
     assert machine.run() == 'aborted'
     assert health.asked == 0
 
@@ -348,8 +384,9 @@ def test_the_time_limit_around_a_wait_stands_still(health):
     outer = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with outer:
         smach.StateMachine.add('X', chain_of(Scripted(fails_unwell(health))))
-    machine = Watched(outer, health=health,
-                      settings=dict(SETTINGS, states={'X': {'time_limit_s': 0.3}}))
+    machine = Watched(
+        outer, health=health, settings=dict(SETTINGS, states={'X': {'time_limit_s': 0.3}})
+    )
     run = in_thread(machine.run)
     awaits(machine)
     assert stays(lambda: not machine.of(EventKind.FAILURE, EventKind.PREEMPT), 1.0)

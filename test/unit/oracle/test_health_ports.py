@@ -1,6 +1,7 @@
 """Who says whether the robot is well: functions, given with the machine or in the settings, and
 ports.
 """
+
 import copy
 import threading
 
@@ -21,11 +22,15 @@ def health():
     return FakeHealth()
 
 
-@pytest.mark.parametrize('said, text', [
-    (False, 'FakeHealth'), ('motors: off', 'FakeHealth: motors: off'),
-    (ValueError('no answer'), 'FakeHealth: ValueError: no answer'),
-    (None, "FakeHealth returned None; True and '' are well"),
-])
+@pytest.mark.parametrize(
+    'said, text',
+    [
+        (False, 'FakeHealth'),
+        ('motors: off', 'FakeHealth: motors: off'),
+        (ValueError('no answer'), 'FakeHealth: ValueError: no answer'),
+        (None, "FakeHealth returned None; True and '' are well"),
+    ],
+)
 def test_what_a_function_may_say(said, text):
     machine = watched(Scripted('aborted'), health=FakeHealth(said), settings=SETTINGS)
     assert machine.run() == 'done'
@@ -38,6 +43,7 @@ def test_a_function_that_does_not_return_counts_as_unwell(monkeypatch):
 
     def sleeps():
         return go.wait(20)
+
     machine = watched(Scripted('aborted'), health=sleeps, settings=SETTINGS)
     run = in_thread(machine.run)
     assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START), 10)
@@ -52,6 +58,7 @@ def test_a_preempt_does_not_wait_for_a_function():
     def sleeps():
         entered.set()
         threading.Event().wait(30)
+
     machine = watched(Scripted('aborted'), health=sleeps, settings=SETTINGS)
     run = in_thread(machine.run)
     assert entered.wait(10)
@@ -61,8 +68,11 @@ def test_a_preempt_does_not_wait_for_a_function():
 
 def test_functions_of_the_settings_and_the_given_one_must_all_be_well(health):
     other = FakeHealth()
-    machine = watched(Scripted('aborted'), health=health,
-                      settings=dict(SETTINGS, healthy={'function': other, 'name': 'battery'}))
+    machine = watched(
+        Scripted('aborted'),
+        health=health,
+        settings=dict(SETTINGS, healthy={'function': other, 'name': 'battery'}),
+    )
     health.said, other.said = [False], [False]
     assert machine.run() == 'done'
     assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'battery; FakeHealth'
@@ -74,8 +84,10 @@ def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
     assert machine.run() == 'done'
     assert len(machine.of(EventKind.FAILURE)) == 1
     said = [text for level, text in log if level == 'warn' and text.startswith('healthy')]
-    assert said == ['healthy: this process is not a ROS node, so topic /motors_on is not listened '
-                    'to, and its condition holds']
+    assert said == [
+        'healthy: this process is not a ROS node, so topic /motors_on is not listened '
+        'to, and its condition holds'
+    ]
 
 
 def test_a_port_for_topics_is_made_once(health, log):
@@ -88,8 +100,14 @@ def test_a_port_for_topics_is_made_once(health, log):
     def listen(conditions):
         heard.append([condition.source for condition in conditions])
         return Port()
-    machine = watched(Scripted('aborted'), settings=dict(SETTINGS, healthy=[
-        {'topic': '/motors_on'}, {'function': FakeHealth()}, {'diagnostics': 'Power'}]))
+
+    machine = watched(
+        Scripted('aborted'),
+        settings=dict(
+            SETTINGS,
+            healthy=[{'topic': '/motors_on'}, {'function': FakeHealth()}, {'diagnostics': 'Power'}],
+        ),
+    )
     oracle_of(machine.machine).listen_to_health(listen)
     health.said = ['motors: off']
     assert machine.run() == 'done'
@@ -129,6 +147,7 @@ def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
         assert go.wait(20)
         ended.set()
         return True  # as it was when it began
+
     port = health_ports.HealthFunctionPort('is_well', is_well)
     assert port.why_unwell(begun.is_set) == ''  # a preempt: nobody waits for it
     if is_asked_meanwhile:

@@ -1,4 +1,5 @@
 """Users' objects are told apart by identity, and marked apart from their own attributes."""
+
 import gc
 
 import hostile
@@ -29,9 +30,17 @@ def wrapped(classes, machine, **settings):
     hostile.arm()
     function = classes.function
     OracleContainer.wrap(
-        machine, {'A': [function(), classes.state('AHEAD'), 'SPARE'], 'B': [function()]},
-        {'states': {'E': {'time_limit_s': 30.0}}, 'healthy': [{'function': function()}],
-         'health_settle_s': 0.0, **settings}, name='TOP', health=function())
+        machine,
+        {'A': [function(), classes.state('AHEAD'), 'SPARE'], 'B': [function()]},
+        {
+            'states': {'E': {'time_limit_s': 30.0}},
+            'healthy': [{'function': function()}],
+            'health_settle_s': 0.0,
+            **settings,
+        },
+        name='TOP',
+        health=function(),
+    )
     seen = []
     oracle_of(machine).events.observers.append(seen.append)
     return seen
@@ -91,6 +100,7 @@ def test_of_two_machines_that_compare_equal_each_is_its_own_key():
     class Equal:
         def __eq__(self, other):
             return True
+
         __hash__ = None
 
     one, other = Equal(), Equal()

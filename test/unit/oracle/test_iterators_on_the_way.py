@@ -1,4 +1,5 @@
 """Iterators on the way of a jump, and in the items of other Iterators."""
+
 import pytest
 from branch_machines import Item, inside, iterator_over
 from guarded_machines import chain
@@ -12,12 +13,18 @@ ASKS = {'max_recoveries': 0}
 
 def each_of(state, label, items=(1, 2), loop=('done',), **contained):
     """An Iterator over a machine or a state; its item is under the key `label`."""
-    iterator = smach.Iterator(outcomes=['done', 'aborted', 'preempted'], input_keys=[],
-                              output_keys=[], it=list(items), it_label=label,
-                              exhausted_outcome='done')
+    iterator = smach.Iterator(
+        outcomes=['done', 'aborted', 'preempted'],
+        input_keys=[],
+        output_keys=[],
+        it=list(items),
+        it_label=label,
+        exhausted_outcome='done',
+    )
     with iterator:
-        smach.Iterator.set_contained_state(label.upper(), state, loop_outcomes=list(loop),
-                                           **contained)
+        smach.Iterator.set_contained_state(
+            label.upper(), state, loop_outcomes=list(loop), **contained
+        )
     return iterator
 
 
@@ -45,8 +52,7 @@ def test_an_iterator_further_down_goes_on_where_an_expert_goes_there(place):
     inner.register_input_keys(['done'])
     machine = chain(INNER=inner, LATER=Scripted())
     machine.userdata.done = []
-    expert = FakeExpert(goto('LATER', container='TOP'),
-                        goto(place[1], container=place[0]))
+    expert = FakeExpert(goto('LATER', container='TOP'), goto(place[1], container=place[0]))
     machine['LATER'].script.append('aborted')
     assert Watched(machine, name='TOP', expert=expert, settings=ASKS).run() == 'done'
     assert each.tried == [1, 2, 3, 3, 4]
@@ -55,8 +61,9 @@ def test_an_iterator_further_down_goes_on_where_an_expert_goes_there(place):
 @pytest.mark.parametrize('final', [{}, {'preempted': 'done'}])
 def test_an_iterator_that_was_left_goes_on_whatever_its_author_makes_of_its_end(final):
     items = each_of(chain(A=Scripted('ok', 'aborted')), 'item', (1, 2, 3), final_outcome_map=final)
-    machine = Watched(chain(ALL=items), name='TOP', expert=FakeExpert(goto('ALL', container='TOP')),
-                      settings=ASKS)
+    machine = Watched(
+        chain(ALL=items), name='TOP', expert=FakeExpert(goto('ALL', container='TOP')), settings=ASKS
+    )
     assert machine.run() == 'done'
     assert machine.visits() == ['ALL', 'A', 'A', 'ALL', 'A', 'A'], 'items 1, 2 and 2, 3'
 
@@ -79,27 +86,43 @@ def test_what_is_left_of_one_item_is_not_gone_on_with_in_the_next():
 
 
 def test_an_item_that_was_given_up_and_passed_over_settles_no_failure_beside_it():
-    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                                    outcome_map={'done': {'ALL': 'done', 'BESIDE': 'ok'}})
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'ALL': 'done', 'BESIDE': 'ok'}},
+    )
     left = each_of(chain(A=Scripted('ok', 'aborted')), 'item', loop=('done', 'aborted'))
     with concurrence:
         smach.Concurrence.add('ALL', left)
         smach.Concurrence.add('BESIDE', Scripted('preempted'))
-    machine = Watched(chain(BOTH=concurrence), name='TOP', settings={
-        'states': {'**/A': {'max_recoveries': 0}}})
+    machine = Watched(
+        chain(BOTH=concurrence), name='TOP', settings={'states': {'**/A': {'max_recoveries': 0}}}
+    )
     assert machine.run() == 'done'
     assert [(event.state, event.outcome) for event in machine.of(EventKind.DECISION)] == [
-        ('A', 'ask'), ('BOTH', 'revisit')]
+        ('A', 'ask'),
+        ('BOTH', 'revisit'),
+    ]
 
 
-@pytest.mark.parametrize('back_to, told', [
-    ('FIRST', ['TOP/ALL: begins with its first item again: items 1 to 2 that had ended are '
-               'repeated']),
-    ('ALL', [])])
+@pytest.mark.parametrize(
+    'back_to, told',
+    [
+        (
+            'FIRST',
+            ['TOP/ALL: begins with its first item again: items 1 to 2 that had ended are repeated'],
+        ),
+        ('ALL', []),
+    ],
+)
 def test_items_that_are_repeated_on_the_authors_way_are_told(log, back_to, told):
     items = each_of(chain(A=Scripted('ok', 'ok', 'aborted')), 'item', (1, 2, 3))
-    machine = Watched(chain(FIRST=Scripted(), ALL=items), name='TOP', settings=ASKS,
-                      expert=FakeExpert(goto(back_to, container='TOP')))
+    machine = Watched(
+        chain(FIRST=Scripted(), ALL=items),
+        name='TOP',
+        settings=ASKS,
+        expert=FakeExpert(goto(back_to, container='TOP')),
+    )
     assert machine.run() == 'done'
     assert machine.visits().count('A') == (6 if told else 4)
     assert [text for level, text in log if 'that had ended' in text] == told

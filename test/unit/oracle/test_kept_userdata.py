@@ -1,4 +1,5 @@
 """Userdata that a recovery wrote stay in their container: a restore in one above keeps none."""
+
 import pytest
 from guarded_machines import chain
 from machines import FakeExpert, Scripted, Watched, goto
@@ -19,10 +20,12 @@ def achieve(ud):
 
 def finding(seen):
     """A state that notes x at each visit, and writes it."""
+
     def find(state, ud):
         seen.append(ud.x if 'x' in ud else None)
         ud.x = 'found'
         return 'ok'
+
     return Scripted(find, find, find, **IO)
 
 
@@ -35,8 +38,13 @@ def nested(**states):
 
 def run(machine, *answers, preconditions=None, **settings):
     machine.userdata.x = 'at the start'
-    watched = Watched(machine, name='TOP', expert=FakeExpert(*answers), settings=settings,
-                      preconditions=preconditions)
+    watched = Watched(
+        machine,
+        name='TOP',
+        expert=FakeExpert(*answers),
+        settings=settings,
+        preconditions=preconditions,
+    )
     assert watched.run() == 'done'
     return watched
 
@@ -46,17 +54,28 @@ def grasp(*script):
     return Scripted(*script, **IO)
 
 
-@pytest.mark.parametrize('answers, settings, failures', [
-    ((), LEFT, 2),
-    ((goto('FIND', container='TOP'),), UNSURE, 1),
-    ((None,), {**UNSURE, 'on_no_answer': {'goto': '/FIND'}}, 1),
-], ids=['the policy steps back', 'the expert says where', 'nobody answers'])
+@pytest.mark.parametrize(
+    'answers, settings, failures',
+    [
+        ((), LEFT, 2),
+        ((goto('FIND', container='TOP'),), UNSURE, 1),
+        ((None,), {**UNSURE, 'on_no_answer': {'goto': '/FIND'}}, 1),
+    ],
+    ids=['the policy steps back', 'the expert says where', 'nobody answers'],
+)
 def test_a_container_that_is_left_keeps_what_its_preconditions_wrote(answers, settings, failures):
     seen = []
-    machine = chain(FIND=finding(seen), PICK=nested(
-        GRASP=grasp(*['aborted'] * failures), LIFT=Scripted()))
-    watched = run(machine, *answers, **settings, preconditions={
-        'PICK/GRASP': [achieve] if settings is LEFT else [achieve, lambda ud: False]})
+    machine = chain(
+        FIND=finding(seen), PICK=nested(GRASP=grasp(*['aborted'] * failures), LIFT=Scripted())
+    )
+    watched = run(
+        machine,
+        *answers,
+        **settings,
+        preconditions={
+            'PICK/GRASP': [achieve] if settings is LEFT else [achieve, lambda ud: False]
+        },
+    )
     assert 'met' in [event.outcome for event in watched.of(EventKind.PRECONDITION_END)]
     assert seen == ['at the start', 'at the start']
 
@@ -70,10 +89,16 @@ def test_an_expert_s_outputs_stay_in_the_container_that_is_left():
 
 def test_a_level_above_that_decides_keeps_what_its_own_preconditions_wrote():
     seen = []
-    machine = chain(FIND=finding(seen), PICK=nested(ARM=nested(
-        GRASP=grasp('aborted', 'aborted'), LIFT=Scripted())))
-    watched = run(machine, escalate=True, **LEFT, states={
-        'GRASP': {'prior': 0.5}, 'ARM': {'preconditions': [achieve, lambda ud: False]}})
+    machine = chain(
+        FIND=finding(seen),
+        PICK=nested(ARM=nested(GRASP=grasp('aborted', 'aborted'), LIFT=Scripted())),
+    )
+    watched = run(
+        machine,
+        escalate=True,
+        **LEFT,
+        states={'GRASP': {'prior': 0.5}, 'ARM': {'preconditions': [achieve, lambda ud: False]}},
+    )
     assert watched.of(EventKind.JUMP)[-1].target == 'FIND'
     assert seen == ['at the start', 'at the start']
 

@@ -1,4 +1,5 @@
 """The claims on names in a rates file: each lives exactly as long as its owners."""
+
 import contextlib
 import gc
 import os
@@ -48,6 +49,7 @@ def lines_of_a_claim(at_line):
             count += 1
             at_line(count)
         return trace
+
     return trace
 
 
@@ -121,6 +123,7 @@ def test_a_child_keeps_no_claim_on_a_folder_that_was_replaced(tmp_path):
 def test_claims_leave_no_file_open_once_their_owners_are_gone(tmp_path):
     def descriptors():
         return len(os.listdir('/proc/self/fd'))
+
     gc.collect()  # machines of other tests
     path, before = str(tmp_path / 'rates.json'), descriptors()
     owners = [Owner() for _ in range(50)]
@@ -139,6 +142,7 @@ def test_a_child_claims_for_itself_and_leaves_the_claim_of_its_parent(tmp_path):
     def claims_again():
         claim(path, 'TASK', owners[0])
         claim(path, 'CHILD', owners[0])
+
     with child_that_waits(claims_again):
         owners.clear()
         assert is_claimed(path, 'TASK', False) and is_claimed(path, 'CHILD', False)

@@ -1,6 +1,7 @@
 """A script's own classes and objects may use any name for their own ends, those of an
 OracleContainer among them.
 """
+
 import importlib
 import sys
 
@@ -13,8 +14,19 @@ from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.asking import question
 from smach_oracle.oracle.records.events import EventKind
 
-NAMES = ('name', 'path', 'settings', 'events', 'trial_id', 'is_top', 'recovers', 'rates',
-         'transition_counts', 'save_rates', 'load_rates')
+NAMES = (
+    'name',
+    'path',
+    'settings',
+    'events',
+    'trial_id',
+    'is_top',
+    'recovers',
+    'rates',
+    'transition_counts',
+    'save_rates',
+    'load_rates',
+)
 
 
 class SetsThem(smach.StateMachine):
@@ -70,8 +82,11 @@ def test_what_a_script_keeps_on_its_machine_stays_its_own(tmp_path):
 def test_what_a_scripts_class_defines_stays_its_own():
     machine = chain_of(Scripted('aborted'), machine_class=DefinesThem)
     assert EventKind.JUMP in recovered(machine)
-    assert (machine.name, machine.events(), machine.rates('euros')) == ('own name', 'own events',
-                                                                        'own rates in euros')
+    assert (machine.name, machine.events(), machine.rates('euros')) == (
+        'own name',
+        'own events',
+        'own rates in euros',
+    )
 
 
 def test_adapters_read_the_containers_face_whatever_the_class_is_like():

@@ -1,4 +1,5 @@
 """When a container has obeyed a stop, in which of them, and what of its clean-up is held then."""
+
 import threading
 
 import pytest
@@ -40,9 +41,12 @@ def working(trail, ends, after_b='CLEAN', **clean_up):
     """A, then B, which `ends`, then what is in `clean_up`: labels with their transitions."""
     return machine_of(
         A=(trail.state('A'), {'ok': 'B'}),
-        B=(trail.state('B', ends, 'ok', outcomes=FROM_B),
-           {'ok': 'done', 'preempted': after_b, 'aborted': after_b, 'stopped': after_b}),
-        **{label: (trail.state(label), transitions) for label, transitions in clean_up.items()})
+        B=(
+            trail.state('B', ends, 'ok', outcomes=FROM_B),
+            {'ok': 'done', 'preempted': after_b, 'aborted': after_b, 'stopped': after_b},
+        ),
+        **{label: (trail.state(label), transitions) for label, transitions in clean_up.items()},
+    )
 
 
 def run_and_stop(machine, ends, before=lambda held: None, then=lambda held: None):
@@ -58,9 +62,11 @@ def run_and_stop(machine, ends, before=lambda held: None, then=lambda held: None
     return held
 
 
-@pytest.mark.parametrize('ends', [
-    Ends('preempted'), Ends('preempted', services=False), Ends('aborted'), Ends('stopped')],
-    ids=lambda ends: '{}{}'.format(ends.outcome, '' if ends.services else ', not serviced'))
+@pytest.mark.parametrize(
+    'ends',
+    [Ends('preempted'), Ends('preempted', services=False), Ends('aborted'), Ends('stopped')],
+    ids=lambda ends: '{}{}'.format(ends.outcome, '' if ends.services else ', not serviced'),
+)
 def test_a_state_that_was_stopped_ends_the_work_by_whatever_outcome(ends):
     trail = Trail()
     held = run_and_stop(working(trail, ends, CLEAN={'ok': 'aborted'}), ends)
@@ -70,22 +76,27 @@ def test_a_state_that_was_stopped_ends_the_work_by_whatever_outcome(ends):
 def test_clean_ups_on_two_levels_end_the_work():
     trail, ends = Trail(), Ends()
     inner = working(trail, ends, CLEAN={'ok': 'aborted'})
-    outer = machine_of(N=(inner, {'aborted': 'HOME', 'preempted': 'HOME'}),
-                       HOME=(trail.state('HOME'), {'ok': 'aborted'}))
+    outer = machine_of(
+        N=(inner, {'aborted': 'HOME', 'preempted': 'HOME'}),
+        HOME=(trail.state('HOME'), {'ok': 'aborted'}),
+    )
     held = run_and_stop(outer, ends)
     assert (held.end(), trail.ran) == ('aborted', ['A', 'B', 'CLEAN', 'HOME'])
 
 
 def test_a_concurrence_that_ends_by_its_default_has_obeyed_too():
     trail, ends = Trail(), Ends()
-    beside = smach.Concurrence(['ok', 'aborted', 'preempted'], 'aborted',
-                               outcome_map={'ok': {'LEFT': 'ok', 'RIGHT': 'ok'}})
+    beside = smach.Concurrence(
+        ['ok', 'aborted', 'preempted'], 'aborted', outcome_map={'ok': {'LEFT': 'ok', 'RIGHT': 'ok'}}
+    )
     with beside:
         smach.Concurrence.add('LEFT', Trail().state('LEFT', ends, 'ok'))
         smach.Concurrence.add('RIGHT', Trail().state('RIGHT', Gate()))
-    outer = machine_of(A=(trail.state('A'), {'ok': 'C'}),
-                       C=(beside, {'ok': 'done', 'aborted': 'CLEAN', 'preempted': 'CLEAN'}),
-                       CLEAN=(trail.state('CLEAN'), {'ok': 'aborted'}))
+    outer = machine_of(
+        A=(trail.state('A'), {'ok': 'C'}),
+        C=(beside, {'ok': 'done', 'aborted': 'CLEAN', 'preempted': 'CLEAN'}),
+        CLEAN=(trail.state('CLEAN'), {'ok': 'aborted'}),
+    )
     held = run_and_stop(outer, ends)
     assert (held.end(), trail.ran) == ('aborted', ['A', 'CLEAN'])
 
@@ -110,13 +121,17 @@ def test_a_branch_that_its_concurrence_ends_is_recovered_as_ever(fails):
     def slips(state, ud):
         raise ValueError('slipped')
 
-    left = machine_of(WATCH=(trail.state('WATCH', gate), {'ok': 'done', 'preempted': 'UNDOCK'}),
-                      UNDOCK=(trail.state('UNDOCK', slips if fails == 'raises' else fails, 'ok'),
-                              {'ok': 'done'}))
+    left = machine_of(
+        WATCH=(trail.state('WATCH', gate), {'ok': 'done', 'preempted': 'UNDOCK'}),
+        UNDOCK=(trail.state('UNDOCK', slips if fails == 'raises' else fails, 'ok'), {'ok': 'done'}),
+    )
     right = trail.state('CARRY', lambda state, ud: gate.entered.wait(LIMIT_S) and 'ok')
-    beside = smach.Concurrence(['done', 'aborted'], 'aborted',
-                               outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'ok'}},
-                               child_termination_cb=lambda outcomes: True)
+    beside = smach.Concurrence(
+        ['done', 'aborted'],
+        'aborted',
+        outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'ok'}},
+        child_termination_cb=lambda outcomes: True,
+    )
     with beside:
         smach.Concurrence.add('LEFT', left)
         smach.Concurrence.add('RIGHT', right)
@@ -130,9 +145,11 @@ def test_a_branch_that_its_concurrence_ends_is_recovered_as_ever(fails):
 @pytest.mark.parametrize('hold', ['breakpoint', 'confirm', 'pause'])
 def test_the_first_state_of_a_clean_up_is_never_held(services, hold):
     trail, ends = Trail(), Ends(services=services)
-    holds = {'breakpoint': lambda held: held.hand.set_breakpoint('CLEAN'),
-             'confirm': lambda held: held.hand.set_autonomy('CLEAN', 'confirm'),
-             'pause': lambda held: None}
+    holds = {
+        'breakpoint': lambda held: held.hand.set_breakpoint('CLEAN'),
+        'confirm': lambda held: held.hand.set_autonomy('CLEAN', 'confirm'),
+        'pause': lambda held: None,
+    }
     machine = working(trail, ends, CLEAN={'ok': 'preempted'})
     held = Held(machine)
     with held:
@@ -159,8 +176,9 @@ def test_the_states_behind_it_are_held_again_on_each_level(around):
         eventually(lambda: [each for each in held.held() if each.endswith('/WASH')])
         held.hand.confirm()
 
-    held = run_and_stop(machine, ends, lambda held: held.hand.set_autonomy('WASH', 'confirm'),
-                        confirm)
+    held = run_and_stop(
+        machine, ends, lambda held: held.hand.set_autonomy('WASH', 'confirm'), confirm
+    )
     assert (held.end(), trail.ran) == ('preempted', ['A', 'B', 'CLEAN', 'WASH'])
 
 
@@ -176,8 +194,7 @@ def test_a_machine_on_any_level_that_is_led_back_to_its_work_recovers_again(arou
 
 def test_an_operator_sends_a_nested_machine_on_after_a_stop():
     trail, ends, gate = Trail(), Ends(), Gate(heeds=False)
-    machine = working(trail, ends, CLEAN={'ok': 'WASH'}, WASH={'ok': 'preempted'},
-                      C={'ok': 'done'})
+    machine = working(trail, ends, CLEAN={'ok': 'WASH'}, WASH={'ok': 'preempted'}, C={'ok': 'done'})
     machine._states['CLEAN'] = trail.state('CLEAN', gate)
 
     def send(held):

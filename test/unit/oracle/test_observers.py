@@ -1,4 +1,5 @@
 """An observer that fails is named once, stops nothing, and what it means is said."""
+
 import pytest
 
 import smach
@@ -12,9 +13,11 @@ def machine_of(runs, *labels, **settings):
     machine = smach.StateMachine(['ok', 'aborted'])
     with machine:
         for label, following in zip(labels, labels[1:] + ('ok',)):
-            smach.StateMachine.add(label, smach.CBState(
-                lambda userdata, label=label: runs(label) or 'ok', outcomes=['ok']),
-                {'ok': following})
+            smach.StateMachine.add(
+                label,
+                smach.CBState(lambda userdata, label=label: runs(label) or 'ok', outcomes=['ok']),
+                {'ok': following},
+            )
     return OracleContainer.wrap(machine, name='TOP', settings=settings)
 
 
@@ -38,7 +41,7 @@ def test_an_observer_that_fails_is_named_once_and_gets_what_follows(log, error):
     for _ in range(2):
         assert machine.execute() == 'ok'
     assert seen.count(0) == 4 and {4, -4} < set(seen)
-    said, = [text for level, text in log if level == 'err']
+    (said,) = [text for level, text in log if level == 'err']
     assert 'broken' in said and 'TRIAL_START of TOP' in said and 'has missed this event' in said
 
 
@@ -46,6 +49,7 @@ def test_each_observer_that_fails_is_named(log):
     def fails(name):
         def observer(event):
             raise ValueError(name)
+
         return observer
 
     machine = machine_of(lambda label: None, 'A')
@@ -64,7 +68,7 @@ def test_what_the_failure_of_one_of_ours_means_is_said(log):
     machine = machine_of(lambda label: None, 'A')
     machine.events.observers.append(Publisher().on_event)
     machine.execute()
-    said, = [text for level, text in log if level == 'err']
+    (said,) = [text for level, text in log if level == 'err']
     assert 'the publisher of ~x failed at' in said and 'consoles miss this event' in said
 
 
@@ -89,7 +93,8 @@ class Person(Expert):
 
 
 def test_after_a_fault_of_the_store_a_person_says_how_the_trial_goes_on(
-        tmp_path, log, monkeypatch, capsys):
+    tmp_path, log, monkeypatch, capsys
+):
     """Otherwise the machine would go back to where the store was written last."""
     begun = []
 
@@ -110,15 +115,16 @@ def test_after_a_fault_of_the_store_a_person_says_how_the_trial_goes_on(
     with pytest.raises(KeyboardInterrupt):
         machine_of(killed, 'A', 'B', 'C', checkpoint=store).execute()
     monkeypatch.undo()
-    said, = [text for level, text in log if level == 'err']
+    (said,) = [text for level, text in log if level == 'err']
     assert 'this trial is not stored any more' in said and 'ZeroDivisionError: a fault' in said
     assert oracle_state([store]) == 0
     assert 'not stored to its end, last: TOP/' in capsys.readouterr().out
     del begun[:]
     person = Person()
     machine = machine_of(begun.append, 'A', 'B', 'C', checkpoint=store, on_resume='recover')
-    machine = OracleContainer.wrap(machine, name='TOP', expert=person, settings={
-        'checkpoint': store, 'on_resume': 'recover'})
+    machine = OracleContainer.wrap(
+        machine, name='TOP', expert=person, settings={'checkpoint': store, 'on_resume': 'recover'}
+    )
     assert machine.execute() == 'ok'
     assert len(person.asked) == 1 and begun == ['C']
 

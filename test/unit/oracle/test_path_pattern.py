@@ -1,28 +1,32 @@
 """Patterns of states."""
+
 import pytest
 
 from smach_oracle.oracle.control.path_pattern import PathPattern
 from smach_oracle.oracle.errors import SettingsError
 
 
-@pytest.mark.parametrize('pattern, path, label, meant', [
-    ('PICK', 'TOP', 'PICK', True),
-    ('PICK', 'TOP/NAV', 'PICK', True),
-    ('PICK', 'TOP/PICK', 'GRASP', False),
-    ('PICK_*', 'TOP', 'PICK_CUP', True),
-    ('pick', 'TOP', 'PICK', False),
-    ('TOP/NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
-    ('/TOP/NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
-    ('NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
-    ('NAV/DRIVE', 'TOP/OTHER/NAV', 'DRIVE', False),
-    ('NAV/*', 'TOP/NAV', 'DRIVE', True),
-    ('NAV/*', 'TOP/NAV/INNER', 'DRIVE', False),
-    ('NAV/**', 'TOP/NAV/INNER', 'DRIVE', True),
-    ('**/DRIVE', 'TOP/NAV/INNER', 'DRIVE', True),
-    ('**/DRIVE', 'TOP', 'DRIVE', True),
-    ('**', 'TOP', 'ANY', True),
-    ('*/A?', 'TOP', 'A1', True),
-])
+@pytest.mark.parametrize(
+    'pattern, path, label, meant',
+    [
+        ('PICK', 'TOP', 'PICK', True),
+        ('PICK', 'TOP/NAV', 'PICK', True),
+        ('PICK', 'TOP/PICK', 'GRASP', False),
+        ('PICK_*', 'TOP', 'PICK_CUP', True),
+        ('pick', 'TOP', 'PICK', False),
+        ('TOP/NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
+        ('/TOP/NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
+        ('NAV/DRIVE', 'TOP/NAV', 'DRIVE', True),
+        ('NAV/DRIVE', 'TOP/OTHER/NAV', 'DRIVE', False),
+        ('NAV/*', 'TOP/NAV', 'DRIVE', True),
+        ('NAV/*', 'TOP/NAV/INNER', 'DRIVE', False),
+        ('NAV/**', 'TOP/NAV/INNER', 'DRIVE', True),
+        ('**/DRIVE', 'TOP/NAV/INNER', 'DRIVE', True),
+        ('**/DRIVE', 'TOP', 'DRIVE', True),
+        ('**', 'TOP', 'ANY', True),
+        ('*/A?', 'TOP', 'A1', True),
+    ],
+)
 def test_which_states_are_meant(pattern: str, path: str, label: str, meant: bool) -> None:
     assert PathPattern(pattern).matches(path, label) is meant
 

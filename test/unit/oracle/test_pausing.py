@@ -1,4 +1,5 @@
 """Pause, resume, step and preempt of a running machine, and its breakpoints."""
+
 import threading
 
 import pytest
@@ -24,7 +25,9 @@ def test_a_pause_lets_the_state_end_and_holds_before_the_next() -> None:
     assert held.told(EventKind.HOLD_START) == ['paused']
     assert held.told(EventKind.HOLD_END) == ['resumed']
     assert [(event.outcome, event.by) for event in held.of(EventKind.OPERATOR_COMMAND)] == [
-        ('pause', 'eva'), ('resume', 'eva')]
+        ('pause', 'eva'),
+        ('resume', 'eva'),
+    ]
     assert [event.seq for event in held.events] == list(range(len(held.events)))
 
 
@@ -33,8 +36,9 @@ def test_a_resume_before_anything_waits_says_what_runs_on() -> None:
     with Held(chain_of(Scripted(gate), Scripted())).begin() as held:
         assert gate.entered.wait(20)
         held.hand.pause()
-        assert held.hand.resume() == ('SM_ROOT goes on; nothing has waited for that, and this runs '
-                                      'on: A in SM_ROOT')
+        assert held.hand.resume() == (
+            'SM_ROOT goes on; nothing has waited for that, and this runs on: A in SM_ROOT'
+        )
         gate.opened.set()
         assert held.end() == 'done'
     assert not held.of(EventKind.HOLD_START)
@@ -159,8 +163,7 @@ def test_the_author_s_clean_up_is_left_out_while_the_pause_lasts(by_operator) ->
     gate, clean_up = Gate(), Scripted()
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('WORK', Scripted(gate),
-                               {'ok': 'done', 'preempted': 'CLEAN_UP'})
+        smach.StateMachine.add('WORK', Scripted(gate), {'ok': 'done', 'preempted': 'CLEAN_UP'})
         smach.StateMachine.add('CLEAN_UP', clean_up, {'ok': 'preempted'})
     with Held(machine).begin() as held:
         assert gate.entered.wait(20)
@@ -181,8 +184,9 @@ def test_a_machine_that_goes_on_after_a_preempt_is_held_again_but_not_its_clean_
         smach.StateMachine.add('WORK', Scripted(gate), {'ok': 'done', 'preempted': 'OTHER'})
         smach.StateMachine.add('OTHER', other, {'ok': 'LAST'})
         smach.StateMachine.add('LAST', Scripted(), {'ok': 'done'})
-    with Held(machine, settings={'autonomy': 'confirm', 'states': {
-            'WORK': {'autonomy': 'run'}}}).begin() as held:
+    with Held(
+        machine, settings={'autonomy': 'confirm', 'states': {'WORK': {'autonomy': 'run'}}}
+    ).begin() as held:
         assert gate.entered.wait(20)
         held.machine.request_preempt()
         held.waits_before('SM_ROOT/LAST')
@@ -270,8 +274,12 @@ def test_an_oracle_that_asks_is_no_state_that_runs_to_its_end() -> None:
         assert cancelled.wait(20)
 
     asked = threading.Event()
-    with Held(chain_of(Scripted('aborted')), expert=FakeExpert(wait), name='TOP',
-              settings={'max_recoveries': 0}).begin() as held:
+    with Held(
+        chain_of(Scripted('aborted')),
+        expert=FakeExpert(wait),
+        name='TOP',
+        settings={'max_recoveries': 0},
+    ).begin() as held:
         assert asked.wait(20)
         assert held.hand.pause() == 'TOP is paused; the oracle is at work in TOP'
 
@@ -286,6 +294,5 @@ def test_a_concurrence_is_no_state_that_runs_to_its_end_where_its_states_do() ->
         smach.StateMachine.add('BOTH', both)
     with Held(machine, name='TOP').begin() as held:
         assert gate.entered.wait(20)
-        assert held.hand.pause() == (
-            'TOP is paused; runs to its end: A in TOP/BOTH/INNER')
+        assert held.hand.pause() == ('TOP is paused; runs to its end: A in TOP/BOTH/INNER')
         gate.opened.set()

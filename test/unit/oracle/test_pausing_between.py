@@ -1,4 +1,5 @@
 """A pause between the items of an Iterator, and before a precondition."""
+
 import pickle
 
 import pytest
@@ -12,8 +13,9 @@ from smach_oracle.oracle.records.events import EventKind
 
 def items_machine(state: smach.State) -> smach.StateMachine:
     """A machine whose state EACH does three items with a state."""
-    each = smach.Iterator(['done', 'aborted', 'preempted'], [], [], it=[1, 2, 3],
-                          exhausted_outcome='done')
+    each = smach.Iterator(
+        ['done', 'aborted', 'preempted'], [], [], it=[1, 2, 3], exhausted_outcome='done'
+    )
     with each:
         smach.Iterator.set_contained_state('ITEM', state, loop_outcomes=['ok'])
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
@@ -42,8 +44,9 @@ def test_an_iterator_waits_between_two_items_and_steps(nested) -> None:
 
 
 @pytest.mark.parametrize('nested, runs', [(True, 0), (False, 2)])
-@pytest.mark.parametrize('ask', [lambda held: held.hand.preempt(),
-                                 lambda held: held.machine.request_preempt()])
+@pytest.mark.parametrize(
+    'ask', [lambda held: held.hand.preempt(), lambda held: held.machine.request_preempt()]
+)
 def test_a_preempt_ends_an_iterator_that_waits(ask, nested, runs) -> None:
     def heed(state, ud):
         if state.preempt_requested():
@@ -75,8 +78,10 @@ def test_gates_go_with_the_oracle_and_stay_one() -> None:
     assert iterator._transition_cbs == []
 
 
-@pytest.mark.parametrize('settings, waits_before', [
-    ({}, 'SM_ROOT/A'), ({'states': {'A': {'autonomy': 'confirm'}}}, 'SM_ROOT/A')])
+@pytest.mark.parametrize(
+    'settings, waits_before',
+    [({}, 'SM_ROOT/A'), ({'states': {'A': {'autonomy': 'confirm'}}}, 'SM_ROOT/A')],
+)
 def test_a_precondition_is_not_begun_while_held(settings, waits_before) -> None:
     gate = Gate('aborted')
     first, second = Scripted(), Scripted(gate)
@@ -108,8 +113,7 @@ def test_a_function_among_the_preconditions_waits_too_and_a_preempt_ends_that() 
 
     called = []
     gate = Gate('aborted')
-    held = Held(chain_of(Scripted(gate)),
-                preconditions={'A': [check]})
+    held = Held(chain_of(Scripted(gate)), preconditions={'A': [check]})
     with held.begin():
         assert gate.entered.wait(20)
         held.hand.pause()

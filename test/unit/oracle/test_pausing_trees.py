@@ -1,4 +1,5 @@
 """Paused trees: nested and concurrent machines, and the time limits around what waits."""
+
 from held_machines import Gate, Held
 from machines import Scripted, chain_of
 from waiting import stays
@@ -55,8 +56,9 @@ def test_stepping_into_a_nested_machine_waits_before_its_first_state() -> None:
 
 def test_every_branch_of_a_concurrence_waits_and_steps_on_its_own() -> None:
     left, right = Gate(), Gate()
-    machine = beside(L=chain_of(Scripted(left), Scripted()),
-                     R=chain_of(Scripted(right), Scripted()))
+    machine = beside(
+        L=chain_of(Scripted(left), Scripted()), R=chain_of(Scripted(right), Scripted())
+    )
     with Held(machine).begin() as held:
         assert left.entered.wait(20) and right.entered.wait(20)
         held.hand.pause()
@@ -101,10 +103,12 @@ def test_a_preempt_ends_a_paused_tree_on_all_levels() -> None:
 
 def test_a_branch_that_its_concurrence_stops_does_not_wait_on() -> None:
     gate = Gate()
-    waiting = chain_of(Scripted(lambda state, ud: 'ok' if gate.entered.wait(20) else 'aborted'),
-                       Scripted())
-    together = smach.Concurrence(['done', 'aborted', 'preempted'], 'done',
-                                 child_termination_cb=lambda outcomes: True)
+    waiting = chain_of(
+        Scripted(lambda state, ud: 'ok' if gate.entered.wait(20) else 'aborted'), Scripted()
+    )
+    together = smach.Concurrence(
+        ['done', 'aborted', 'preempted'], 'done', child_termination_cb=lambda outcomes: True
+    )
     with together:
         smach.Concurrence.add('SHORT', Scripted(gate))
         smach.Concurrence.add('LONG', waiting)
@@ -122,8 +126,10 @@ def test_a_branch_that_its_concurrence_stops_does_not_wait_on() -> None:
 
 
 def test_a_time_limit_around_what_waits_stands_still() -> None:
-    held = Held(nest(chain_of(Scripted(), Scripted()), Scripted()),
-                settings={'states': {'INNER': {'time_limit_s': 1.0}}})
+    held = Held(
+        nest(chain_of(Scripted(), Scripted()), Scripted()),
+        settings={'states': {'INNER': {'time_limit_s': 1.0}}},
+    )
     held.hand.set_breakpoint('INNER/B')
     with held.begin():
         held.waits_before('SM_ROOT/INNER/B')
@@ -135,8 +141,11 @@ def test_a_time_limit_around_what_waits_stands_still() -> None:
 
 def test_a_time_limit_runs_on_once_resumed() -> None:
     gate = Gate()
-    held = Held(nest(chain_of(Scripted(gate)), Scripted()), recover=True,
-                settings={'states': {'INNER': {'time_limit_s': 1.0}}, 'max_recoveries': 0})
+    held = Held(
+        nest(chain_of(Scripted(gate)), Scripted()),
+        recover=True,
+        settings={'states': {'INNER': {'time_limit_s': 1.0}}, 'max_recoveries': 0},
+    )
     held.hand.set_breakpoint('INNER/A')
     with held.begin():
         held.waits_before('SM_ROOT/INNER/A')
@@ -148,8 +157,10 @@ def test_a_time_limit_runs_on_once_resumed() -> None:
 
 def test_the_minutes_of_the_trial_stand_still() -> None:
     gate = Gate()
-    held = Held(chain_of(Scripted(), Scripted('aborted')),
-                settings={'budget': {'minutes': 1.0 / 60}, 'max_recoveries': 3})
+    held = Held(
+        chain_of(Scripted(), Scripted('aborted')),
+        settings={'budget': {'minutes': 1.0 / 60}, 'max_recoveries': 3},
+    )
     held.hand.set_breakpoint('B')
     with held.begin():
         held.waits_before('SM_ROOT/B')

@@ -2,6 +2,7 @@
 
 The files in test/data/pinned hold it, the same for each engine.
 """
+
 import pinned_scenes
 import pytest
 from pinned import FOLDER, held

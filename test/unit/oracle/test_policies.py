@@ -1,6 +1,7 @@
 """The policies against the tables of doc/policies.md, and what continuous and stepping back mean in
 a machine.
 """
+
 import itertools
 import os
 import subprocess
@@ -32,13 +33,19 @@ CLASSES = (FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH)
 def table_of_the_page():
     """{(policy, class, preconditions, continuous): action} as doc/policies.md has it."""
     with open(os.path.join(ROOT, 'doc', 'policies.md'), encoding='utf-8') as page:
-        rows = [[cell.strip() for cell in line.strip().strip('|').split('|')] for line in page
-                if line.startswith('|')]
-    begin = next(index for index, row in enumerate(rows)
-                 if row[:3] == ['class', 'preconditions', 'continuous'])
+        rows = [
+            [cell.strip() for cell in line.strip().strip('|').split('|')]
+            for line in page
+            if line.startswith('|')
+        ]
+    begin = next(
+        index
+        for index, row in enumerate(rows)
+        if row[:3] == ['class', 'preconditions', 'continuous']
+    )
     names = rows[begin][3:]
     table = {}
-    for row in itertools.takewhile(lambda row: len(row) == len(rows[begin]), rows[begin + 2:]):
+    for row in itertools.takewhile(lambda row: len(row) == len(rows[begin]), rows[begin + 2 :]):
         for name, action in zip(names, row[3:]):
             table[name, row[0], row[1], row[2]] = action
     return table
@@ -49,16 +56,19 @@ TABLE = table_of_the_page()
 
 def test_the_page_covers_every_cell_of_every_policy():
     cells = set(
-        itertools.product(PAPER, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'),
-                          ('no', 'yes')))
+        itertools.product(
+            PAPER, ('LOW', 'MODERATE', 'HIGH'), ('none', 'met', 'not met'), ('no', 'yes')
+        )
+    )
     assert set(TABLE) == cells
 
 
 @pytest.mark.parametrize('cell', sorted(TABLE), ids=' '.join)
 def test_the_policy_decides_as_the_page_says(cell):
     name, failure_class, preconditions, continuous = cell
-    situation = Situation(FailureClass[failure_class], Preconditions(preconditions),
-                          continuous == 'yes')
+    situation = Situation(
+        FailureClass[failure_class], Preconditions(preconditions), continuous == 'yes'
+    )
     assert POLICIES[name].decide(situation).value.replace('_', ' ') == TABLE[cell]
 
 
@@ -77,15 +87,21 @@ def machine_in(cell):
         answers.insert(0, goto('B'))
     failing_state = Scripted(*['aborted'] * (1 + again))
     return watched(
-        Scripted(), failing_state, Scripted(), expert=FakeExpert(*answers), settings={
-            'policy': name, 'memory': 100,
-            'states': {'B': {'prior': prior, 'preconditions': lists[preconditions]}}
-        })
+        Scripted(),
+        failing_state,
+        Scripted(),
+        expert=FakeExpert(*answers),
+        settings={
+            'policy': name,
+            'memory': 100,
+            'states': {'B': {'prior': prior, 'preconditions': lists[preconditions]}},
+        },
+    )
 
 
-@pytest.mark.parametrize('cell',
-                         sorted(cell for cell in TABLE if cell[1] != 'HIGH' or cell[2] == 'none'),
-                         ids=' '.join)
+@pytest.mark.parametrize(
+    'cell', sorted(cell for cell in TABLE if cell[1] != 'HIGH' or cell[2] == 'none'), ids=' '.join
+)
 def test_a_machine_does_what_the_page_says(cell):
     machine = machine_in(cell)
     machine.run()
@@ -111,8 +127,10 @@ def failing(policy, *states, **settings):
 
 
 def test_algorithm1_steps_back_to_the_latest_visit_without_preconditions():
-    machine = Watched(chain_of(Scripted(), Scripted(), Scripted('aborted')), settings={
-        'policy': 'algorithm1', 'states': {'B': {'preconditions': [bool]}}})
+    machine = Watched(
+        chain_of(Scripted(), Scripted(), Scripted('aborted')),
+        settings={'policy': 'algorithm1', 'states': {'B': {'preconditions': [bool]}}},
+    )
     machine.run()
     assert machine.decisions() == [('step_back', 'A')]
 
@@ -128,10 +146,12 @@ def test_algorithm1_counts_earlier_visits_of_the_failed_state_itself():
 
 def test_algorithm1_steps_back_to_the_initial_state_where_no_visit_was_without_preconditions():
     machine = Watched(
-        chain_of(Scripted(), Scripted('aborted')), settings={
+        chain_of(Scripted(), Scripted('aborted')),
+        settings={
             'policy': 'algorithm1',
-            'states': {'A': {'preconditions': [bool]}, 'B': {'preconditions': [lambda ud: True]}}
-        })
+            'states': {'A': {'preconditions': [bool]}, 'B': {'preconditions': [lambda ud: True]}},
+        },
+    )
     machine.run()
     assert machine.decisions() == [('step_back', 'A')]
 
@@ -139,10 +159,12 @@ def test_algorithm1_steps_back_to_the_initial_state_where_no_visit_was_without_p
 def test_algorithm1_calls_a_failure_continuous_though_the_state_succeeded_in_between():
     def run(policy):
         a, b = Scripted('aborted', 'ok', 'aborted'), Scripted('back', outcomes=('ok', 'back'))
-        machine = Watched(loop_of(a, b),
-                          settings={'policy': policy, 'states': {'A': {'prior': 0.1}}})
+        machine = Watched(
+            loop_of(a, b), settings={'policy': policy, 'states': {'A': {'prior': 0.1}}}
+        )
         machine.run()
         return [event.continuous for event in machine.of(EventKind.FAILURE)]
+
     assert run('algorithm1') == [False, True]
     assert run('prose') == [False, False]
 
@@ -156,8 +178,9 @@ def loop_of(a, b):
 
 
 def test_a_failure_of_another_state_in_between_ends_continuity():
-    machine = failing('prose', Scripted(), Scripted('aborted', 'ok', 'aborted'),
-                      Scripted('aborted', 'ok', 'ok'))
+    machine = failing(
+        'prose', Scripted(), Scripted('aborted', 'ok', 'aborted'), Scripted('aborted', 'ok', 'ok')
+    )
     machine.run()
     assert [event.continuous for event in machine.of(EventKind.FAILURE)][:2] == [False, False]
 
@@ -173,8 +196,9 @@ def test_prose_keeps_its_goal_while_the_state_keeps_failing():
     """From the goal another way may lead back: what succeeds on it is no goal."""
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')),
-                               {'ok': 'S', 'way': 'X'})
+        smach.StateMachine.add(
+            'A', Scripted('ok', 'way', 'way', outcomes=('ok', 'way')), {'ok': 'S', 'way': 'X'}
+        )
         smach.StateMachine.add('X', Scripted(outcomes=('ok',)), {'ok': 'S'})
         smach.StateMachine.add('S', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'})
     machine = Watched(machine, settings={'policy': 'prose', 'memory': 1000})
@@ -187,11 +211,17 @@ def test_prose_steps_back_to_a_new_goal_once_the_state_has_succeeded():
     with machine:
         smach.StateMachine.add('A', Scripted(), {'ok': 'B'})
         smach.StateMachine.add('B', Scripted('aborted', 'ok', 'aborted'), {'ok': 'C'})
-        smach.StateMachine.add('C', Scripted('back', outcomes=('ok', 'back')),
-                               {'ok': 'done', 'back': 'B'})
-    machine = Watched(machine, settings={
-        'policy': 'prose', 'memory': 1000,
-        'states': {'B': {'preconditions': [lambda ud: False]}}})
+        smach.StateMachine.add(
+            'C', Scripted('back', outcomes=('ok', 'back')), {'ok': 'done', 'back': 'B'}
+        )
+    machine = Watched(
+        machine,
+        settings={
+            'policy': 'prose',
+            'memory': 1000,
+            'states': {'B': {'preconditions': [lambda ud: False]}},
+        },
+    )
     machine.run()
     assert machine.decisions() == [('step_back', 'A'), ('step_back', 'C')]
 
@@ -232,12 +262,15 @@ def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
     def drive_again(state, ud):
         driven.set()
         return 'ok'
+
     both = smach.Concurrence(outcomes=['done'], default_outcome='done')
     with both:
-        smach.Concurrence.add('ARM', machine_of(
-            ('REACH', Scripted('aborted', reach_again), {'ok': 'done'})))
-        smach.Concurrence.add('BASE', machine_of(
-            ('DRIVE', Scripted(drive, drive_again), {'ok': 'done'})))
+        smach.Concurrence.add(
+            'ARM', machine_of(('REACH', Scripted('aborted', reach_again), {'ok': 'done'}))
+        )
+        smach.Concurrence.add(
+            'BASE', machine_of(('DRIVE', Scripted(drive, drive_again), {'ok': 'done'}))
+        )
     machine = Watched(machine_of(('BOTH', both, {'done': 'done'})), settings={'policy': policy})
     assert machine.run() == 'done'
     assert [event.state for event in machine.of(EventKind.FAILURE)] == ['REACH', 'DRIVE', 'REACH']
@@ -248,21 +281,42 @@ def test_a_failure_in_a_sibling_of_a_concurrence_breaks_no_continuity(policy):
 @pytest.mark.parametrize('policy', PAPER)
 def test_a_failure_of_the_machine_around_breaks_no_continuity(policy):
     arm = machine_of(('REACH', Scripted('aborted', 'aborted', 'aborted'), {'ok': 'done'}))
-    machine = Watched(machine_of(('ARM', arm, {'done': 'done'})), settings={
-        'policy': policy, 'memory': 1000, 'escalate': True, 'states': {'REACH': {'prior': 0.5}}})
+    machine = Watched(
+        machine_of(('ARM', arm, {'done': 'done'})),
+        settings={
+            'policy': policy,
+            'memory': 1000,
+            'escalate': True,
+            'states': {'REACH': {'prior': 0.5}},
+        },
+    )
     machine.run()
     assert [event.state for event in machine.of(EventKind.FAILURE)] == [
-        'REACH', 'REACH', 'ARM', 'REACH', 'ARM']
+        'REACH',
+        'REACH',
+        'ARM',
+        'REACH',
+        'ARM',
+    ]
     assert continuous_failures(machine, 'REACH') == [False, True, True]
 
 
 def test_prose_keeps_the_initial_state_as_its_goal_whatever_succeeds_while_the_state_fails():
-    machine = Watched(machine_of(
-        ('S', Scripted('lost', 'aborted', 'aborted', outcomes=('ok', 'lost', 'aborted')),
-         {'ok': 'done', 'lost': 'SEARCH'}),
-        ('SEARCH', Scripted(outcomes=('ok',)), {'ok': 'S'})),
-        settings={'policy': 'prose', 'memory': 1000,
-                  'states': {'S': {'failure_outcomes': ['lost']}}})
+    machine = Watched(
+        machine_of(
+            (
+                'S',
+                Scripted('lost', 'aborted', 'aborted', outcomes=('ok', 'lost', 'aborted')),
+                {'ok': 'done', 'lost': 'SEARCH'},
+            ),
+            ('SEARCH', Scripted(outcomes=('ok',)), {'ok': 'S'}),
+        ),
+        settings={
+            'policy': 'prose',
+            'memory': 1000,
+            'states': {'S': {'failure_outcomes': ['lost']}},
+        },
+    )
     assert machine.run() == 'done'
     assert continuous_failures(machine, 'S') == [False, True, True]
     assert machine.decisions() == [('step_back', 'S'), ('step_back', 'S')]
@@ -279,6 +333,7 @@ def test_prose_looks_its_goal_up_anew_where_the_container_is_executed_again():
         history.failed(state, 0)
         visit(state, VisitResult.FAILURE)
         return goal
+
     history.begin_trial()
     visit('A')
     assert (fails('S'), fails('S')) == ('A', 'A')
@@ -308,8 +363,9 @@ def test_continuity_ends_with_the_trial():
 
 
 def test_the_class_is_that_after_the_failure_and_the_failure_event_tells_that_before():
-    machine = watched(Scripted('aborted'),
-                      settings={'memory': 1, 'prior': 0.0, 'on_no_answer': 'give_up:done'})
+    machine = watched(
+        Scripted('aborted'), settings={'memory': 1, 'prior': 0.0, 'on_no_answer': 'give_up:done'}
+    )
     machine.run()
     failure, decision = machine.of(EventKind.FAILURE, EventKind.DECISION)
     assert (failure.failure_class, failure.rate) == (FailureClass.LOW, 0.0)
@@ -321,11 +377,22 @@ def test_an_unknown_policy_is_refused_by_name():
         policy_named('guess')
 
 
-@pytest.mark.parametrize('module', [
-    'errors', 'decision.policy', 'decision.failure_rate', 'settings.settings',
-    'settings.failing_outcomes', 'settings.preconditions', 'records.history', 'records.events',
-    'records.visits', 'records.state_record', 'asking.question'
-])
+@pytest.mark.parametrize(
+    'module',
+    [
+        'errors',
+        'decision.policy',
+        'decision.failure_rate',
+        'settings.settings',
+        'settings.failing_outcomes',
+        'settings.preconditions',
+        'records.history',
+        'records.events',
+        'records.visits',
+        'records.state_record',
+        'asking.question',
+    ],
+)
 def test_the_pure_parts_need_no_smach(module):
     code = 'import sys, smach_oracle.oracle.{}; sys.exit("smach" in sys.modules)'.format(module)
     environment = dict(os.environ, PYTHONPATH=os.path.join(ROOT, 'src'))

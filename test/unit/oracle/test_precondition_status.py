@@ -1,6 +1,7 @@
 """How the preconditions of a question's choices stand while it is open: looked at, never brought
 about.
 """
+
 from machines import FakeExpert, Scripted, goto, watched
 
 from smach_oracle.oracle.records.events import EventKind
@@ -15,12 +16,20 @@ def asked(preconditions, **settings):
     class Looking(FakeExpert):
         def ask(self, question, cancelled, progress):
             look = question.preconditions
-            found.extend((look.names[number],) + tuple(look.status(number))
-                         for number in range(len(look.names)))
+            found.extend(
+                (look.names[number],) + tuple(look.status(number))
+                for number in range(len(look.names))
+            )
             return super().ask(question, cancelled, progress)
 
-    machine = watched(Scripted(), Scripted('aborted'), Scripted(), expert=Looking(goto('C')),
-                      preconditions=preconditions, settings=dict({'max_recoveries': 0}, **settings))
+    machine = watched(
+        Scripted(),
+        Scripted('aborted'),
+        Scripted(),
+        expert=Looking(goto('C')),
+        preconditions=preconditions,
+        settings=dict({'max_recoveries': 0}, **settings),
+    )
     machine.machine.userdata.cup = 'mug'
     assert machine.run() == 'done'
     return machine, found
@@ -34,9 +43,13 @@ def test_a_function_tells_and_a_state_is_not_run():
         return []
 
     machine, found = asked({'B': [has_cup, is_dark, 'A'], 'C': ['B', Scripted()]})
-    assert [each[:2] for each in found] == [(('B', 'has_cup'), True), (('B', 'is_dark'), False),
-                                            (('B', 'A'), None), (('C', 'B'), None),
-                                            (('C', 'Scripted'), None)]
+    assert [each[:2] for each in found] == [
+        (('B', 'has_cup'), True),
+        (('B', 'is_dark'), False),
+        (('B', 'A'), None),
+        (('C', 'B'), None),
+        (('C', 'Scripted'), None),
+    ]
     assert found[2][2] == 'only running A would tell; its last visit succeeded'
     assert found[3][2] == 'only running B would tell; its last visit failed'
     assert machine.visits() == ['A', 'B', 'C']

@@ -1,4 +1,5 @@
 """The four kinds of precondition, and that they run on failure alone."""
+
 import contextvars
 import threading
 import time
@@ -19,8 +20,9 @@ def machine_with(*preconditions, b=None, extra=(), **settings):
     machine = chain_of(Scripted(), b or Scripted('aborted'), Scripted())
     with machine:
         for label, state in extra:
-            smach.StateMachine.add(label, state,
-                                   {'ok': 'A'} if 'ok' in state.get_registered_outcomes() else {})
+            smach.StateMachine.add(
+                label, state, {'ok': 'A'} if 'ok' in state.get_registered_outcomes() else {}
+            )
     return Watched(machine, preconditions={'B': list(preconditions)}, settings=settings)
 
 
@@ -100,6 +102,7 @@ def test_a_callable_that_does_not_say_true_is_not_met(result):
 def test_a_callable_that_raises_is_not_met_and_the_machine_goes_on():
     def broken(ud):
         raise OSError('no camera')
+
     machine = machine_with(broken)
     assert machine.run() == 'done'
     end = machine.of(EventKind.PRECONDITION_END)[0]
@@ -107,11 +110,13 @@ def test_a_callable_that_raises_is_not_met_and_the_machine_goes_on():
     assert 'no camera' in end.text
 
 
-@pytest.mark.parametrize('holds, achieved, met, runs', [(True, 'ok', 'met', 0),
-                                                        (False, 'ok', 'met', 1),
-                                                        (False, 'aborted', 'not met', 1)])
+@pytest.mark.parametrize(
+    'holds, achieved, met, runs',
+    [(True, 'ok', 'met', 0), (False, 'ok', 'met', 1), (False, 'aborted', 'not met', 1)],
+)
 def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(
-        holds, achieved, met, runs):
+    holds, achieved, met, runs
+):
     achieve, checks = Scripted(achieved), []
     machine = machine_with((lambda ud: checks.append(1) or holds, achieve))
     machine.run()
@@ -122,8 +127,11 @@ def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(
 
 def test_preconditions_run_in_order_and_stop_at_the_first_that_is_not_met():
     ran = []
-    machine = machine_with(lambda ud: ran.append(1) or True, lambda ud: ran.append(2) or False,
-                           lambda ud: ran.append(3) or True)
+    machine = machine_with(
+        lambda ud: ran.append(1) or True,
+        lambda ud: ran.append(2) or False,
+        lambda ud: ran.append(3) or True,
+    )
     machine.run()
     assert ran == [1, 2]
 
@@ -153,8 +161,11 @@ def test_a_labelled_state_keeps_its_time_limit():
     machine = chain_of(Scripted(), Scripted('aborted'), Scripted())
     with machine:
         smach.StateMachine.add('CLEAR', Scripted(gate), {'ok': 'A'})
-    machine = Watched(machine, preconditions={'B': ['CLEAR']},
-                      settings={'states': {'CLEAR': {'time_limit_s': 0.05, 'grace_period_s': 5}}})
+    machine = Watched(
+        machine,
+        preconditions={'B': ['CLEAR']},
+        settings={'states': {'CLEAR': {'time_limit_s': 0.05, 'grace_period_s': 5}}},
+    )
     assert machine.run() == 'done'
     assert ends(machine) == [('CLEAR', 'not met')]
     assert 'time limit' in machine.of(EventKind.PRECONDITION_END)[0].text
@@ -212,6 +223,7 @@ def test_a_function_that_ends_within_its_grace_period_lets_the_machine_go_on():
         time.sleep(0.2)  # longer than the limit alone, which is the point
         ud.late = 'too late'
         return True
+
     machine = machine_with(slow, states={'B': {'time_limit_s': 0.1, 'grace_period_s': 20.0}})
     assert in_thread(machine.run).result() == 'done'
     assert ends(machine) == [('slow', 'not met')] and 'late' not in machine.machine.userdata
@@ -255,6 +267,7 @@ def test_a_function_that_does_not_come_back_does_not_outlast_a_shutdown(monkeypa
 def test_what_ends_a_program_passes_through_a_function(stop):
     def stops(ud):
         raise stop()
+
     machine = machine_with(stops)
     with pytest.raises(stop):
         machine.run()
@@ -286,6 +299,7 @@ def test_a_state_that_ignores_the_end_of_its_time_is_left_behind():
         ud.late = 'too late'
         left.set()
         return 'ok'
+
     machine = machine_with(Scripted(stubborn, output_keys=['late']), **BRIEF)
     assert in_thread(machine.run).result() == 'done'
     assert 'abandoned' in machine.of(EventKind.PRECONDITION_END)[0].text
@@ -307,16 +321,21 @@ def test_a_state_added_with_preconditions_has_them():
     ran = []
     machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        OracleContainer.add('A', Scripted('aborted'), {'ok': 'done'},
-                            preconditions=[lambda ud: ran.append(1) or True])
+        OracleContainer.add(
+            'A',
+            Scripted('aborted'),
+            {'ok': 'done'},
+            preconditions=[lambda ud: ran.append(1) or True],
+        )
     assert machine.execute() == 'done'
     assert ran == [1]
     assert machine.rates()[0].has_preconditions
 
 
 def test_a_precondition_naming_no_state_is_refused_with_the_labels_there_are():
-    with pytest.raises(SettingsError,
-                       match=r"states.B.preconditions: 'NOWHERE' is not allowed.*A, C"):
+    with pytest.raises(
+        SettingsError, match=r"states.B.preconditions: 'NOWHERE' is not allowed.*A, C"
+    ):
         machine_with('NOWHERE')
 
 
@@ -326,17 +345,29 @@ def test_a_state_cannot_be_its_own_precondition():
 
 
 def test_where_not_strict_an_unknown_label_is_warned_of_and_never_met(log):
-    machine = Watched(chain_of(Scripted(), Scripted('aborted')),
-                      preconditions={'B': ['NOWHERE'], 'GHOST': [bool]}, strict=False)
+    machine = Watched(
+        chain_of(Scripted(), Scripted('aborted')),
+        preconditions={'B': ['NOWHERE'], 'GHOST': [bool]},
+        strict=False,
+    )
     machine.run()
     assert ends(machine) == [('NOWHERE', 'not met')]
     warnings = [text for level, text in log if level == 'warn']
     assert any('NOWHERE' in text for text in warnings) and any('GHOST' in text for text in warnings)
 
 
-@pytest.mark.parametrize('wrong, position', [(5, '[0]'), ({'check': 'A'}, '[0]'), ('', '[0]'),
-                                             (('A',), '[0]'), ('python:a:b', '[0]'),
-                                             (Scripted, '[0]'), ((('A', 'C'), 'C'), '[0]')])
+@pytest.mark.parametrize(
+    'wrong, position',
+    [
+        (5, '[0]'),
+        ({'check': 'A'}, '[0]'),
+        ('', '[0]'),
+        (('A',), '[0]'),
+        ('python:a:b', '[0]'),
+        (Scripted, '[0]'),
+        ((('A', 'C'), 'C'), '[0]'),
+    ],
+)
 def test_what_is_no_precondition_is_refused_with_its_place(wrong, position):
     with pytest.raises(SettingsError) as raised:
         Watched(chain_of(Scripted(), Scripted(), Scripted()), preconditions={'B': [wrong]})
@@ -350,12 +381,16 @@ def test_a_list_is_asked_for():
 
 def test_python_names_are_resolved_by_what_is_handed_in():
     from smach_oracle.oracle.settings.settings import Settings
+
     found = {'python:robot:is_clear': lambda ud: True}
-    settings = Settings.from_dict({'states': {'B': {'preconditions': [
-        {'check': 'python:robot:is_clear', 'achieve': 'A'}]}}}, resolver=found.__getitem__)
+    settings = Settings.from_dict(
+        {'states': {'B': {'preconditions': [{'check': 'python:robot:is_clear', 'achieve': 'A'}]}}},
+        resolver=found.__getitem__,
+    )
     machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings=settings)
     assert machine.run() == 'done'
     assert ends(machine) == [('is_clear or A', 'met')]
     with pytest.raises(SettingsError, match='python:robot:lost'):
-        Settings.from_dict({'states': {'B': {'preconditions': ['python:robot:lost']}}},
-                           resolver=found.__getitem__)
+        Settings.from_dict(
+            {'states': {'B': {'preconditions': ['python:robot:lost']}}}, resolver=found.__getitem__
+        )

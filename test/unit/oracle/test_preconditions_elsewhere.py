@@ -1,4 +1,5 @@
 """Preconditions that name a state of another container of the tree, by its path."""
+
 import threading
 
 import pytest
@@ -11,8 +12,10 @@ from smach_oracle.oracle.records.events import EventKind
 
 
 def ends(watched):
-    return [(event.path, event.state, event.target, event.outcome, event.text)
-            for event in watched.of(EventKind.PRECONDITION_END)]
+    return [
+        (event.path, event.state, event.target, event.outcome, event.text)
+        for event in watched.of(EventKind.PRECONDITION_END)
+    ]
 
 
 def wrapped(machine, state, *preconditions, states=None, **more):
@@ -21,8 +24,14 @@ def wrapped(machine, state, *preconditions, states=None, **more):
 
 
 def each(state):
-    iterator = smach.Iterator(outcomes=list(OUTCOMES), input_keys=[], output_keys=[],
-                              it=[1, 2], it_label='item', exhausted_outcome='done')
+    iterator = smach.Iterator(
+        outcomes=list(OUTCOMES),
+        input_keys=[],
+        output_keys=[],
+        it=[1, 2],
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with iterator:
         smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['done', 'ok'])
     return iterator
@@ -31,10 +40,14 @@ def each(state):
 @pytest.mark.parametrize('name', ['/LOOK', 'SEE/LOOK', 'PICK/SEE/LOOK'])
 def test_a_state_above_beside_or_below_is_run_and_is_no_visit(name):
     look = Scripted()
-    states = {'/LOOK': {'LOOK': look, 'PICK': chain(GRASP=Scripted('aborted'))},
-              'SEE/LOOK': {'SEE': chain(FIRST=Scripted(), LOOK=look),
-                           'PICK': chain(GRASP=Scripted('aborted'))},
-              'PICK/SEE/LOOK': {'PICK': chain(SEE=chain(LOOK=look), GRASP=Scripted('aborted'))}}
+    states = {
+        '/LOOK': {'LOOK': look, 'PICK': chain(GRASP=Scripted('aborted'))},
+        'SEE/LOOK': {
+            'SEE': chain(FIRST=Scripted(), LOOK=look),
+            'PICK': chain(GRASP=Scripted('aborted')),
+        },
+        'PICK/SEE/LOOK': {'PICK': chain(SEE=chain(LOOK=look), GRASP=Scripted('aborted'))},
+    }
     watched = wrapped(chain(**states[name]), 'GRASP', name)
     assert watched.run() == 'done'
     assert look.runs == 2
@@ -57,8 +70,9 @@ def mapped_machine(see, look_at, grasp):
     """TOP: SEE (LOOK) -> PICK (ARM (GRASP)): the pose that LOOK finds goes to GRASP."""
     seeing = smach.StateMachine(outcomes=OUTCOMES, input_keys=['what'], output_keys=['where'])
     with seeing:
-        smach.StateMachine.add('LOOK', see, {'ok': 'done'},
-                               remapping={'thing': 'what', 'pose': 'where'})
+        smach.StateMachine.add(
+            'LOOK', see, {'ok': 'done'}, remapping={'thing': 'what', 'pose': 'where'}
+        )
     arm = smach.StateMachine(outcomes=OUTCOMES, input_keys=['target'])
     with arm:
         smach.StateMachine.add('GRASP', grasp, {'ok': 'done'}, remapping={'at': 'target'})
@@ -67,8 +81,9 @@ def mapped_machine(see, look_at, grasp):
         smach.StateMachine.add('ARM', arm, {'done': 'done'}, remapping={'target': 'goal'})
     machine = smach.StateMachine(outcomes=OUTCOMES)
     with machine:
-        smach.StateMachine.add('SEE', seeing, {'done': 'PICK'},
-                               remapping={'what': 'cup', 'where': 'cup_pose'})
+        smach.StateMachine.add(
+            'SEE', seeing, {'done': 'PICK'}, remapping={'what': 'cup', 'where': 'cup_pose'}
+        )
         smach.StateMachine.add('PICK', pick, {'done': 'done'}, remapping={'goal': 'cup_pose'})
     machine.userdata.cup = look_at
     return machine
@@ -80,19 +95,24 @@ def see_with(poses, outcomes=()):
     def see(state, ud):
         ud.pose = (ud.thing, poses.pop(0))
         return outcomes.pop(0) if outcomes else 'ok'
+
     return Scripted(*[see] * 9, input_keys=['thing'], output_keys=['pose'])
 
 
 def grasp_seeing(seen, *script):
     def grasp(outcome):
         return lambda state, ud: seen.append(ud.at) or outcome
+
     return Scripted(*[grasp(outcome) for outcome in script], input_keys=['at'])
 
 
 def test_userdata_go_where_the_remappings_of_the_author_lead():
     seen = []
-    watched = wrapped(mapped_machine(see_with([1, 2]), 'red', grasp_seeing(seen, 'aborted', 'ok')),
-                      'GRASP', 'SEE/LOOK')
+    watched = wrapped(
+        mapped_machine(see_with([1, 2]), 'red', grasp_seeing(seen, 'aborted', 'ok')),
+        'GRASP',
+        'SEE/LOOK',
+    )
     assert watched.run() == 'done'
     assert seen == [('red', 1), ('red', 2)], 'what LOOK has found again reaches GRASP'
     assert watched.machine.userdata.cup_pose == ('red', 2)
@@ -100,8 +120,9 @@ def test_userdata_go_where_the_remappings_of_the_author_lead():
 
 def test_what_an_unmet_one_wrote_is_taken_back():
     seen = []
-    machine = mapped_machine(see_with([1, 2, 3], ['ok', 'aborted']), 'red',
-                             grasp_seeing(seen, 'aborted', 'ok'))
+    machine = mapped_machine(
+        see_with([1, 2, 3], ['ok', 'aborted']), 'red', grasp_seeing(seen, 'aborted', 'ok')
+    )
     seeing = machine.get_children()['SEE']
     watched = wrapped(machine, 'GRASP', 'SEE/LOOK')
     assert watched.run() == 'done'
@@ -113,8 +134,13 @@ def test_what_an_unmet_one_wrote_is_taken_back():
 def test_a_machine_of_another_container_that_fails_as_a_precondition_asks_nobody():
     expert = FakeExpert(supersede('ok'))
     see = chain(AIM=chain(FOCUS=Scripted('ok', 'aborted', 'aborted', 'aborted')))
-    watched = wrapped(chain(SEE=see, PICK=chain(GRASP=Scripted('aborted'))), 'GRASP', 'SEE/AIM',
-                      states={'FOCUS': {'max_recoveries': 0}}, expert=expert)
+    watched = wrapped(
+        chain(SEE=see, PICK=chain(GRASP=Scripted('aborted'))),
+        'GRASP',
+        'SEE/AIM',
+        states={'FOCUS': {'max_recoveries': 0}},
+        expert=expert,
+    )
     assert watched.run() == 'done' and not expert.questions
     assert ends(watched)[0][3] == 'not met'
     assert 'it runs as a precondition' in watched.of(EventKind.GIVE_UP)[0].text
@@ -131,8 +157,12 @@ def test_a_preempt_ends_it():
                 return 'preempted'
             threading.Event().wait(0.01)
         return 'ok'
-    watched = wrapped(chain(SEE=chain(LOOK=Scripted('ok', look)),
-                            PICK=chain(GRASP=Scripted('aborted'))), 'GRASP', 'SEE/LOOK')
+
+    watched = wrapped(
+        chain(SEE=chain(LOOK=Scripted('ok', look)), PICK=chain(GRASP=Scripted('aborted'))),
+        'GRASP',
+        'SEE/LOOK',
+    )
     run = in_thread(watched.run)
     assert entered.wait(20)
     watched.machine.request_preempt()
@@ -155,12 +185,15 @@ def test_what_runs_beside_is_not_met():
     def then(state, ud):
         over.set()
         return 'ok'
-    machine = both(LEFT=chain(L=Scripted(fail, then)),
-                   RIGHT=chain(R=Scripted(beside), S=Scripted()))
+
+    machine = both(
+        LEFT=chain(L=Scripted(fail, then)), RIGHT=chain(R=Scripted(beside), S=Scripted())
+    )
     watched = wrapped(chain(BOTH=machine), 'L', 'BOTH/RIGHT/S')
     try:
         watched.machine.events.observers.append(
-            lambda event: over.set() if event.kind is EventKind.PRECONDITION_END else None)
+            lambda event: over.set() if event.kind is EventKind.PRECONDITION_END else None
+        )
         assert watched.run() == 'done'
     finally:
         over.set()
@@ -181,10 +214,16 @@ def test_one_of_two_branches_runs_a_state_that_both_need():
         threading.Event().wait(0.02)
         inside.release()
         return 'ok'
-    machine = chain(LOOK=Scripted('ok', *[look] * 20), BOTH=both(
-        LEFT=chain(L=Scripted(fail)), RIGHT=chain(R=Scripted(fail))))
-    watched = Watched(machine, name='TOP', settings={'states': {
-        'L': {'preconditions': ['/LOOK']}, 'R': {'preconditions': ['/LOOK']}}})
+
+    machine = chain(
+        LOOK=Scripted('ok', *[look] * 20),
+        BOTH=both(LEFT=chain(L=Scripted(fail)), RIGHT=chain(R=Scripted(fail))),
+    )
+    watched = Watched(
+        machine,
+        name='TOP',
+        settings={'states': {'L': {'preconditions': ['/LOOK']}, 'R': {'preconditions': ['/LOOK']}}},
+    )
     assert watched.run() == 'done'
     assert 'met' in [end[3] for end in ends(watched)]
     assert all(end[4] in ('', 'is being run as a precondition already') for end in ends(watched))
@@ -199,31 +238,48 @@ def test_a_branch_may_need_a_state_elsewhere():
 
 def test_a_state_that_is_not_repeated_by_itself_is_not_met():
     pour = Scripted()
-    watched = wrapped(chain(SEE=chain(POUR=pour), PICK=chain(GRASP=Scripted('aborted'))), 'GRASP',
-                      'SEE/POUR', states={'SEE': {'on_retry': 'confirm'}},
-                      expert=FakeExpert(give_up()))
+    watched = wrapped(
+        chain(SEE=chain(POUR=pour), PICK=chain(GRASP=Scripted('aborted'))),
+        'GRASP',
+        'SEE/POUR',
+        states={'SEE': {'on_retry': 'confirm'}},
+        expert=FakeExpert(give_up()),
+    )
     watched.run()
     assert pour.runs == 1
     assert ends(watched)[0][3:] == (
-        'not met', 'TOP/SEE was done in this trial and is not repeated by itself')
+        'not met',
+        'TOP/SEE was done in this trial and is not repeated by itself',
+    )
 
 
-@pytest.mark.parametrize('state, name, why', [
-    ('GRASP', 'SEE/NOTHING', 'there is no such state'),
-    ('GRASP', 'NOTHING', 'there is no such state'),
-    ('GRASP', 'SEE/LOKO', 'there is no such state (did you mean SEE/LOOK?)'),
-    ('GRASP', 'LIFTT', 'there is no such state (did you mean LIFT?)'),
-    ('GRASP', 'GRAPS', 'there is no such state'),  # the state itself does not count
-    ('GRASP', 'PICK/GRASP', 'it is the state itself'),
-    ('GRASP', '/PICK', 'it is a container around the state, and runs meanwhile'),
-    ('GRASP', 'LOOK', 'in other containers there is ALL/EACH/LOOK, SEE/LOOK'),
-    ('GRASP', 'ALL/EACH/LOOK', 'it is in an Iterator, and there is no item where it is run alone'),
-    ('GRASP', 'DO/PLAIN', 'a state of a Concurrence or an Iterator cannot be run alone'),
-    ('DO/PLAIN', 'LOOK', 'in other containers there is ALL/EACH/LOOK, SEE/LOOK')])
+@pytest.mark.parametrize(
+    'state, name, why',
+    [
+        ('GRASP', 'SEE/NOTHING', 'there is no such state'),
+        ('GRASP', 'NOTHING', 'there is no such state'),
+        ('GRASP', 'SEE/LOKO', 'there is no such state (did you mean SEE/LOOK?)'),
+        ('GRASP', 'LIFTT', 'there is no such state (did you mean LIFT?)'),
+        ('GRASP', 'GRAPS', 'there is no such state'),  # the state itself does not count
+        ('GRASP', 'PICK/GRASP', 'it is the state itself'),
+        ('GRASP', '/PICK', 'it is a container around the state, and runs meanwhile'),
+        ('GRASP', 'LOOK', 'in other containers there is ALL/EACH/LOOK, SEE/LOOK'),
+        (
+            'GRASP',
+            'ALL/EACH/LOOK',
+            'it is in an Iterator, and there is no item where it is run alone',
+        ),
+        ('GRASP', 'DO/PLAIN', 'a state of a Concurrence or an Iterator cannot be run alone'),
+        ('DO/PLAIN', 'LOOK', 'in other containers there is ALL/EACH/LOOK, SEE/LOOK'),
+    ],
+)
 def test_what_cannot_be_is_refused(state, name, why):
-    machine = chain(SEE=chain(LOOK=Scripted()), ALL=each(chain(LOOK=Scripted())),
-                    PICK=chain(GRASP=Scripted(), LIFT=Scripted()),
-                    DO=both(PLAIN=Scripted()))
+    machine = chain(
+        SEE=chain(LOOK=Scripted()),
+        ALL=each(chain(LOOK=Scripted())),
+        PICK=chain(GRASP=Scripted(), LIFT=Scripted()),
+        DO=both(PLAIN=Scripted()),
+    )
     with pytest.raises(SettingsError) as raised:
         wrapped(machine, state, name)
     assert raised.value.key == 'states.{}.preconditions'.format(state.rpartition('/')[2])

@@ -1,4 +1,5 @@
 """A preempt or a shutdown at any moment."""
+
 import threading
 
 import pytest
@@ -34,8 +35,12 @@ def test_in_a_state():
 def test_before_the_start():
     seen = []
     machine = watched(
-        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt() or
-                 'preempted'))
+        Scripted(
+            lambda self, ud: (
+                seen.append(self.preempt_requested()) or self.service_preempt() or 'preempted'
+            )
+        )
+    )
     machine.machine.request_preempt()
     assert machine.run() == 'preempted'
     assert seen == [True]
@@ -50,6 +55,7 @@ def test_a_state_that_fails_while_preempted_is_not_recovered_and_not_counted(end
         if isinstance(end, Exception):
             raise end
         return end
+
     machine = watched(Scripted(fails), Scripted())
     holder = [machine.machine]
     if end == 'aborted':
@@ -66,6 +72,7 @@ def test_a_failure_at_shutdown_is_not_recovered(monkeypatch):
     def fails(state, ud):
         monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         return 'aborted'
+
     machine = watched(Scripted(fails), Scripted())
     assert machine.run() == 'aborted'
     assert not machine.of(EventKind.FAILURE)
@@ -75,8 +82,12 @@ def test_an_unserviced_preempt_goes_on_to_the_next_state():
     seen = []
     machine = watched(
         Scripted(lambda self, ud: holder[0].request_preempt() or 'ok'),
-        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or self.service_preempt() or
-                 'preempted'))
+        Scripted(
+            lambda self, ud: (
+                seen.append(self.preempt_requested()) or self.service_preempt() or 'preempted'
+            )
+        ),
+    )
     holder = [machine.machine]
     assert machine.run() == 'preempted'
     assert seen == [True]
@@ -87,20 +98,24 @@ def test_a_state_that_services_its_preempt_and_goes_on_clears_it_for_the_machine
     seen = []
     machine = watched(
         Scripted(lambda self, ud: holder[0].request_preempt() or self.service_preempt() or 'ok'),
-        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
+        Scripted(lambda self, ud: seen.append(self.preempt_requested()) or 'ok'),
+    )
     holder = [machine.machine]
     assert machine.run() == 'done'
     assert seen == [False]
 
 
 def test_a_machine_without_a_preempted_outcome_ends_as_the_failure_would_have():
-    machine = chain_of(Scripted('aborted', outcomes=('ok', 'aborted')),
-                       outcomes=('done', 'aborted'))
-    machine = Watched(machine, expert=FakeExpert(waits),
-                      settings={'max_recoveries': 0, 'deadline_s': 0})
+    machine = chain_of(
+        Scripted('aborted', outcomes=('ok', 'aborted')), outcomes=('done', 'aborted')
+    )
+    machine = Watched(
+        machine, expert=FakeExpert(waits), settings={'max_recoveries': 0, 'deadline_s': 0}
+    )
     asked = threading.Event()
     machine.machine.events.observers.append(
-        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
+        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     machine.machine.request_preempt()
@@ -111,7 +126,8 @@ def test_a_machine_without_a_preempted_outcome_ends_as_the_failure_would_have():
 def test_a_preempted_recovery_from_an_exception_raises_where_there_is_no_outcome_for_it():
     machine = Watched(
         chain_of(Scripted(ValueError('no grasp'), outcomes=('ok',)), outcomes=('done',)),
-        preconditions={'A': [lambda ud: holder[0].request_preempt() or True]})
+        preconditions={'A': [lambda ud: holder[0].request_preempt() or True]},
+    )
     holder = [machine.machine]
     with pytest.raises(smach.InvalidUserCodeError, match='no grasp'):
         machine.run()
@@ -119,24 +135,35 @@ def test_a_preempted_recovery_from_an_exception_raises_where_there_is_no_outcome
     assert machine.machine.is_running() is False
 
 
-@pytest.mark.parametrize('kind', [
-    EventKind.DECISION, EventKind.FAILURE, EventKind.TRANSITION, EventKind.QUERY_OPENED,
-    EventKind.JUMP, EventKind.PRECONDITION_START
-])
+@pytest.mark.parametrize(
+    'kind',
+    [
+        EventKind.DECISION,
+        EventKind.FAILURE,
+        EventKind.TRANSITION,
+        EventKind.QUERY_OPENED,
+        EventKind.JUMP,
+        EventKind.PRECONDITION_START,
+    ],
+)
 def test_at_every_step_of_a_recovery(kind):
     """Preempted from another thread at the moment of each kind of step, the machine ends soon, and
     once only.
     """
     machine = watched(
-        Scripted('aborted'), Scripted(Gate(), outcomes=('ok', 'preempted')), Scripted(Gate()),
+        Scripted('aborted'),
+        Scripted(Gate(), outcomes=('ok', 'preempted')),
+        Scripted(Gate()),
         expert=FakeExpert(waits),
         settings={'deadline_s': 0, 'max_recoveries': int(kind is not EventKind.QUERY_OPENED)},
-        preconditions={'A': [lambda ud: True]})
+        preconditions={'A': [lambda ud: True]},
+    )
     calls = []
 
     def preempt(event):
         if event.kind is kind and not calls:
             calls.append(in_thread(machine.machine.request_preempt))
+
     machine.machine.events.observers.append(preempt)
     run = in_thread(machine.run)
     assert run.result() == 'preempted'
@@ -150,11 +177,13 @@ def test_a_preempt_in_a_query_of_a_nested_machine_ends_all():
     outer = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with outer:
         smach.StateMachine.add('INNER', inner, {'done': 'done'})
-    machine = Watched(outer, expert=FakeExpert(waits),
-                      settings={'deadline_s': 0, 'max_recoveries': 0})
+    machine = Watched(
+        outer, expert=FakeExpert(waits), settings={'deadline_s': 0, 'max_recoveries': 0}
+    )
     asked = threading.Event()
     machine.machine.events.observers.append(
-        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
+        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     assert machine.machine.get_active_states() == ['INNER']
@@ -167,17 +196,23 @@ def test_a_preempt_that_the_last_state_has_not_serviced_stays():
     def ends_unserviced(state, ud):
         machine.machine.request_preempt()
         return 'preempted'
+
     machine = watched(Scripted(ends_unserviced))
     assert machine.run() == 'preempted'
     assert machine.machine.preempt_requested()
 
 
 def test_the_next_run_after_a_preempted_one_is_as_any_other():
-    machine = watched(Scripted('aborted'), Scripted(), expert=FakeExpert(waits, supersede('ok')),
-                      settings={'max_recoveries': 0, 'deadline_s': 0})
+    machine = watched(
+        Scripted('aborted'),
+        Scripted(),
+        expert=FakeExpert(waits, supersede('ok')),
+        settings={'max_recoveries': 0, 'deadline_s': 0},
+    )
     asked = threading.Event()
     machine.machine.events.observers.append(
-        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None)
+        lambda event: asked.set() if event.kind is EventKind.QUERY_OPENED else None
+    )
     run = in_thread(machine.run)
     assert asked.wait(10)
     machine.machine.request_preempt()

@@ -1,4 +1,5 @@
 """A preempt of a machine that is held: the state is passed by, and its author's clean-up runs."""
+
 import threading
 
 import pytest
@@ -36,9 +37,15 @@ def waiting_for_a_confirmation(held):
     held.hand.set_autonomy('B', 'confirm')
 
 
-@pytest.mark.parametrize('hold, preempt', [
-    (at_a_breakpoint, by_operator), (stepped_there, by_operator),
-    (waiting_for_a_confirmation, by_operator), (waiting_for_a_confirmation, by_script)])
+@pytest.mark.parametrize(
+    'hold, preempt',
+    [
+        (at_a_breakpoint, by_operator),
+        (stepped_there, by_operator),
+        (waiting_for_a_confirmation, by_operator),
+        (waiting_for_a_confirmation, by_script),
+    ],
+)
 def test_what_the_author_drew_after_preempted_runs_and_the_held_state_does_not(hold, preempt):
     trail = Trail()
     with Held(trail.cleaned()) as held:
@@ -54,7 +61,8 @@ def test_what_the_author_drew_after_preempted_runs_and_the_held_state_does_not(h
         assert (passed.state, passed.outcome, passed.target) == ('B', 'preempted', 'CLEAN')
         assert held.rate('B').failures == held.rate('B').successes == 0
         held.hand.remove_breakpoint('B') if hold is at_a_breakpoint else held.hand.set_autonomy(
-            'B', 'run')
+            'B', 'run'
+        )
         held.begin()
         assert (held.end(), trail.ran[2:]) == ('done', ['A', 'B']), 'nothing of it is left'
 
@@ -93,8 +101,9 @@ def test_a_state_leads_by_preempted_to_what_the_author_calls_it():
     trail = Trail()
     machine = smach.StateMachine(['done', 'preempted', 'stopped'])
     with machine:
-        smach.StateMachine.add('B', trail.state('B'), {'ok': 'done', 'preempted': 'stopped',
-                                                       'aborted': 'stopped'})
+        smach.StateMachine.add(
+            'B', trail.state('B'), {'ok': 'done', 'preempted': 'stopped', 'aborted': 'stopped'}
+        )
     with Held(machine, settings=CONFIRM).begin() as held:
         held.waits_before('SM_ROOT/B')
         by_script(held)
@@ -104,7 +113,8 @@ def test_a_state_leads_by_preempted_to_what_the_author_calls_it():
 @pytest.mark.parametrize('preempt', [by_operator, by_script])
 @pytest.mark.parametrize('hold', [waiting_for_a_confirmation, at_a_breakpoint])
 def test_a_state_that_would_be_held_is_passed_by_where_the_one_before_ignores_the_request(
-        hold, preempt):
+    hold, preempt
+):
     trail, gate = Trail(), Gate(heeds=False)
     machine = trail.cleaned(trail.state('A', gate), trail.state('B'))
     with Held(machine).begin() as held:
@@ -139,8 +149,11 @@ def test_a_preempt_that_takes_its_time_to_arrive_lets_the_clean_up_run():
     machine = Slow(OUTCOMES)
     with machine:
         smach.StateMachine.add('B', trail.state('B'), {'ok': 'done', 'preempted': 'CLEAN'})
-        smach.StateMachine.add('CLEAN', trail.state('CLEAN', lambda state, ud: (
-            cleaned.set() or 'ok')), {'ok': 'preempted'})
+        smach.StateMachine.add(
+            'CLEAN',
+            trail.state('CLEAN', lambda state, ud: cleaned.set() or 'ok'),
+            {'ok': 'preempted'},
+        )
     held = Held(machine)
     held.hand.pause()
     with held.begin():
@@ -179,8 +192,10 @@ def test_a_machine_that_is_held_whose_first_state_has_no_way_of_its_own_is_not_e
 @pytest.mark.parametrize('preempt', [by_operator, by_script])
 def test_a_branch_of_a_concurrence_is_passed_by_and_the_others_are_preempted(preempt):
     trail, gate = Trail(), Gate()
-    machine = trail.cleaned(trail.state('A'), both(
-        LEFT=trail.state('LEFT'), RIGHT=trail.state('RIGHT', gate), DEEP=trail.cleaned()))
+    machine = trail.cleaned(
+        trail.state('A'),
+        both(LEFT=trail.state('LEFT'), RIGHT=trail.state('RIGHT', gate), DEEP=trail.cleaned()),
+    )
     machine['B']._outcome_map['preempted'] = dict.fromkeys(('LEFT', 'RIGHT', 'DEEP'), 'preempted')
     held = Held(machine)
     for place in ('LEFT', 'DEEP/B'):
@@ -213,12 +228,14 @@ def test_an_item_of_an_iterator_is_passed_by(is_machine):
 
 def asked(machine):
     return Held(machine, expert=FakeExpert(waits), settings={'max_recoveries': 0}), (
-        EventKind.QUERY_OPENED)
+        EventKind.QUERY_OPENED
+    )
 
 
 def unwell(machine):
-    return Held(machine, health=FakeHealth('', *['unwell'] * 9999),
-                settings={'health_settle_s': 0.0}), EventKind.WARNING
+    return Held(
+        machine, health=FakeHealth('', *['unwell'] * 9999), settings={'health_settle_s': 0.0}
+    ), EventKind.WARNING
 
 
 @pytest.mark.parametrize('hold', [asked, unwell])
@@ -239,10 +256,12 @@ def test_a_state_that_is_not_to_be_repeated_is_passed_by_at_a_preempt():
         held.machine.request_preempt()
         return 'ok'
 
-    machine = trail.cleaned(trail.state('A', 'ok', preempted_too_late),
-                            trail.state('B', 'aborted'))
-    held = Held(machine, expert=FakeExpert(goto('A')), settings={
-        'max_recoveries': 0, 'states': {'B': {'on_retry': 'never'}}})
+    machine = trail.cleaned(trail.state('A', 'ok', preempted_too_late), trail.state('B', 'aborted'))
+    held = Held(
+        machine,
+        expert=FakeExpert(goto('A')),
+        settings={'max_recoveries': 0, 'states': {'B': {'on_retry': 'never'}}},
+    )
     with held.begin():
         assert held.end() == 'preempted'
     assert trail.ran == ['A', 'B', 'A', 'CLEAN']

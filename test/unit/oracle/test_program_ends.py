@@ -1,4 +1,5 @@
 """A state that ends the program by sys.exit: nothing failed, and nothing is done again."""
+
 import sys
 import threading
 
@@ -37,8 +38,9 @@ def nested(state):
 
 
 def concurrent(state):
-    container = smach.Concurrence(['ok', 'aborted'], default_outcome='aborted',
-                                  outcome_map={'ok': {'ONE': 'ok'}})
+    container = smach.Concurrence(
+        ['ok', 'aborted'], default_outcome='aborted', outcome_map={'ok': {'ONE': 'ok'}}
+    )
     with container:
         smach.Concurrence.add('ONE', state)
         smach.Concurrence.add('TWO', Scripted('ok', outcomes=('ok', 'aborted')))
@@ -46,18 +48,34 @@ def concurrent(state):
 
 
 def iterated(state):
-    container = smach.Iterator(['ok', 'aborted'], [], [], it=lambda: range(3), it_label='item',
-                               exhausted_outcome='ok')
+    container = smach.Iterator(
+        ['ok', 'aborted'], [], [], it=lambda: range(3), it_label='item', exhausted_outcome='ok'
+    )
     with container:
         smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['ok'])
     return container
 
 
-PLACES = [alone, nested, concurrent, iterated, lambda state: nested(concurrent(state)),
-          lambda state: concurrent(concurrent(state)), lambda state: iterated(nested(state)),
-          lambda state: concurrent(nested(state))]
-NAMES = ['alone', 'nested', 'concurrent', 'iterated', 'concurrent in nested',
-         'concurrent in concurrent', 'nested in iterated', 'nested in concurrent']
+PLACES = [
+    alone,
+    nested,
+    concurrent,
+    iterated,
+    lambda state: nested(concurrent(state)),
+    lambda state: concurrent(concurrent(state)),
+    lambda state: iterated(nested(state)),
+    lambda state: concurrent(nested(state)),
+]
+NAMES = [
+    'alone',
+    'nested',
+    'concurrent',
+    'iterated',
+    'concurrent in nested',
+    'concurrent in concurrent',
+    'nested in iterated',
+    'nested in concurrent',
+]
 
 
 def error_of(execute):
@@ -73,13 +91,14 @@ def test_a_state_that_ends_the_program_is_no_failure_and_runs_once(place, error,
     bare = error_of(chain_of(Scripted(), place(Ends(error)), Scripted()).execute)
     state = Ends(error)
     settings = {'states': {'*': {'time_limit_s': limit_s}}} if limit_s else {}
-    machine = Watched(chain_of(Scripted(), place(state), Scripted()), expert=FakeExpert(),
-                      settings=settings)
+    machine = Watched(
+        chain_of(Scripted(), place(state), Scripted()), expert=FakeExpert(), settings=settings
+    )
     ended = error_of(machine.machine.execute)
     assert ended == bare or ended == (error, 3 if error is SystemExit else None)
     assert state.visits == 1
     assert not machine.of(EventKind.FAILURE, EventKind.DECISION, EventKind.QUERY_OPENED)
-    end, = machine.of(EventKind.TRIAL_END)
+    (end,) = machine.of(EventKind.TRIAL_END)
     assert end.data[ENDED_BY] == 'stopped'
     assert machine.rate('B').failures == 0
     assert not machine.machine.is_running() and threading.current_thread().is_alive()
@@ -95,6 +114,7 @@ def test_an_error_of_the_author_that_hides_an_exit_is_a_failure():
 
         def has_no_plan(self):
             raise ValueError('no plan')
+
     machine = Watched(chain_of(Hides()), settings={'max_recoveries': 1})
     with pytest.raises(smach.InvalidUserCodeError):
         machine.machine.execute()

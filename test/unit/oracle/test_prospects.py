@@ -1,4 +1,5 @@
 """What the oracle may do in each state, told before anything runs."""
+
 import pytest
 
 import smach
@@ -63,9 +64,15 @@ def test_an_authors_recovery_that_the_settings_override_is_the_oracles():
 def test_the_actions_are_those_of_the_policy():
     low, moderate, high = FailureClass.LOW, FailureClass.MODERATE, FailureClass.HIGH
     states = told({'states': {'HELP': {'max_recoveries': 0}, 'PICK': {'preconditions': ['HOME']}}})
-    assert states['HOME'].actions == states['PICK'].actions == (
-        (low, (Action.REVISIT, Action.STEP_BACK)), (moderate, (Action.REVISIT, Action.ASK)),
-        (high, (Action.ASK,)))
+    assert (
+        states['HOME'].actions
+        == states['PICK'].actions
+        == (
+            (low, (Action.REVISIT, Action.STEP_BACK)),
+            (moderate, (Action.REVISIT, Action.ASK)),
+            (high, (Action.ASK,)),
+        )
+    )
     assert {actions for _, actions in states['HELP'].actions} == {(Action.ASK,)}
     listing = told({'policy': 'algorithm1', 'states': {'PICK': {'preconditions': ['HOME']}}})
     assert dict(listing['HOME'].actions)[low] == (Action.STEP_BACK,)
@@ -90,6 +97,7 @@ def test_without_recoveries_in_the_budget_the_oracle_asks_everywhere():
 def test_a_good_outcome_is_no_failure_and_a_preempt_only_where_there_is_no_other():
     def good(*outcomes):
         return good_outcome(smach.StateMachine(list(outcomes)), Settings())
+
     assert good('aborted', 'done', 'succeeded') == 'succeeded'
     assert good('aborted', 'preempted', 'some_failed', 'through') == 'through'
     assert good('aborted', 'preempted') == 'preempted'
@@ -97,12 +105,16 @@ def test_a_good_outcome_is_no_failure_and_a_preempt_only_where_there_is_no_other
 
 
 def test_branches_are_told_with_where_their_outcomes_lead():
-    tour = smach.Iterator(OUTCOMES, [], [], it=[1, 2], it_label='item',
-                          exhausted_outcome='succeeded')
+    tour = smach.Iterator(
+        OUTCOMES, [], [], it=[1, 2], it_label='item', exhausted_outcome='succeeded'
+    )
     with tour:
         smach.Iterator.set_contained_state('VISIT', Never(), loop_outcomes=['succeeded'])
-    both = smach.Concurrence(OUTCOMES, 'succeeded', outcome_map={
-        'aborted': {'LEFT': 'aborted'}, 'succeeded': {'RIGHT': 'aborted'}})
+    both = smach.Concurrence(
+        OUTCOMES,
+        'succeeded',
+        outcome_map={'aborted': {'LEFT': 'aborted'}, 'succeeded': {'RIGHT': 'aborted'}},
+    )
     with both:
         smach.Concurrence.add('LEFT', Never())
         smach.Concurrence.add('RIGHT', Never())
@@ -113,12 +125,17 @@ def test_branches_are_told_with_where_their_outcomes_lead():
     settings = {'states': {'TOUR/*': {'memory': 3}, 'RIGHT': {'author_recoveries': 'keep'}}}
     containers = prospects_of(OracleContainer.wrap(top, settings=settings, name='TOP'))
     assert [(each.path, each.initial, each.has_branches, each.machine) for each in containers] == [
-        ('TOP', 'TOUR', False, top), ('TOP/TOUR', 'VISIT', True, tour),
-        ('TOP/BOTH', 'LEFT, RIGHT', True, both)]
+        ('TOP', 'TOUR', False, top),
+        ('TOP/TOUR', 'VISIT', True, tour),
+        ('TOP/BOTH', 'LEFT, RIGHT', True, both),
+    ]
     states = {state.label: state for each in containers for state in each.states}
     assert states['VISIT'].settings.memory == 3
     assert outcome(states['VISIT'], 'succeeded').route.target == 'the next item'
     assert outcome(states['VISIT'], 'aborted')[1:] == (
-        ('the end of the iteration, with aborted', True), True, False)
+        ('the end of the iteration, with aborted', True),
+        True,
+        False,
+    )
     assert not outcome(states['LEFT'], 'aborted').author_recovers
     assert outcome(states['RIGHT'], 'aborted').author_recovers, 'the map has foreseen it'

@@ -1,4 +1,5 @@
 """The machines of the engine in use have every member that the executive relies on."""
+
 import inspect
 import os
 import typing
@@ -14,9 +15,13 @@ OURS_ALONE = {'_is_preempt_passed_on'}  # set, never read, on upstream's engine
 def members_of(protocol):
     """The attributes, properties and methods that a protocol names."""
     prefix = protocol.__qualname__ + '.'
-    methods = {name for name, value in vars(protocol).items()
-               if isinstance(value, property)
-               or inspect.isfunction(value) and value.__qualname__.startswith(prefix)}
+    methods = {
+        name
+        for name, value in vars(protocol).items()
+        if isinstance(value, property)
+        or inspect.isfunction(value)
+        and value.__qualname__.startswith(prefix)
+    }
     return methods | set(typing.get_type_hints(protocol))
 
 
@@ -47,5 +52,8 @@ def test_a_member_that_is_missing_is_noticed():
 
         def no_such_method(self):
             """Not there."""
+
     assert missing_in(smach.StateMachine(outcomes=['done']), More) >= {
-        '_no_such_member', 'no_such_method'}
+        '_no_such_member',
+        'no_such_method',
+    }

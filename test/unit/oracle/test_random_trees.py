@@ -1,4 +1,5 @@
 """Random trees: the executive goes as a model goes that is written apart from it."""
+
 import os
 import threading
 
@@ -39,8 +40,9 @@ def test_what_differs_is_found_and_reported():
     plan = next(plan for plan in map(draw, range(50)) if len(plan.top.children) > 1)
     found = compare(plan, IS_UPSTREAM)
     path, event = found.executed.course.pop()
-    changed = found._replace(difference=difference_of(plan, found.model.course,
-                                                      found.executed.course))
+    changed = found._replace(
+        difference=difference_of(plan, found.model.course, found.executed.course)
+    )
     assert not changed.is_fine
     assert changed.difference.path in ('', path) and changed.difference.model == (path,) + event
     assert 'seed {}'.format(plan.seed) in changed.report() and event[0] in changed.report()

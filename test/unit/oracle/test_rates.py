@@ -1,4 +1,5 @@
 """Learned rates: the estimators, and the file that keeps them across runs."""
+
 import json
 import os
 import random
@@ -87,19 +88,26 @@ def test_the_exponential_estimator_agrees_on_the_first_result_and_forgets_gradua
     assert one_by_one.rate == pytest.approx(mean.rate)
 
 
-@pytest.mark.parametrize('rate, failure_class', [(0.0, FailureClass.LOW), (0.39, FailureClass.LOW),
-                                                 (0.4, FailureClass.MODERATE),
-                                                 (0.1 + 0.3, FailureClass.MODERATE),
-                                                 (0.74, FailureClass.MODERATE),
-                                                 (0.75, FailureClass.HIGH),
-                                                 (1.0, FailureClass.HIGH)])
+@pytest.mark.parametrize(
+    'rate, failure_class',
+    [
+        (0.0, FailureClass.LOW),
+        (0.39, FailureClass.LOW),
+        (0.4, FailureClass.MODERATE),
+        (0.1 + 0.3, FailureClass.MODERATE),
+        (0.74, FailureClass.MODERATE),
+        (0.75, FailureClass.HIGH),
+        (1.0, FailureClass.HIGH),
+    ],
+)
 def test_classes_begin_at_their_thresholds(rate, failure_class):
     assert classify(rate, 0.4, 0.75) is failure_class
 
 
 @pytest.mark.parametrize('estimator', [FailureRate, ExponentialFailureRate])
-@pytest.mark.parametrize('memory, prior', [(0, 0.1), (-1, 0.1), (1.5, 0.1), (True, 0.1), (3, -0.1),
-                                           (3, 1.1), (3, None)])
+@pytest.mark.parametrize(
+    'memory, prior', [(0, 0.1), (-1, 0.1), (1.5, 0.1), (True, 0.1), (3, -0.1), (3, 1.1), (3, None)]
+)
 def test_what_is_no_memory_or_prior_is_refused(estimator, memory, prior):
     with pytest.raises(SettingsError, match='memory|prior'):
         estimator(memory, prior)
@@ -124,8 +132,15 @@ def test_what_was_learned_can_be_handed_on(kind):
     assert (other.rate, other.failures, other.successes) == (0.2, 2, 1)
 
 
-@pytest.mark.parametrize('learned', [{'estimator': 'window', 'window': [2]}, {'successes': -1},
-                                     {'failures': 'x'}, {'estimator': 'window', 'window': 'no'}])
+@pytest.mark.parametrize(
+    'learned',
+    [
+        {'estimator': 'window', 'window': [2]},
+        {'successes': -1},
+        {'failures': 'x'},
+        {'estimator': 'window', 'window': 'no'},
+    ],
+)
 def test_what_is_no_snapshot_is_refused(learned):
     with pytest.raises(ValueError):
         FailureRate(3, 0.1).restore(learned)
@@ -133,12 +148,15 @@ def test_what_is_no_snapshot_is_refused(learned):
 
 def test_states_learn_apart_by_their_own_memory_and_thresholds():
     machine = watched(
-        Scripted('aborted'), Scripted('aborted'), settings={
+        Scripted('aborted'),
+        Scripted('aborted'),
+        settings={
             'states': {
                 'A': {'memory': 2, 'moderate_from': 0.5, 'high_from': 0.9},
-                'B': {'estimator': 'exponential'}
+                'B': {'estimator': 'exponential'},
             }
-        })
+        },
+    )
     machine.run()
     a, b = machine.rate('A'), machine.rate('B')
     assert (a.failures, a.successes, a.rate) == (1, 1, pytest.approx(0.5))
@@ -156,6 +174,7 @@ def test_many_successes_are_learned_however_they_were_counted():
 
 
 # -- the file
+
 
 def learned_machine(path, *script, **settings):
     return watched(Scripted(*script), settings=dict(settings, rates_file=str(path)))
@@ -179,6 +198,7 @@ def test_rates_of_nested_machines_are_kept_under_any_name_of_the_top(tmp_path):
         with machine:
             smach.StateMachine.add('INNER', chain_of(Scripted('aborted')), {'done': 'done'})
         return Watched(machine, name=name, settings={'rates_file': str(tmp_path / 'rates.json')})
+
     make('FIRST').run()
     assert make('SECOND').rate('A').failures == 1
 
@@ -187,8 +207,10 @@ def test_a_failure_is_on_disk_before_the_machine_recovers_from_it(tmp_path):
     path = tmp_path / 'rates.json'
     seen = []
     machine = watched(
-        Scripted('aborted'), settings={'rates_file': str(path)},
-        preconditions={'A': [lambda ud: seen.append(json.loads(path.read_text())) or True]})
+        Scripted('aborted'),
+        settings={'rates_file': str(path)},
+        preconditions={'A': [lambda ud: seen.append(json.loads(path.read_text())) or True]},
+    )
     machine.run()
     assert seen[0]['containers']['']['A']['failures'] == 1
 
@@ -199,11 +221,20 @@ def test_another_memory_takes_the_newest_results(tmp_path):
     assert learned_machine(path, memory=2).rate('A').rate == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize('content', [
-    '', '{"format": "smach_ora', '[]', '{"format": "other"}', 'null',
-    '{"format": "smach_oracle rates", "version": 9, "containers": {}}',
-    '{"format": "smach_oracle rates", "version": 1, "containers": 5}', '\udcff\udcfe', '[' * 100000
-])
+@pytest.mark.parametrize(
+    'content',
+    [
+        '',
+        '{"format": "smach_ora',
+        '[]',
+        '{"format": "other"}',
+        'null',
+        '{"format": "smach_oracle rates", "version": 9, "containers": {}}',
+        '{"format": "smach_oracle rates", "version": 1, "containers": 5}',
+        '\udcff\udcfe',
+        '[' * 100000,
+    ],
+)
 def test_a_damaged_file_is_kept_aside_and_the_priors_count(tmp_path, log, content):
     path = tmp_path / 'rates.json'
     path.write_bytes(content.encode('utf-8', 'surrogateescape'))
@@ -218,15 +249,23 @@ def test_a_damaged_file_is_kept_aside_and_the_priors_count(tmp_path, log, conten
 def test_one_state_that_makes_no_sense_costs_only_itself(tmp_path, log):
     path = tmp_path / 'rates.json'
     good = {'estimator': 'window', 'successes': 1, 'failures': 0, 'window': [0]}
-    path.write_text(json.dumps({'format': rates_file.FORMAT, 'version': 1,
-                                'containers': {'': {'A': 5, 'B': good, 'GONE': good}}}))
+    path.write_text(
+        json.dumps(
+            {
+                'format': rates_file.FORMAT,
+                'version': 1,
+                'containers': {'': {'A': 5, 'B': good, 'GONE': good}},
+            }
+        )
+    )
     machine = watched(Scripted(), Scripted(), settings={'rates_file': str(path)})
     assert (machine.rate('A').successes, machine.rate('B').successes) == (0, 1)
-    warned, = [text for level, text in log if level == 'warn']
+    (warned,) = [text for level, text in log if level == 'warn']
     assert warned.startswith("Rates file {}: 'A' of SM_ROOT cannot be used: ".format(path))
     machine.run()
-    assert 'GONE' in json.loads(
-        path.read_text())['containers'][''], 'a state that comes back has its rate back'
+    assert 'GONE' in json.loads(path.read_text())['containers'][''], (
+        'a state that comes back has its rate back'
+    )
 
 
 @pytest.mark.parametrize('where', ['no/such/folder/rates.json', 'file/rates.json'])
@@ -244,6 +283,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, lo
 
     def full(descriptor):
         raise OSError(28, 'No space left on device')
+
     monkeypatch.setattr(os, 'fsync', full)
     machine = learned_machine(path, 'aborted')
     assert machine.run() == 'done'
@@ -252,7 +292,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, lo
     assert any('No space left' in text for level, text in log if level == 'warn')
 
 
-WRITER = '''
+WRITER = """
 import sys
 sys.path[:0] = {path!r}
 import smach
@@ -265,7 +305,7 @@ while True:
     machine.events.clear()
     machine.run()
     print('.', flush=True)
-'''
+"""
 
 
 def test_a_writer_killed_at_any_moment_leaves_a_whole_file(tmp_path):
@@ -291,12 +331,16 @@ def test_a_writer_killed_at_any_moment_leaves_a_whole_file(tmp_path):
 
 def test_the_record_of_a_trial_tells_how_to_go_on_after_it(tmp_path):
     path = tmp_path / 'rates.json'
-    watch = watched(Scripted('aborted'),
-                    settings={'rates_file': str(path), 'memory': 7, 'policy': 'algorithm1'})
+    watch = watched(
+        Scripted('aborted'), settings={'rates_file': str(path), 'memory': 7, 'policy': 'algorithm1'}
+    )
     watch.machine.execute()
     settings, learned = watch.events[0].data['settings'], watch.events[-1].data['learned']
-    assert (settings['policy'], settings['memory'], settings['moderate_from']) == ('algorithm1', 7,
-                                                                                   0.4)
+    assert (settings['policy'], settings['memory'], settings['moderate_from']) == (
+        'algorithm1',
+        7,
+        0.4,
+    )
     assert learned == json.loads(path.read_text())['containers']
     rates_file.write_learned(str(tmp_path / 'again.json'), learned)
     assert (tmp_path / 'again.json').read_text() == path.read_text()
@@ -320,6 +364,7 @@ def test_rates_read_from_another_thread_while_the_machine_runs_are_counted_once(
     import threading
 
     import smach
+
     left = [20000]
 
     def laps(state, ud):
@@ -329,6 +374,7 @@ def test_rates_read_from_another_thread_while_the_machine_runs_are_counted_once(
     class Lap(Scripted):
         def execute(self, ud):
             return laps(self, ud)
+
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', Lap(outcomes=('ok', 'out')), {'ok': 'B', 'out': 'done'})
@@ -340,6 +386,7 @@ def test_rates_read_from_another_thread_while_the_machine_runs_are_counted_once(
     def read():
         while not stop.is_set():
             seen.append([row.rate for row in wrapped.rates()])
+
     reader = threading.Thread(target=read, daemon=True)
     reader.start()
     assert wrapped.execute() == 'done'
@@ -351,10 +398,14 @@ def test_rates_read_from_another_thread_while_the_machine_runs_are_counted_once(
 
 def test_recoveries_of_a_nested_machine_are_those_of_the_present_trial():
     import smach
+
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('CHOICE', Scripted('inner', 'ok', outcomes=('ok', 'inner')),
-                               {'ok': 'done', 'inner': 'INNER'})
+        smach.StateMachine.add(
+            'CHOICE',
+            Scripted('inner', 'ok', outcomes=('ok', 'inner')),
+            {'ok': 'done', 'inner': 'INNER'},
+        )
         smach.StateMachine.add('INNER', chain_of(Scripted('aborted')), {'done': 'done'})
     machine = Watched(machine)
     machine.run()

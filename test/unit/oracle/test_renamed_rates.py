@@ -1,4 +1,5 @@
 """A machine that was renamed goes on with its rates; one that lives keeps its own to itself."""
+
 import contextlib
 import gc
 import json
@@ -13,7 +14,7 @@ import smach
 from smach_oracle.oracle.records import name_claims
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-PROGRAM = '''
+PROGRAM = """
 import os, sys
 sys.path[:0] = {path!r}
 import smach
@@ -36,18 +37,21 @@ if 'fork' in sys.argv and not os.fork():
 if 'fork' not in sys.argv:
     print('has run', flush=True)
     sys.stdin.readline()
-'''
+"""
 
 
 @pytest.fixture
 def program(tmp_path):
     """Start a program of one machine with one state, that lives until its context ends."""
+
     @contextlib.contextmanager
     def started(name, runs=0, *words):
         code = PROGRAM.format(path=[HERE] + sys.path)
         process = subprocess.Popen(
             [sys.executable, '-c', code, str(tmp_path / 'rates.json'), name, str(runs), *words],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
         try:
             told = tuple(map(int, process.stdout.readline().split()))
             process.stdout.readline()  # it has run, or it has ended
@@ -56,6 +60,7 @@ def program(tmp_path):
             process.stdin.close()
             process.stdout.close()
             assert process.wait(60) == 0
+
     return started
 
 
@@ -109,6 +114,7 @@ def test_one_that_never_came_to_its_last_states_hands_its_rates_on_once(tmp_path
     def machine(name):
         states = Scripted('aborted', 'aborted'), Scripted(*['aborted'] * 40), Scripted()
         return Watched(chain_of(*states), name=name, settings=settings)
+
     machine('OLD').run()
     gc.collect()
     assert 'C' not in file_of(tmp_path)['machines']['OLD']['']
@@ -121,8 +127,10 @@ def test_one_that_has_another_state_beside_takes_nothing_over(tmp_path, program)
     settings = {'rates_file': str(tmp_path / 'rates.json')}
     with program('OLD', 3):
         pass
-    more, same = (Watched(chain_of(*states), name=name, settings=settings) for name, states in (
-        ('MORE', (Scripted(), Scripted())), ('SAME', (Scripted(),))))
+    more, same = (
+        Watched(chain_of(*states), name=name, settings=settings)
+        for name, states in (('MORE', (Scripted(), Scripted())), ('SAME', (Scripted(),)))
+    )
     assert (more.rate('A').failures, same.rate('A').failures) == (0, 3)
 
 
@@ -143,9 +151,14 @@ def test_a_machine_without_a_name_hands_its_rates_to_each_that_has_a_state_of_it
     inside = smach.StateMachine(['done', 'aborted', 'preempted'])
     with inside:
         smach.StateMachine.add('INNER', chain_of(Scripted()))
-    alive = [Watched(machine, name=name, settings=settings) for name, machine in (
-        ('NEW', chain_of(Scripted())), ('OTHER', chain_of(Scripted(), Scripted())),
-        ('ELSE', inside))]
+    alive = [
+        Watched(machine, name=name, settings=settings)
+        for name, machine in (
+            ('NEW', chain_of(Scripted())),
+            ('OTHER', chain_of(Scripted(), Scripted())),
+            ('ELSE', inside),
+        )
+    ]
     assert [each.rate('A').failures for each in alive] == [1, 1, 0]
     assert sum('is new there' in text for _, text in log) == 2
 
@@ -175,6 +188,7 @@ def test_where_nobody_can_say_who_lives_nothing_is_inherited(tmp_path, program, 
     with program('OLD', 1):
         pass
     monkeypatch.setattr(name_claims, '_ask', lambda *_: (_ for _ in ()).throw(OSError(38, 'none')))
-    new = Watched(chain_of(Scripted()), name='NEW',
-                  settings={'rates_file': str(tmp_path / 'rates.json')})
+    new = Watched(
+        chain_of(Scripted()), name='NEW', settings={'rates_file': str(tmp_path / 'rates.json')}
+    )
     assert new.rate('A').failures == 0

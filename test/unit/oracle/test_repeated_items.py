@@ -1,4 +1,5 @@
 """An item that is done again finds the userdata as they were when it began, and is an event."""
+
 import pytest
 from machines import FakeExpert, Scripted, Watched, goto
 
@@ -12,8 +13,9 @@ class Adds(smach.State):
     """Adds 1 to `total`, and the item to `names`, and then ends as told for that visit."""
 
     def __init__(self, *script, in_place=False):
-        smach.State.__init__(self, ['ok', 'stuck', 'preempted'], io_keys=['total', 'names'],
-                             input_keys=['item'])
+        smach.State.__init__(
+            self, ['ok', 'stuck', 'preempted'], io_keys=['total', 'names'], input_keys=['item']
+        )
         self.script = list(script)
         self.in_place = in_place
 
@@ -29,11 +31,18 @@ class Adds(smach.State):
 
 def over(state, items=(1, 2, 3), label='item', loop=('ok', 'done')):
     """An Iterator with the keys total and names, whose break outcome `stuck` is a failure."""
-    iterator = smach.Iterator(OUTCOMES, ['total', 'names'], ['total', 'names'], it=items,
-                              it_label=label, exhausted_outcome='done')
+    iterator = smach.Iterator(
+        OUTCOMES,
+        ['total', 'names'],
+        ['total', 'names'],
+        it=items,
+        it_label=label,
+        exhausted_outcome='done',
+    )
     with iterator:
-        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=list(loop),
-                                           final_outcome_map={'stuck': 'aborted'})
+        smach.Iterator.set_contained_state(
+            'EACH', state, loop_outcomes=list(loop), final_outcome_map={'stuck': 'aborted'}
+        )
     return iterator
 
 
@@ -55,8 +64,11 @@ def total_of(machine, *answers, **settings):
 
 
 def told(watched):
-    return [(event.path, event.state, event.text) for event in watched.of(EventKind.WARNING)
-            if 'repeated' in event.text]
+    return [
+        (event.path, event.state, event.text)
+        for event in watched.of(EventKind.WARNING)
+        if 'repeated' in event.text
+    ]
 
 
 WITH_2 = [('TOP', 'ALL', 'goes on with item 2 of 3, which is repeated')]
@@ -69,17 +81,20 @@ def test_an_item_that_failed_after_it_wrote_counts_once():
 
 
 def test_what_was_changed_inside_is_taken_back_under_deep_copied_keys():
-    _, left = total_of(machine_of(over(Adds('ok', 'stuck', in_place=True))),
-                       deep_copy_keys=['names'])
+    _, left = total_of(
+        machine_of(over(Adds('ok', 'stuck', in_place=True))), deep_copy_keys=['names']
+    )
     assert left == (3, [1, 2, 3])
 
 
 def test_an_item_may_be_repeated_more_than_once():
-    watched, left = total_of(machine_of(over(Adds('ok', 'stuck', 'stuck', 'ok', 'stuck'))),
-                             max_recoveries=9)
+    watched, left = total_of(
+        machine_of(over(Adds('ok', 'stuck', 'stuck', 'ok', 'stuck'))), max_recoveries=9
+    )
     assert left == (3, [1, 2, 3])
     assert told(watched) == 2 * WITH_2 + [
-        ('TOP', 'ALL', 'goes on with item 3 of 3, which is repeated')]
+        ('TOP', 'ALL', 'goes on with item 3 of 3, which is repeated')
+    ]
 
 
 def test_keys_that_are_not_given_from_above_are_taken_back_too():
@@ -91,12 +106,14 @@ def test_keys_that_are_not_given_from_above_are_taken_back_too():
 
 
 def test_a_machine_in_the_iterator_counts_once_for_an_item():
-    inner = smach.StateMachine(['done', 'stuck', 'preempted'], ['total', 'names', 'item'],
-                               ['total', 'names'])
+    inner = smach.StateMachine(
+        ['done', 'stuck', 'preempted'], ['total', 'names', 'item'], ['total', 'names']
+    )
     with inner:
         smach.StateMachine.add('ADD', Adds(), {'ok': 'THEN'})
-        smach.StateMachine.add('THEN', Scripted('ok', 'stuck', outcomes=('ok', 'stuck')),
-                               {'ok': 'done'})
+        smach.StateMachine.add(
+            'THEN', Scripted('ok', 'stuck', outcomes=('ok', 'stuck')), {'ok': 'done'}
+        )
     watched, left = total_of(machine_of(over(inner, loop=('done',))))
     assert left == (3, [1, 2, 3])
     assert told(watched) == WITH_2
@@ -104,25 +121,44 @@ def test_a_machine_in_the_iterator_counts_once_for_an_item():
 
 @pytest.mark.parametrize('fails_at', range(4))
 def test_an_iterator_in_an_iterator_counts_each_of_its_items_once(fails_at):
-    inner = smach.Iterator(['done', 'stuck', 'preempted'], ['total', 'names'], ['total', 'names'],
-                           it=['a', 'b'], it_label='item', exhausted_outcome='done')
+    inner = smach.Iterator(
+        ['done', 'stuck', 'preempted'],
+        ['total', 'names'],
+        ['total', 'names'],
+        it=['a', 'b'],
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with inner:
-        smach.Iterator.set_contained_state('IN', Adds(*fails_at * ['ok'], 'stuck'),
-                                           loop_outcomes=['ok'])
+        smach.Iterator.set_contained_state(
+            'IN', Adds(*fails_at * ['ok'], 'stuck'), loop_outcomes=['ok']
+        )
     _, left = total_of(machine_of(over(inner, (1, 2), 'outer', loop=('done',))))
     assert left == (4, ['a', 'b', 'a', 'b'])
 
 
-@pytest.mark.parametrize('to, repeated', [('ALL', WITH_2), ('FIRST', [
-    ('TOP', 'ALL', 'begins with its first item again: item 1 that had ended is repeated')])])
+@pytest.mark.parametrize(
+    'to, repeated',
+    [
+        ('ALL', WITH_2),
+        (
+            'FIRST',
+            [('TOP', 'ALL', 'begins with its first item again: item 1 that had ended is repeated')],
+        ),
+    ],
+)
 def test_one_that_is_left_by_a_jump_counts_each_item_once(to, repeated):
-    inner = smach.StateMachine(['done', 'aborted', 'preempted'], ['total', 'names', 'item'],
-                               ['total', 'names'])
+    inner = smach.StateMachine(
+        ['done', 'aborted', 'preempted'], ['total', 'names', 'item'], ['total', 'names']
+    )
     with inner:
         smach.StateMachine.add('ADD', Adds(), {'ok': 'THEN', 'stuck': 'aborted'})
         smach.StateMachine.add('THEN', Scripted('ok', 'aborted'), {'ok': 'done'})
-    watched, left = total_of(machine_of(over(inner, loop=('done',)), first=True),
-                             goto(to, container='TOP'), max_recoveries=0)
+    watched, left = total_of(
+        machine_of(over(inner, loop=('done',)), first=True),
+        goto(to, container='TOP'),
+        max_recoveries=0,
+    )
     assert left == (3, [1, 2, 3])
     assert told(watched) == repeated
 

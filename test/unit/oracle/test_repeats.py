@@ -1,4 +1,5 @@
 """States that are not repeated by themselves: `on_retry: confirm` and `never`."""
+
 import threading
 
 import pytest
@@ -24,28 +25,35 @@ from smach_oracle.oracle.records.facts import Decider
 
 # -- what the oracle does by itself
 
+
 @pytest.mark.parametrize('policy', ['prose', 'algorithm1'])
 def test_a_guarded_state_that_has_failed_is_not_tried_again_by_itself(policy):
     machine, expert = guarded(pouring(pour=['aborted']), give_up(), policy=policy)
     assert machine.run() == 'aborted'
     assert machine.visits() == ['DETECT', 'POUR']
     assert sentences(machine) == [
-        'POUR failed (its first result); it is not repeated by itself: asking an expert, 300 s']
+        'POUR failed (its first result); it is not repeated by itself: asking an expert, 300 s'
+    ]
     assert deciders(machine) == [Decider.ON_RETRY]
     assert expert.questions[0].reason.endswith('it is not repeated by itself')
 
 
 def test_no_precondition_is_run_where_nothing_will_be_decided():
     look = Scripted()
-    machine, _ = guarded(pouring(pour=['aborted']), give_up(),
-                         states={'POUR': dict(NEVER, preconditions=[look])})
+    machine, _ = guarded(
+        pouring(pour=['aborted']), give_up(), states={'POUR': dict(NEVER, preconditions=[look])}
+    )
     assert machine.run() == 'aborted'
     assert look.runs == 0
 
 
 def test_prose_steps_back_no_further_than_a_guarded_state_allows():
-    machine = chain(DETECT=Scripted(), POUR=Scripted(), LIFT=Scripted(),
-                    PLACE=Scripted('aborted', 'aborted', 'aborted'))
+    machine = chain(
+        DETECT=Scripted(),
+        POUR=Scripted(),
+        LIFT=Scripted(),
+        PLACE=Scripted('aborted', 'aborted', 'aborted'),
+    )
     watched, expert = guarded(machine, give_up())
     assert watched.run() == 'done', 'LIFT lies behind POUR'
     assert not expert.questions and watched.visits().count('POUR') == 1
@@ -59,7 +67,8 @@ def test_a_step_back_to_the_guarded_state_becomes_a_question(on_retry):
     assert machine.decisions() == [('revisit', 'PLACE'), ('ask', '')]
     assert sentences(machine)[1] == (
         'PLACE keeps failing after trying it again (2 of its last 2); going back to POUR would '
-        'repeat POUR: asking an expert, 300 s')
+        'repeat POUR: asking an expert, 300 s'
+    )
     assert expert.questions[0].reason.endswith('going back to POUR would repeat POUR')
     assert deciders(machine) == [Decider.POLICY, Decider.ON_RETRY]
 
@@ -67,18 +76,24 @@ def test_a_step_back_to_the_guarded_state_becomes_a_question(on_retry):
 def test_a_step_back_across_a_guarded_state_becomes_a_question():
     """The precondition of POUR keeps algorithm1 from stepping back to POUR itself."""
     machine, expert = guarded(
-        pouring('aborted'), goto('PLACE'), policy='algorithm1',
-        states={'POUR': dict(CONFIRM, preconditions=[lambda ud: True])})
+        pouring('aborted'),
+        goto('PLACE'),
+        policy='algorithm1',
+        states={'POUR': dict(CONFIRM, preconditions=[lambda ud: True])},
+    )
     assert machine.run() == 'done'
     assert machine.visits() == ['DETECT', 'POUR', 'PLACE', 'PLACE']
-    assert sentences(machine) == ['PLACE failed (its first result); going back to DETECT would '
-                                  'repeat POUR: asking an expert, 300 s']
+    assert sentences(machine) == [
+        'PLACE failed (its first result); going back to DETECT would '
+        'repeat POUR: asking an expert, 300 s'
+    ]
     assert deciders(machine) == [Decider.ON_RETRY] and len(expert.questions) == 1
 
 
 def test_it_may_be_set_for_all_states():
-    machine, expert = guarded(pouring('aborted'), give_up(), of_all='never',
-                              states={'POUR': {'on_retry': 'allow'}})
+    machine, expert = guarded(
+        pouring('aborted'), give_up(), of_all='never', states={'POUR': {'on_retry': 'allow'}}
+    )
 
     assert machine.run() == 'aborted'
     assert [question.failed_state for question in expert.questions] == ['PLACE']
@@ -115,8 +130,14 @@ def test_a_fallback_may_lead_to_a_place_from_which_nothing_is_repeated():
 def behind_a_held_back_state(fallback, *answers):
     """DETECT, POUR, HOME, PLACE; PLACE fails once, and an expert goes to DETECT."""
     machine = chain(DETECT=Scripted(), POUR=Scripted(), HOME=Scripted(), PLACE=Scripted('aborted'))
-    return guarded(machine, goto('DETECT'), *answers, max_recoveries=0, deadline_s=0.1,
-                   on_no_answer='goto:' + fallback)
+    return guarded(
+        machine,
+        goto('DETECT'),
+        *answers,
+        max_recoveries=0,
+        deadline_s=0.1,
+        on_no_answer='goto:' + fallback,
+    )
 
 
 def test_a_fallback_leads_past_a_state_that_was_held_back():
@@ -124,7 +145,9 @@ def test_a_fallback_leads_past_a_state_that_was_held_back():
     assert machine.run() == 'done'
     assert machine.visits() == ['DETECT', 'POUR', 'HOME', 'PLACE', 'DETECT', 'HOME', 'PLACE']
     assert [choice.state for choice in expert.questions[1].choices if choice.repeats] == [
-        'DETECT', 'POUR']
+        'DETECT',
+        'POUR',
+    ]
 
 
 def test_a_fallback_does_not_lead_before_a_state_that_was_held_back():
@@ -136,10 +159,15 @@ def test_a_fallback_does_not_lead_before_a_state_that_was_held_back():
 def test_what_an_expert_has_done_counts_as_done_then():
     machine, expert = guarded(
         chain(DETECT=Scripted(), POUR=Scripted(), PLACE=Scripted('aborted', 'aborted')),
-        goto('DETECT'), supersede('ok'), give_up(), max_recoveries=0)
+        goto('DETECT'),
+        supersede('ok'),
+        give_up(),
+        max_recoveries=0,
+    )
     assert machine.run() == 'aborted'
-    assert [choice.repeats for choice in expert.questions[2].choices
-            if choice.state == 'DETECT'] == [('POUR',)]
+    assert [
+        choice.repeats for choice in expert.questions[2].choices if choice.state == 'DETECT'
+    ] == [('POUR',)]
 
 
 def test_a_fallback_that_repeats_nothing_is_taken():
@@ -148,6 +176,7 @@ def test_a_fallback_that_repeats_nothing_is_taken():
 
 
 # -- what an expert may do
+
 
 def test_an_expert_goes_back_and_is_asked_before_the_state_is_repeated():
     machine, expert = guarded(pouring('aborted'), goto('DETECT'), goto('POUR'), max_recoveries=0)
@@ -163,37 +192,66 @@ def test_an_expert_goes_back_and_is_asked_before_the_state_is_repeated():
 
 
 def test_a_confirmed_repeat_holds_once():
-    machine, expert = guarded(pouring('aborted', 'aborted'), goto('DETECT'), goto('POUR'),
-                              goto('DETECT'), give_up(), max_recoveries=0)
+    machine, expert = guarded(
+        pouring('aborted', 'aborted'),
+        goto('DETECT'),
+        goto('POUR'),
+        goto('DETECT'),
+        give_up(),
+        max_recoveries=0,
+    )
     assert machine.run() == 'aborted'
     assert machine.visits().count('POUR') == 2
-    assert [question.failed_state for question in expert.questions] == ['PLACE', 'POUR', 'PLACE',
-                                                                        'POUR']
+    assert [question.failed_state for question in expert.questions] == [
+        'PLACE',
+        'POUR',
+        'PLACE',
+        'POUR',
+    ]
 
 
 def test_going_directly_to_a_state_confirms_that_one_alone():
     states = chain(POUR=Scripted(), CUT=Scripted(), PLACE=Scripted('aborted'))
-    machine, expert = guarded(states, goto('POUR'), goto('PLACE'),
-                              states={'POUR': CONFIRM, 'CUT': CONFIRM},
-                              max_recoveries=0)
+    machine, expert = guarded(
+        states,
+        goto('POUR'),
+        goto('PLACE'),
+        states={'POUR': CONFIRM, 'CUT': CONFIRM},
+        max_recoveries=0,
+    )
     assert machine.run() == 'done'
     assert machine.visits() == ['POUR', 'CUT', 'PLACE', 'POUR', 'PLACE']
     assert expert.questions[1].failed_state == 'CUT'
 
 
 def test_an_expert_is_refused_a_state_that_is_never_repeated():
-    machine, expert = guarded(pouring('aborted'), goto('POUR'), goto('DETECT'), goto('POUR'),
-                              supersede('ok'), on_retry='never', max_recoveries=0)
+    machine, expert = guarded(
+        pouring('aborted'),
+        goto('POUR'),
+        goto('DETECT'),
+        goto('POUR'),
+        supersede('ok'),
+        on_retry='never',
+        max_recoveries=0,
+    )
     assert machine.run() == 'done'
     assert machine.visits() == ['DETECT', 'POUR', 'PLACE', 'DETECT', 'PLACE']
     why = 'was done in this trial and must not be repeated (on_retry: never)'
     assert {choice.state: choice.blocked for choice in expert.questions[0].choices} == {
-        'DETECT': '', 'POUR': why, 'PLACE': ''}
+        'DETECT': '',
+        'POUR': why,
+        'PLACE': '',
+    }
     refused = [event.text for event in machine.of(EventKind.WARNING)]
-    assert len(refused) == 2 and all('POUR cannot be entered now: ' + why in text
-                                     for text in refused)
-    assert [question.failed_state for question in expert.questions] == ['PLACE', 'PLACE', 'POUR',
-                                                                        'POUR']
+    assert len(refused) == 2 and all(
+        'POUR cannot be entered now: ' + why in text for text in refused
+    )
+    assert [question.failed_state for question in expert.questions] == [
+        'PLACE',
+        'PLACE',
+        'POUR',
+        'POUR',
+    ]
 
 
 def test_the_rules_of_answers_name_the_reason():
@@ -204,23 +262,41 @@ def test_the_rules_of_answers_name_the_reason():
 
 
 def test_a_question_says_what_would_come_again_behind_each_choice():
-    states = chain(DETECT=Scripted(), POUR=Scripted(), LIFT=Scripted(), PLACE=Scripted('aborted'),
-                   LATER=Scripted())
+    states = chain(
+        DETECT=Scripted(),
+        POUR=Scripted(),
+        LIFT=Scripted(),
+        PLACE=Scripted('aborted'),
+        LATER=Scripted(),
+    )
     machine, expert = guarded(states, give_up(), max_recoveries=0)
     machine.run()
     assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
-        'DETECT': ('POUR',), 'POUR': ('POUR',), 'LIFT': (), 'PLACE': (), 'LATER': ()}
+        'DETECT': ('POUR',),
+        'POUR': ('POUR',),
+        'LIFT': (),
+        'PLACE': (),
+        'LATER': (),
+    }
 
 
 def test_behind_a_state_never_visited_it_says_where_the_authors_transitions_lead():
-    states = chain(ARM=chain(POUR=Scripted()), DETECT=Scripted('aborted'), LATER=Scripted(),
-                   LAST=Scripted(outcomes=('ok', 'again', 'aborted')))
+    states = chain(
+        ARM=chain(POUR=Scripted()),
+        DETECT=Scripted('aborted'),
+        LATER=Scripted(),
+        LAST=Scripted(outcomes=('ok', 'again', 'aborted')),
+    )
     states._transitions['LAST']['again'] = 'ARM'
     machine, expert = guarded(states, give_up(), max_recoveries=0)
     machine.run()
     assert {choice.state: choice.repeats for choice in expert.questions[0].choices} == {
-        'ARM': ('ARM/POUR',), 'POUR': ('ARM/POUR',), 'DETECT': (),
-        'LATER': ('ARM/POUR',), 'LAST': ('ARM/POUR',)}
+        'ARM': ('ARM/POUR',),
+        'POUR': ('ARM/POUR',),
+        'DETECT': (),
+        'LATER': ('ARM/POUR',),
+        'LAST': ('ARM/POUR',),
+    }
 
 
 def test_a_fallback_does_not_lead_to_where_the_way_leads_back():
@@ -231,8 +307,10 @@ def test_a_fallback_does_not_lead_to_where_the_way_leads_back():
         smach.StateMachine.add('LATER', Scripted(), {'ok': 'POUR'})
     machine, _ = guarded(states, max_recoveries=0, on_no_answer='goto:LATER')
     assert machine.run() == 'aborted'
-    assert ('this trial has not been in LATER, and going there may repeat POUR; stopping'
-            in machine.of(EventKind.WARNING)[-1].text)
+    assert (
+        'this trial has not been in LATER, and going there may repeat POUR; stopping'
+        in machine.of(EventKind.WARNING)[-1].text
+    )
 
 
 def test_a_state_that_was_not_done_is_no_repeat():
@@ -261,12 +339,17 @@ def test_with_nobody_to_ask_a_spent_state_ends_the_machine_as_configured():
 def test_a_machine_without_a_failing_outcome_ends_in_an_error_at_a_spent_state():
     machine = smach.StateMachine(outcomes=['done'])
     with machine:
-        smach.StateMachine.add('POUR', Scripted(), {'ok': 'PLACE', 'aborted': 'done',
-                                                    'preempted': 'done'})
-        smach.StateMachine.add('PLACE', Scripted(ValueError('slipped')), {
-            'ok': 'done', 'aborted': 'done', 'preempted': 'done'})
-        smach.StateMachine.add('BEFORE', Scripted(), {'ok': 'POUR', 'aborted': 'done',
-                                                      'preempted': 'done'})
+        smach.StateMachine.add(
+            'POUR', Scripted(), {'ok': 'PLACE', 'aborted': 'done', 'preempted': 'done'}
+        )
+        smach.StateMachine.add(
+            'PLACE',
+            Scripted(ValueError('slipped')),
+            {'ok': 'done', 'aborted': 'done', 'preempted': 'done'},
+        )
+        smach.StateMachine.add(
+            'BEFORE', Scripted(), {'ok': 'POUR', 'aborted': 'done', 'preempted': 'done'}
+        )
     watched, _ = guarded(machine, goto('BEFORE'), max_recoveries=0)
     with pytest.raises(smach.InvalidUserCodeError, match=HELD_BACK[5:]):
         watched.run()
@@ -274,14 +357,16 @@ def test_a_machine_without_a_failing_outcome_ends_in_an_error_at_a_spent_state()
 
 # -- the author's own ways
 
+
 def looping(*check):
     """POUR, CHECK; CHECK leads back to POUR by 'again'."""
     machine = smach.StateMachine(outcomes=OUTCOMES)
     outcomes = ('ok', 'again', 'aborted')
     with machine:
         smach.StateMachine.add('POUR', Scripted(), {'ok': 'CHECK'})
-        smach.StateMachine.add('CHECK', Scripted(*check, outcomes=outcomes),
-                               {'again': 'POUR', 'ok': 'done'})
+        smach.StateMachine.add(
+            'CHECK', Scripted(*check, outcomes=outcomes), {'again': 'POUR', 'ok': 'done'}
+        )
     return machine
 
 
@@ -313,13 +398,21 @@ def test_once_an_expert_has_done_it_the_authors_loop_is_free_again():
     assert machine.run() == 'done'
     assert machine.visits() == ['POUR', 'CHECK', 'BEFORE', 'CHECK', 'POUR', 'CHECK']
     results = [visit.result.name for visit in states._oracle.records.history.latest()]
-    assert results == ['SUCCESS', 'FAILURE', 'SUCCESS', 'SUPERSEDED', 'SUCCESS', 'SUCCESS',
-                       'SUCCESS']
+    assert results == [
+        'SUCCESS',
+        'FAILURE',
+        'SUCCESS',
+        'SUPERSEDED',
+        'SUCCESS',
+        'SUCCESS',
+        'SUCCESS',
+    ]
 
 
 def test_a_new_trial_begins_anew():
-    machine, expert = guarded(pouring('aborted'), goto('DETECT'), give_up(), on_retry='never',
-                              max_recoveries=0)
+    machine, expert = guarded(
+        pouring('aborted'), goto('DETECT'), give_up(), on_retry='never', max_recoveries=0
+    )
     assert machine.run() == 'aborted'
     assert machine.run() == 'done' and len(expert.questions) == 2
 
@@ -331,12 +424,15 @@ def test_what_is_only_observed_is_not_guarded():
 
 # -- the rest
 
+
 def test_a_preempt_at_a_spent_state_ends_the_machine_as_preempted():
     def preempted_too_late(state, ud):
         machine.machine.request_preempt()
         return 'ok'
-    states = chain(DETECT=Scripted('ok', preempted_too_late), POUR=Scripted(),
-                   PLACE=Scripted('aborted'))
+
+    states = chain(
+        DETECT=Scripted('ok', preempted_too_late), POUR=Scripted(), PLACE=Scripted('aborted')
+    )
     machine, expert = guarded(states, goto('DETECT'), max_recoveries=0)
     assert machine.run() == 'preempted'
     assert machine.visits() == ['DETECT', 'POUR', 'PLACE', 'DETECT'] and len(expert.questions) == 1
@@ -350,6 +446,7 @@ def test_a_question_about_a_spent_state_is_taken_back_by_a_preempt():
     def waits(question, cancelled, progress):
         asked.set()
         assert cancelled.wait(20)
+
     machine, _ = guarded(pouring('aborted'), goto('DETECT'), waits, max_recoveries=0)
     run = in_thread(machine.run)
     assert asked.wait(20)
@@ -359,9 +456,12 @@ def test_a_question_about_a_spent_state_is_taken_back_by_a_preempt():
 
 def test_a_state_with_a_time_limit_is_guarded_too():
     pour = Scripted()
-    machine, expert = guarded(chain(DETECT=Scripted(), POUR=pour, PLACE=Scripted('aborted')),
-                              goto('DETECT'), max_recoveries=0,
-        states={'POUR': dict(NEVER, time_limit_s=20)})
+    machine, expert = guarded(
+        chain(DETECT=Scripted(), POUR=pour, PLACE=Scripted('aborted')),
+        goto('DETECT'),
+        max_recoveries=0,
+        states={'POUR': dict(NEVER, time_limit_s=20)},
+    )
     assert machine.run() == 'aborted'
     assert pour.runs == 1
 
@@ -371,7 +471,8 @@ def test_where_no_state_is_guarded_nothing_is_noted():
     assert machine.run() == 'done'
     node = machine.machine._oracle
     assert not node.tree.numbers_visits and not any(
-        record.special for record in node.records.by_label.values())
+        record.special for record in node.records.by_label.values()
+    )
     assert node.records.marks.of('POUR').reached == 0
 
 

@@ -1,4 +1,5 @@
 """Machines at random: no guarded state is repeated, as the events alone tell."""
+
 import random
 
 import pytest
@@ -46,10 +47,10 @@ class AnyAnswer(Expert):
 def machine_of(chance, depth, prefix, settings):
     """A machine with nested ones and loops; `settings` of its states are added."""
     machine = smach.StateMachine(outcomes=OUTCOMES)
-    labels = [prefix + letter for letter in 'ABCDE'[:chance.randint(2, 5)]]
+    labels = [prefix + letter for letter in 'ABCDE'[: chance.randint(2, 5)]]
     with machine:
         for label, following in zip(labels, labels[1:] + ['done']):
-            before = labels[:labels.index(label) + 1]
+            before = labels[: labels.index(label) + 1]
             _add(chance, depth, label, following, before, settings)
             if chance.random() < 0.4:
                 settings[label] = {'on_retry': chance.choice(['confirm', 'never'])}
@@ -67,13 +68,18 @@ def _add(chance, depth, label, following, before, settings):
         return
     loops = chance.random() < 0.3
     smach.StateMachine.add(
-        label, Chance(chance, ['ok', 'ok', 'again'] if loops else ['ok']),
-        {'ok': following, **({'again': chance.choice(before)} if loops else {})})
+        label,
+        Chance(chance, ['ok', 'ok', 'again'] if loops else ['ok']),
+        {'ok': following, **({'again': chance.choice(before)} if loops else {})},
+    )
 
 
 def _beside(left, right):
-    both = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                             outcome_map={'done': {'L': 'done', 'R': 'done'}})
+    both = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'L': 'done', 'R': 'done'}},
+    )
     with both:
         smach.Concurrence.add('L', left)
         smach.Concurrence.add('R', right)
@@ -124,8 +130,11 @@ class Rule:
     def _jumps(self, event):
         target = (event.path, event.target)
         since = self._latest.get(target, 0)
-        again = {place for place in self._begun if self._latest[place] >= since
-                 and (place[0] + '/').startswith(event.path + '/')}
+        again = {
+            place
+            for place in self._begun
+            if self._latest[place] >= since and (place[0] + '/').startswith(event.path + '/')
+        }
         assert event.by or not again, 'the oracle repeats nothing by itself'
         assert target not in self._begun or self.guard(target) == 'confirm', target
         self._spent |= again
@@ -141,9 +150,17 @@ def test_no_guarded_state_is_repeated_unless_confirmed(policy):
     held_back = repeated = 0
     for seed in range(50):
         chance, states = random.Random(seed), {}
-        machine = Watched(machine_of(chance, 2, '', states), expert=AnyAnswer(chance), settings={
-            'policy': policy, 'states': states, 'max_recoveries': 2, 'escalate': bool(seed % 3),
-            'budget': chance.choice([{}, {'recoveries': 5}, {'questions': 5}])})
+        machine = Watched(
+            machine_of(chance, 2, '', states),
+            expert=AnyAnswer(chance),
+            settings={
+                'policy': policy,
+                'states': states,
+                'max_recoveries': 2,
+                'escalate': bool(seed % 3),
+                'budget': chance.choice([{}, {'recoveries': 5}, {'questions': 5}]),
+            },
+        )
         assert machine.run() in OUTCOMES
         rule = Rule(states)
         for number, event in enumerate(machine.events, 1):

@@ -1,4 +1,5 @@
 """The policy `restart`: where a script begins again, with which userdata, and where it does not."""
+
 import copy
 import threading
 
@@ -11,8 +12,12 @@ from smach_oracle.oracle.records.events import EventKind
 
 def failing(fails=20, **settings):
     """A chain A, B, C whose B fails so often."""
-    return watched(Scripted(), Scripted(*['aborted'] * fails), Scripted(),
-                   settings={'policy': 'restart', **settings})
+    return watched(
+        Scripted(),
+        Scripted(*['aborted'] * fails),
+        Scripted(),
+        settings={'policy': 'restart', **settings},
+    )
 
 
 def test_a_restart_begins_with_the_initial_state_and_the_userdata_of_the_start():
@@ -23,9 +28,14 @@ def test_a_restart_begins_with_the_initial_state_and_the_userdata_of_the_start()
         ud.x = 'written'
         ud.y = 'new'
         return 'ok'
-    machine = Watched(chain_of(
-        Scripted(first, first, first, input_keys=['x'], output_keys=['x', 'y']),
-        Scripted('aborted', 'aborted')), settings={'policy': 'restart', 'userdata': 'keep'})
+
+    machine = Watched(
+        chain_of(
+            Scripted(first, first, first, input_keys=['x'], output_keys=['x', 'y']),
+            Scripted('aborted', 'aborted'),
+        ),
+        settings={'policy': 'restart', 'userdata': 'keep'},
+    )
     machine.machine.userdata.x = 'start'
     assert machine.run() == 'done'
     assert seen == [{'x': 'start'}] * 3
@@ -42,15 +52,18 @@ def test_what_was_changed_in_an_object_is_as_at_the_start_for_deep_copied_keys()
     def fill(state, ud):
         ud.cups.append('full')
         return 'ok'
+
     seen = []
 
     def look(state, ud):
         seen.append(list(ud.cups))
         return 'aborted' if len(seen) < 3 else 'ok'
+
     keys = dict(input_keys=['cups'], output_keys=['cups'])
-    machine = Watched(chain_of(Scripted(fill, fill, fill, **keys),
-                               Scripted(look, look, look, **keys)),
-                      settings={'policy': 'restart', 'deep_copy_keys': ['cups']})
+    machine = Watched(
+        chain_of(Scripted(fill, fill, fill, **keys), Scripted(look, look, look, **keys)),
+        settings={'policy': 'restart', 'deep_copy_keys': ['cups']},
+    )
     machine.machine.userdata.cups = []
     assert machine.run() == 'done'
     assert seen == [['full']] * 3
@@ -76,7 +89,8 @@ def test_a_failure_deep_in_a_tree_starts_the_top_machine_over():
     assert machine.visits() == ['FIRST', 'IN', 'DEEP', 'A', 'B'] * 3 + ['LAST']
     jumps = machine.of(EventKind.JUMP)
     assert [(jump.path, jump.target, jump.data['from']) for jump in jumps] == [
-        ('TOP', 'FIRST', 'TOP/IN/DEEP/B')] * 2
+        ('TOP', 'FIRST', 'TOP/IN/DEEP/B')
+    ] * 2
     assert machine.decisions() == [('restart', 'TOP/FIRST')] * 2
 
 
@@ -87,6 +101,7 @@ def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
         seen.append(ud.note)
         ud.note = 'used'
         return 'ok'
+
     inner = chain_of(Scripted(write, write, input_keys=['note'], output_keys=['note']))
     inner.userdata.note = 'clean'
     machine = Watched(nested(inner, after=Scripted('aborted')), settings={'policy': 'restart'})
@@ -95,8 +110,12 @@ def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
 
 
 def test_the_restarts_are_those_of_the_trial_whichever_state_has_failed():
-    machine = watched(Scripted('aborted'), Scripted('aborted'), Scripted('aborted'),
-                      settings={'policy': 'restart'})
+    machine = watched(
+        Scripted('aborted'),
+        Scripted('aborted'),
+        Scripted('aborted'),
+        settings={'policy': 'restart'},
+    )
     assert machine.run() == 'aborted'
     assert machine.visits() == ['A', 'A', 'B', 'A', 'B', 'C']
     assert "the trial's 2 restarts are spent" in machine.of(EventKind.DECISION)[-1].text
@@ -106,7 +125,11 @@ def test_the_next_trial_has_its_restarts_again():
     machine = failing(4)
     assert (machine.run(), machine.run()) == ('aborted', 'done')
     assert [action for action, _ in machine.decisions()] == [
-        'restart', 'restart', 'give_up', 'restart']
+        'restart',
+        'restart',
+        'give_up',
+        'restart',
+    ]
 
 
 def test_nothing_starts_over_where_the_author_goes_on():
@@ -119,7 +142,7 @@ def test_nothing_starts_over_where_the_author_goes_on():
     machine = Watched(top, settings={'policy': 'restart'})
     assert machine.run() == 'done'
     assert machine.visits() == ['FIRST', 'IN', 'A', 'TIDY']
-    decision, = machine.of(EventKind.DECISION)
+    (decision,) = machine.of(EventKind.DECISION)
     assert (decision.outcome, decision.data['decided_by']) == ('give_up', 'author')
     assert 'its author goes on from there' in decision.text
 
@@ -129,7 +152,7 @@ def test_a_restart_repeats_no_state_that_is_not_to_be_repeated(on_retry):
     machine = failing(states={'A': {'on_retry': on_retry}})
     assert machine.run() == 'aborted'
     assert machine.visits() == ['A', 'B']
-    decision, = machine.of(EventKind.DECISION)
+    (decision,) = machine.of(EventKind.DECISION)
     assert (decision.outcome, decision.data['decided_by']) == ('give_up', 'on_retry')
 
 
@@ -137,7 +160,9 @@ def test_a_restart_spends_the_budget_of_the_trial():
     machine = failing(budget={'recoveries': 1})
     assert machine.run() == 'aborted'
     assert [event.data['decided_by'] for event in machine.of(EventKind.DECISION)] == [
-        'policy', 'budget']
+        'policy',
+        'budget',
+    ]
 
 
 def test_a_branch_that_fails_starts_the_whole_script_over_once():
@@ -146,15 +171,24 @@ def test_a_branch_that_fails_starts_the_whole_script_over_once():
     def fail(state, ud):
         gate.wait()
         return 'aborted'
-    both = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                             outcome_map={'done': {'L': 'ok', 'R': 'ok'}})
+
+    both = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'L': 'ok', 'R': 'ok'}},
+    )
     with both:
         smach.Concurrence.add('L', Scripted(fail))
         smach.Concurrence.add('R', Scripted(fail))
     machine = Watched(nested(both), settings={'policy': 'restart'}, name='TOP')
     assert machine.run() == 'done'
-    assert [event.state for event in machine.of(EventKind.STATE_START)
-            if event.path == 'TOP'] == ['FIRST', 'IN', 'FIRST', 'IN', 'LAST']
+    assert [event.state for event in machine.of(EventKind.STATE_START) if event.path == 'TOP'] == [
+        'FIRST',
+        'IN',
+        'FIRST',
+        'IN',
+        'LAST',
+    ]
     assert machine.machine._oracle.tree.restarts.count == 1
 
 

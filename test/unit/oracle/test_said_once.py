@@ -1,4 +1,5 @@
 """Warnings that may come at each visit are said once in a trial; long texts keep head and tail."""
+
 import threading
 
 import pytest
@@ -34,7 +35,7 @@ def test_an_iterator_s_items_name_such_a_key_once(log):
 
 @pytest.mark.parametrize('length, longest', [(0, 5), (5, 5), (6, 5), (1000, 300), (1001, 300)])
 def test_a_text_keeps_its_head_and_its_tail(length, longest):
-    text = ('ValueError: ' + 'x' * length)[:max(0, length - 3)] + 'end'[:length]
+    text = ('ValueError: ' + 'x' * length)[: max(0, length - 3)] + 'end'[:length]
     short = shortened(text, longest)
     assert len(short) <= max(longest, 3)
     if length > longest > 10:

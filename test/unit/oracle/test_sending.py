@@ -1,4 +1,5 @@
 """A running machine that an operator sends to a state, with the checks of an expert's jump."""
+
 import threading
 from typing import Any
 
@@ -22,7 +23,7 @@ def test_it_goes_there_once_its_state_has_ended() -> None:
         gate.opened.set()
         assert (held.end(), second.runs, third.runs) == ('done', 0, 1)
         assert held.hand.status().jumps == {}
-    sent, = held.of(EventKind.SENT)
+    (sent,) = held.of(EventKind.SENT)
     assert (sent.state, sent.target, sent.by) == ('B', 'C', 'eva')
     assert sent.data == {'missing_keys': [], 'userdata': 'keep'}
     assert not held.of(EventKind.JUMP, EventKind.FAILURE)
@@ -72,10 +73,14 @@ def test_it_is_refused_what_an_expert_is_refused() -> None:
 
 def test_a_blocked_state_is_refused() -> None:
     gate = Gate(heeds=False)
-    held = Held(chain_of(Scripted(gate), Scripted('aborted')),
-                settings={'states': {'A': {'time_limit_s': 0.1, 'grace_period_s': 0.05}},
-                          'max_recoveries': 0},
-                expert=FakeExpert(goto('B')))
+    held = Held(
+        chain_of(Scripted(gate), Scripted('aborted')),
+        settings={
+            'states': {'A': {'time_limit_s': 0.1, 'grace_period_s': 0.05}},
+            'max_recoveries': 0,
+        },
+        expert=FakeExpert(goto('B')),
+    )
     held.hand.set_breakpoint('B')
     with held.begin():
         held.waits_before('SM_ROOT/B')
@@ -100,8 +105,10 @@ def test_missing_keys_are_told_before() -> None:
 
 def test_a_state_that_is_not_repeated_by_itself_has_to_be_confirmed() -> None:
     gate, first = Gate(), Scripted()
-    held = Held(chain_of(first, Scripted(gate), Scripted()),
-                settings={'states': {'A': {'on_retry': 'confirm'}}})
+    held = Held(
+        chain_of(first, Scripted(gate), Scripted()),
+        settings={'states': {'A': {'on_retry': 'confirm'}}},
+    )
     with held.begin():
         assert gate.entered.wait(20)
         with pytest.raises(OperatorError, match='going to A may repeat A: confirm that it may'):
@@ -128,8 +135,9 @@ def test_what_comes_to_be_repeated_in_between_is_not_confirmed() -> None:
         held.hand.resume()
         assert held.end() == 'done'
     assert states[0].runs == 1
-    assert ('is not sent to A: it may repeat A, which nobody has confirmed'
-            in [event.text for event in held.of(EventKind.WARNING)])
+    assert 'is not sent to A: it may repeat A, which nobody has confirmed' in [
+        event.text for event in held.of(EventKind.WARNING)
+    ]
 
 
 def test_userdata_are_as_the_state_had_them_unless_settings_keep_them() -> None:
@@ -164,12 +172,14 @@ def test_a_state_that_was_not_entered_after_all_is_the_authors_the_next_time() -
     def pauses(state: Any, ud: Any) -> str:
         held.hand.pause()
         return 'aborted'
+
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
         smach.StateMachine.add('A', Scripted(pauses, gate), {'ok': 'done'})
         smach.StateMachine.add('B', Scripted(), {'ok': 'A'})
-    held = Held(machine, expert=expert, settings={'still_running_s': 0.05,
-                                                  'still_running_factor': 1})
+    held = Held(
+        machine, expert=expert, settings={'still_running_s': 0.05, 'still_running_factor': 1}
+    )
     with held.begin():
         held.waits_before('SM_ROOT/A')
         held.hand.go_to('', 'B')
@@ -189,7 +199,8 @@ def test_a_container_that_ends_before_says_so() -> None:
         gate.opened.set()
         assert held.end() == 'done'
     assert [event.text for event in held.of(EventKind.WARNING)] == [
-        'has ended before it could be sent to A']
+        'has ended before it could be sent to A'
+    ]
     assert not held.hand.status().jumps
 
 
@@ -208,8 +219,11 @@ def test_a_machine_whose_expert_is_asked_goes_there_after_the_answer() -> None:
         return goto('A')
 
     asked, first, last = Gate(), Scripted('aborted'), Scripted()
-    held = Held(chain_of(first, Scripted(), last), expert=FakeExpert(wait_and_go),
-                settings={'max_recoveries': 0})
+    held = Held(
+        chain_of(first, Scripted(), last),
+        expert=FakeExpert(wait_and_go),
+        settings={'max_recoveries': 0},
+    )
     with held.begin():
         eventually(lambda: held.of(EventKind.QUERY_OPENED))
         assert held.hand.go_to('', 'C') == 'SM_ROOT goes to C once ORACLE has ended'
@@ -230,17 +244,17 @@ def test_a_preempt_comes_before_a_jump() -> None:
 def test_it_can_be_sent_into_the_middle_of_a_machine_that_does_not_run() -> None:
     gate, look, aim = Gate(), Scripted(), Scripted()
     between = Scripted()
-    machine = chain(FIRST=Scripted(gate), BETWEEN=between, SEE=chain(ARM=chain(AIM=aim,
-                                                                                  LOOK=look)))
+    machine = chain(FIRST=Scripted(gate), BETWEEN=between, SEE=chain(ARM=chain(AIM=aim, LOOK=look)))
     with Held(machine).begin() as held:
         assert gate.entered.wait(20)
         assert held.hand.go_to('SM_ROOT/SEE/ARM', 'LOOK', 'eva') == (
-            'SM_ROOT goes to SM_ROOT/SEE/ARM/LOOK once FIRST has ended')
+            'SM_ROOT goes to SM_ROOT/SEE/ARM/LOOK once FIRST has ended'
+        )
         assert held.hand.status().jumps == {'SM_ROOT': 'SM_ROOT/SEE/ARM/LOOK'}
         gate.opened.set()
         assert held.end() == 'done'
     assert (between.runs, aim.runs, look.runs) == (0, 0, 1)
-    sent, = held.of(EventKind.SENT)
+    (sent,) = held.of(EventKind.SENT)
     assert (sent.path, sent.state, sent.target) == ('SM_ROOT', 'BETWEEN', 'SEE')
     assert sent.data['to'] == 'SM_ROOT/SEE/ARM/LOOK'
     assert held.machine.execute() == 'done' and aim.runs == 1, 'later it begins at its own start'
@@ -252,7 +266,8 @@ def test_a_paused_machine_goes_into_another_container_and_waits_on_the_way() -> 
     with held.begin():
         held.waits_before('SM_ROOT/FIRST')
         assert held.hand.go_to('SM_ROOT/SEE', 'LOOK') == (
-            'SM_ROOT goes to SM_ROOT/SEE/LOOK instead of FIRST, where it waits')
+            'SM_ROOT goes to SM_ROOT/SEE/LOOK instead of FIRST, where it waits'
+        )
         held.waits_before('SM_ROOT/SEE')
         held.hand.step()
         held.waits_before('SM_ROOT/SEE/LOOK')
@@ -263,24 +278,33 @@ def test_a_paused_machine_goes_into_another_container_and_waits_on_the_way() -> 
 def test_a_jump_into_another_container_has_the_checks_of_an_experts_jump() -> None:
     gate = Gate()
     pour = Scripted()
-    machine = chain(SEE=chain(POUR=pour, LOOK=Scripted(input_keys=['lamp'])),
-                     WAIT=Scripted(gate), LAST=Scripted())
+    machine = chain(
+        SEE=chain(POUR=pour, LOOK=Scripted(input_keys=['lamp'])),
+        WAIT=Scripted(gate),
+        LAST=Scripted(),
+    )
     held = Held(machine, settings={'states': {'POUR': {'on_retry': 'confirm'}}})
     with held.begin():
         assert gate.entered.wait(20)
         with pytest.raises(OperatorError, match='may repeat SEE/POUR: confirm that it may'):
             held.hand.go_to('SM_ROOT/SEE', 'POUR')
         assert held.hand.go_to('SM_ROOT/SEE', 'LOOK', confirm_repeats=True).endswith(
-            '; without its input keys lamp; it may repeat SEE/POUR')
+            '; without its input keys lamp; it may repeat SEE/POUR'
+        )
         held.hand.go_to('SM_ROOT/SEE', 'POUR', confirm_repeats=True)
         gate.opened.set()
         assert held.end() == 'done'
     assert pour.runs == 2
 
 
-@pytest.mark.parametrize('command, told', [
-    ('resume', 'runs now: C in SM_ROOT'), ('step', 'runs now: C in SM_ROOT'),
-    ('confirm', 'runs now: C in SM_ROOT once it is resumed')])
+@pytest.mark.parametrize(
+    'command, told',
+    [
+        ('resume', 'runs now: C in SM_ROOT'),
+        ('step', 'runs now: C in SM_ROOT'),
+        ('confirm', 'runs now: C in SM_ROOT once it is resumed'),
+    ],
+)
 def test_a_command_right_after_a_jump_finds_what_waits_where_it_leads(command, told) -> None:
     """The machine is on its way meanwhile: a callback of its author's takes its time."""
     on_its_way, let_go = threading.Event(), threading.Event()
@@ -292,8 +316,9 @@ def test_a_command_right_after_a_jump_finds_what_waits_where_it_leads(command, t
 
     machine = chain_of(Scripted(), Scripted(), Scripted())
     machine.register_transition_cb(callback)
-    held = Held(machine, settings={'states': {'C': {'autonomy': 'confirm'}}}
-                if command == 'confirm' else {})
+    held = Held(
+        machine, settings={'states': {'C': {'autonomy': 'confirm'}}} if command == 'confirm' else {}
+    )
     held.hand.pause()
     with held.begin():
         held.waits_before('SM_ROOT/A')

@@ -1,4 +1,5 @@
 """Settings by patterns of labels and paths."""
+
 import pytest
 from branch_machines import both, inside, iterator_over
 from machines import Scripted, Watched, chain_of
@@ -11,15 +12,34 @@ from smach_oracle.oracle.settings.patterns import exactness, matches
 from smach_oracle.oracle.settings.settings import Settings
 
 
-@pytest.mark.parametrize('name, path, whether', [
-    ('PICK', 'PICK', True), ('PICK', 'ARM/PICK', True), ('PICK', 'ARM/PICKS', False),
-    ('ARM/PICK', 'ARM/PICK', True), ('ARM/PICK', 'LEFT/ARM/PICK', False),
-    ('P*', 'ARM/PICK', True), ('P*', 'PAN/GRIP', False), ('*', 'A/B', True),
-    ('ARM/*', 'ARM/PICK', True), ('ARM/*', 'ARM/HAND/PICK', False), ('ARM/*', 'ARM', False),
-    ('ARM/**', 'ARM/HAND/PICK', True), ('ARM/**', 'ARM/PICK', True), ('ARM/**', 'ARM', False),
-    ('**/PICK', 'PICK', True), ('**/PICK', 'A/B/PICK', True), ('**/PICK', 'A/B/PICKS', False),
-    ('A/**/Z', 'A/Z', True), ('A/**/Z', 'A/B/C/Z', True), ('A/**/Z', 'B/A/Z', False),
-    ('*_*/GO', 'LEFT_ARM/GO', True), ('**', 'A/B', True), ('A.B', 'AxB', False)])
+@pytest.mark.parametrize(
+    'name, path, whether',
+    [
+        ('PICK', 'PICK', True),
+        ('PICK', 'ARM/PICK', True),
+        ('PICK', 'ARM/PICKS', False),
+        ('ARM/PICK', 'ARM/PICK', True),
+        ('ARM/PICK', 'LEFT/ARM/PICK', False),
+        ('P*', 'ARM/PICK', True),
+        ('P*', 'PAN/GRIP', False),
+        ('*', 'A/B', True),
+        ('ARM/*', 'ARM/PICK', True),
+        ('ARM/*', 'ARM/HAND/PICK', False),
+        ('ARM/*', 'ARM', False),
+        ('ARM/**', 'ARM/HAND/PICK', True),
+        ('ARM/**', 'ARM/PICK', True),
+        ('ARM/**', 'ARM', False),
+        ('**/PICK', 'PICK', True),
+        ('**/PICK', 'A/B/PICK', True),
+        ('**/PICK', 'A/B/PICKS', False),
+        ('A/**/Z', 'A/Z', True),
+        ('A/**/Z', 'A/B/C/Z', True),
+        ('A/**/Z', 'B/A/Z', False),
+        ('*_*/GO', 'LEFT_ARM/GO', True),
+        ('**', 'A/B', True),
+        ('A.B', 'AxB', False),
+    ],
+)
 def test_what_a_name_stands_for(name, path, whether):
     assert matches(name, path) is whether
 
@@ -38,8 +58,15 @@ def test_the_most_exact_name_wins():
 
 
 def test_names_add_up_key_by_key():
-    settings = Settings.from_dict({'states': {'**': {'memory': 3, 'prior': 0.2},
-                                              'ARM/*': {'prior': 0.3}, 'PICK': {'high_from': 0.9}}})
+    settings = Settings.from_dict(
+        {
+            'states': {
+                '**': {'memory': 3, 'prior': 0.2},
+                'ARM/*': {'prior': 0.3},
+                'PICK': {'high_from': 0.9},
+            }
+        }
+    )
     found = settings.for_state('ARM', 'PICK')
     assert (found.memory, found.prior, found.high_from) == (3, 0.3, 0.9)
 
@@ -61,15 +88,21 @@ def tree(left=None, each=None):
     with top:
         smach.StateMachine.add('ARM', arm, {'done': 'BOTH'})
         smach.StateMachine.add('BOTH', both(left or Scripted(), Scripted()), {'done': 'ALL'})
-        smach.StateMachine.add('ALL', iterator_over(each or Scripted(), items=[1, 2]),
-                               {'done': 'done'})
+        smach.StateMachine.add(
+            'ALL', iterator_over(each or Scripted(), items=[1, 2]), {'done': 'done'}
+        )
     return top, arm, hand
 
 
 def test_a_pattern_reaches_states_and_branches():
     top, _, _ = tree()
-    machine = Watched(top, name='TOP', settings={'states': {
-        '**/A': {'prior': 0.2}, 'BOTH/*': {'prior': 0.3}, 'EA*': {'prior': 0.4}}})
+    machine = Watched(
+        top,
+        name='TOP',
+        settings={
+            'states': {'**/A': {'prior': 0.2}, 'BOTH/*': {'prior': 0.3}, 'EA*': {'prior': 0.4}}
+        },
+    )
     rates = {(row.path, row.state): pytest.approx(row.rate) for row in machine.machine.rates()}
     assert rates['TOP/ARM/HAND', 'A'] == 0.2 and rates['TOP/ARM', 'HAND'] == 0.1
     assert rates['TOP/BOTH', 'LEFT'] == rates['TOP/BOTH', 'RIGHT'] == 0.3
@@ -88,17 +121,29 @@ def test_a_mistyped_state_is_refused_with_the_one_that_is_meant():
         OracleContainer.wrap(tree()[0], settings={'states': {'RIHGT': {'prior': 0.3}}})
 
 
-@pytest.mark.parametrize('nested, paths', [
-    (True, {'ARM', 'ARM/HAND', 'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'}), (False, set()),
-    ([], set()), (['ARM'], {'ARM'}), (['ARM', 'ARM/HAND'], {'ARM', 'ARM/HAND'}),
-    (['ARM/HAND'], set()), (['*'], {'ARM', 'ARM/HAND', 'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'}),
-    (['BOTH/*'], {'BOTH/LEFT', 'BOTH/RIGHT'}), (['**/LEFT', 'ALL/**'], {'BOTH/LEFT', 'ALL/EACH'})])
+@pytest.mark.parametrize(
+    'nested, paths',
+    [
+        (True, {'ARM', 'ARM/HAND', 'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'}),
+        (False, set()),
+        ([], set()),
+        (['ARM'], {'ARM'}),
+        (['ARM', 'ARM/HAND'], {'ARM', 'ARM/HAND'}),
+        (['ARM/HAND'], set()),
+        (['*'], {'ARM', 'ARM/HAND', 'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'}),
+        (['BOTH/*'], {'BOTH/LEFT', 'BOTH/RIGHT'}),
+        (['**/LEFT', 'ALL/**'], {'BOTH/LEFT', 'ALL/EACH'}),
+    ],
+)
 def test_nested_says_which_have_oracles_of_their_own(nested, paths):
     top, arm, hand = tree()
     machine = Watched(top, name='TOP', settings={'nested': nested})
-    wrapped = {name for name, each in (('ARM', arm), ('ARM/HAND', hand))
-               if isinstance(each, OracleContainer)}
-    rates = {(row.path + '/' + row.state)[len('TOP/'):] for row in machine.machine.rates()}
+    wrapped = {
+        name
+        for name, each in (('ARM', arm), ('ARM/HAND', hand))
+        if isinstance(each, OracleContainer)
+    }
+    rates = {(row.path + '/' + row.state)[len('TOP/') :] for row in machine.machine.rates()}
     branches = rates.intersection({'BOTH/LEFT', 'BOTH/RIGHT', 'ALL/EACH'})
     assert wrapped | branches == paths
     assert machine.run() == 'done'
@@ -110,7 +155,9 @@ def test_a_branch_without_an_oracle_fails_as_bare():
     machine = Watched(top, name='TOP', settings={'nested': ['ALL/*'], 'max_recoveries': 1})
     assert machine.run() == 'done'
     assert [(event.path, event.state) for event in machine.of(EventKind.FAILURE)] == [
-        ('TOP', 'BOTH'), ('TOP/ALL', 'EACH')]
+        ('TOP', 'BOTH'),
+        ('TOP/ALL', 'EACH'),
+    ]
     assert (left.runs, each.runs) == (2, 3)
 
 

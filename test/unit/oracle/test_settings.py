@@ -1,4 +1,5 @@
 """Settings: what is allowed, and errors that name the key, the value and what is allowed."""
+
 import dataclasses
 
 import pytest
@@ -27,74 +28,142 @@ def test_preconditions_that_were_checked_before_are_taken_and_no_other_tuple():
 def test_the_defaults_are_those_of_the_design():
     settings = Settings.from_dict({})
     state = settings.for_state('', 'ANY')
-    assert (state.memory, state.prior, state.moderate_from, state.high_from,
-            state.max_recoveries) == (10, 0.1, 0.4, 0.75, 5)
-    assert (settings.policy, settings.userdata, settings.on_no_answer) == ('prose', 'restore',
-                                                                           ('stop', ''))
+    assert (
+        state.memory,
+        state.prior,
+        state.moderate_from,
+        state.high_from,
+        state.max_recoveries,
+    ) == (10, 0.1, 0.4, 0.75, 5)
+    assert (settings.policy, settings.userdata, settings.on_no_answer) == (
+        'prose',
+        'restore',
+        ('stop', ''),
+    )
     assert settings.failing_outcomes == ('aborted', 'failed', 'failure', 'error')
     assert settings.deadline_s > 0, 'never an endless wait unless asked for'
     assert Settings.from_dict(None) == settings
 
 
-@pytest.mark.parametrize('given, key, value, allowed', [
-    ({'polisy': 'prose'}, 'polisy', 'prose', 'policy'),
-    ({'policy': 'guess'}, 'policy', 'guess',
-     'algorithm1, always_ask, ladder, prose, random, restart, retry, step_back'),
-    ({'memory': 0}, 'memory', 0, 'whole number'), ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
-    ({'memory': True}, 'memory', True, 'whole number'), ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
-    ({'prior': float('nan')}, 'prior', None, '0 to 1'),
-    ({'moderate_from': 0.9}, 'moderate_from', 0.9, 'high_from'),
-    ({'estimator': 'mean'}, 'estimator', 'mean', 'exponential, window'),
-    ({'max_recoveries': -1}, 'max_recoveries', -1, 'from 0'),
-    ({'on_retry': 'ask'}, 'on_retry', 'ask', 'allow, confirm, never'),
-    ({'states': {'POUR': {'on_retry': True}}}, 'states.POUR.on_retry', True, 'allow, confirm'),
-    ({'failing_outcomes': 'aborted'}, 'failing_outcomes', 'aborted', 'list of strings'),
-    ({'failure_outcomes': ['']}, 'failure_outcomes', '', 'none of them empty'),
-    ({'author_recoveries': 'drop'}, 'author_recoveries', 'drop', 'keep, override'),
-    ({'userdata': 'forget'}, 'userdata', 'forget', 'restore, keep'),
-    ({'time_limit_s': -1}, 'time_limit_s', -1, 'seconds'),
-    ({'time_limit_s': '1'}, 'time_limit_s', '1', 'seconds'),
-    ({'grace_period_s': None}, 'grace_period_s', None, 'seconds'),
-    ({'deadline_s': -1}, 'deadline_s', -1, '0 waits without end'),
-    ({'on_no_answer': 'panic'}, 'on_no_answer', 'panic', 'stop'),
-    ({'on_no_answer': {'goto': ''}}, 'on_no_answer', {'goto': ''}, 'goto'),
-    ({'escalate': 'yes'}, 'escalate', 'yes', 'true or false'),
-    ({'history_length': 0}, 'history_length', 0, 'from 1'),
-    ({'oracle_label': ''}, 'oracle_label', '', 'not empty'),
-    ({'rates_file': 5}, 'rates_file', 5, 'string'), ({'states': ['A']}, 'states', ['A'], 'mapping'),
-    ({'states': {5: {}}}, 'states', 5, 'strings'),
-    ({'states': {'PICK': {'memory': 'ten'}}}, 'states.PICK.memory', 'ten', 'whole number'),
-    ({'states': {'PICK': {'memroy': 1}}}, 'states.PICK.memroy', 1, 'memory'),
-    ({'states': {'PICK': {'policy': 'prose'}}}, 'states.PICK.policy', 'prose', 'prior'),
-    ({'states': {'PICK': {'high_from': 0.2}}
-      }, 'states.PICK.high_from', 0.2, 'moderate_from, which is 0.4'),
-    ({'states': {'PICK': {'moderate_from': 0.8}}
-      }, 'states.PICK.moderate_from', 0.8, 'high_from, which is 0.75'),
-    ({'deadline_s': 10**400}, 'deadline_s', 10**400, 'seconds'),
-    ({'grace_period_s': float('inf')}, 'grace_period_s', float('inf'), 'seconds'),
-    ({'history_length': 10**30}, 'history_length', 10**30, 'to 1000000'),
-    ({'states': {'PICK': {'preconditions': 'A'}}}, 'states.PICK.preconditions', 'A', 'list'),
-    ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
-    ({'interfaces': {'hand': {'action': 'a', 'state': []}}}, 'interfaces.hand.state', [], 'states'),
-    ({'interfaces': {'hand': {'action': 'a', 'states': 'A'}}
-      }, 'interfaces.hand.states', 'A', 'list'),
-    ({'interfaces': {'hand': {'action': 'a', 'args': []}}
-      }, 'interfaces.hand.args', [], 'launch or node'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'launch': 'p/f.launch'}}
-      }, 'interfaces.hand.node', 'p t', 'not both'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': '/tmp/f.launch'}}
-      }, 'interfaces.hand.launch', '/tmp/f.launch', 'PACKAGE/FILE.launch'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}
-      }, 'interfaces.hand.launch', 'p/../f.launch', 'PACKAGE/FILE.launch'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t; rm'}}
-      }, 'interfaces.hand.node', 'p t; rm', 'PACKAGE TYPE'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'args': 'x'}}
-      }, 'interfaces.hand.args', 'x', 'list'),
-    ({'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x': [1]}}}
-      }, 'interfaces.hand.args.x', [1], 'launch argument'),
-    ({'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}
-      }, 'interfaces.hand.start_limit_s', 0, 'seconds'), ('prose', 'settings', 'prose', 'mapping')
-])
+@pytest.mark.parametrize(
+    'given, key, value, allowed',
+    [
+        ({'polisy': 'prose'}, 'polisy', 'prose', 'policy'),
+        (
+            {'policy': 'guess'},
+            'policy',
+            'guess',
+            'algorithm1, always_ask, ladder, prose, random, restart, retry, step_back',
+        ),
+        ({'memory': 0}, 'memory', 0, 'whole number'),
+        ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
+        ({'memory': True}, 'memory', True, 'whole number'),
+        ({'prior': 1.1}, 'prior', 1.1, '0 to 1'),
+        ({'prior': float('nan')}, 'prior', None, '0 to 1'),
+        ({'moderate_from': 0.9}, 'moderate_from', 0.9, 'high_from'),
+        ({'estimator': 'mean'}, 'estimator', 'mean', 'exponential, window'),
+        ({'max_recoveries': -1}, 'max_recoveries', -1, 'from 0'),
+        ({'on_retry': 'ask'}, 'on_retry', 'ask', 'allow, confirm, never'),
+        ({'states': {'POUR': {'on_retry': True}}}, 'states.POUR.on_retry', True, 'allow, confirm'),
+        ({'failing_outcomes': 'aborted'}, 'failing_outcomes', 'aborted', 'list of strings'),
+        ({'failure_outcomes': ['']}, 'failure_outcomes', '', 'none of them empty'),
+        ({'author_recoveries': 'drop'}, 'author_recoveries', 'drop', 'keep, override'),
+        ({'userdata': 'forget'}, 'userdata', 'forget', 'restore, keep'),
+        ({'time_limit_s': -1}, 'time_limit_s', -1, 'seconds'),
+        ({'time_limit_s': '1'}, 'time_limit_s', '1', 'seconds'),
+        ({'grace_period_s': None}, 'grace_period_s', None, 'seconds'),
+        ({'deadline_s': -1}, 'deadline_s', -1, '0 waits without end'),
+        ({'on_no_answer': 'panic'}, 'on_no_answer', 'panic', 'stop'),
+        ({'on_no_answer': {'goto': ''}}, 'on_no_answer', {'goto': ''}, 'goto'),
+        ({'escalate': 'yes'}, 'escalate', 'yes', 'true or false'),
+        ({'history_length': 0}, 'history_length', 0, 'from 1'),
+        ({'oracle_label': ''}, 'oracle_label', '', 'not empty'),
+        ({'rates_file': 5}, 'rates_file', 5, 'string'),
+        ({'states': ['A']}, 'states', ['A'], 'mapping'),
+        ({'states': {5: {}}}, 'states', 5, 'strings'),
+        ({'states': {'PICK': {'memory': 'ten'}}}, 'states.PICK.memory', 'ten', 'whole number'),
+        ({'states': {'PICK': {'memroy': 1}}}, 'states.PICK.memroy', 1, 'memory'),
+        ({'states': {'PICK': {'policy': 'prose'}}}, 'states.PICK.policy', 'prose', 'prior'),
+        (
+            {'states': {'PICK': {'high_from': 0.2}}},
+            'states.PICK.high_from',
+            0.2,
+            'moderate_from, which is 0.4',
+        ),
+        (
+            {'states': {'PICK': {'moderate_from': 0.8}}},
+            'states.PICK.moderate_from',
+            0.8,
+            'high_from, which is 0.75',
+        ),
+        ({'deadline_s': 10**400}, 'deadline_s', 10**400, 'seconds'),
+        ({'grace_period_s': float('inf')}, 'grace_period_s', float('inf'), 'seconds'),
+        ({'history_length': 10**30}, 'history_length', 10**30, 'to 1000000'),
+        ({'states': {'PICK': {'preconditions': 'A'}}}, 'states.PICK.preconditions', 'A', 'list'),
+        ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'state': []}}},
+            'interfaces.hand.state',
+            [],
+            'states',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'states': 'A'}}},
+            'interfaces.hand.states',
+            'A',
+            'list',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'args': []}}},
+            'interfaces.hand.args',
+            [],
+            'launch or node',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'launch': 'p/f.launch'}}},
+            'interfaces.hand.node',
+            'p t',
+            'not both',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'launch': '/tmp/f.launch'}}},
+            'interfaces.hand.launch',
+            '/tmp/f.launch',
+            'PACKAGE/FILE.launch',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}},
+            'interfaces.hand.launch',
+            'p/../f.launch',
+            'PACKAGE/FILE.launch',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'node': 'p t; rm'}}},
+            'interfaces.hand.node',
+            'p t; rm',
+            'PACKAGE TYPE',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'args': 'x'}}},
+            'interfaces.hand.args',
+            'x',
+            'list',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x': [1]}}}},
+            'interfaces.hand.args.x',
+            [1],
+            'launch argument',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}},
+            'interfaces.hand.start_limit_s',
+            0,
+            'seconds',
+        ),
+        ('prose', 'settings', 'prose', 'mapping'),
+    ],
+)
 def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value, allowed):
     with pytest.raises(SettingsError) as raised:
         Settings.from_dict(given)
@@ -107,20 +176,28 @@ def test_an_error_names_the_key_the_value_and_what_is_allowed(given, key, value,
 
 
 def test_settings_of_a_state_win_over_the_machines_and_a_path_over_a_label():
-    settings = Settings.from_dict({'prior': 0.2, 'memory': 5, 'states': {
-        'PICK': {'prior': 0.3}, 'LEFT/PICK': {'memory': 7}}})
-    assert (settings.for_state('', 'PLACE').prior, settings.for_state('',
-                                                                      'PICK').prior) == (0.2, 0.3)
+    settings = Settings.from_dict(
+        {'prior': 0.2, 'memory': 5, 'states': {'PICK': {'prior': 0.3}, 'LEFT/PICK': {'memory': 7}}}
+    )
+    assert (settings.for_state('', 'PLACE').prior, settings.for_state('', 'PICK').prior) == (
+        0.2,
+        0.3,
+    )
     assert settings.for_state('LEFT', 'PICK').memory == 7
     assert settings.for_state('LEFT', 'PICK').prior == 0.3
     assert settings.for_state('RIGHT', 'PICK').memory == 5
 
 
-@pytest.mark.parametrize('given, taken', [('stop', ('stop', '')),
-                                          ({'goto': 'SAFE'}, ('goto', 'SAFE')),
-                                          ('goto:SAFE', ('goto', 'SAFE')),
-                                          ('give_up:aborted', ('give_up', 'aborted')),
-                                          ({'give_up': 'aborted'}, ('give_up', 'aborted'))])
+@pytest.mark.parametrize(
+    'given, taken',
+    [
+        ('stop', ('stop', '')),
+        ({'goto': 'SAFE'}, ('goto', 'SAFE')),
+        ('goto:SAFE', ('goto', 'SAFE')),
+        ('give_up:aborted', ('give_up', 'aborted')),
+        ({'give_up': 'aborted'}, ('give_up', 'aborted')),
+    ],
+)
 def test_fallbacks(given, taken):
     assert Settings.from_dict({'on_no_answer': given}).on_no_answer == taken
 
@@ -131,28 +208,42 @@ def test_no_time_limit_is_said_by_0_or_nothing(given, limit_s):
 
 
 def test_interfaces_are_offered_for_the_states_they_name_or_for_all():
-    settings = Settings.from_dict({'interfaces': {
-        'all': {'action': 'a'}, 'pick': {'action': 'b', 'description': 'd', 'states': ['PICK']},
-        'left': {'action': 'c', 'states': ['LEFT/PICK']}}})
+    settings = Settings.from_dict(
+        {
+            'interfaces': {
+                'all': {'action': 'a'},
+                'pick': {'action': 'b', 'description': 'd', 'states': ['PICK']},
+                'left': {'action': 'c', 'states': ['LEFT/PICK']},
+            }
+        }
+    )
     assert [offer.name for offer in settings.offers_for('', 'PLACE')] == ['all']
     assert settings.offers_for('', 'PICK')[1] == InterfaceOffer('pick', 'b', 'd')
     assert [offer.name for offer in settings.offers_for('LEFT', 'PICK')] == ['all', 'pick', 'left']
 
 
 def test_an_interface_may_say_how_it_is_started():
-    settings = Settings.from_dict({
-        'interfaces': {
-            'hand': {
-                'action': 'a', 'launch': 'my_robot/hand.launch',
-                'args': {'camera': 'head', 'clearance': False}
-            }, 'eye': {
-                'action': 'b', 'node': 'my_robot eye.py', 'args': ['_rate:=5'], 'start_limit_s': 5
+    settings = Settings.from_dict(
+        {
+            'interfaces': {
+                'hand': {
+                    'action': 'a',
+                    'launch': 'my_robot/hand.launch',
+                    'args': {'camera': 'head', 'clearance': False},
+                },
+                'eye': {
+                    'action': 'b',
+                    'node': 'my_robot eye.py',
+                    'args': ['_rate:=5'],
+                    'start_limit_s': 5,
+                },
             }
         }
-    })
+    )
     assert [offer.start for offer in settings.offers_for('', 'PICK')] == [
         InterfaceStart('launch', 'my_robot', 'hand.launch', ('camera:=head', 'clearance:=false')),
-        InterfaceStart('node', 'my_robot', 'eye.py', ('_rate:=5',), 5.0)]
+        InterfaceStart('node', 'my_robot', 'eye.py', ('_rate:=5',), 5.0),
+    ]
 
 
 def test_empty_sections_of_a_file_are_empty():
@@ -164,15 +255,46 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
     with pytest.raises(SettingsError) as raised:
         Settings.from_dict({'polcy': 'prose'})
     assert set(str(raised.value).split('one of the keys ')[1].split(', ')) == {
-        'policy', 'memory', 'prior', 'moderate_from', 'high_from', 'estimator', 'max_recoveries',
-        'failing_outcomes', 'failure_outcomes', 'author_recoveries', 'userdata', 'deep_copy_keys',
-        'time_limit_s', 'grace_period_s', 'on_retry', 'autonomy', 'budget', 'deadline_s',
+        'policy',
+        'memory',
+        'prior',
+        'moderate_from',
+        'high_from',
+        'estimator',
+        'max_recoveries',
+        'failing_outcomes',
+        'failure_outcomes',
+        'author_recoveries',
+        'userdata',
+        'deep_copy_keys',
+        'time_limit_s',
+        'grace_period_s',
+        'on_retry',
+        'autonomy',
+        'budget',
+        'deadline_s',
         'on_no_answer',
-        'escalate', 'step_back_across', 'still_running_s', 'still_running_factor',
-        'watch_preconditions', 'history_length', 'rates_file', 'oracle_label', 'nested',
-        'interfaces', 'states', 'healthy', 'health_settle_s', 'checkpoint', 'checkpoint_wait_s',
-            'checkpoint_synchronous', 'on_resume', 'resume_from', 'resume_map',
-            'resume_repeat', 'after_preempt_s'
+        'escalate',
+        'step_back_across',
+        'still_running_s',
+        'still_running_factor',
+        'watch_preconditions',
+        'history_length',
+        'rates_file',
+        'oracle_label',
+        'nested',
+        'interfaces',
+        'states',
+        'healthy',
+        'health_settle_s',
+        'checkpoint',
+        'checkpoint_wait_s',
+        'checkpoint_synchronous',
+        'on_resume',
+        'resume_from',
+        'resume_map',
+        'resume_repeat',
+        'after_preempt_s',
     }
 
 
@@ -181,10 +303,16 @@ def test_a_map_of_states_may_be_nested_as_the_parameter_server_has_it():
     assert settings.resume_map == {'LOOK': 'SEE', 'KITCHEN/A/B': 'C/D'}
 
 
-@pytest.mark.parametrize('given, named', [
-    ('LOOK=SEE', "resume_map: 'LOOK=SEE'"), ({'LOOK': 3}, 'resume_map.LOOK: 3'),
-    ({'K': {'LOOK': ''}}, "resume_map.K/LOOK: ''"), ({7: 'A'}, 'resume_map: 7'),
-    ({'A//B': 'A'}, "resume_map: 'A//B'")])
+@pytest.mark.parametrize(
+    'given, named',
+    [
+        ('LOOK=SEE', "resume_map: 'LOOK=SEE'"),
+        ({'LOOK': 3}, 'resume_map.LOOK: 3'),
+        ({'K': {'LOOK': ''}}, "resume_map.K/LOOK: ''"),
+        ({7: 'A'}, 'resume_map: 7'),
+        ({'A//B': 'A'}, "resume_map: 'A//B'"),
+    ],
+)
 def test_a_wrong_map_of_states_is_named(given, named):
     with pytest.raises(SettingsError) as caught:
         Settings.from_dict({'resume_map': given})

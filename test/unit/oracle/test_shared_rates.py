@@ -1,4 +1,5 @@
 """Machines that have one rates file, in one process and in several."""
+
 import json
 import os
 import signal
@@ -21,8 +22,11 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def machine(path, name, *scripts, **settings):
-    return Watched(chain_of(*[Scripted(*script) for script in scripts]), name=name,
-                   settings=dict(settings, rates_file=str(path)))
+    return Watched(
+        chain_of(*[Scripted(*script) for script in scripts]),
+        name=name,
+        settings=dict(settings, rates_file=str(path)),
+    )
 
 
 def learned(path, name, label='A', place=''):
@@ -67,8 +71,15 @@ def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):
 def test_a_file_of_before_is_read_and_keeps_its_states(tmp_path):
     path = tmp_path / 'rates.json'
     good = {'estimator': 'window', 'successes': 3, 'failures': 1, 'window': [0, 1, 0, 0]}
-    path.write_text(json.dumps({'format': 'smach_oracle rates', 'version': 1,
-                                'containers': {'': {'A': good, 'GONE': good}}}))
+    path.write_text(
+        json.dumps(
+            {
+                'format': 'smach_oracle rates',
+                'version': 1,
+                'containers': {'': {'A': good, 'GONE': good}},
+            }
+        )
+    )
     task = machine(path, 'TASK', ['aborted'])
     assert task.rate('A').successes == 3
     task.run()
@@ -150,7 +161,7 @@ def test_a_damaged_file_is_kept_aside_also_while_the_machine_runs(tmp_path, log)
     assert learned(path, 'TASK') == (1, 1)
 
 
-HAMMER = '''
+HAMMER = """
 import sys
 sys.path[:0] = {path!r}
 import smach
@@ -165,16 +176,23 @@ for _ in range(runs):
     state.script = ['aborted']
     machine.run()
     machine.events.clear()
-'''
+"""
 
 
-@pytest.mark.parametrize('names', [('ONE', 'TWO', 'THREE'), ('SAME', 'SAME', 'SAME'),
-                                   ('SAME', 'SAME', 'OTHER')])
+@pytest.mark.parametrize(
+    'names', [('ONE', 'TWO', 'THREE'), ('SAME', 'SAME', 'SAME'), ('SAME', 'SAME', 'OTHER')]
+)
 def test_processes_that_hammer_one_file_lose_nothing(tmp_path, names):
     path, runs = tmp_path / 'rates.json', 30
     code = HAMMER.format(path=[HERE] + sys.path)
-    programs = [subprocess.Popen([sys.executable, '-c', code, str(path), name, str(runs)],
-                                 stdin=subprocess.PIPE, stdout=subprocess.PIPE) for name in names]
+    programs = [
+        subprocess.Popen(
+            [sys.executable, '-c', code, str(path), name, str(runs)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        for name in names
+    ]
     for each in programs:
         assert each.stdout.readline() == b'ready\n'
     for each in programs:
@@ -220,18 +238,25 @@ def estimator(kind, results, memory=5):
 
 
 @pytest.mark.parametrize('kind', sorted(ESTIMATORS))
-@pytest.mark.parametrize('shared, theirs, own', [
-    ('', '', '101'), ('110', '', ''), ('110', '01', ''), ('110', '', '0001'),
-    ('1101010', '0001', '11011')])
+@pytest.mark.parametrize(
+    'shared, theirs, own',
+    [
+        ('', '', '101'),
+        ('110', '', ''),
+        ('110', '01', ''),
+        ('110', '', '0001'),
+        ('1101010', '0001', '11011'),
+    ],
+)
 def test_what_is_merged_is_what_one_would_have_learned(kind, shared, theirs, own):
     def of(text):
         return estimator(kind, [letter == '1' for letter in text]).snapshot()
 
     found = merged(of(shared + own), base_of(of(shared)), of(shared + theirs), 5)
     wanted = of(shared + theirs + own)
-    assert {key: pytest.approx(value) for key, value in wanted.items()
-            if key != 'estimator'} == {key: value for key, value in found.items()
-                                       if key != 'estimator'}
+    assert {key: pytest.approx(value) for key, value in wanted.items() if key != 'estimator'} == {
+        key: value for key, value in found.items() if key != 'estimator'
+    }
 
 
 @pytest.mark.parametrize('kind', sorted(ESTIMATORS))

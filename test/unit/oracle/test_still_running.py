@@ -1,4 +1,5 @@
 """A state that the oracle has entered and that takes much longer than ever before."""
+
 import re
 import threading
 
@@ -25,8 +26,12 @@ from smach_oracle.oracle.asking.question import AnswerKind, Expert
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 SOON = {'still_running_s': 0.05, 'still_running_factor': 1}
-QUERIES = (EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_CANCELLED,
-           EventKind.QUERY_EXPIRED)
+QUERIES = (
+    EventKind.QUERY_OPENED,
+    EventKind.QUERY_ANSWERED,
+    EventKind.QUERY_CANCELLED,
+    EventKind.QUERY_EXPIRED,
+)
 
 
 def asked(*states, expert=None, health=None, **settings):
@@ -36,10 +41,12 @@ def asked(*states, expert=None, health=None, **settings):
 
 def letting_go(gate, answer):
     """An expert who lets the state go, and answers when that is of no use any more."""
+
     def ask(question, cancelled, progress):
         gate.go.set()
         assert cancelled.wait(20)
         return answer
+
     return ask
 
 
@@ -57,7 +64,7 @@ def test_a_person_is_asked_in_plain_words_and_the_state_runs_on():
     expert = FakeExpert(letting_go(gate, None))
     machine = asked(Scripted('aborted', gate), expert=expert)
     assert machine.run() == 'done'
-    question, = expert.questions
+    (question,) = expert.questions
     assert (question.failed_state, question.failure_kind) == ('A', FailureKind.STILL_RUNNING)
     assert re.match(r'A still runs after (under )?[0-9.]+ s; ', question.text)
     assert '; its longest so far was ' in question.text
@@ -74,12 +81,15 @@ def test_who_waits_on_is_asked_again_after_twice_the_time():
     expert = FakeExpert(goto('A'), goto('A'), letting_go(gate, None))
     machine = asked(Scripted('aborted', gate), expert=expert, still_running_s=0.2)
     assert machine.run() == 'done'
-    first, second, third = [float(re.findall('[0-9.]+', question.text)[0])
-                            for question in expert.questions]
+    first, second, third = [
+        float(re.findall('[0-9.]+', question.text)[0]) for question in expert.questions
+    ]
     # rounded to two digits, and whoever is asked takes a moment
     assert second > 1.8 * first and third > 1.8 * second
     assert told(machine) == [('QUERY_OPENED', 'A'), ('QUERY_ANSWERED', 'A')] * 2 + [
-        ('QUERY_OPENED', 'A'), ('QUERY_CANCELLED', 'A')]
+        ('QUERY_OPENED', 'A'),
+        ('QUERY_CANCELLED', 'A'),
+    ]
     assert [event.target for event in machine.of(EventKind.JUMP)] == ['A']
 
 
@@ -88,18 +98,25 @@ def test_a_question_that_nobody_can_answer_comes_again():
     expert = FakeExpert(OSError('no connection'), letting_go(gate, None))
     machine = asked(Scripted('aborted', gate), expert=expert)
     assert machine.run() == 'done'
-    assert [kind for kind, _ in told(machine)] == ['QUERY_OPENED', 'QUERY_EXPIRED', 'QUERY_OPENED',
-                                                   'QUERY_CANCELLED']
+    assert [kind for kind, _ in told(machine)] == [
+        'QUERY_OPENED',
+        'QUERY_EXPIRED',
+        'QUERY_OPENED',
+        'QUERY_CANCELLED',
+    ]
     assert machine.of(EventKind.QUERY_EXPIRED)[0].text.endswith('; it runs on')
 
 
-@pytest.mark.parametrize('answer, outcome, visits', [
-    (goto('B', why='it hangs'), 'done', ['A', 'A', 'B']),
-    (supersede('ok'), 'done', ['A', 'A', 'B']),
-    (supersede('aborted'), 'aborted', ['A', 'A']),
-    (give_up('preempted'), 'preempted', ['A', 'A']),
-    (give_up(), 'aborted', ['A', 'A']),
-])
+@pytest.mark.parametrize(
+    'answer, outcome, visits',
+    [
+        (goto('B', why='it hangs'), 'done', ['A', 'A', 'B']),
+        (supersede('ok'), 'done', ['A', 'A', 'B']),
+        (supersede('aborted'), 'aborted', ['A', 'A']),
+        (give_up('preempted'), 'preempted', ['A', 'A']),
+        (give_up(), 'aborted', ['A', 'A']),
+    ],
+)
 def test_the_state_is_preempted_and_the_machine_goes_as_answered(answer, outcome, visits):
     machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(answer))
     before = machine.rate('A').failures
@@ -107,11 +124,15 @@ def test_the_state_is_preempted_and_the_machine_goes_as_answered(answer, outcome
     assert machine.visits() == visits
     assert failures(machine) == ['A'] and machine.rate('A').failures == before + 1
     results = [visit.result.name for visit in machine.machine._oracle.records.history.latest()]
-    assert results[:2] == ['FAILURE', 'SUPERSEDED' if answer.kind is AnswerKind.SUPERSEDE
-                           else 'PREEMPTED']
+    assert results[:2] == [
+        'FAILURE',
+        'SUPERSEDED' if answer.kind is AnswerKind.SUPERSEDE else 'PREEMPTED',
+    ]
     assert not machine.of(EventKind.PREEMPT)
-    assert (machine.of(EventKind.TRANSITION)[1].state,
-            machine.of(EventKind.TRANSITION)[1].target) == ('A', 'ORACLE')
+    assert (
+        machine.of(EventKind.TRANSITION)[1].state,
+        machine.of(EventKind.TRANSITION)[1].target,
+    ) == ('A', 'ORACLE')
     assert told(machine) == [('QUERY_OPENED', 'A'), ('QUERY_ANSWERED', 'A')]
 
 
@@ -125,8 +146,12 @@ def test_the_log_says_by_whose_answer_the_state_is_preempted(by, who, log):
 
 def test_the_preempt_is_taken_back_for_the_next_visit():
     hanging = Scripted('aborted', Gate(), 'ok')
-    machine = asked(hanging, Scripted('aborted'), expert=FakeExpert(goto('B'), goto('A')),
-                    states={'B': {'max_recoveries': 0}})
+    machine = asked(
+        hanging,
+        Scripted('aborted'),
+        expert=FakeExpert(goto('B'), goto('A')),
+        states={'B': {'max_recoveries': 0}},
+    )
     assert machine.run() == 'done'
     assert not hanging.preempt_requested() and hanging.runs == 3
 
@@ -136,10 +161,13 @@ def test_outputs_of_an_answer_are_written_once_the_state_has_ended():
         outcome = Gate()(state, ud)
         ud.box = 'half of it'
         return outcome
+
     seen = []
-    machine = asked(Scripted('aborted', writes, output_keys=['box']),
-                    Scripted(lambda state, ud: seen.append(ud.box) or 'ok', input_keys=['box']),
-                    expert=FakeExpert(supersede('ok', outputs={'box': 'whole'})))
+    machine = asked(
+        Scripted('aborted', writes, output_keys=['box']),
+        Scripted(lambda state, ud: seen.append(ud.box) or 'ok', input_keys=['box']),
+        expert=FakeExpert(supersede('ok', outputs={'box': 'whole'})),
+    )
     assert machine.run() == 'done' and seen == ['whole']
 
 
@@ -150,6 +178,7 @@ def test_whatever_the_state_ends_with_is_replaced(end, log):
         if isinstance(end, Exception):
             raise end
         return end
+
     machine = asked(Scripted('aborted', ends), Scripted(), Scripted(), expert=FakeExpert(goto('C')))
     assert machine.run() == 'done'
     assert machine.visits() == ['A', 'A', 'C'] and failures(machine) == ['A']
@@ -163,18 +192,25 @@ def test_a_state_that_ignores_its_preempt_is_waited_for_and_the_log_says_so(log)
     def ignores(state, ud):
         assert said.wait(20), 'nobody said that it ignores the preempt'
         return 'ok'
-    machine = asked(Scripted('aborted', ignores), Scripted(), expert=FakeExpert(goto('B')),
-                    grace_period_s=0.05)
+
+    machine = asked(
+        Scripted('aborted', ignores), Scripted(), expert=FakeExpert(goto('B')), grace_period_s=0.05
+    )
     machine.machine.events.observers.append(
-        lambda event: 'does not heed its preempt' in event.text and said.set())
+        lambda event: 'does not heed its preempt' in event.text and said.set()
+    )
     assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'B']
     assert any(level == 'warn' and 'the machine waits for its end' in text for level, text in log)
 
 
 def test_answers_that_do_not_fit_are_refused_and_asked_again():
     expert = FakeExpert(interface('hand'), goto('NOWHERE'), goto('B'))
-    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=expert,
-                    interfaces={'hand': {'action': 'hand/assist'}})
+    machine = asked(
+        Scripted('aborted', Gate()),
+        Scripted(),
+        expert=expert,
+        interfaces={'hand': {'action': 'hand/assist'}},
+    )
     assert machine.run() == 'done'
     assert len(expert.questions) == 3 and machine.visits() == ['A', 'A', 'B']
 
@@ -187,7 +223,7 @@ def test_without_an_expert_the_log_warns_once(log):
     assert not gate.go.wait(0.3)  # six times as long as it takes to ask
     gate.go.set()
     assert run.result() == 'done'
-    warning, = machine.of(EventKind.WARNING)
+    (warning,) = machine.of(EventKind.WARNING)
     assert warning.text.startswith('A still runs after ')
     assert sum('still runs after' in text for _, text in log) == 1
     assert not machine.of(*QUERIES)
@@ -197,9 +233,14 @@ def test_a_state_that_the_machine_came_to_by_itself_is_left_alone():
     def takes_long(state, ud):
         assert not threading.Event().wait(0.3)  # six times as long as it takes to ask
         return 'ok'
+
     expert = FakeExpert()
-    machine = asked(Scripted('aborted', takes_long), Scripted(takes_long), expert=expert,
-                    states={'A': {'time_limit_s': 20.0}})
+    machine = asked(
+        Scripted('aborted', takes_long),
+        Scripted(takes_long),
+        expert=expert,
+        states={'A': {'time_limit_s': 20.0}},
+    )
     assert machine.run() == 'done' and not expert.questions
     machine = asked(Scripted(takes_long), expert=expert)
     assert machine.run() == 'done' and not expert.questions
@@ -211,12 +252,15 @@ def test_it_may_take_ten_times_its_longest_visit():
     def takes(state, ud):
         assert not threading.Event().wait(0.2)
         return 'aborted'
+
     machine = asked(Scripted(takes, takes), expert=expert, still_running_factor=10.0)
     assert machine.run() == 'done' and not expert.questions
 
 
-@pytest.mark.parametrize('settings', [
-    {'still_running_s': 0}, {'states': {'A': {'time_limit_s': 0.2}}, 'max_recoveries': 1}])
+@pytest.mark.parametrize(
+    'settings',
+    [{'still_running_s': 0}, {'states': {'A': {'time_limit_s': 0.2}}, 'max_recoveries': 1}],
+)
 def test_a_time_limit_rules_and_zero_asks_never(settings):
     gate = Gate()
     machine = asked(Scripted('aborted', gate), **settings)
@@ -240,6 +284,7 @@ def test_a_preempt_or_a_shutdown_takes_the_question_back(stop, monkeypatch):
             monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         cancelled_in_time.append(cancelled.wait(10))
         gate.go.set()
+
     machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(ask))
     machine.run()
     assert wait_for(lambda: cancelled_in_time == [True])
@@ -259,6 +304,7 @@ def test_a_question_that_is_taken_back_while_the_state_runs_says_why(stop, why, 
         else:
             monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         assert cancelled.wait(10)
+
     machine = asked(Scripted('aborted', stays), expert=FakeExpert(ask))
     machine.run()
     assert [event.text for event in machine.of(EventKind.QUERY_CANCELLED)] == [why]
@@ -274,14 +320,18 @@ def test_a_preempt_or_a_shutdown_goes_before_an_answer(stop, monkeypatch):
             monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         state.service_preempt()
         return 'preempted'
+
     machine = asked(Scripted('aborted', ends), Scripted(), expert=FakeExpert(goto('B')))
     assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
     assert [event.target for event in machine.of(EventKind.TRANSITION)] == ['ORACLE', 'preempted']
 
 
 def both_branches(*scripts):
-    both = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                             outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}})
+    both = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}},
+    )
     with both:
         for label, script in zip(('LEFT', 'RIGHT'), scripts):
             smach.Concurrence.add(label, chain_of(Scripted(*script)))
@@ -306,8 +356,9 @@ class Meeting(Expert):
 def test_two_questions_may_be_open_at_once():
     left, right = Gate(), Gate()
     expert = Meeting({'LEFT': supersede('ok'), 'RIGHT': goto('A')})
-    machine = Watched(both_branches(['aborted', left], ['aborted', right]), expert=expert,
-                      settings=SOON)
+    machine = Watched(
+        both_branches(['aborted', left], ['aborted', right]), expert=expert, settings=SOON
+    )
     run = in_thread(machine.run)
     assert wait_for(lambda: len(machine.of(EventKind.SUPERSEDE)) == 1)
     expert.begun = threading.Barrier(1)
@@ -332,8 +383,12 @@ def test_limits_around_run_on_and_take_the_question_back(monkeypatch):
     def ask(question, cancelled, progress):
         clock.asked.set()
         assert cancelled.wait(20), 'the limit has stood still'
-    machine = Watched(around('X', chain_of(Scripted('aborted', Gate()))), expert=FakeExpert(ask),
-                      settings=dict(SOON, states={'X': {'time_limit_s': 30.0}}))
+
+    machine = Watched(
+        around('X', chain_of(Scripted('aborted', Gate()))),
+        expert=FakeExpert(ask),
+        settings=dict(SOON, states={'X': {'time_limit_s': 30.0}}),
+    )
     assert machine.run() == 'done' and failures(machine) == ['A', 'X']
     assert told(machine) == [('QUERY_OPENED', 'A'), ('QUERY_CANCELLED', 'A')]
 
@@ -342,17 +397,24 @@ def test_a_state_in_which_a_person_is_asked_does_not_count_as_still_running():
     def ask(question, cancelled, progress):
         assert not cancelled.wait(1.5)
         return supersede('ok')
+
     expert = FakeExpert(goto('X'), ask)
-    machine = Watched(around('X', chain_of(Scripted('aborted', 'aborted'))), expert=expert,
-                      settings=dict(SOON, still_running_s=1.0, max_recoveries=0))
+    machine = Watched(
+        around('X', chain_of(Scripted('aborted', 'aborted'))),
+        expert=expert,
+        settings=dict(SOON, still_running_s=1.0, max_recoveries=0),
+    )
     assert machine.run() == 'done' and failures(machine) == ['A', 'A']
     assert [question.failed_state for question in expert.questions] == ['A', 'A']
 
 
 def test_a_nested_machine_that_hangs_is_preempted_as_a_whole():
     inner = chain_of(Scripted('aborted', Gate()))
-    machine = Watched(around('X', inner), expert=FakeExpert(goto('X'), supersede('done')),
-                      settings=dict(SOON, max_recoveries=0))
+    machine = Watched(
+        around('X', inner),
+        expert=FakeExpert(goto('X'), supersede('done')),
+        settings=dict(SOON, max_recoveries=0),
+    )
     assert machine.run() == 'done'
     assert not inner.preempt_requested()
     assert [event.state for event in machine.of(EventKind.QUERY_ANSWERED)] == ['A', 'X']
@@ -362,20 +424,28 @@ def test_the_clocks_thread_lives_only_while_a_state_runs():
     clocks = []
 
     def looks(state, ud):
-        clocks.extend(thread for thread in threading.enumerate()
-                      if 'smach_oracle alarm clock' in thread.name)
+        clocks.extend(
+            thread for thread in threading.enumerate() if 'smach_oracle alarm clock' in thread.name
+        )
         return 'ok'
+
     machine = asked(Scripted('aborted', looks))
     assert machine.run() == 'done'
     assert [clock.daemon for clock in clocks] == [True], 'it keeps no program from its end'
-    assert wait_for(lambda: not any('smach_oracle alarm clock' in thread.name
-                                    for thread in threading.enumerate()))
+    assert wait_for(
+        lambda: (
+            not any('smach_oracle alarm clock' in thread.name for thread in threading.enumerate())
+        )
+    )
 
 
 def test_a_visit_that_was_cut_short_says_nothing_of_how_long_the_state_takes():
     """One that overran, that was taken out, or that a preempt has ended."""
-    overran = Watched(chain_of(Scripted(Gate(), 'ok')), expert=FakeExpert(give_up('preempted')),
-                      settings={'states': {'A': {'time_limit_s': 0.05}}, 'max_recoveries': 0})
+    overran = Watched(
+        chain_of(Scripted(Gate(), 'ok')),
+        expert=FakeExpert(give_up('preempted')),
+        settings={'states': {'A': {'time_limit_s': 0.05}}, 'max_recoveries': 0},
+    )
     taken_out = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(goto('B')))
     preempted = watched(Scripted(Gate()))
     assert overran.run() == 'preempted' and taken_out.run() == 'done'

@@ -1,4 +1,5 @@
 """What bounds the question about a state that still runs: the trial's budget, the state's end."""
+
 import threading
 
 import pytest
@@ -29,7 +30,7 @@ def warned_once(machine, gate):
     assert not gate.go.wait(0.3)  # six times as long as it takes to ask
     gate.go.set()
     assert run.result() == 'done'
-    warning, = machine.of(EventKind.WARNING)
+    (warning,) = machine.of(EventKind.WARNING)
     return warning.text
 
 
@@ -46,7 +47,8 @@ def test_where_the_minutes_are_over_the_log_warns_once(clock):
     gate, expert = Gate(), FakeExpert()
     machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
     machine.machine.events.observers.append(
-        lambda event: event.kind is EventKind.JUMP and clock.__setitem__(0, 1061.0))
+        lambda event: event.kind is EventKind.JUMP and clock.__setitem__(0, 1061.0)
+    )
     assert warned_once(machine, gate).endswith("the trial's 1 minute is over")
     assert not expert.questions
 
@@ -56,6 +58,7 @@ def test_the_question_is_open_no_longer_than_the_minutes(clock):
 
     def ask(question, cancelled, progress):
         clock[0] += 61.0
+
     expert = FakeExpert(ask)
     machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
     run = in_thread(machine.run)
@@ -63,15 +66,18 @@ def test_the_question_is_open_no_longer_than_the_minutes(clock):
     assert not gate.go.wait(0.3)  # nobody is asked again
     gate.go.set()
     assert run.result() == 'done'
-    question, = expert.questions
+    (question,) = expert.questions
     assert 0 < question.deadline_s <= 60.0
     assert machine.of(EventKind.QUERY_EXPIRED)[0].text.endswith(
-        "; the trial's 1 minute is over; it runs on")
+        "; the trial's 1 minute is over; it runs on"
+    )
     assert not machine.of(EventKind.WARNING)
 
 
-@pytest.mark.parametrize('answer, warnings', [
-    (goto('B'), ['A has ended by itself; the answer is not used']), (goto('A'), [])])
+@pytest.mark.parametrize(
+    'answer, warnings',
+    [(goto('B'), ['A has ended by itself; the answer is not used']), (goto('A'), [])],
+)
 def test_an_answer_to_a_state_that_ends_at_that_moment_is_told_of(answer, warnings, monkeypatch):
     gate = Gate()
     take_out = WatchedVisit._take_out
@@ -79,14 +85,16 @@ def test_an_answer_to_a_state_that_ends_at_that_moment_is_told_of(answer, warnin
     def take_out_late(visit, answer):
         assert visit._ended.wait(20)
         take_out(visit, answer)
+
     monkeypatch.setattr(WatchedVisit, '_take_out', take_out_late)
     machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(answer))
     machine.machine.events.observers.append(
-        lambda event: event.kind is EventKind.QUERY_ANSWERED and gate.go.set())
+        lambda event: event.kind is EventKind.QUERY_ANSWERED and gate.go.set()
+    )
     assert machine.run() == 'done'
     assert [kind for kind, _ in told(machine)][:2] == ['QUERY_OPENED', 'QUERY_ANSWERED']
     assert [event.text for event in machine.of(EventKind.WARNING)] == warnings
-    answered, = [event.query_id for event in machine.of(EventKind.QUERY_ANSWERED)]
+    (answered,) = [event.query_id for event in machine.of(EventKind.QUERY_ANSWERED)]
     assert answered not in [event.query_id for event in machine.of(EventKind.QUERY_CANCELLED)]
 
 
@@ -98,6 +106,7 @@ def test_an_answer_after_the_state_has_ended_is_none(log):
         assert cancelled.wait(20)
         assert wait_for(lambda: machine.of(EventKind.QUERY_CANCELLED))
         return goto('B')
+
     machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(ask))
     assert machine.run() == 'done'
     assert wait_for(lambda: any('came too late' in text for _, text in log))
@@ -107,7 +116,11 @@ def test_an_answer_after_the_state_has_ended_is_none(log):
 def test_a_state_that_is_held_back_is_no_longer_one_that_the_oracle_has_entered():
     machine, expert = guarded(
         chain(DETECT=Scripted('ok', 'aborted'), POUR=Scripted(), PLACE=Scripted('aborted')),
-        goto('DETECT'), supersede('ok'), supersede('ok'), max_recoveries=0)
+        goto('DETECT'),
+        supersede('ok'),
+        supersede('ok'),
+        max_recoveries=0,
+    )
     assert machine.run() == 'done' and len(expert.questions) == 3
     assert expert.questions[2].failure_kind is FailureKind.HELD_BACK
     assert not machine.machine._oracle.record('POUR').entered_by_oracle
@@ -118,6 +131,7 @@ def test_the_clock_lives_on_after_an_alarm_that_fails(log):
 
     def fails():
         raise RuntimeError('no more threads')
+
     clock.ring_in(0.0, fails)
     clock.ring_in(0.05, rung.set)
     assert rung.wait(10)
@@ -130,8 +144,14 @@ def test_the_answer_waits_until_the_robot_is_well():
     def ask(question, cancelled, progress):
         health.now = 'motors: off'
         return goto('B')
-    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(ask),
-                    health=health, health_settle_s=0.05)
+
+    machine = asked(
+        Scripted('aborted', Gate()),
+        Scripted(),
+        expert=FakeExpert(ask),
+        health=health,
+        health_settle_s=0.05,
+    )
     run = in_thread(machine.run)
     assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START))
     assert machine.visits() == ['A', 'A']
@@ -141,8 +161,9 @@ def test_the_answer_waits_until_the_robot_is_well():
 
 def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
     closed = []
-    monkeypatch.setattr(way, 'why_closed',
-                        lambda node, label: 'still runs' if closed and label == 'B' else '')
+    monkeypatch.setattr(
+        way, 'why_closed', lambda node, label: 'still runs' if closed and label == 'B' else ''
+    )
 
     class ClosesB(Gate):
         def __call__(self, state, ud):
@@ -154,5 +175,6 @@ def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatc
     machine = asked(Scripted('aborted', ClosesB()), Scripted(), Scripted(), expert=expert)
     assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'C']
     assert [event.text for event in machine.of(EventKind.WARNING)] == [
-        'cannot go to B, as was answered: B still runs']
+        'cannot go to B, as was answered: B still runs'
+    ]
     assert expert.questions[1].text == 'was taken out while it still ran'

@@ -1,4 +1,5 @@
 """States with a time limit: preempted, given grace, abandoned, blocked while their thread lives."""
+
 import threading
 import time
 from typing import List
@@ -90,13 +91,17 @@ class Stubborn(Scripted):
 
 def limited(state, *others, expert=None, machine_settings=None, **settings):
     machine = chain_of(state, *others)
-    return Watched(machine, expert=expert, settings=dict(machine_settings or {},
-                                                         states={'A': settings or LIMITED}))
+    return Watched(
+        machine,
+        expert=expert,
+        settings=dict(machine_settings or {}, states={'A': settings or LIMITED}),
+    )
 
 
 def test_a_state_within_its_limit_is_as_any_other():
-    state = Scripted(lambda self, ud: setattr(ud, 'x', ud.y + 1) or 'ok', input_keys=['y'],
-                     output_keys=['x'])
+    state = Scripted(
+        lambda self, ud: setattr(ud, 'x', ud.y + 1) or 'ok', input_keys=['y'], output_keys=['x']
+    )
     machine = limited(state, **LIMITED)
     machine.machine.userdata.y = 1
     assert machine.run() == 'done'
@@ -133,8 +138,9 @@ def test_a_preempt_that_the_state_did_not_service_in_its_grace_does_not_reach_it
         return 'ok'
 
     seen = []
-    machine = limited(Scripted(slow,
-                               lambda self, ud: seen.append(self.preempt_requested()) or 'ok'))
+    machine = limited(
+        Scripted(slow, lambda self, ud: seen.append(self.preempt_requested()) or 'ok')
+    )
     clock.end(1, entered)
     assert machine.run() == 'done'
     assert seen == [False]
@@ -159,8 +165,12 @@ def test_a_nested_machine_that_is_abandoned_hands_no_late_outputs_up(clock):
     with outer:
         smach.StateMachine.add('A', inner, {'done': 'B'})
         smach.StateMachine.add('B', Scripted(), {'ok': 'done'})
-    machine = Watched(outer, expert=FakeExpert(goto('B')),
-                      settings={'states': {'TOP': {}, 'A': ABANDONING}}, strict=False)
+    machine = Watched(
+        outer,
+        expert=FakeExpert(goto('B')),
+        settings={'states': {'TOP': {}, 'A': ABANDONING}},
+        strict=False,
+    )
     machine.machine._oracle.configure(machine.machine.settings)
     assert machine.run() == 'done'
     inner_state.leave()
@@ -189,8 +199,11 @@ def test_a_transition_into_a_state_whose_thread_lives_fails_at_once(clock):
     with machine:
         smach.StateMachine.add('A', state, {'ok': 'done'})
         smach.StateMachine.add('B', Scripted(), {'ok': 'A'})
-    machine = Watched(machine, expert=FakeExpert(goto('B'), supersede('ok')),
-                      settings={'states': {'A': ABANDONING}})
+    machine = Watched(
+        machine,
+        expert=FakeExpert(goto('B'), supersede('ok')),
+        settings={'states': {'A': ABANDONING}},
+    )
     assert machine.run() == 'done'
     failures = machine.of(EventKind.FAILURE)
     assert {event.failure_kind for event in failures} == {FailureKind.TIME_LIMIT}
@@ -208,8 +221,12 @@ def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too(clock):
         smach.StateMachine.add('TWIN', state, {'ok': 'done'})
         smach.StateMachine.add('B', Scripted('aborted'), {'ok': 'done'})
     expert = FakeExpert(goto('TWIN'), goto('B'), goto('B'))
-    machine = Watched(machine, expert=expert, preconditions={'B': ['TWIN']},
-                      settings={'states': {'A': ABANDONING}})
+    machine = Watched(
+        machine,
+        expert=expert,
+        preconditions={'B': ['TWIN']},
+        settings={'states': {'A': ABANDONING}},
+    )
     assert machine.run() == 'done'
     assert state.runs == 1
     end = machine.of(EventKind.PRECONDITION_END)[0]
@@ -254,6 +271,7 @@ def test_ctrl_c_while_the_machine_waits_leaves_the_state_behind(monkeypatch):
             assert state.stuck.wait(20)
             raise KeyboardInterrupt
         return real(event, seconds)
+
     monkeypatch.setattr(worker, 'wait', interrupted)
     with pytest.raises(KeyboardInterrupt):
         machine.run()
@@ -294,8 +312,10 @@ def test_an_overrun_that_nobody_resolves_stops_with_the_machines_failing_outcome
 
 
 def test_an_overrun_in_a_machine_without_a_failing_outcome_raises():
-    machine = Watched(chain_of(Scripted(Gate(), outcomes=('ok',)), outcomes=('done',)),
-                      settings={'max_recoveries': 0, 'time_limit_s': BRIEF_S})
+    machine = Watched(
+        chain_of(Scripted(Gate(), outcomes=('ok',)), outcomes=('done',)),
+        settings={'max_recoveries': 0, 'time_limit_s': BRIEF_S},
+    )
     with pytest.raises(smach.InvalidUserCodeError, match='overran its time limit of 0.1 s'):
         machine.run()
 
@@ -313,16 +333,20 @@ def test_without_recovery_there_are_no_limits():
     def longer_than_its_limit(state, ud):
         time.sleep(0.02)  # what makes it late is that time passes
         return 'ok'
-    machine = watched(Scripted(longer_than_its_limit), settings={'time_limit_s': 0.01},
-                      recover=False)
+
+    machine = watched(
+        Scripted(longer_than_its_limit), settings={'time_limit_s': 0.01}, recover=False
+    )
     assert machine.run() == 'done'
     assert not machine.of(EventKind.FAILURE)
 
 
 def test_a_limit_given_with_add():
     from smach_oracle.oracle import OracleContainer
-    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'],
-                              settings={'max_recoveries': 0})
+
+    machine = OracleContainer(
+        outcomes=['done', 'aborted', 'preempted'], settings={'max_recoveries': 0}
+    )
     with machine:
         OracleContainer.add('A', Scripted(Gate()), {'ok': 'done'}, time_limit_s=BRIEF_S)
     assert machine.execute() == 'aborted'
@@ -330,6 +354,7 @@ def test_a_limit_given_with_add():
 
 def test_context_variables_reach_the_worker():
     import contextvars
+
     variable = contextvars.ContextVar('v', default='unset')
     seen = []
     variable.set('set')

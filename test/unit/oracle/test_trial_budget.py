@@ -1,4 +1,5 @@
 """The budget of a whole trial: recoveries, minutes, questions."""
+
 import copy
 import threading
 
@@ -28,8 +29,11 @@ def failing(*answers, budget, times=100, **settings):
     """LOOK, and PICK that fails so often; the machine, watched, and its expert."""
     expert = FakeExpert(*answers)
     states = chain(LOOK=Scripted(), PICK=Scripted(*['aborted'] * times))
-    return Watched(states, expert=expert, settings=dict(
-        {'memory': 1000, 'max_recoveries': 50, 'budget': budget}, **settings)), expert
+    return Watched(
+        states,
+        expert=expert,
+        settings=dict({'memory': 1000, 'max_recoveries': 50, 'budget': budget}, **settings),
+    ), expert
 
 
 def test_it_is_checked():
@@ -40,14 +44,18 @@ def test_it_is_checked():
     assert Settings.from_dict({'budget': nothing}).budget == Budget()
 
 
-@pytest.mark.parametrize('given, key, allowed', [
-    ({'recoveries': -1}, 'budget.recoveries', 'a whole number from 0'),
-    ({'recoveries': True}, 'budget.recoveries', 'a whole number from 0'),
-    ({'questions': 1.5}, 'budget.questions', 'a whole number from 0'),
-    ({'minutes': 0}, 'budget.minutes', 'a number of minutes above 0'),
-    ({'minutes': 'ten'}, 'budget.minutes', 'a number of minutes above 0'),
-    ({'hours': 1}, 'budget.hours', 'one of the keys recoveries, minutes, questions'),
-    (5, 'budget', 'a mapping')])
+@pytest.mark.parametrize(
+    'given, key, allowed',
+    [
+        ({'recoveries': -1}, 'budget.recoveries', 'a whole number from 0'),
+        ({'recoveries': True}, 'budget.recoveries', 'a whole number from 0'),
+        ({'questions': 1.5}, 'budget.questions', 'a whole number from 0'),
+        ({'minutes': 0}, 'budget.minutes', 'a number of minutes above 0'),
+        ({'minutes': 'ten'}, 'budget.minutes', 'a number of minutes above 0'),
+        ({'hours': 1}, 'budget.hours', 'one of the keys recoveries, minutes, questions'),
+        (5, 'budget', 'a mapping'),
+    ],
+)
 def test_what_is_no_budget_is_refused(given, key, allowed):
     with pytest.raises(SettingsError) as told:
         Settings.from_dict({'budget': given})
@@ -61,31 +69,37 @@ def test_it_is_the_machines_not_a_states():
 
 # -- recoveries
 
+
 def test_when_the_recoveries_are_spent_the_expert_is_asked():
     machine, expert = failing(give_up(), budget={'recoveries': 2})
     assert machine.run() == 'aborted'
     assert [action for action, _ in machine.decisions()] == ['revisit', 'step_back', 'ask']
     assert sentences(machine)[-1] == (
         "PICK keeps failing after going back to LOOK (3 of its last 3); the trial's 2 recoveries "
-        'are spent: asking an expert, 300 s')
+        'are spent: asking an expert, 300 s'
+    )
     assert deciders(machine)[-1] == Decider.BUDGET
     assert expert.questions[0].reason.endswith("the trial's 2 recoveries are spent")
 
 
-@pytest.mark.parametrize('recoveries, told', [(0, 'this trial is allowed no recoveries'),
-                                              (1, "the trial's 1 recovery is spent")])
+@pytest.mark.parametrize(
+    'recoveries, told',
+    [(0, 'this trial is allowed no recoveries'), (1, "the trial's 1 recovery is spent")],
+)
 def test_no_precondition_is_run_then(recoveries, told):
     clear = Scripted()
-    machine, _ = failing(give_up(), budget={'recoveries': recoveries},
-                         states={'PICK': {'preconditions': [clear]}})
+    machine, _ = failing(
+        give_up(), budget={'recoveries': recoveries}, states={'PICK': {'preconditions': [clear]}}
+    )
     assert machine.run() == 'aborted'
     assert clear.runs == recoveries
     assert told in sentences(machine)[-1]
 
 
 def test_what_an_expert_decides_costs_no_recovery():
-    machine, expert = failing(goto('PICK'), goto('PICK'), goto('PICK'), give_up(), times=4,
-                              budget={'recoveries': 1})
+    machine, expert = failing(
+        goto('PICK'), goto('PICK'), goto('PICK'), give_up(), times=4, budget={'recoveries': 1}
+    )
     assert machine.run() == 'done'
     assert [action for action, _ in machine.decisions()] == ['revisit', 'ask', 'ask', 'ask']
 
@@ -99,14 +113,21 @@ def test_a_new_trial_has_all_of_it_again():
 
 def test_it_is_one_for_all_containers():
     inner = chain(REACH=Scripted(*['aborted'] * 9))
-    machine = Watched(chain(LOOK=Scripted('aborted'), INNER=inner), expert=FakeExpert(give_up()),
-                      settings={'memory': 1000, 'budget': {'recoveries': 2}})
+    machine = Watched(
+        chain(LOOK=Scripted('aborted'), INNER=inner),
+        expert=FakeExpert(give_up()),
+        settings={'memory': 1000, 'budget': {'recoveries': 2}},
+    )
     assert machine.run() == 'aborted'
     assert [(event.path, event.outcome) for event in machine.of(EventKind.DECISION)] == [
-        ('SM_ROOT', 'revisit'), ('SM_ROOT/INNER', 'revisit'), ('SM_ROOT/INNER', 'ask')]
+        ('SM_ROOT', 'revisit'),
+        ('SM_ROOT/INNER', 'revisit'),
+        ('SM_ROOT/INNER', 'ask'),
+    ]
     assert sentences(machine)[2] == (
         "REACH keeps failing after trying it again (2 of its last 2); the trial's 2 recoveries "
-        'are spent: asking an expert, 300 s')
+        'are spent: asking an expert, 300 s'
+    )
 
 
 def test_a_fallback_to_a_state_costs_a_recovery():
@@ -127,42 +148,51 @@ def test_the_branches_of_a_concurrence_share_it():
         if state.runs == 1:
             barrier.wait(20)
         return 'aborted'
+
     branches = {name: chain(REACH=Scripted(*[fails] * 30)) for name in 'ABCD'}
-    concurrence = smach.Concurrence(outcomes=['done', 'aborted'], default_outcome='aborted',
-                                    outcome_map={})
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'], default_outcome='aborted', outcome_map={}
+    )
     with concurrence:
         for name, branch in branches.items():
             smach.Concurrence.add(name, branch)
-    machine = Watched(chain(BOTH=concurrence), expert=FakeExpert(), settings={
-        'memory': 1000, 'max_recoveries': 50, 'budget': {'recoveries': 10}})
+    machine = Watched(
+        chain(BOTH=concurrence),
+        expert=FakeExpert(),
+        settings={'memory': 1000, 'max_recoveries': 50, 'budget': {'recoveries': 10}},
+    )
     assert machine.run() == 'aborted'
     assert len(machine.of(EventKind.JUMP)) == 10
 
 
 # -- questions
 
+
 def test_when_the_questions_are_spent_nobody_is_asked():
-    machine, expert = failing(goto('PICK'), goto('PICK'), max_recoveries=0,
-                              budget={'questions': 1})
+    machine, expert = failing(goto('PICK'), goto('PICK'), max_recoveries=0, budget={'questions': 1})
     assert machine.run() == 'aborted'
     assert len(expert.questions) == len(machine.of(EventKind.QUERY_OPENED)) == 1
-    assert sentences(machine)[-1] == ('PICK failed (2 of its last 2), and no recovery of it is '
-                                      "allowed: asking nobody, since the trial's 1 question is "
-                                      'spent')
+    assert sentences(machine)[-1] == (
+        'PICK failed (2 of its last 2), and no recovery of it is '
+        "allowed: asking nobody, since the trial's 1 question is "
+        'spent'
+    )
     assert machine.of(EventKind.GIVE_UP)[0].text == "the trial's 1 question is spent"
 
 
 def test_what_is_configured_for_no_answer_is_done_then():
-    machine, expert = failing(max_recoveries=0, times=1, on_no_answer='goto:PICK',
-                              budget={'questions': 0})
+    machine, expert = failing(
+        max_recoveries=0, times=1, on_no_answer='goto:PICK', budget={'questions': 0}
+    )
     assert machine.run() == 'done'
     assert not expert.questions
     assert machine.of(EventKind.JUMP)[0].text == 'this trial is allowed no questions'
 
 
 def test_a_question_put_again_counts_once():
-    machine, expert = failing(goto('NOWHERE'), goto('PICK'), max_recoveries=0, times=1,
-                              budget={'questions': 1})
+    machine, expert = failing(
+        goto('NOWHERE'), goto('PICK'), max_recoveries=0, times=1, budget={'questions': 1}
+    )
     assert machine.run() == 'done'
     assert len(expert.questions) == 2
 
@@ -170,34 +200,52 @@ def test_a_question_put_again_counts_once():
 def test_a_failure_on_which_the_level_above_decides_is_no_question():
     inner = chain(REACH=Scripted('aborted', 'aborted'))
     expert = FakeExpert()
-    machine = Watched(chain(INNER=inner), expert=expert, settings={
-        'escalate': True, 'memory': 1000, 'budget': {'questions': 0, 'recoveries': 2},
-        'states': {'REACH': {'prior': 0.5}}})
+    machine = Watched(
+        chain(INNER=inner),
+        expert=expert,
+        settings={
+            'escalate': True,
+            'memory': 1000,
+            'budget': {'questions': 0, 'recoveries': 2},
+            'states': {'REACH': {'prior': 0.5}},
+        },
+    )
     assert machine.run() == 'done' and not expert.questions
     assert machine.decisions() == [('revisit', 'REACH'), ('ask', ''), ('revisit', 'INNER')]
 
 
 # -- minutes
 
+
 def passing(clock, minutes, outcome='aborted'):
     """A step of a state that takes so long and ends so."""
+
     def step(state, ud):
         clock[0] += 60.0 * minutes
         return outcome
+
     return step
 
 
 def test_when_the_minutes_are_over_it_ends_as_without_an_oracle(clock):
     clear, expert = Scripted(), FakeExpert(goto('PICK'))
     states = chain(PICK=Scripted(passing(clock, 1), passing(clock, 29), passing(clock, 0)))
-    machine = Watched(states, expert=expert, settings={
-        'memory': 1000, 'budget': {'minutes': 30}, 'on_no_answer': 'goto:PICK',
-        'states': {'PICK': {'preconditions': [clear]}}})
+    machine = Watched(
+        states,
+        expert=expert,
+        settings={
+            'memory': 1000,
+            'budget': {'minutes': 30},
+            'on_no_answer': 'goto:PICK',
+            'states': {'PICK': {'preconditions': [clear]}},
+        },
+    )
     assert machine.run() == 'aborted'
     assert machine.decisions() == [('revisit', 'PICK')] and clear.runs == 1
     assert machine.of(EventKind.GIVE_UP)[0].text == (
         "PICK keeps failing after trying it again (2 of its last 2); the trial's 30 minutes are "
-        'over: the machine ends as without an oracle')
+        'over: the machine ends as without an oracle'
+    )
     assert not expert.questions
     assert machine.run() == 'done', 'the next trial has minutes of its own'
 
@@ -206,6 +254,7 @@ def test_an_exception_is_raised_then(clock):
     def late(state, ud):
         clock[0] += 61
         raise ValueError('no grasp')
+
     machine = Watched(chain(PICK=Scripted(late)), settings={'budget': {'minutes': 1}})
     with pytest.raises(smach.InvalidUserCodeError, match='no grasp'):
         machine.run()
@@ -232,19 +281,27 @@ def test_a_question_is_open_no_longer_than_the_trial(clock, deadline_s):
     def too_late(question, cancelled, progress):
         clock[0] += 90
         return None
-    machine, expert = failing(too_late, max_recoveries=0, deadline_s=deadline_s,
-                              on_no_answer='goto:PICK', budget={'minutes': 1.5})
+
+    machine, expert = failing(
+        too_late,
+        max_recoveries=0,
+        deadline_s=deadline_s,
+        on_no_answer='goto:PICK',
+        budget={'minutes': 1.5},
+    )
     assert machine.run() == 'aborted'
     assert expert.questions[0].deadline_s == pytest.approx(90, abs=20)
     assert expert.questions[0].fallback == 'stop with aborted'
     assert sentences(machine)[0].endswith("asking an expert, 90 s, which are the trial's last")
     assert machine.of(EventKind.GIVE_UP)[0].text == (
-        "no answer by the deadline; the trial's 1.5 minutes are over")
+        "no answer by the deadline; the trial's 1.5 minutes are over"
+    )
 
 
 def test_a_deadline_within_the_minutes_stays(clock):
-    machine, expert = failing(goto('PICK'), max_recoveries=0, times=1, deadline_s=30,
-                              budget={'minutes': 1})
+    machine, expert = failing(
+        goto('PICK'), max_recoveries=0, times=1, deadline_s=30, budget={'minutes': 1}
+    )
     assert machine.run() == 'done'
     assert expert.questions[0].deadline_s == pytest.approx(30, abs=20)
     assert sentences(machine)[0].endswith('asking an expert, 30 s')

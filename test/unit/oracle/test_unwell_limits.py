@@ -1,4 +1,5 @@
 """What ends the wait for health, and the repeats that nobody counts: a cap, and the budget."""
+
 import pytest
 from machines import FakeExpert, FakeHealth, Scripted, goto, supersede, watched
 from test_health import SETTINGS, fails_unwell, heals_at_once, notices
@@ -22,8 +23,13 @@ def clock(monkeypatch):
 
 def flapping(health, times=100, expert=None, **settings):
     """A state that makes the robot unwell, for a moment, so often as it runs; and one behind."""
-    machine = watched(Scripted(*[fails_unwell(health)] * times), Scripted(), health=health,
-                      expert=expert, settings=dict(SETTINGS, **settings))
+    machine = watched(
+        Scripted(*[fails_unwell(health)] * times),
+        Scripted(),
+        health=health,
+        expert=expert,
+        settings=dict(SETTINGS, **settings),
+    )
     heals_at_once(machine, health)
     return machine
 
@@ -42,10 +48,20 @@ def test_beyond_the_cap_a_person_is_asked_once_the_robot_is_well(health):
     expert = FakeExpert(supersede('ok'))
     machine = flapping(health, expert=expert, max_recoveries=0)
     assert machine.run() == 'done'
-    kinds = [kind for kind in machine.kinds() if kind in (
-        'FAILURE', 'HEALTH_WAIT_START', 'HEALTH_WAIT_END', 'QUERY_OPENED', 'SUPERSEDE')]
-    assert kinds == ['HEALTH_WAIT_START', 'HEALTH_WAIT_END', 'FAILURE', 'HEALTH_WAIT_START',
-                     'HEALTH_WAIT_END', 'QUERY_OPENED', 'SUPERSEDE']
+    kinds = [
+        kind
+        for kind in machine.kinds()
+        if kind in ('FAILURE', 'HEALTH_WAIT_START', 'HEALTH_WAIT_END', 'QUERY_OPENED', 'SUPERSEDE')
+    ]
+    assert kinds == [
+        'HEALTH_WAIT_START',
+        'HEALTH_WAIT_END',
+        'FAILURE',
+        'HEALTH_WAIT_START',
+        'HEALTH_WAIT_END',
+        'QUERY_OPENED',
+        'SUPERSEDE',
+    ]
 
 
 def test_each_trial_has_its_own_uncounted_repeats(health):
@@ -57,12 +73,16 @@ def test_each_trial_has_its_own_uncounted_repeats(health):
 
 
 def test_the_minutes_end_the_wait(health, clock):
-    machine = watched(Scripted(fails_unwell(health)), health=health,
-                      settings=dict(SETTINGS, budget={'minutes': 1}))
+    machine = watched(
+        Scripted(fails_unwell(health)),
+        health=health,
+        settings=dict(SETTINGS, budget={'minutes': 1}),
+    )
 
     def pass_time(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
             clock[0] += 61.0
+
     machine.machine.events.observers.append(pass_time)
     assert machine.run() == 'aborted'
     assert machine.visits() == ['A'] and notices(machine)[1].outcome == 'stopped'
@@ -73,8 +93,8 @@ def test_after_the_minutes_nobody_waits(health, clock):
     def late(state, ud):
         clock[0] += 61.0
         return fails_unwell(health)(state, ud)
-    machine = watched(Scripted(late), health=health,
-                      settings=dict(SETTINGS, budget={'minutes': 1}))
+
+    machine = watched(Scripted(late), health=health, settings=dict(SETTINGS, budget={'minutes': 1}))
     assert machine.run() == 'aborted'
     assert machine.visits() == ['A'] and not notices(machine)
 
@@ -83,12 +103,19 @@ def test_the_minutes_end_the_wait_before_a_jump(health, clock):
     def answer(question, cancelled, progress):
         health.now = 'motors: off'
         return goto('B')
-    machine = watched(Scripted('aborted'), Scripted(), health=health, expert=FakeExpert(answer),
-                      settings=dict(SETTINGS, max_recoveries=0, budget={'minutes': 1}))
+
+    machine = watched(
+        Scripted('aborted'),
+        Scripted(),
+        health=health,
+        expert=FakeExpert(answer),
+        settings=dict(SETTINGS, max_recoveries=0, budget={'minutes': 1}),
+    )
 
     def pass_time(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
             clock[0] += 61.0
+
     machine.machine.events.observers.append(pass_time)
     assert machine.run() == 'aborted' and machine.visits() == ['A']
 
@@ -100,9 +127,13 @@ def test_a_precondition_that_makes_the_robot_unwell_is_not_run_without_end(healt
         runs.append(1)
         health.now = 'motors: off'
         return False
-    machine = watched(Scripted('aborted'), health=health,
-                      preconditions={'A': [trips]}, settings=dict(
-                          SETTINGS, max_recoveries=2))
+
+    machine = watched(
+        Scripted('aborted'),
+        health=health,
+        preconditions={'A': [trips]},
+        settings=dict(SETTINGS, max_recoveries=2),
+    )
     heals_at_once(machine, health)
     machine.run()
     assert len(runs) == 3

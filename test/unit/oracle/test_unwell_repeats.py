@@ -1,4 +1,5 @@
 """States that are not repeated by themselves, and have failed while the robot was not well."""
+
 import pytest
 from machines import FakeExpert, FakeHealth, Scripted, goto, in_thread, supersede, watched
 from waiting import wait_for
@@ -10,6 +11,7 @@ def fails_unwell(health):
     def fail(state, ud):
         health.now = 'motors: off'
         return 'aborted'
+
     return fail
 
 
@@ -24,18 +26,25 @@ def health():
     return FakeHealth()
 
 
-@pytest.mark.parametrize('answer, visited', [
-    (goto('B'), ['A', 'B', 'B', 'C']), (supersede('ok'), ['A', 'B', 'C'])])
+@pytest.mark.parametrize(
+    'answer, visited', [(goto('B'), ['A', 'B', 'B', 'C']), (supersede('ok'), ['A', 'B', 'C'])]
+)
 def test_a_state_that_is_not_repeated_by_itself_is_asked_about_once_all_is_well(
-        health, answer, visited):
+    health, answer, visited
+):
     expert = FakeExpert(answer)
-    machine = watched(Scripted(), Scripted(fails_unwell(health)), Scripted(), health=health,
-                      expert=expert, settings={'health_settle_s': 0.05,
-                                               'states': {'B': {'on_retry': 'confirm'}}})
+    machine = watched(
+        Scripted(),
+        Scripted(fails_unwell(health)),
+        Scripted(),
+        health=health,
+        expert=expert,
+        settings={'health_settle_s': 0.05, 'states': {'B': {'on_retry': 'confirm'}}},
+    )
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
     assert machine.visits() == visited
-    question, = expert.questions
+    (question,) = expert.questions
     assert question.failed_state == 'B'
     assert 'failed while the robot was not well, and is not repeated by itself' in question.reason
     assert not machine.of(EventKind.FAILURE)
@@ -44,9 +53,14 @@ def test_a_state_that_is_not_repeated_by_itself_is_asked_about_once_all_is_well(
 
 def test_a_state_that_must_not_be_repeated_is_not_when_all_is_well_again(health):
     expert = FakeExpert(goto('B'), supersede('ok'))
-    machine = watched(Scripted(), Scripted(fails_unwell(health)), Scripted(), health=health,
-                      expert=expert, settings={'health_settle_s': 0.05,
-                                               'states': {'B': {'on_retry': 'never'}}})
+    machine = watched(
+        Scripted(),
+        Scripted(fails_unwell(health)),
+        Scripted(),
+        health=health,
+        expert=expert,
+        settings={'health_settle_s': 0.05, 'states': {'B': {'on_retry': 'never'}}},
+    )
     run = in_thread(machine.run)
     assert healthy_again(machine, health, run) == 'done'
     assert machine.visits() == ['A', 'B', 'C']

@@ -1,4 +1,5 @@
 """A machine comes out of its oracle as it went in."""
+
 import pytest
 from machines import FakeExpert, Scripted, chain_of, supersede
 

@@ -1,4 +1,5 @@
 """What userdata looks like after a jump, and what a recovery's own writes are worth."""
+
 import pytest
 from machines import FakeExpert, Scripted, Watched, chain_of, contents, goto, supersede
 
@@ -10,6 +11,7 @@ def writes(key, value, outcome):
     def step(state, ud):
         ud[key] = value
         return outcome
+
     return step
 
 
@@ -67,6 +69,7 @@ def test_what_a_callable_precondition_wrote_survives():
         ud.x = 'achieved'
         ud['new'] = 2
         return True
+
     _, seen = run([writes('x', 'half done', 'aborted')], [achieve])
     assert seen[1] == {'x': 'achieved', 'new': 2}
 
@@ -78,13 +81,15 @@ def test_what_a_precondition_wrote_survives_though_it_is_what_the_failed_state_w
     def achieve(ud):
         ud.x = done
         return True
+
     _, seen = run([writes('x', done, 'aborted')], [achieve])
     assert seen[1] == {'x': done}
 
 
 def test_what_a_state_precondition_wrote_survives():
-    _, seen = run([writes('x', 'half done', 'aborted')],
-                  [Scripted(writes('x', 'achieved', 'ok'), **IO)])
+    _, seen = run(
+        [writes('x', 'half done', 'aborted')], [Scripted(writes('x', 'achieved', 'ok'), **IO)]
+    )
     assert seen[1] == {'x': 'achieved'}
 
 
@@ -92,15 +97,22 @@ def test_what_a_state_precondition_wrote_survives():
 def test_what_a_precondition_that_was_not_met_wrote_is_taken_back(userdata):
     """Such as an action state does: it has outputs of an aborted goal, too."""
     for end in ('aborted', ValueError('x')):
+
         def fail(state, ud, end=end):
             ud.x, ud.new = 'nothing was found', 'neither'
             del ud._data['x']
             if isinstance(end, Exception):
                 raise end
             return end
+
         expert = FakeExpert(supersede('ok'))
-        machine, _ = run([writes('x', 'half done', 'aborted')], [Scripted(fail, **IO)],
-                         expert=expert, userdata=userdata, max_recoveries=1)
+        machine, _ = run(
+            [writes('x', 'half done', 'aborted')],
+            [Scripted(fail, **IO)],
+            expert=expert,
+            userdata=userdata,
+            max_recoveries=1,
+        )
         assert machine.of(EventKind.PRECONDITION_END)[0].outcome == 'not met'
         left = {'x': 'at the start' if userdata == 'restore' else 'half done'}
         assert contents(machine.machine.userdata) == left
@@ -114,6 +126,7 @@ def test_of_two_preconditions_the_one_that_was_met_keeps_what_it_wrote():
     def neither(ud):
         ud.x = ud.new = 'half achieved'
         return False
+
     _, seen = run(['aborted', 'aborted'], [both, neither])
     assert seen[-1] == {'x': 'achieved'}
 
@@ -127,13 +140,15 @@ def test_what_a_check_found_is_there_for_what_achieves_it(achieves):
     def achieve(ud):
         ud.x = ud.new
         return achieves
+
     _, seen = run(['aborted'], [(check, achieve)])
     assert seen[1] == ({'x': 'found', 'new': 'found'} if achieves else {'x': 'at the start'})
 
 
 def test_what_an_unmet_precondition_wrote_past_its_view_is_taken_back():
-    machine = machine_of(Scripted('aborted', **IO),
-                         [lambda ud: setattr(holder[0].userdata, 'x', 'half achieved')])
+    machine = machine_of(
+        Scripted('aborted', **IO), [lambda ud: setattr(holder[0].userdata, 'x', 'half achieved')]
+    )
     holder = [machine.machine]
     machine.run()
     assert machine.machine.userdata.x == 'at the start'
@@ -142,17 +157,27 @@ def test_what_an_unmet_precondition_wrote_past_its_view_is_taken_back():
 def test_what_an_unmet_precondition_changed_inside_a_deep_copied_key_is_taken_back():
     machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
     machine.userdata.x = ['at the start']
-    Watched(machine, preconditions={'B': [lambda ud: ud.x.append('half achieved')]},
-            settings={'deep_copy_keys': ['x'], 'userdata': 'restore'}).run()
+    Watched(
+        machine,
+        preconditions={'B': [lambda ud: ud.x.append('half achieved')]},
+        settings={'deep_copy_keys': ['x'], 'userdata': 'restore'},
+    ).run()
     assert machine.userdata.x == ['at the start']
 
 
 def test_what_a_met_one_changed_there_before_stays():
     machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
     machine.userdata.x = ['at the start']
-    Watched(machine, preconditions={'B': [lambda ud: ud.x.append('achieved') or True,
-                                          lambda ud: ud.x.append('half achieved')]},
-            settings={'deep_copy_keys': ['x']}).run()
+    Watched(
+        machine,
+        preconditions={
+            'B': [
+                lambda ud: ud.x.append('achieved') or True,
+                lambda ud: ud.x.append('half achieved'),
+            ]
+        },
+        settings={'deep_copy_keys': ['x']},
+    ).run()
     assert machine.userdata.x == ['at the start', 'achieved']
 
 
@@ -167,8 +192,10 @@ def test_what_a_nested_machine_as_precondition_wrote_survives():
 
 
 def test_what_a_precondition_wrote_past_its_view_survives():
-    machine = machine_of(Scripted(writes('x', 'half done', 'aborted'), **IO),
-                         [lambda ud: setattr(holder[0].userdata, 'x', 'achieved') or True])
+    machine = machine_of(
+        Scripted(writes('x', 'half done', 'aborted'), **IO),
+        [lambda ud: setattr(holder[0].userdata, 'x', 'achieved') or True],
+    )
     holder = [machine.machine]
     machine.run()
     assert machine.machine.userdata.x == 'achieved'
@@ -178,6 +205,7 @@ def test_what_a_precondition_removed_stays_removed():
     def remove(ud):
         del ud._data['x']
         return True
+
     _, seen = run(['aborted'], [remove])
     assert seen[1] == {}
 
@@ -191,16 +219,24 @@ def test_what_the_expert_wrote_survives():
 def test_superseding_hands_on_the_experts_outputs_by_the_states_remapping():
     machine = smach.StateMachine(outcomes=['done', 'aborted'])
     with machine:
-        smach.StateMachine.add('A', Scripted('aborted', output_keys=['mine']),
-                               {'ok': 'done', 'preempted': 'aborted'}, remapping={'mine': 'yours'})
-    Watched(machine, expert=FakeExpert(supersede('ok', outputs={'mine': 7})),
-            settings={'max_recoveries': 0}).run()
+        smach.StateMachine.add(
+            'A',
+            Scripted('aborted', output_keys=['mine']),
+            {'ok': 'done', 'preempted': 'aborted'},
+            remapping={'mine': 'yours'},
+        )
+    Watched(
+        machine,
+        expert=FakeExpert(supersede('ok', outputs={'mine': 7})),
+        settings={'max_recoveries': 0},
+    ).run()
     assert contents(machine.userdata) == {'yours': 7}
 
 
 def test_a_jump_to_a_state_never_entered_restores_nothing():
-    machine, _ = run([writes('x', 'half done', 'aborted')], expert=FakeExpert(goto('C')),
-                     max_recoveries=0)
+    machine, _ = run(
+        [writes('x', 'half done', 'aborted')], expert=FakeExpert(goto('C')), max_recoveries=0
+    )
     assert machine.machine.userdata.x == 'half done'
     assert machine.of(EventKind.JUMP)[0].data['userdata'] == 'keep'
 
@@ -216,6 +252,7 @@ def test_in_place_changes_stay_unless_the_key_is_named_for_a_deep_copy():
         machine.userdata.x = ['start']
         Watched(machine, settings=settings).run()
         return machine.userdata.x
+
     assert after() == ['start', 'half done']
     assert after(deep_copy_keys=['x']) == ['start']
 
@@ -223,13 +260,17 @@ def test_in_place_changes_stay_unless_the_key_is_named_for_a_deep_copy():
 def test_a_precondition_that_changes_a_deep_copied_key_in_place_is_heard():
     machine = chain_of(Scripted(), Scripted('aborted'))
     machine.userdata.x = ['start']
-    Watched(machine, preconditions={'B': [lambda ud: ud.x.append('achieved') or True]},
-            settings={'deep_copy_keys': ['x']}).run()
+    Watched(
+        machine,
+        preconditions={'B': [lambda ud: ud.x.append('achieved') or True]},
+        settings={'deep_copy_keys': ['x']},
+    ).run()
     assert machine.userdata.x == ['start', 'achieved']
 
 
 def test_what_cannot_be_deep_copied_is_kept_by_reference_and_said(log):
     import threading
+
     machine = chain_of(Scripted(), Scripted('aborted'))
     machine.userdata.x = lock = threading.Lock()
     assert Watched(machine, settings={'deep_copy_keys': ['x', 'absent']}).run() == 'done'
@@ -255,8 +296,9 @@ def test_the_dictionary_that_a_script_holds_on_to_is_restored_in_place():
 
 def test_missing_input_keys_of_the_target_are_said_before_the_jump():
     expert = FakeExpert(goto('C'))
-    machine = chain_of(Scripted(), Scripted('aborted'),
-                       Scripted(input_keys=['grasp', 'x'], outcomes=('ok',)))
+    machine = chain_of(
+        Scripted(), Scripted('aborted'), Scripted(input_keys=['grasp', 'x'], outcomes=('ok',))
+    )
     machine.userdata.x = 1
     machine = Watched(machine, expert=expert, settings={'max_recoveries': 0})
     machine.run()
@@ -292,6 +334,7 @@ def test_replaced_dictionaries_and_shared_userdata_are_respected(shared):
         else:
             machine.userdata._data = other._data
         return 'ok'
+
     machine = chain_of(Scripted(swap), Scripted(writes('x', 'half done', 'aborted'), 'ok', **IO))
     assert Watched(machine).run() == 'done'
     assert other.x == 'other'
@@ -310,6 +353,7 @@ def test_a_dictionary_replaced_before_a_later_visit_is_restored():
             ud.x = 'half done'
             return 'aborted'
         return 'done' if len(seen) == 3 else 'again'
+
     machine = smach.StateMachine(['done', 'aborted'])
     machine.userdata.x = 'old'
     with machine:

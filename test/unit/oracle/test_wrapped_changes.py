@@ -1,4 +1,5 @@
 """Wrapped machines that are changed afterwards, and machines that cannot be wrapped."""
+
 import inspect
 
 import pytest
@@ -11,7 +12,8 @@ from smach_oracle.oracle.records.events import EventKind
 
 needs_constants = pytest.mark.skipif(
     'constants' not in inspect.signature(smach.StateMachine.add).parameters,
-    reason='this engine has no constants')
+    reason='this engine has no constants',
+)
 
 
 def test_a_transition_changed_while_running_is_taken_and_counted():
@@ -29,6 +31,7 @@ def test_keys_registered_late_are_seen():
     def write(state, ud):
         ud.late = 1
         return 'ok'
+
     state = Scripted('ok', write)
     machine = watched(state)
     machine.run()
@@ -44,8 +47,12 @@ def test_constants_are_handed_to_the_state():
     with machine:
         OracleContainer.add(
             'A',
-            Scripted('aborted', lambda self, ud: seen.append((ud.x, ud.y)) or 'ok',
-                     input_keys=['x', 'y']), {'ok': 'done'}, constants={'x': 1})
+            Scripted(
+                'aborted', lambda self, ud: seen.append((ud.x, ud.y)) or 'ok', input_keys=['x', 'y']
+            ),
+            {'ok': 'done'},
+            constants={'x': 1},
+        )
     machine.userdata.y = 2
     events = []
     machine.events.observers.append(events.append)
@@ -65,22 +72,36 @@ def machine_with(*states):
 
 def remapped_constant(seen):
     """A state A that reads its n, the machine's constant `answer`, and changes it."""
+
     def read(state, ud):
         seen.append((ud.n, state.parent.userdata.answer))
         ud.n = -1
         return 'ok' if len(seen) > 2 else 'again'
-    state = Scripted(read, read, read, outcomes=('ok', 'again', 'aborted'), input_keys=['n'],
-                     output_keys=['n'])
+
+    state = Scripted(
+        read, read, read, outcomes=('ok', 'again', 'aborted'), input_keys=['n'], output_keys=['n']
+    )
     machine = state.parent = machine_with(
-        ('A', state, {'transitions': {'ok': 'B', 'again': 'A'}, 'remapping': {'n': 'answer'},
-                      'constants': {'answer': 42}}),
-        ('B', Scripted(), {'transitions': {'ok': 'done'}}))
+        (
+            'A',
+            state,
+            {
+                'transitions': {'ok': 'B', 'again': 'A'},
+                'remapping': {'n': 'answer'},
+                'constants': {'answer': 42},
+            },
+        ),
+        ('B', Scripted(), {'transitions': {'ok': 'done'}}),
+    )
     return machine
 
 
 @needs_constants
-@pytest.mark.parametrize('settings', [{}, {'states': {'A': {'time_limit_s': 20}}},
-                                      {'deep_copy_keys': ['answer']}], ids=str)
+@pytest.mark.parametrize(
+    'settings',
+    [{}, {'states': {'A': {'time_limit_s': 20}}}, {'deep_copy_keys': ['answer']}],
+    ids=str,
+)
 @pytest.mark.parametrize('recover', [True, False])
 def test_constants_are_keys_of_the_machine_bare_and_wrapped(settings, recover):
     seen, wrapped_seen = [], []
@@ -94,9 +115,15 @@ def test_constants_are_keys_of_the_machine_bare_and_wrapped(settings, recover):
 @needs_constants
 def test_constants_exchanged_between_visits_count():
     seen = []
-    machine = OracleContainer.wrap(machine_with(
-        ('A', Scripted(*[lambda state, ud: seen.append(ud.x) or 'ok'] * 2, input_keys=['x']),
-         {'transitions': {'ok': 'done'}})))
+    machine = OracleContainer.wrap(
+        machine_with(
+            (
+                'A',
+                Scripted(*[lambda state, ud: seen.append(ud.x) or 'ok'] * 2, input_keys=['x']),
+                {'transitions': {'ok': 'done'}},
+            )
+        )
+    )
     for value in (1, 2):
         machine._constants['A'] = {'x': value}
         machine.execute()
@@ -116,7 +143,8 @@ def test_machines_of_an_engine_without_constants_run_too():
 def test_constants_that_cannot_be_written_fail_the_state():
     machine = OracleContainer.wrap(
         machine_with(('A', Scripted(), {'transitions': {'ok': 'done'}, 'constants': ['x']})),
-        settings={'max_recoveries': 1})
+        settings={'max_recoveries': 1},
+    )
     with pytest.raises(smach.InvalidUserCodeError, match='items'):
         machine.execute()
     assert machine.rates()[0].failures > 0 and not machine.is_running()
@@ -127,10 +155,18 @@ def test_a_precondition_gets_the_constants_of_its_state():
     seen = []
     look = Scripted('ok', lambda state, ud: seen.append(ud.mode) or 'ok', input_keys=['mode'])
     machine = OracleContainer.wrap(
-        machine_with(('LOOK', look, {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}}),
-                     ('GRASP', Scripted(lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted',
-                                        output_keys=['mode']), {'transitions': {'ok': 'done'}})),
-        settings={'policy': 'prose', 'states': {'GRASP': {'preconditions': ['LOOK']}}})
+        machine_with(
+            ('LOOK', look, {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}}),
+            (
+                'GRASP',
+                Scripted(
+                    lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted', output_keys=['mode']
+                ),
+                {'transitions': {'ok': 'done'}},
+            ),
+        ),
+        settings={'policy': 'prose', 'states': {'GRASP': {'preconditions': ['LOOK']}}},
+    )
     assert machine.execute() == 'done'
     assert seen == ['far'] and machine.userdata.mode == 'far'
 
@@ -138,15 +174,29 @@ def test_a_precondition_gets_the_constants_of_its_state():
 @needs_constants
 def test_constants_of_a_precondition_that_is_not_met_are_taken_back():
     machine = OracleContainer.wrap(
-        machine_with(('LOOK', Scripted('ok', 'aborted'),
-                      {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}}),
-                     ('GRASP', Scripted(lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted',
-                                        lambda state, ud: ud.mode == 'near' and 'ok',
-                                        input_keys=['mode'], output_keys=['mode']),
-                      {'transitions': {'ok': 'done'}})),
-        settings={'userdata': 'keep',
-                  'states': {'GRASP': {'preconditions': ['LOOK'], 'prior': 0.5, 'memory': 100}}},
-        expert=FakeExpert(goto('GRASP')))
+        machine_with(
+            (
+                'LOOK',
+                Scripted('ok', 'aborted'),
+                {'transitions': {'ok': 'GRASP'}, 'constants': {'mode': 'far'}},
+            ),
+            (
+                'GRASP',
+                Scripted(
+                    lambda state, ud: setattr(ud, 'mode', 'near') or 'aborted',
+                    lambda state, ud: ud.mode == 'near' and 'ok',
+                    input_keys=['mode'],
+                    output_keys=['mode'],
+                ),
+                {'transitions': {'ok': 'done'}},
+            ),
+        ),
+        settings={
+            'userdata': 'keep',
+            'states': {'GRASP': {'preconditions': ['LOOK'], 'prior': 0.5, 'memory': 100}},
+        },
+        expert=FakeExpert(goto('GRASP')),
+    )
     assert machine.execute() == 'done' and machine.userdata.mode == 'near'
 
 
@@ -154,15 +204,31 @@ def test_constants_of_a_precondition_that_is_not_met_are_taken_back():
 def test_a_question_shows_constants_by_the_names_of_the_state():
     expert = FakeExpert(supersede('ok'))
     machine = OracleContainer.wrap(
-        machine_with(('A', Scripted('aborted', input_keys=['n']),
-                      {'transitions': {'ok': 'B'}, 'remapping': {'n': 'answer'},
-                       'constants': {'answer': 42, 'beside': 1}}),
-                     ('B', Scripted(input_keys=['m']),
-                      {'transitions': {'ok': 'done'}, 'remapping': {'m': 'later'},
-                       'constants': {'later': 3}})),
-        settings={'max_recoveries': 0}, expert=expert)
+        machine_with(
+            (
+                'A',
+                Scripted('aborted', input_keys=['n']),
+                {
+                    'transitions': {'ok': 'B'},
+                    'remapping': {'n': 'answer'},
+                    'constants': {'answer': 42, 'beside': 1},
+                },
+            ),
+            (
+                'B',
+                Scripted(input_keys=['m']),
+                {
+                    'transitions': {'ok': 'done'},
+                    'remapping': {'m': 'later'},
+                    'constants': {'later': 3},
+                },
+            ),
+        ),
+        settings={'max_recoveries': 0},
+        expert=expert,
+    )
     assert machine.execute() == 'done'
-    question, = expert.questions
+    (question,) = expert.questions
     assert question.input_userdata == {'n': 42}
     assert {choice.state: choice.missing_keys for choice in question.choices} == {'A': (), 'B': ()}
 

@@ -1,4 +1,5 @@
 """The wrapped machine is the script's own object, and stays usable as any state machine is."""
+
 import copy
 import pickle
 
@@ -79,10 +80,18 @@ def test_the_viewer_sees_n_edges_to_the_oracle_and_one_from_it_to_every_state_an
     machine = OracleContainer.wrap(chain_of(Scripted(), Scripted(), Scripted()))
     edges = machine.get_internal_edges()
     assert [(edge[0], edge[1]) for edge in edges if edge[2] == 'ORACLE'] == [
-        ('failure', 'A'), ('failure', 'B'), ('failure', 'C')]
-    assert {edge[2]
-            for edge in edges
-            if edge[1] == 'ORACLE'} == {'A', 'B', 'C', 'done', 'aborted', 'preempted'}
+        ('failure', 'A'),
+        ('failure', 'B'),
+        ('failure', 'C'),
+    ]
+    assert {edge[2] for edge in edges if edge[1] == 'ORACLE'} == {
+        'A',
+        'B',
+        'C',
+        'done',
+        'aborted',
+        'preempted',
+    }
     assert list(machine.get_children()) == ['A', 'B', 'C', 'ORACLE']
 
 
@@ -91,11 +100,13 @@ def test_oracle_is_the_active_state_while_it_works_and_callbacks_see_it():
     machine = chain_of(Scripted('aborted'), Scripted())
     machine.register_transition_cb(lambda ud, labels: seen.append(labels))
     machine.register_start_cb(lambda ud, labels: seen.append(('start', labels)))
-    machine.register_termination_cb(lambda ud, labels, outcome: seen.append(
-        ('end', labels, outcome)))
+    machine.register_termination_cb(
+        lambda ud, labels, outcome: seen.append(('end', labels, outcome))
+    )
     OracleContainer.wrap(
         machine,
-        preconditions={'A': [lambda ud: active.append(machine.get_active_states()) or True]})
+        preconditions={'A': [lambda ud: active.append(machine.get_active_states()) or True]},
+    )
     assert machine.execute() == 'done'
     assert active == [['ORACLE']]
     assert seen == [('start', ['A']), ['ORACLE'], ['A'], ['B'], ('end', ['B'], 'done')]
@@ -116,8 +127,7 @@ def test_a_state_added_after_wrapping_is_under_the_oracle():
     machine.machine.set_initial_state(['NEW'])
     assert ('failure', 'NEW', 'ORACLE') in machine.machine.get_internal_edges()
     assert 'NEW' in {
-        edge[2]
-        for edge in machine.machine.get_internal_edges() if edge[1] == 'ORACLE'
+        edge[2] for edge in machine.machine.get_internal_edges() if edge[1] == 'ORACLE'
     }
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'NEW')]
@@ -137,9 +147,11 @@ def test_a_state_exchanged_for_another_is_exchanged_among_the_oracles():
         smach.StateMachine.add('NEW', Scripted('aborted'), {'ok': 'done'})
     machine.machine._transitions['A']['ok'] = 'NEW'
     assert machine.run() == 'done'
-    assert {edge[2]
-            for edge in machine.machine.get_internal_edges()
-            if edge[1] == 'ORACLE'} >= {'A', 'NEW', 'done'}
+    assert {edge[2] for edge in machine.machine.get_internal_edges() if edge[1] == 'ORACLE'} >= {
+        'A',
+        'NEW',
+        'done',
+    }
 
 
 def test_a_machine_filled_after_wrapping_begins_where_it_should():
@@ -195,8 +207,11 @@ def test_a_machine_may_begin_at_any_other_state():
 
 
 def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state():
-    machine = watched(Scripted('aborted'), expert=FakeExpert(supersede('ok')),
-                      settings={'states': {'A': {'prior': 1.0}}})
+    machine = watched(
+        Scripted('aborted'),
+        expert=FakeExpert(supersede('ok')),
+        settings={'states': {'A': {'prior': 1.0}}},
+    )
     meta, seen = machine.machine.get_children()['ORACLE'], []
     execute = meta.execute
 
@@ -204,6 +219,7 @@ def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state()
         outcome = execute(ud)
         seen.append((ud is machine.machine.userdata, outcome))
         return outcome
+
     meta.execute = hooked
     assert machine.run() == 'done'
     assert seen == [(True, 'ok')]
@@ -239,13 +255,15 @@ def test_a_subclass_that_runs_its_machine_twice_in_one_execute():
         def execute(self, parent_ud=None):
             smach.StateMachine.execute(self, parent_ud)
             return smach.StateMachine.execute(self, parent_ud)
+
     machine = Watched(chain_of(Scripted('aborted', 'ok', 'aborted', 'ok'), machine_class=Twice))
     assert machine.run() == 'done'
     assert machine.visits() == ['A'] * 4
 
 
-@pytest.mark.parametrize('name',
-                         ['execute', 'request_preempt', 'check_consistency', 'get_children'])
+@pytest.mark.parametrize(
+    'name', ['execute', 'request_preempt', 'check_consistency', 'get_children']
+)
 def test_patched_class_attributes_are_respected(monkeypatch, name):
     calls = []
     real = getattr(smach.StateMachine, name)
@@ -253,6 +271,7 @@ def test_patched_class_attributes_are_respected(monkeypatch, name):
     def patched(self, *args, **kwargs):
         calls.append(name)
         return real(self, *args, **kwargs)
+
     machine = watched(Scripted('aborted')).machine
     monkeypatch.setattr(smach.StateMachine, name, patched)
     machine.execute()
@@ -264,8 +283,9 @@ def test_patched_class_attributes_are_respected(monkeypatch, name):
 def test_a_patched_transition_callback_caller_is_called(monkeypatch):
     calls = []
     real = smach.Container.call_transition_cbs
-    monkeypatch.setattr(smach.Container, 'call_transition_cbs',
-                        lambda self: calls.append(1) or real(self))
+    monkeypatch.setattr(
+        smach.Container, 'call_transition_cbs', lambda self: calls.append(1) or real(self)
+    )
     watched(Scripted(), Scripted(), Scripted()).run()
     assert len(calls) == 2
 
@@ -275,7 +295,8 @@ def test_wrapping_again_gives_new_settings_and_keeps_what_was_learned():
     OracleContainer.wrap(machine).execute()
     cls = type(machine)
     again = OracleContainer.wrap(
-        machine, settings={'max_recoveries': 3, 'memory': 4, 'oracle_label': 'HELP'})
+        machine, settings={'max_recoveries': 3, 'memory': 4, 'oracle_label': 'HELP'}
+    )
     assert again is machine and type(machine) is cls
     assert machine.settings.defaults.max_recoveries == 3
     assert (machine.rates()[0].failures, machine.rates()[0].successes) == (1, 1)
@@ -310,18 +331,26 @@ def test_a_wrapped_machine_is_executed_again_and_again():
     assert [
         event.seq for event in machine.events if event.trial_id == machine.machine.trial_id
     ] == list(
-        range(len([event for event in machine.events
-                   if event.trial_id == machine.machine.trial_id])))
+        range(
+            len([event for event in machine.events if event.trial_id == machine.machine.trial_id])
+        )
+    )
     assert machine.rate('A').successes == 50
 
 
 @pytest.mark.parametrize(
-    'duplicate', [copy.deepcopy, lambda machine: pickle.loads(pickle.dumps(machine)), copy.copy],
-    ids=['deepcopy', 'pickle', 'copy'])
+    'duplicate',
+    [copy.deepcopy, lambda machine: pickle.loads(pickle.dumps(machine)), copy.copy],
+    ids=['deepcopy', 'pickle', 'copy'],
+)
 def test_a_copy_of_a_wrapped_machine_is_a_wrapped_machine(duplicate):
     machine = chain_of(PlainState(), PlainState())
-    OracleContainer.wrap(machine, preconditions={'B': ['A']}, settings={'memory': 7},
-                         expert=FakeExpert(supersede('ok')))
+    OracleContainer.wrap(
+        machine,
+        preconditions={'B': ['A']},
+        settings={'memory': 7},
+        expert=FakeExpert(supersede('ok')),
+    )
     try:
         twin = duplicate(machine)
     except TypeError as err:
@@ -345,8 +374,13 @@ def test_a_copy_made_after_a_run_brings_what_was_learned():
 
 
 def test_it_is_built_like_any_machine():
-    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'], input_keys=['x'],
-                              output_keys=['y'], name='TOP', settings={'policy': 'algorithm1'})
+    machine = OracleContainer(
+        outcomes=['done', 'aborted', 'preempted'],
+        input_keys=['x'],
+        output_keys=['y'],
+        name='TOP',
+        settings={'policy': 'algorithm1'},
+    )
     with machine:
         OracleContainer.add('A', Scripted(), {'ok': 'B'})
         OracleContainer.add('B', Scripted('aborted'), {'ok': 'done'}, prior=0.2)
@@ -374,6 +408,7 @@ def test_an_observer_that_raises_stops_nothing(log):
 
     def broken(event):
         raise RuntimeError('observer')
+
     machine.events.observers.append(broken)
     assert machine.execute() == 'done'
     assert any('observer' in text for level, text in log if level == 'err')
@@ -383,7 +418,12 @@ def test_transitions_are_counted():
     machine = watched(Scripted('aborted'), Scripted())
     for _ in range(3):
         machine.run()
-    counts = {(row.state, row.outcome, row.to): row.count
-              for row in machine.machine.transition_counts()}
-    assert counts == {('A', 'aborted', 'ORACLE'): 1, ('ORACLE', 'A', 'A'): 1, ('A', 'ok', 'B'): 3,
-                      ('B', 'ok', 'done'): 3}
+    counts = {
+        (row.state, row.outcome, row.to): row.count for row in machine.machine.transition_counts()
+    }
+    assert counts == {
+        ('A', 'aborted', 'ORACLE'): 1,
+        ('ORACLE', 'A', 'A'): 1,
+        ('A', 'ok', 'B'): 3,
+        ('B', 'ok', 'done'): 3,
+    }

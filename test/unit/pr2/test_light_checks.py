@@ -1,4 +1,5 @@
 """A light in the camera is waited for, not forever; the fingers tell whether a hand may hold."""
+
 import collections
 
 import pytest
@@ -37,6 +38,7 @@ def _eyes(monkeypatch):
         made = checks._Eyes(FakeCamera(*given, **more), FakeTime(), True)
         monkeypatch.setattr(checks, '_eyes', lambda: made)
         return made
+
     monkeypatch.setattr(checks, 'dazzled', bool)
     monkeypatch.setattr(checks.rospy, 'is_shutdown', lambda: False)
     return have

@@ -1,4 +1,5 @@
 """What a robot sees and feels through a world that publishes when it is asked; no master."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,8 +15,11 @@ from smach_oracle.pr2.ros_senses import RosSenses
 from smach_oracle.ros import connections
 from smach_oracle.ros.images import colour_image, depth_image
 
-COLOUR, DEPTH, INFO = ('head_camera/rgb/image_raw', 'head_camera/depth_registered/image_raw',
-                       'head_camera/rgb/camera_info')
+COLOUR, DEPTH, INFO = (
+    'head_camera/rgb/image_raw',
+    'head_camera/depth_registered/image_raw',
+    'head_camera/rgb/camera_info',
+)
 
 
 def connection():
@@ -63,9 +67,11 @@ class World:
         number = stamp.secs
         told = [('joint_states', JointState(header, ['elbow'], [float(number)], [], []))]
         if camera:
-            told += [(COLOUR, colour_image(np.full((2, 3, 3), number, np.uint8), header)),
-                     (DEPTH, depth_image(np.full((2, 3), float(number)), header)),
-                     (INFO, CameraInfo(header=header, K=[1, 0, 0, 0, 1, 0, 0, 0, 1]))]
+            told += [
+                (COLOUR, colour_image(np.full((2, 3, 3), number, np.uint8), header)),
+                (DEPTH, depth_image(np.full((2, 3), float(number)), header)),
+                (INFO, CameraInfo(header=header, K=[1, 0, 0, 0, 1, 0, 0, 0, 1])),
+            ]
         return told
 
 
@@ -78,10 +84,15 @@ def world(monkeypatch):
     monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind, persistent: made)
     monkeypatch.setattr(rospy, 'wait_for_service', lambda name, timeout: None)
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
-    monkeypatch.setattr(ros_senses, 'tf2_ros', SimpleNamespace(
-        Buffer=lambda *_: SimpleNamespace(lookup_transform=lambda *_: still),
-        TransformListener=lambda *_, **__: SimpleNamespace(tf_sub=made.tree),
-        TransformException=LookupError))
+    monkeypatch.setattr(
+        ros_senses,
+        'tf2_ros',
+        SimpleNamespace(
+            Buffer=lambda *_: SimpleNamespace(lookup_transform=lambda *_: still),
+            TransformListener=lambda *_, **__: SimpleNamespace(tf_sub=made.tree),
+            TransformException=LookupError,
+        ),
+    )
     monkeypatch.setattr(ros_senses, 'AGAIN_S', 0.05)
     monkeypatch.setattr(connections, 'GRACE_S', 0.0)
     return made
@@ -144,6 +155,7 @@ def test_what_is_not_connected_yet_is_named(world, monkeypatch):
 
     def absent(name, timeout):
         raise rospy.ROSException('timeout')
+
     monkeypatch.setattr(rospy, 'wait_for_service', absent)
     assert senses.lacking()[-1] == '/world/snapshot'
     for topic in ('joint_states', DEPTH):

@@ -1,4 +1,5 @@
 """A hand that closes is not cut off by a stop: a PR2's gripper then has no force left."""
+
 import pytest
 from actionlib_msgs.msg import GoalStatus
 
@@ -21,8 +22,9 @@ class FakeGoal:
             return GoalEvent(status=GoalStatus.PREEMPTED)
         if self.left > 0:
             return None
-        return GoalEvent(status=GoalStatus.SUCCEEDED,
-                         result=GripperCommandResult(0.05, 40.0, True, False))
+        return GoalEvent(
+            status=GoalStatus.SUCCEEDED, result=GripperCommandResult(0.05, 40.0, True, False)
+        )
 
     def unheard(self, now_s):
         return False
@@ -57,6 +59,7 @@ def _stopped(monkeypatch):
             monkeypatch.setattr(ros_robot, part, lambda *_: None)
         robot = ros_robot.RosRobot()
         return robot, gripper.goal
+
     return make
 
 

@@ -1,4 +1,5 @@
 """The localisation is told once: a pose that came late would be taken for one of later on."""
+
 import numpy as np
 import pytest
 

@@ -1,4 +1,5 @@
 """What planning and perception cost in the world's time, and how it is charged."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -37,8 +38,11 @@ def service(monkeypatch):
     monkeypatch.setattr(rospy, 'resolve_name', lambda name: '/' + name)
     monkeypatch.setattr(rospy, 'get_name', lambda: '/node')
     monkeypatch.setattr(rospy, 'ServiceProxy', lambda name, kind, persistent: made)
-    monkeypatch.setattr(ros_time.rosgraph, 'Master',
-                        lambda caller: SimpleNamespace(lookupService=lambda name: 'rosrpc://here'))
+    monkeypatch.setattr(
+        ros_time.rosgraph,
+        'Master',
+        lambda caller: SimpleNamespace(lookupService=lambda name: 'rosrpc://here'),
+    )
     return made
 
 
@@ -62,17 +66,23 @@ def test_a_robot_without_the_service_is_charged_nothing(service, monkeypatch):
 
     def unknown(name):
         raise ros_time.rosgraph.MasterError('unknown service')
-    monkeypatch.setattr(ros_time.rosgraph, 'Master',
-                        lambda caller: SimpleNamespace(lookupService=unknown))
+
+    monkeypatch.setattr(
+        ros_time.rosgraph, 'Master', lambda caller: SimpleNamespace(lookupService=unknown)
+    )
     WorldTime('world/pass_time').spend(1.0, 'planning')
     assert not service.calls
 
 
-@pytest.mark.parametrize('given, service_name', [({}, 'world/pass_time'),
-                                                 ({'~snapshot': 'none'}, 'none'),
-                                                 ({'~pass_time': 'none'}, 'none'),
-                                                 ({'~pass_time': '/other/pass_time'},
-                                                  '/other/pass_time')])
+@pytest.mark.parametrize(
+    'given, service_name',
+    [
+        ({}, 'world/pass_time'),
+        ({'~snapshot': 'none'}, 'none'),
+        ({'~pass_time': 'none'}, 'none'),
+        ({'~pass_time': '/other/pass_time'}, '/other/pass_time'),
+    ],
+)
 def test_a_robot_without_snapshots_has_no_service_for_time_either(monkeypatch, given, service_name):
     monkeypatch.setattr(rospy, 'get_param', lambda name, default: given.get(name, default))
     assert pass_time_service() == service_name

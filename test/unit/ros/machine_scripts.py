@@ -2,7 +2,7 @@
 
 RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
 # states that say when they run, and a chain of them
-MACHINES = '''
+MACHINES = """
 class Runs(smach.State):
     def __init__(self):
         smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
@@ -15,4 +15,4 @@ def machine(*labels):
         for label, after in zip(labels, labels[1:] + ('succeeded',)):
             smach.StateMachine.add(label, Runs(), {'succeeded': after})
     return sm
-'''
+"""

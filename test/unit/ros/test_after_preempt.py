@@ -1,6 +1,7 @@
 """`after_preempt_s`: what an author has drawn behind `preempted` runs after a signal, in a script
 that is no node. Real processes, real signals.
 """
+
 import os
 import signal
 import subprocess
@@ -14,7 +15,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.settings import Settings
 
 RUNNER = 'from smach_oracle.ros.oracle_run.script_runner import main; main()'
-SCRIPT = '''
+SCRIPT = """
 import sys, threading, time
 import smach
 smach.set_loggers(*[lambda text, *args: None] * 4)
@@ -94,7 +95,7 @@ if how == 'in_a_thread':
 else:
     run()
     run()
-'''
+"""
 
 
 class Program:
@@ -106,8 +107,12 @@ class Program:
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
         self.process = subprocess.Popen(
             [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', 'task.py', how],
-            cwd=str(folder), env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            universal_newlines=True)
+            cwd=str(folder),
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            universal_newlines=True,
+        )
         self.reads(how if how in ('beginning', 'resuming') else 'working')
 
     def reads(self, text):
@@ -134,6 +139,7 @@ def program(tmp_path):
     def begin(how='', settings='after_preempt_s: 20'):
         begun.append(Program(tmp_path, how, settings))
         return begun[-1]
+
     yield begin
     for each in begun:
         each.process.kill()
@@ -173,7 +179,7 @@ def test_no_trial_of_another_thread_begins_meanwhile(program):
     running = program('beside')
     running.process.send_signal(signal.SIGINT)
     output, code, errors, _ = running.rest()
-    behind = output[output.index('stowing'):output.index('stowed')]
+    behind = output[output.index('stowing') : output.index('stowed')]
     assert behind.count('beside') <= 1, 'one may have begun before the signal'
     assert output.count('stowed') == 1 and code == -2 and 'KeyboardInterrupt' in errors
 

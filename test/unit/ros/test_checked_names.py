@@ -1,6 +1,7 @@
 """`oracle_run --check` refuses a name in the settings that nothing has. A start does so where a
 state would run that its author forbids or limits.
 """
+
 import os
 import subprocess
 import sys
@@ -15,19 +16,26 @@ CHAIN = "machine('HOME', 'GRASP').execute()"
 @pytest.fixture
 def run(tmp_path):
     """Run a script under oracle_run, or check it; returns exit code, output and errors."""
+
     def run_script(settings, text=CHAIN, *options):
         (tmp_path / 'task.py').write_text('import smach\n' + MACHINES + textwrap.dedent(text))
         (tmp_path / 'oracle.yaml').write_text(settings)
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
         done = subprocess.run(
             [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', *options, 'task.py'],
-            cwd=str(tmp_path), env=environment, timeout=120, stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE, universal_newlines=True)
+            cwd=str(tmp_path),
+            env=environment,
+            timeout=120,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            universal_newlines=True,
+        )
         return done.returncode, done.stdout, done.stderr
+
     return run_script
 
 
-ALL_UNKNOWN = '''
+ALL_UNKNOWN = """
 nested: [ARMM]
 on_no_answer: {goto: HOEM}
 on_resume: state:GRAPS
@@ -38,17 +46,23 @@ states:
   ARM*/**: {memory: 3}
 interfaces:
   by_hand: {action: by_hand, states: [GRSAP]}
-'''
+"""
 
 
 def test_a_check_names_every_unknown_name_in_any_setting_and_ends_with_2(run):
     code, _, errors = run(ALL_UNKNOWN, CHAIN, '--check')
     told = [line for line in errors.splitlines() if line.startswith('oracle_run: oracle.yaml line')]
     assert code == 2 and len(told) == 8, errors
-    for part in ("states.GRAPS: 'GRAPS' is no state (did you mean GRASP?)", "states.ARM*/**: ",
-                 "nested", "on_no_answer", "on_resume", 'resume_map.OLD',
-                 'interfaces.by_hand.states',
-                 "states.HOME.failure_outcomes: 'abortde' is no outcome (did you mean aborted?)"):
+    for part in (
+        "states.GRAPS: 'GRAPS' is no state (did you mean GRASP?)",
+        'states.ARM*/**: ',
+        'nested',
+        'on_no_answer',
+        'on_resume',
+        'resume_map.OLD',
+        'interfaces.by_hand.states',
+        "states.HOME.failure_outcomes: 'abortde' is no outcome (did you mean aborted?)",
+    ):
         assert any(part in line for line in told), (part, told)
 
 
@@ -82,21 +96,27 @@ def test_a_state_of_a_machine_that_is_made_later_is_known(run, label):
 
 
 def test_a_state_of_another_machine_that_is_there_is_known_without_a_word(run):
-    code, out, errors = run('states: {POUR: {on_retry: never}}', """
+    code, out, errors = run(
+        'states: {POUR: {on_retry: never}}',
+        """
         first, second = machine('HOME'), machine('POUR')
         first.execute()
         second.execute()
-    """)
+    """,
+    )
     assert (code, out.count('STATE RUNS')) == (0, 2) and 'is no state' not in out + errors, errors
 
 
 def test_a_state_of_a_machine_in_a_module_beside_the_script_is_known(run, tmp_path):
     (tmp_path / 'later.py').write_text('import smach\nLABEL = "POUR"\n')
-    code, out, errors = run('states: {POUR: {on_retry: never}}', """
+    code, out, errors = run(
+        'states: {POUR: {on_retry: never}}',
+        """
         machine('HOME').execute()
         import later
         machine(later.LABEL).execute()
-    """)
+    """,
+    )
     assert (code, out.count('STATE RUNS')) == (0, 2), errors
 
 
@@ -114,8 +134,10 @@ TURNED = 'NEPO'[::-1]  # OPEN
 
 def test_a_label_is_known_that_stands_in_any_way_in_a_source(run, tmp_path):
     (tmp_path / 'labels.py').write_text(LABELS)  # it does not name SMACH
-    settings = 'states: {%s}' % ', '.join(label + ': {on_retry: never}' for label in (
-        'POUR', 'TABLE', 'Fetch', 'PICK', 'PUT-IT', 'LOOK_LEFT', 'OPEN'))
+    settings = 'states: {%s}' % ', '.join(
+        label + ': {on_retry: never}'
+        for label in ('POUR', 'TABLE', 'Fetch', 'PICK', 'PUT-IT', 'LOOK_LEFT', 'OPEN')
+    )
     text = """
         import sys, labels
         machine('HOME').execute()
@@ -143,8 +165,9 @@ def test_a_general_list_of_failures_may_hold_more_than_a_machine_has(run):
 
 
 def test_a_name_that_no_reached_machine_has_but_a_source_mentions_is_a_warning(run):
-    code, report, _ = run('states: {POUR: {on_retry: never}}', CHAIN + '\nNOT_MADE = "POUR"\n',
-                          '--check')
+    code, report, _ = run(
+        'states: {POUR: {on_retry: never}}', CHAIN + '\nNOT_MADE = "POUR"\n', '--check'
+    )
     assert code == 0 and "Warning: oracle.yaml line 1: states.POUR: 'POUR' is no state" in report
 
 
@@ -155,18 +178,30 @@ def test_a_precondition_must_fit_one_of_the_machines_that_are_checked(run):
     assert code == 2 and "'GRASP' is not allowed" in errors
 
 
-@pytest.mark.parametrize('text, told', [
-    ("sm = machine('HOME')\nsm._transitions['HOME']['aborted'] = 'AWAY'\nsm.execute()",
-     "TASK/HOME: its outcome 'aborted' leads to 'AWAY', which is no state or outcome of TASK"),
-    ("machine('HOME').execute()\nsm = machine('A')\nwith sm:\n"
-     "    smach.StateMachine.add('B', Runs(), {'sucess': 'A'})\nsm.execute()",
-     'task.py line 18: SMACH refuses the machine: InvalidTransitionError'),
-    ("from smach_oracle import OracleContainer\n"
-     "OracleContainer.wrap(machine('A'), settings={'states': {'AA': {'memory': 3}}}).execute()",
-     "states.AA: 'AA' is no state"),
-])
+@pytest.mark.parametrize(
+    'text, told',
+    [
+        (
+            "sm = machine('HOME')\nsm._transitions['HOME']['aborted'] = 'AWAY'\nsm.execute()",
+            "TASK/HOME: its outcome 'aborted' leads to 'AWAY', which is no state or outcome "
+            'of TASK',
+        ),
+        (
+            "machine('HOME').execute()\nsm = machine('A')\nwith sm:\n"
+            "    smach.StateMachine.add('B', Runs(), {'sucess': 'A'})\nsm.execute()",
+            'task.py line 18: SMACH refuses the machine: InvalidTransitionError',
+        ),
+        (
+            'from smach_oracle import OracleContainer\n'
+            "OracleContainer.wrap(machine('A'), settings={'states': {'AA': {'memory': 3}}})"
+            '.execute()',
+            "states.AA: 'AA' is no state",
+        ),
+    ],
+)
 def test_a_check_of_a_machine_that_cannot_run_ends_with_2(run, text, told):
     code, report, errors = run('{}', text, '--check')
     assert code == 2 and 'All is well' not in report
     assert any(line.startswith('oracle_run: ') and told in line for line in errors.splitlines()), (
-        errors)
+        errors
+    )

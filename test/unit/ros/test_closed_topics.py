@@ -1,4 +1,5 @@
 """rospy closes topics before `rospy.is_shutdown` says so: whoever publishes then is quiet."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -129,17 +130,29 @@ def end_of_a_question(_report):
     action_server().publish_result(None, None)
 
 
-@pytest.mark.parametrize('publish', [
-    events, rates_of_the_machines_thread, rates_of_their_own_thread, recorder_status,
-    interface_output, failure_images, status_of_the_servers_timer,
-    feedback_of_a_question, end_of_a_question
-], ids=lambda function: function.__name__)
-def test_a_closed_topic_is_an_error_unless_the_node_goes_down(monkeypatch, topic, going_down,
-                                                              publish):
+@pytest.mark.parametrize(
+    'publish',
+    [
+        events,
+        rates_of_the_machines_thread,
+        rates_of_their_own_thread,
+        recorder_status,
+        interface_output,
+        failure_images,
+        status_of_the_servers_timer,
+        feedback_of_a_question,
+        end_of_a_question,
+    ],
+    ids=lambda function: function.__name__,
+)
+def test_a_closed_topic_is_an_error_unless_the_node_goes_down(
+    monkeypatch, topic, going_down, publish
+):
     errors = []
 
     def report(*words):
         errors.append(words)
+
     monkeypatch.setattr(rospy, 'logerr', report)
     try:
         publish(report)

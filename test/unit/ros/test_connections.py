@@ -1,4 +1,5 @@
 """A new connection counts once its publisher sends to it, however long that takes; no master."""
+
 import threading
 from types import SimpleNamespace
 from xmlrpc.server import SimpleXMLRPCServer
@@ -24,11 +25,20 @@ class Publisher:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def get_bus_info(self, caller):
-        listed = [[number, caller, 'o', 'TCPROS', topic, True, 'text']
-                  for number, topic in enumerate(self.listed)]
+        listed = [
+            [number, caller, 'o', 'TCPROS', topic, True, 'text']
+            for number, topic in enumerate(self.listed)
+        ]
         self.asked.release()
-        return [1, 'bus info', listed + [[8, '/other', 'o', 'TCPROS', '/image', True, 'text'],
-                                         [9, caller, 'i', 'TCPROS', '/image', True, 'text']]]
+        return [
+            1,
+            'bus info',
+            listed
+            + [
+                [8, '/other', 'o', 'TCPROS', '/image', True, 'text'],
+                [9, caller, 'i', 'TCPROS', '/image', True, 'text'],
+            ],
+        ]
 
     def close(self):
         self._server.shutdown()

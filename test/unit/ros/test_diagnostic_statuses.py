@@ -1,4 +1,5 @@
 """What /diagnostics and roswtf say about an oracle."""
+
 import os
 import sys
 
@@ -17,29 +18,42 @@ def values(status):
 
 
 def test_a_question_of_this_node_is_a_warning_one_of_another_is_not():
-    own = OpenQuery(query=ExpertQueryGoal(query_id='q1', robot='/robot', container_path='FETCH',
-                                          failed_state='PICK'), age=12.3)
+    own = OpenQuery(
+        query=ExpertQueryGoal(
+            query_id='q1', robot='/robot', container_path='FETCH', failed_state='PICK'
+        ),
+        age=12.3,
+    )
     other = OpenQuery(query=ExpertQueryGoal(query_id='q2', robot='/other'))
     told = statuses.questions_status('/robot', [own, other])
     assert (told.level, told.name, told.message) == (
-        WARN, 'robot: oracle questions', '1 open question')
+        WARN,
+        'robot: oracle questions',
+        '1 open question',
+    )
     assert values(told) == {'q1': 'PICK of FETCH, for 12 s'}
     assert statuses.questions_status('/robot', [other]).level == OK
 
 
 def test_only_states_in_class_high_are_a_warning():
-    rows = [StateRateRow('FETCH', name, rate, kind, 1, 1, 0, False)
-            for name, rate, kind in (('PICK', 0.83, 3), ('LOOK', 0.4, 2), ('GO', 0.0, 1))]
+    rows = [
+        StateRateRow('FETCH', name, rate, kind, 1, 1, 0, False)
+        for name, rate, kind in (('PICK', 0.83, 3), ('LOOK', 0.4, 2), ('GO', 0.0, 1))
+    ]
     told = statuses.states_status('/robot', rows)
     assert told.level == WARN and values(told) == {'FETCH/PICK': 'failure rate 0.83'}
     assert statuses.states_status('/robot', rows[1:]).level == OK
 
 
-@pytest.mark.parametrize('status, level', [
-    (None, OK), (RecorderStatus(state=RecorderStatus.RECORDING), OK),
-    (RecorderStatus(state=RecorderStatus.DROPPING, text='no space left'), ERROR),
-    (RecorderStatus(state=RecorderStatus.IDLE, events_lost_in_total=3), WARN)
-])
+@pytest.mark.parametrize(
+    'status, level',
+    [
+        (None, OK),
+        (RecorderStatus(state=RecorderStatus.RECORDING), OK),
+        (RecorderStatus(state=RecorderStatus.DROPPING, text='no space left'), ERROR),
+        (RecorderStatus(state=RecorderStatus.IDLE, events_lost_in_total=3), WARN),
+    ],
+)
 def test_a_recorder_that_loses_events_is_an_error_and_stays_a_warning(status, level):
     told = statuses.recorder_status('/robot', status)
     assert told.level == level and told.message
@@ -56,10 +70,11 @@ def test_a_store_that_is_behind_is_an_error():
 def test_roswtf_repeats_what_the_oracles_tell_and_nobody_else():
     heard = {
         'a': statuses.store_status('/robot', {'fetch.db': 'disk full'}, 1),
-        'b': DiagnosticStatus(level=ERROR, name='motor', hardware_id='base')
+        'b': DiagnosticStatus(level=ERROR, name='motor', hardware_id='base'),
     }
     assert roswtf_plugin.told_by_nodes(ERROR, heard) == [
-        'robot: oracle store: 1 store behind: a crash now would lose steps (fetch.db: disk full)']
+        'robot: oracle store: 1 store behind: a crash now would lose steps (fetch.db: disk full)'
+    ]
     assert roswtf_plugin.told_by_nodes(WARN, heard) == []
 
 

@@ -1,4 +1,5 @@
 """Events and rates as messages, in a process without a ROS master."""
+
 import io
 import json
 import math
@@ -38,18 +39,47 @@ def over_the_wire(message):
 
 
 def test_every_field_of_an_event_arrives():
-    event = Event(EventKind.FAILURE, 'trial-1', 7, 12.5, 'TOP/ARM', 'PICK', 'aborted', 'PLACE',
-                  FailureKind.FELL_THROUGH, 2, 0.5, True, 'query-1', 'Ann', 'dropped it',
-                  {'keys': ['a']})
+    event = Event(
+        EventKind.FAILURE,
+        'trial-1',
+        7,
+        12.5,
+        'TOP/ARM',
+        'PICK',
+        'aborted',
+        'PLACE',
+        FailureKind.FELL_THROUGH,
+        2,
+        0.5,
+        True,
+        'query-1',
+        'Ann',
+        'dropped it',
+        {'keys': ['a']},
+    )
     message = over_the_wire(to_msg(event))
-    assert [message.kind, message.wall_time, message.trial_id,
-            message.seq] == [OracleEvent.FAILURE, 12.5, 'trial-1', 7]
-    assert [message.path, message.state, message.outcome,
-            message.target] == ['TOP/ARM', 'PICK', 'aborted', 'PLACE']
-    assert [message.failure_kind,
-            message.failure_class] == [OracleEvent.FELL_THROUGH, OracleEvent.MODERATE]
-    assert [message.rate, message.continuous, message.query_id,
-            message.by] == [0.5, True, 'query-1', 'Ann']
+    assert [message.kind, message.wall_time, message.trial_id, message.seq] == [
+        OracleEvent.FAILURE,
+        12.5,
+        'trial-1',
+        7,
+    ]
+    assert [message.path, message.state, message.outcome, message.target] == [
+        'TOP/ARM',
+        'PICK',
+        'aborted',
+        'PLACE',
+    ]
+    assert [message.failure_kind, message.failure_class] == [
+        OracleEvent.FELL_THROUGH,
+        OracleEvent.MODERATE,
+    ]
+    assert [message.rate, message.continuous, message.query_id, message.by] == [
+        0.5,
+        True,
+        'query-1',
+        'Ann',
+    ]
     assert message.text == 'dropped it'
     assert json.loads(message.data) == {'keys': ['a']}
 
@@ -71,8 +101,9 @@ def test_without_ros_the_stamp_is_zero_and_a_given_one_is_kept():
     assert to_msg(event, genpy.Time(3, 5)).header.stamp == genpy.Time(3, 5)
 
 
-@pytest.mark.parametrize('text, arrives', [('Überlauf – 手', 'Überlauf – 手'),
-                                           ('half \ud800', 'half \\ud800')])
+@pytest.mark.parametrize(
+    'text, arrives', [('Überlauf – 手', 'Überlauf – 手'), ('half \ud800', 'half \\ud800')]
+)
 def test_any_text_a_state_may_raise_can_be_sent(text, arrives):
     event = Event(EventKind.FAILURE, 'trial-1', 0, 1.0, 'TOP', text=text)
     assert over_the_wire(to_msg(event)).text == arrives
@@ -85,12 +116,22 @@ def test_data_that_json_does_not_know_is_sent_as_its_text():
 
 def test_rates_and_edges_arrive():
     message = over_the_wire(
-        rates_to_msg('trial-1', [FakeRateRow(), FakeRateRow(state='PLACE')], [FakeTransitionRow()]))
+        rates_to_msg('trial-1', [FakeRateRow(), FakeRateRow(state='PLACE')], [FakeTransitionRow()])
+    )
     assert message.trial_id == 'trial-1'
     row, edge = message.states[0], message.transitions[0]
-    assert (row.path, row.state, row.rate, row.failure_class) == ('TOP', 'PICK', 0.25,
-                                                                  OracleEvent.LOW)
+    assert (row.path, row.state, row.rate, row.failure_class) == (
+        'TOP',
+        'PICK',
+        0.25,
+        OracleEvent.LOW,
+    )
     assert (row.successes, row.failures, row.recoveries, row.has_preconditions) == (3, 1, 2, True)
     assert message.states[1].state == 'PLACE'
-    assert (edge.path, edge.state, edge.outcome, edge.target,
-            edge.count) == ('TOP', 'PICK', 'succeeded', 'PLACE', 3)
+    assert (edge.path, edge.state, edge.outcome, edge.target, edge.count) == (
+        'TOP',
+        'PICK',
+        'succeeded',
+        'PLACE',
+        3,
+    )

@@ -2,6 +2,7 @@
 
 Its children touch nothing of it. Real processes, real signals.
 """
+
 import fcntl
 import json
 import os
@@ -24,8 +25,14 @@ ENVIRONMENT = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is
 
 
 def run(*command):
-    return subprocess.run([sys.executable, *command], env=ENVIRONMENT, timeout=60,
-                          stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+    return subprocess.run(
+        [sys.executable, *command],
+        env=ENVIRONMENT,
+        timeout=60,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+    )
 
 
 def said(process):
@@ -36,27 +43,44 @@ def first_said(program):
     """The next that a program says, the lines of SMACH's log left out."""
     for line in program.stdout:
         if line.startswith(b'SAID '):
-            return line.decode()[len('SAID '):].strip()
+            return line.decode()[len('SAID ') :].strip()
     raise AssertionError('it has ended without a word')
 
 
 @pytest.fixture
 def under_oracle(tmp_path):
     """Run a script under oracle_run, with all that a program keeps in files."""
+
     def run_script(*script):
-        return run('-c', RUNNER, '--record', str(tmp_path / 'bags'), '--checkpoint',
-                   str(tmp_path / 'store'), '--rates-file', str(tmp_path / 'rates'), *script)
+        return run(
+            '-c',
+            RUNNER,
+            '--record',
+            str(tmp_path / 'bags'),
+            '--checkpoint',
+            str(tmp_path / 'store'),
+            '--rates-file',
+            str(tmp_path / 'rates'),
+            *script,
+        )
+
     return run_script
 
 
 @pytest.fixture
 def script(tmp_path):
     """Write a script beside the one that starts processes, whose names it has."""
+
     def write(text):
         path = tmp_path / 'task.py'
-        path.write_text('import sys; sys.path.insert(0, {!r})\nfrom forking_script import *\n'
-                        .format(os.path.dirname(SCRIPT)) + textwrap.dedent(text))
+        path.write_text(
+            'import sys; sys.path.insert(0, {!r})\nfrom forking_script import *\n'.format(
+                os.path.dirname(SCRIPT)
+            )
+            + textwrap.dedent(text)
+        )
         return str(path)
+
     return write
 
 
@@ -80,7 +104,7 @@ def test_children_start_and_end_as_without_an_oracle(under_oracle, kind, tmp_pat
 
 
 def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(script, tmp_path):
-    path = script('''
+    path = script("""
         class Start(smach.State):
             def __init__(self):
                 smach.State.__init__(self, outcomes=['succeeded'])
@@ -93,10 +117,21 @@ def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(s
         with top:
             smach.StateMachine.add('START', Start())
         top.execute()
-        ''')
-    program = subprocess.Popen([sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'),
-                                '--checkpoint', str(tmp_path / 'store'), path],
-                               stdout=subprocess.PIPE, env=ENVIRONMENT)
+        """)
+    program = subprocess.Popen(
+        [
+            sys.executable,
+            '-c',
+            RUNNER,
+            '--record',
+            str(tmp_path / 'bags'),
+            '--checkpoint',
+            str(tmp_path / 'store'),
+            path,
+        ],
+        stdout=subprocess.PIPE,
+        env=ENVIRONMENT,
+    )
     child = json.loads(first_said(program))
     try:
         assert program.wait(30) == -signal.SIGKILL
@@ -136,7 +171,7 @@ def can_lock(file):
     return True
 
 
-ASYNCIO = '''
+ASYNCIO = """
 import asyncio
 heard = []
 async def main():
@@ -155,9 +190,9 @@ asyncio.run(main())
 said(heard)
 said(signal.getsignal(signal.SIGTERM))
 said(signal.set_wakeup_fd(-1))
-'''
+"""
 # says what `begin` returns, and then heeds nothing
-NEVER_ENDS = '''
+NEVER_ENDS = """
 class Deaf(smach.State):
     def __init__(self):
         smach.State.__init__(self, outcomes=['succeeded'])
@@ -175,20 +210,26 @@ top = smach.StateMachine(outcomes=['succeeded'])
 with top:
     smach.StateMachine.add('DEAF', Deaf())
 top.execute()
-'''
+"""
 
 
 def test_a_loop_of_asyncio_hears_its_signals(under_oracle, script):
     path = script(ASYNCIO)
-    assert said(under_oracle(path)) == said(run(path)) == ([
-        "SAID ['usr1', 'term']", 'SAID {}'.format(signal.SIG_DFL), 'SAID -1'], 0)
+    assert (
+        said(under_oracle(path))
+        == said(run(path))
+        == (["SAID ['usr1', 'term']", 'SAID {}'.format(signal.SIG_DFL), 'SAID -1'], 0)
+    )
 
 
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 def test_signals_are_heard_after_a_loop_of_asyncio(script, number, tmp_path):
     path = script(ASYNCIO + "begin = lambda: 'ready'" + NEVER_ENDS)
-    program = subprocess.Popen([sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'),
-                                path], stdout=subprocess.PIPE, env=ENVIRONMENT)
+    program = subprocess.Popen(
+        [sys.executable, '-c', RUNNER, '--record', str(tmp_path / 'bags'), path],
+        stdout=subprocess.PIPE,
+        env=ENVIRONMENT,
+    )
     try:
         while first_said(program) != 'ready':
             pass
@@ -197,19 +238,26 @@ def test_signals_are_heard_after_a_loop_of_asyncio(script, number, tmp_path):
     finally:
         program.kill()
         program.stdout.close()
-    bag, = (tmp_path / 'bags').iterdir()
+    (bag,) = (tmp_path / 'bags').iterdir()
     assert bag.suffix == '.bag', 'it is closed'
 
 
 def test_a_program_that_is_ended_by_force_leaves_no_child(script):
-    path = script('''
+    path = script(
+        """
 def begin():
     global workers
     workers = multiprocessing.get_context('fork').Pool(2)
     return [each.pid for each in workers._pool]
-''' + NEVER_ENDS)
-    program = subprocess.Popen([sys.executable, '-c', RUNNER, path], stdout=subprocess.PIPE,
-                               env=ENVIRONMENT, start_new_session=True)
+"""
+        + NEVER_ENDS
+    )
+    program = subprocess.Popen(
+        [sys.executable, '-c', RUNNER, path],
+        stdout=subprocess.PIPE,
+        env=ENVIRONMENT,
+        start_new_session=True,
+    )
     try:
         first = json.loads(first_said(program))
         assert set(first) < living(program.pid)

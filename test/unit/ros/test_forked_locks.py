@@ -1,4 +1,5 @@
 """A child that is forked while its parent holds the lock of a file does not keep that lock."""
+
 import fcntl
 import os
 import re
@@ -43,8 +44,9 @@ def disk(path):
 def catalogue(path):
     path.touch()
     folders = SimpleNamespace(open=lambda name: os.open(name, os.O_RDONLY))
-    assert not BagCatalogue._is_written(SimpleNamespace(_folders=folders), str(path),
-                                        SimpleNamespace(changed_ns=0))
+    assert not BagCatalogue._is_written(
+        SimpleNamespace(_folders=folders), str(path), SimpleNamespace(changed_ns=0)
+    )
     return path
 
 
@@ -84,10 +86,15 @@ def experiment(path):
     return path / '.lock'
 
 
-WAYS = {'ros/recording/bag_repair.py': [bag_repair], 'ros/recording/bag_writer.py': [bag_writer],
-        'ros/disk/bag_folder.py': [disk], 'expert/console/trials/bag_catalogue.py': [catalogue],
-        'oracle/records/folder_lock.py': [rates_folder], 'experiment/pool.py': [experiment],
-        'store/holding.py': [held_machine, looked_at_machine, looked_at_all_machines]}
+WAYS = {
+    'ros/recording/bag_repair.py': [bag_repair],
+    'ros/recording/bag_writer.py': [bag_writer],
+    'ros/disk/bag_folder.py': [disk],
+    'expert/console/trials/bag_catalogue.py': [catalogue],
+    'oracle/records/folder_lock.py': [rates_folder],
+    'experiment/pool.py': [experiment],
+    'store/holding.py': [held_machine, looked_at_machine, looked_at_all_machines],
+}
 
 
 @pytest.fixture
@@ -107,6 +114,7 @@ def forks_as_it_locks(monkeypatch):
             if not child:
                 signal.pause()
             children.append(child)
+
     monkeypatch.setattr(fcntl, 'flock', locks)
     yield children
     for child in children:
@@ -126,14 +134,16 @@ def can_lock(path):
 
 
 @pytest.mark.parametrize('way', [way for ways in WAYS.values() for way in ways])
-def test_a_child_that_is_forked_meanwhile_does_not_keep_the_lock(
-        tmp_path, forks_as_it_locks, way):
+def test_a_child_that_is_forked_meanwhile_does_not_keep_the_lock(tmp_path, forks_as_it_locks, way):
     path = way(tmp_path / 'file')
     assert forks_as_it_locks, 'it has locked'
     assert can_lock(path)
 
 
 def test_each_module_that_locks_a_file_is_tried():
-    found = {str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob('*.py')
-             if re.search(r'fcntl\.(flock|lockf)\(.*(LOCK_[ES]|kind)', path.read_text())}
+    found = {
+        str(path.relative_to(PACKAGE))
+        for path in PACKAGE.rglob('*.py')
+        if re.search(r'fcntl\.(flock|lockf)\(.*(LOCK_[ES]|kind)', path.read_text())
+    }
     assert found == set(WAYS)

@@ -3,6 +3,7 @@
 actionlib calls transitions back under a lock of their goal: whoever then waits for a client must
 not be waited for. No master.
 """
+
 import threading
 
 import actionlib.msg as messages
@@ -102,6 +103,7 @@ def test_a_callback_sends_the_next_goal(called):
         def again(*_, client=client, sent=sent):
             client.send_goal(messages.TestGoal())
             sent.set()
+
         client.send(**{called: again})
         assert sent.wait(LIMIT_S)
         assert_nobody_hangs(client)
@@ -115,6 +117,7 @@ def test_feedback_sends_the_next_goal(monkeypatch):
         def again(*_, client=client, sent=sent):
             client.send_goal(messages.TestGoal())
             sent.set()
+
         client.send_goal(messages.TestGoal(), feedback_cb=again)
         # actionlib drops what comes before the goal is noted
         for status in client.server.manager._get_live_statuses():
@@ -134,6 +137,7 @@ def test_callbacks_of_two_clients_send_with_the_other_one():
             except threading.BrokenBarrierError:
                 pass
             client.send_goal(messages.TestGoal())
+
         first.send(done_cb=lambda *_, other=second, send=meet_and_send: send(other))
         second.send(done_cb=lambda *_, other=first, send=meet_and_send: send(other))
         assert_nobody_hangs(first, second, first)
@@ -149,6 +153,7 @@ def test_goals_are_cancelled_while_others_are_sent():
     def cancel():
         for _ in range(10 * ROUNDS):
             client.cancel_goal()
+
     for function in (send, cancel, send, cancel):
         client.server.start(function)
     assert_nobody_hangs(client)

@@ -1,4 +1,5 @@
 """What of a goal on its way counts as lost; no master."""
+
 import time
 from types import SimpleNamespace
 
@@ -36,9 +37,15 @@ def sent_and_seen(*states):
     return sent
 
 
-@pytest.mark.parametrize('states, lost', [
-    ([], True), ([CommState.PENDING], False), ([CommState.PENDING, CommState.ACTIVE], False),
-    ([CommState.ACTIVE, CommState.WAITING_FOR_RESULT], True)])
+@pytest.mark.parametrize(
+    'states, lost',
+    [
+        ([], True),
+        ([CommState.PENDING], False),
+        ([CommState.PENDING, CommState.ACTIVE], False),
+        ([CommState.ACTIVE, CommState.WAITING_FOR_RESULT], True),
+    ],
+)
 def test_a_goal_nobody_took_up_and_an_end_without_a_result_are_lost_in_time(states, lost):
     sent = sent_and_seen(*states)
     assert not sent.unheard(time.monotonic() + 1.0)
@@ -72,7 +79,6 @@ def test_a_connection_to_a_node_that_has_died_reaches_nobody():
 
 
 class FakeConnection:
-
     def __init__(self, node):
         self.callerid_pub = node
         self.socket = object()
@@ -87,11 +93,11 @@ class FakeSubscriber:
 
 
 class FakeClient:
-
     def __init__(self):
         self.pub_goal, self.pub_cancel = FakePublisher('/server'), FakePublisher('/server')
-        self.status_sub, self.result_sub, self.feedback_sub = (FakeSubscriber('/server')
-                                                               for _ in range(3))
+        self.status_sub, self.result_sub, self.feedback_sub = (
+            FakeSubscriber('/server') for _ in range(3)
+        )
 
 
 @pytest.fixture
@@ -120,9 +126,13 @@ def test_a_new_connection_is_given_time_to_be_known_to_the_server(link):
     assert ready_after_s(link) < 0.2, 'but once'
 
 
-@pytest.mark.parametrize('made_anew', [
-    lambda client: setattr(client, 'result_sub', FakeSubscriber('/server')),
-    lambda client: setattr(client.result_sub.connections[0], 'socket', object())])
+@pytest.mark.parametrize(
+    'made_anew',
+    [
+        lambda client: setattr(client, 'result_sub', FakeSubscriber('/server')),
+        lambda client: setattr(client.result_sub.connections[0], 'socket', object()),
+    ],
+)
 def test_a_connection_made_anew_is_given_that_time_again(client, link, made_anew):
     link.ready()
     made_anew(client)
@@ -131,7 +141,7 @@ def test_a_connection_made_anew_is_given_that_time_again(client, link, made_anew
 
 @pytest.mark.parametrize('topic', ['status_sub', 'result_sub', 'feedback_sub'])
 def test_a_topic_without_the_server_is_waited_for(client, link, topic):
-    connection, = getattr(client, topic).connections
+    (connection,) = getattr(client, topic).connections
     connection.callerid_pub = '/another'
     assert not link.ready()
     connection.callerid_pub, connection.socket = '/server', None
@@ -140,12 +150,14 @@ def test_a_topic_without_the_server_is_waited_for(client, link, topic):
 
 def test_a_node_that_reports_about_goals_and_takes_none_is_named_once(monkeypatch):
     warnings = []
-    monkeypatch.setattr(goal_link.rospy, 'logwarn',
-                        lambda text, *args: warnings.append(text % args))
+    monkeypatch.setattr(
+        goal_link.rospy, 'logwarn', lambda text, *args: warnings.append(text % args)
+    )
     monkeypatch.setattr(goal_link.rospy, 'resolve_name', str)
     monkeypatch.setattr(goal_link, 'LISTENS_AFTER_S', 0.02)
-    monkeypatch.setattr(actionlib.ActionClient, '__init__',
-                        lambda self, ns, _: setattr(self, 'ns', ns))
+    monkeypatch.setattr(
+        actionlib.ActionClient, '__init__', lambda self, ns, _: setattr(self, 'ns', ns)
+    )
     taken = []
     monkeypatch.setattr(actionlib.ActionClient, '_status_cb', lambda _, told: taken.append(told))
     client = ServedClient('/server', SharedAutonomyAction)
@@ -164,5 +176,7 @@ def test_a_node_that_reports_about_goals_and_takes_none_is_named_once(monkeypatc
         hear('/relay', '/server')
         time.sleep(0.03)  # longer than any connection takes
     assert len(taken) == 1
-    assert warnings == ['/server: ignored what /relay reports about goals, as it does not '
-                        'listen for them. A bag that is played does that']
+    assert warnings == [
+        '/server: ignored what /relay reports about goals, as it does not '
+        'listen for them. A bag that is played does that'
+    ]

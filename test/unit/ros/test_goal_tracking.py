@@ -1,4 +1,5 @@
 """Answers to a goal that come before actionlib's client has noted which goal it is."""
+
 import threading
 
 import pytest
@@ -72,6 +73,7 @@ def test_who_waits_for_the_end_with_a_lock_of_his_own_gets_it(client):
         with condition:
             done.append(result)
             condition.notify()
+
     with condition:
         client.send_goal('goal', end)
         assert condition.wait_for(lambda: done, 20.0)
@@ -84,5 +86,6 @@ def test_who_is_told_of_the_end_may_send_the_next_goal(client):
     def again(*result):
         client.send_goal('next')
         sent.set()
+
     client.send_goal('goal', again)
     assert sent.wait(20.0)

@@ -1,6 +1,7 @@
 """Settings from a file, the parameter server and the command line; every mistake says where it was
 made.
 """
+
 import sys
 import types
 
@@ -34,25 +35,30 @@ def write(tmp_path):
         path = tmp_path / 'oracle.yaml'
         path.write_text(text)
         return str(path)
+
     return write_file
 
 
 @pytest.fixture
 def node(monkeypatch):
     """This process looks like the ROS node /robot with the given parameters."""
+
     def be_node(**values):
         server = FakeParameterServer({'~' + name: value for name, value in values.items()})
         monkeypatch.setattr(settings_module.rospy, 'get_param', server.get_param)
         monkeypatch.setattr(settings_module.rospy.core, 'is_initialized', lambda: True)
-        monkeypatch.setattr(settings_module.rospy, 'resolve_name',
-                            lambda name: name.replace('~', '/robot/'))
+        monkeypatch.setattr(
+            settings_module.rospy, 'resolve_name', lambda name: name.replace('~', '/robot/')
+        )
+
     return be_node
 
 
 def test_a_file_is_read_as_it_is_written(write):
     path = write('policy: prose\nstates:\n  PICK: {memory: 4, preconditions: [DETECT]}\n')
     assert load_settings(path) == {
-        'policy': 'prose', 'states': {'PICK': {'memory': 4, 'preconditions': ['DETECT']}}
+        'policy': 'prose',
+        'states': {'PICK': {'memory': 4, 'preconditions': ['DETECT']}},
     }
 
 
@@ -82,8 +88,9 @@ def test_a_file_that_is_no_text_is_refused(tmp_path):
         read_yaml(str(path))
 
 
-@pytest.mark.parametrize('text', [
-    'states: &a {PICK: *a}\n', 'x: ' + '[' * 3000 + '\n', 'memory: !!int many\n'])
+@pytest.mark.parametrize(
+    'text', ['states: &a {PICK: *a}\n', 'x: ' + '[' * 3000 + '\n', 'memory: !!int many\n']
+)
 def test_a_file_that_no_yaml_reader_can_make_sense_of_is_refused_by_name(write, text):
     with pytest.raises(SettingsError, match=r'oracle\.yaml'):
         read_yaml(write(text))
@@ -94,13 +101,20 @@ def test_an_object_from_a_file_is_never_made(write):
         read_yaml(write('policy: !!python/object/apply:os.getcwd []\n'))
 
 
-@pytest.mark.parametrize('text, place', [
-    ('memory: 3\nprior: 0.1\nmemory: 4\n', r'line 3: memory: .*first in line 1'),
-    ('states:\n  PICK: {memory: 3}\n  PLACE: {}\n  PICK: {prior: 0.2}\n',
-     r'line 4: states\.PICK: .*first in line 2'),
-    ('states:\n  A:\n    preconditions:\n    - {check: B, check: C}\n',
-     r'line 4: states\.A\.preconditions\[0\]\.check'),
-])
+@pytest.mark.parametrize(
+    'text, place',
+    [
+        ('memory: 3\nprior: 0.1\nmemory: 4\n', r'line 3: memory: .*first in line 1'),
+        (
+            'states:\n  PICK: {memory: 3}\n  PLACE: {}\n  PICK: {prior: 0.2}\n',
+            r'line 4: states\.PICK: .*first in line 2',
+        ),
+        (
+            'states:\n  A:\n    preconditions:\n    - {check: B, check: C}\n',
+            r'line 4: states\.A\.preconditions\[0\]\.check',
+        ),
+    ],
+)
 def test_a_key_given_twice_names_both_lines(write, text, place):
     with pytest.raises(SettingsError, match=place):
         read_yaml(write(text))
@@ -114,7 +128,8 @@ def test_the_same_key_in_different_mappings_is_no_repetition(write):
 
 def test_anchors_and_merge_keys_work(write):
     values, _ = read_yaml(
-        write('states:\n  A: &usual {memory: 4}\n  B:\n    <<: *usual\n    prior: 0.3\n'))
+        write('states:\n  A: &usual {memory: 4}\n  B:\n    <<: *usual\n    prior: 0.3\n')
+    )
     assert values['states']['B'] == {'memory': 4, 'prior': 0.3}
 
 
@@ -132,8 +147,12 @@ def test_the_parameter_server_goes_over_the_file_and_the_command_line_over_both(
     path = write('policy: prose\nmemory: 3\nstates:\n  PICK: {memory: 4, prior: 0.3}\n')
     node(oracle={'memory': 5, 'states': {'PICK': {'memory': 6}}, 'deadline_s': 7.0})
     settings = load_settings(path, overrides={'deadline_s': 8.0})
-    assert settings == {'policy': 'prose', 'memory': 5, 'deadline_s': 8.0,
-                        'states': {'PICK': {'memory': 6, 'prior': 0.3}}}
+    assert settings == {
+        'policy': 'prose',
+        'memory': 5,
+        'deadline_s': 8.0,
+        'states': {'PICK': {'memory': 6, 'prior': 0.3}},
+    }
     assert settings.origin('memory') == 'parameter /robot/oracle'
     assert settings.origin('deadline_s') == 'command line'
     assert 'line 4' in settings.origin('states.PICK.prior')
@@ -158,11 +177,16 @@ def test_a_state_of_a_nested_machine_can_be_set_by_parameter(node):
         oracle={
             'states': {
                 'TASK': {'memory': 3, 'PICK': {'memory': 4}, 'ARM': {'MOVE': {'prior': 0.2}}},
-                'X': {}
+                'X': {},
             }
-        })
+        }
+    )
     assert read_param('~oracle')['states'] == {
-        'TASK': {'memory': 3}, 'TASK/PICK': {'memory': 4}, 'TASK/ARM/MOVE': {'prior': 0.2}, 'X': {}}
+        'TASK': {'memory': 3},
+        'TASK/PICK': {'memory': 4},
+        'TASK/ARM/MOVE': {'prior': 0.2},
+        'X': {},
+    }
 
 
 def test_an_unreachable_master_does_not_keep_the_robot_from_starting(node, monkeypatch):
@@ -170,6 +194,7 @@ def test_an_unreachable_master_does_not_keep_the_robot_from_starting(node, monke
 
     def refuse(name, default):
         raise ConnectionRefusedError('nobody there')
+
     monkeypatch.setattr(settings_module.rospy, 'get_param', refuse)
     assert read_param('~oracle') == {}
 
@@ -189,6 +214,7 @@ def checks_module(monkeypatch):
 
         def get_registered_outcomes(self):
             return ('succeeded',)
+
     module.Home = Home
     module.arm = types.SimpleNamespace(is_parked=module.view_is_clear)
     monkeypatch.setitem(sys.modules, 'robot_checks', module)
@@ -204,13 +230,16 @@ def test_a_state_class_named_as_a_precondition_becomes_a_state(checks_module):
     assert isinstance(resolve_python('python:robot_checks:Home'), checks_module.Home)
 
 
-@pytest.mark.parametrize('name, reason', [
-    ('python:robot_checks', 'the form is'),
-    ('python::view', 'the form is'),
-    ('robot_checks:view_is_clear', 'python:module:attribute'),
-    ('python:robot_checks:blind', "has no 'blind'"),
-    ('python:no_such_module_here:view', 'no_such_module_here'),
-])
+@pytest.mark.parametrize(
+    'name, reason',
+    [
+        ('python:robot_checks', 'the form is'),
+        ('python::view', 'the form is'),
+        ('robot_checks:view_is_clear', 'python:module:attribute'),
+        ('python:robot_checks:blind', "has no 'blind'"),
+        ('python:no_such_module_here:view', 'no_such_module_here'),
+    ],
+)
 def test_a_name_that_leads_nowhere_says_why(checks_module, name, reason):
     with pytest.raises((ValueError, ImportError), match=reason):
         resolve_python(name)
@@ -218,7 +247,8 @@ def test_a_name_that_leads_nowhere_says_why(checks_module, name, reason):
 
 def test_the_key_is_named_where_a_precondition_cannot_be_imported(write, checks_module):
     settings = load_settings(
-        write('states:\n  PICK:\n    preconditions: ["python:robot_checks:blind"]\n'))
+        write('states:\n  PICK:\n    preconditions: ["python:robot_checks:blind"]\n')
+    )
     with pytest.raises(SettingsError) as caught:
         Settings.from_dict(settings, resolve_python)
     text = str(settings.located(caught.value))
@@ -226,8 +256,9 @@ def test_the_key_is_named_where_a_precondition_cannot_be_imported(write, checks_
 
 
 def test_what_a_parameter_overrides_is_named():
-    settings = LoadedSettings({'max_recoveries': 5, 'memory': 10,
-                               'states': {'PICK': {'prior': 0.2}}})
-    assert settings.overridden_by({'max_recoveries': 0, 'memory': 10, 'deadline_s': 3.0,
-                                   'states': {'PICK': {'prior': 0.3}}}) == [
-        'max_recoveries: 5, now 0', 'states.PICK.prior: 0.2, now 0.3']
+    settings = LoadedSettings(
+        {'max_recoveries': 5, 'memory': 10, 'states': {'PICK': {'prior': 0.2}}}
+    )
+    assert settings.overridden_by(
+        {'max_recoveries': 0, 'memory': 10, 'deadline_s': 3.0, 'states': {'PICK': {'prior': 0.3}}}
+    ) == ['max_recoveries: 5, now 0', 'states.PICK.prior: 0.2, now 0.3']

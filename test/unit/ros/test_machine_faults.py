@@ -1,4 +1,5 @@
 """A machine that SMACH refuses to run is found before it runs, with state, outcome and name."""
+
 import os
 import re
 
@@ -64,19 +65,20 @@ def begun_at(label):
 
 
 REFUSED = {
-    'TOP/A: its outcome \'ok\' leads to \'BB\', which is no state or outcome of TOP (did you mean '
-    'B?)':
-        lambda: machine(A=(state('ok'), {'ok': 'BB'}), B=(state('ok'), {'ok': 'done'})),
-    'TOP/A: its outcome \'odd\' leads to no state, and is no outcome of TOP':
-        lambda: machine(A=(state('ok', 'odd'), {'ok': 'done'})),
+    "TOP/A: its outcome 'ok' leads to 'BB', which is no state or outcome of TOP (did you mean "
+    'B?)': lambda: machine(A=(state('ok'), {'ok': 'BB'}), B=(state('ok'), {'ok': 'done'})),
+    "TOP/A: its outcome 'odd' leads to no state, and is no outcome of TOP": lambda: machine(
+        A=(state('ok', 'odd'), {'ok': 'done'})
+    ),
     'TOP: it has no states': machine,
-    'TOP: its initial state is LOST, which is none of its states; they are A':
-        lambda: begun_at('LOST'),
-    'TOP/A: its outcome \'bad\' leads to no state': lambda: sequence('A', 'B'),
-    'TOP: its outcome map waits for the state \'LEFF\', which is none of its states (did you mean '
+    'TOP: its initial state is LOST, which is none of its states; they are A': lambda: begun_at(
+        'LOST'
+    ),
+    "TOP/A: its outcome 'bad' leads to no state": lambda: sequence('A', 'B'),
+    "TOP: its outcome map waits for the state 'LEFF', which is none of its states (did you mean "
     'LEFT?)': lambda: concurrence({'done': {'LEFF': 'ok'}}, LEFT=state('ok')),
-    'TOP: its outcome map leads to \'dome\', which is none of its outcomes (did you mean done?)':
-        lambda: concurrence({'dome': {'LEFT': 'ok'}}, LEFT=state('ok')),
+    "TOP: its outcome map leads to 'dome', which is none of its outcomes (did you mean "
+    'done?)': lambda: concurrence({'dome': {'LEFT': 'ok'}}, LEFT=state('ok')),
 }
 EMPTY = {'a Concurrence': lambda: concurrence({}), 'an Iterator': iterator, 'a Sequence': sequence}
 
@@ -93,9 +95,14 @@ def test_containers_without_states_are_named(kind):
     assert [str(each) for each in faults_of(EMPTY[kind](), 'TOP')] == ['TOP: it has no states']
 
 
-@pytest.mark.parametrize('make', [lambda inner: around(around(inner)),
-                                  lambda inner: around(concurrence({}, LEFT=inner)),
-                                  lambda inner: around(iterator(inner, loop_outcomes=['done']))])
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda inner: around(around(inner)),
+        lambda inner: around(concurrence({}, LEFT=inner)),
+        lambda inner: around(iterator(inner, loop_outcomes=['done'])),
+    ],
+)
 def test_faults_are_found_at_any_depth(make):
     top = make(machine(A=(state('ok'), {'ok': 'BB'})))
     found = [str(fault) for fault in faults_of(top, 'TOP') if fault.is_certain]
@@ -112,12 +119,12 @@ def test_an_outcome_that_is_registered_late_is_no_certain_fault():
     given = state('ok')
     sm = machine(A=(given, {'ok': 'done'}))
     given.register_outcomes(['later'])
-    fault, = faults_of(sm, 'TOP')
+    (fault,) = faults_of(sm, 'TOP')
     assert not fault.is_certain and "'later' was registered after it was added" in str(fault)
 
 
 def test_an_iterator_may_end_in_an_outcome_that_it_lacks():
-    fault, = faults_of(iterator(state('ok', 'broken'), loop_outcomes=['ok']), 'TOP')
+    (fault,) = faults_of(iterator(state('ok', 'broken'), loop_outcomes=['ok']), 'TOP')
     assert not fault.is_certain and "would end in 'broken'" in str(fault)
 
 
@@ -144,10 +151,12 @@ RUN_BY_SMACH = {
     'an empty machine, which a state fills': lambda: around(machine()),
     'an empty Concurrence, which a state fills': lambda: around(concurrence({})),
     'an own execute, which adds the target': lambda: with_one_state(Completed, 'B'),
-    'a map with an outcome that a state lacks':
-        lambda: concurrence({'done': {'LEFT': 'okay'}}, LEFT=state('ok')),
-    'a map with an end that is not reached':
-        lambda: iterator(state('ok'), loop_outcomes=['ok'], final_outcome_map={'done': 'dome'}),
+    'a map with an outcome that a state lacks': lambda: concurrence(
+        {'done': {'LEFT': 'okay'}}, LEFT=state('ok')
+    ),
+    'a map with an end that is not reached': lambda: iterator(
+        state('ok'), loop_outcomes=['ok'], final_outcome_map={'done': 'dome'}
+    ),
     'a state that is only shown': lambda: with_one_state(Shown, 'done'),
 }
 
@@ -163,6 +172,7 @@ def test_a_machine_that_builds_itself_when_it_is_executed_is_no_fault():
             with self:
                 smach.StateMachine.add('A', state('ok'), {'ok': 'done'})
             return super().execute(parent_ud)
+
     assert not [fault for fault in faults_of(Late(outcomes=['done']), 'TOP') if fault.is_certain]
 
 
@@ -170,11 +180,13 @@ def test_the_complaints_of_an_authors_own_check_are_passed_on():
     class Picky(smach.StateMachine):
         def check_consistency(self):
             raise smach.InvalidStateError('no gripper')
+
     sm = Picky(outcomes=['done'])
     with sm:
         smach.StateMachine.add('A', state('ok'), {'ok': 'done'})
     assert [str(each) for each in faults_of(sm, 'TOP')] == [
-        'TOP: SMACH refuses it: InvalidStateError: no gripper']
+        'TOP: SMACH refuses it: InvalidStateError: no gripper'
+    ]
 
 
 class Outcomes(smach.State):
@@ -188,10 +200,14 @@ def added_late(state):
     return sm
 
 
-@pytest.mark.parametrize('make', [
-    lambda: added_late(Outcomes(outcomes=['ok'])),
-    lambda: around(added_late(Outcomes(outcomes=['ok']))),
-    lambda: around(concurrence({'done': {'A': 'ok'}}, A=Outcomes(outcomes=['ok'])))])
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda: added_late(Outcomes(outcomes=['ok'])),
+        lambda: around(added_late(Outcomes(outcomes=['ok']))),
+        lambda: around(concurrence({'done': {'A': 'ok'}}, A=Outcomes(outcomes=['ok']))),
+    ],
+)
 def test_a_state_that_raises_as_it_is_looked_at_is_named_with_its_line(make):
     with pytest.raises(MachineFaultError) as raised:
         faults_of(make(), 'TOP')
@@ -207,11 +223,14 @@ def error_of(build):
         return refused_while_built(type(err), err, err.__traceback__)
 
 
-@pytest.mark.parametrize('build', [
-    lambda: machine(A=(state('ok'), {'okay': 'done'})),
-    lambda: smach.StateMachine.add('A', state('ok')),
-    lambda: smach.Concurrence(['done'], 'dome'),
-])
+@pytest.mark.parametrize(
+    'build',
+    [
+        lambda: machine(A=(state('ok'), {'okay': 'done'})),
+        lambda: smach.StateMachine.add('A', state('ok')),
+        lambda: smach.Concurrence(['done'], 'dome'),
+    ],
+)
 def test_an_error_of_smach_while_a_machine_is_built_is_told_with_its_line(build, monkeypatch):
     # upstream's SMACH leaves a container open whose construction has raised
     monkeypatch.setattr(smach.Container, '_construction_stack', [])
@@ -225,12 +244,15 @@ def test_the_outcome_map_is_told_that_smach_refuses_by_a_key_alone(monkeypatch):
     def build():
         with smach.Concurrence(['done'], 'done', outcome_map={'done': {'LEFF': 'ok'}}):
             smach.Concurrence.add('LEFT', state('ok'))
+
     assert "its outcome map waits for the state 'LEFF', which is none of its states (did you " in (
-        str(error_of(build)))
+        str(error_of(build))
+    )
 
 
 def test_an_error_of_the_script_itself_is_none_of_smach():
     def build():
         raise ValueError('no robot')
+
     assert error_of(build) is None
     assert error_of(lambda: machine().userdata['missing']) is None

@@ -1,4 +1,5 @@
 """What machines are called that were given no name."""
+
 import threading
 
 import pytest
@@ -21,10 +22,12 @@ def machine(*labels, name=''):
 @pytest.fixture
 def node(monkeypatch):
     """Be this node."""
+
     def be(name):
         monkeypatch.setattr(machine_names.rospy.core, 'is_initialized', lambda: True)
         monkeypatch.setattr(machine_names.rospy, 'get_name', lambda: name)
         return MachineNames()
+
     return be
 
 
@@ -34,10 +37,15 @@ def named(names, sm):
     return oracle_of(sm).path
 
 
-@pytest.mark.parametrize('name, expected', [
-    ('/task_executive', 'task_executive'), ('/robot1/arm/task_executive', 'task_executive'),
-    ('/task_4711_1795323273041', 'task'), ('/robot_12', 'robot_12'),
-])
+@pytest.mark.parametrize(
+    'name, expected',
+    [
+        ('/task_executive', 'task_executive'),
+        ('/robot1/arm/task_executive', 'task_executive'),
+        ('/task_4711_1795323273041', 'task'),
+        ('/robot_12', 'robot_12'),
+    ],
+)
 def test_a_machine_is_called_as_its_node_is_in_every_run(node, name, expected):
     assert named(node(name), machine('A')) == expected
 
@@ -45,8 +53,12 @@ def test_a_machine_is_called_as_its_node_is_in_every_run(node, name, expected):
 def test_each_machine_has_a_name_of_its_own_and_keeps_it(node):
     names = node('/task')
     first, second = machine('A'), machine('B')
-    assert [named(names, sm) for sm in (first, second, first, second)] == ['task', 'task_2',
-                                                                           'task', 'task_2']
+    assert [named(names, sm) for sm in (first, second, first, second)] == [
+        'task',
+        'task_2',
+        'task',
+        'task_2',
+    ]
 
 
 def test_machines_of_one_structure_share_a_name_unless_they_run_at_once(node):
@@ -66,14 +78,20 @@ def test_machines_in_threads_at_once_are_told_apart(node):
     def run(sm):
         with names.running(sm):
             begun.wait(10.0)
+
     machines = [machine('A') for _ in range(5)]
     threads = [threading.Thread(target=run, args=(sm,)) for sm in machines]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join(10.0)
-    assert {oracle_of(sm).name for sm in machines} == {'task', 'task_2', 'task_3', 'task_4',
-                                                       'task_5'}
+    assert {oracle_of(sm).name for sm in machines} == {
+        'task',
+        'task_2',
+        'task_3',
+        'task_4',
+        'task_5',
+    }
 
 
 def test_a_given_name_stays_and_is_given_to_no_other(node):
@@ -89,8 +107,10 @@ def test_a_given_name_stays_and_is_given_to_no_other(node):
 def test_a_name_for_the_first_machine_goes_over_that_of_the_node(node):
     names = node('/task')
     names.given = 'PICK_AND_PLACE'
-    assert [named(names, machine('A')), named(names, machine('B'))] == ['PICK_AND_PLACE',
-                                                                        'PICK_AND_PLACE_2']
+    assert [named(names, machine('A')), named(names, machine('B'))] == [
+        'PICK_AND_PLACE',
+        'PICK_AND_PLACE_2',
+    ]
 
 
 def test_the_name_that_the_launch_file_gives_every_script_says_less_than_the_script(node):

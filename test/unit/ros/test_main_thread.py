@@ -1,4 +1,5 @@
 """Calls to the master run outside the main thread."""
+
 import threading
 
 import pytest
@@ -25,7 +26,8 @@ def test_without_a_node_a_call_stays_in_its_thread():
 def test_a_call_from_another_thread_stays_in_it():
     found = []
     thread = threading.Thread(
-        target=lambda: found.append(outside_main_thread(threading.current_thread)))
+        target=lambda: found.append(outside_main_thread(threading.current_thread))
+    )
     thread.start()
     thread.join()
     assert found == [thread]
@@ -35,6 +37,7 @@ def test_a_call_from_another_thread_stays_in_it():
 def test_what_it_raises_is_raised_here():
     def fails():
         raise OSError('no such folder')
+
     with pytest.raises(OSError, match='no such folder'):
         outside_main_thread(fails)
 

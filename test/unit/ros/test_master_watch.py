@@ -1,12 +1,15 @@
 """When a node registers again with its master, and when it leaves it alone."""
+
 import pytest
 
 from smach_oracle.ros import master_watch
 from smach_oracle.ros.master_watch import MasterCallError, MasterLink, MasterWatch, Registrations
 
-ITEMS = Registrations([['/task/oracle/events', 'smach_oracle/OracleEvent']],
-                      [['/task/expert_query/goal', 'smach_oracle/ExpertQueryActionGoal']],
-                      [('/task/expert_query/answer', 'rosrpc://localhost:1')])
+ITEMS = Registrations(
+    [['/task/oracle/events', 'smach_oracle/OracleEvent']],
+    [['/task/expert_query/goal', 'smach_oracle/ExpertQueryActionGoal']],
+    [('/task/expert_query/answer', 'rosrpc://localhost:1')],
+)
 
 
 class FakeLink:
@@ -90,9 +93,8 @@ def test_a_registration_that_fails_half_way_is_tried_again(watch, link):
 
 
 @pytest.mark.parametrize(
-    'error',
-    [OSError('no route'), ValueError('half an answer'),
-     KeyError('odd')])
+    'error', [OSError('no route'), ValueError('half an answer'), KeyError('odd')]
+)
 def test_whatever_a_dying_master_answers_the_watch_goes_on(watch, link, error):
     link.error = error
     watch.check()
@@ -126,6 +128,7 @@ class FakeMaster:
         def call(_caller, name, *_more):
             self.calls.append((method, name))
             return 1, '', ['http://localhost:2'] if method == 'registerSubscriber' else 0
+
         return call
 
 
@@ -134,6 +137,8 @@ def test_who_hears_from_a_node_again_finds_its_services_there(monkeypatch):
     monkeypatch.setattr(master_watch.xmlrpc.client, 'ServerProxy', lambda *_, **__: master)
     found = MasterLink('http://localhost:1', '/task', 'http://localhost:3').register(ITEMS)
     assert found == [('/task/expert_query/goal', ['http://localhost:2'])]
-    assert master.calls == [('registerService', '/task/expert_query/answer'),
-                            ('registerSubscriber', '/task/expert_query/goal'),
-                            ('registerPublisher', '/task/oracle/events')]
+    assert master.calls == [
+        ('registerService', '/task/expert_query/answer'),
+        ('registerSubscriber', '/task/expert_query/goal'),
+        ('registerPublisher', '/task/oracle/events'),
+    ]

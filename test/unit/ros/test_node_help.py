@@ -1,6 +1,7 @@
 """Nodes that are set by parameters say so, with no master to ask, and without packages that not
 every robot has.
 """
+
 import os
 import re
 import subprocess
@@ -40,10 +41,14 @@ def set_by_parameters() -> List[str]:
 
 def run(node: str, hidden: str = '') -> 'subprocess.CompletedProcess[str]':
     """A node asked for help, then called wrongly, where a module `hidden` is not installed."""
-    return subprocess.run([sys.executable, '-c', TWICE, hidden,
-                           str(ROOT / 'scripts' / node)], stdout=subprocess.PIPE,
-                          stderr=subprocess.PIPE, universal_newlines=True, timeout=60,
-                          env=dict(os.environ, ROS_MASTER_URI='http://localhost:1'))
+    return subprocess.run(
+        [sys.executable, '-c', TWICE, hidden, str(ROOT / 'scripts' / node)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+        timeout=60,
+        env=dict(os.environ, ROS_MASTER_URI='http://localhost:1'),
+    )
 
 
 def test_the_nodes_are_found():
@@ -58,8 +63,9 @@ def test_help_tells_the_parameters_and_a_wrong_argument_is_named(node: str) -> N
     assert '--nonsense' in told.stderr
 
 
-@pytest.mark.parametrize('node',
-                         ['manipulation_interface', 'expert_console', 'perception_interface'])
+@pytest.mark.parametrize(
+    'node', ['manipulation_interface', 'expert_console', 'perception_interface']
+)
 def test_where_there_is_no_pybullet_the_nodes_for_any_robot_still_begin(node: str) -> None:
     told = run(node, hidden='pybullet')
     assert 'ended with 0' in told.stdout, told.stderr

@@ -1,4 +1,5 @@
 """The keeper of a command leaves nothing of it behind, whichever process ends."""
+
 import os
 import shutil
 import signal
@@ -12,7 +13,7 @@ from smach_oracle.ros.interfaces import process_keeper
 from smach_oracle.ros.interfaces.process_keeper import descendants
 
 KEEPER = [sys.executable, '-I', process_keeper.__file__, '1', '0.5']
-STUBBORN = '''
+STUBBORN = """
 import os, signal, subprocess, sys, time
 for number in (signal.SIGINT, signal.SIGTERM):
     signal.signal(number, signal.SIG_IGN)
@@ -20,7 +21,7 @@ if len(sys.argv) < 2:  # a child that leaves, with a session of its own
     subprocess.Popen([sys.executable, __file__, 'child'], start_new_session=True)
 print('up', os.getpid(), flush=True)
 time.sleep(600)
-'''
+"""
 
 
 @pytest.fixture
@@ -31,8 +32,9 @@ def stubborn(tmp_path):
 
 
 def begin(command, **options):
-    return subprocess.Popen(KEEPER + command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                            text=True, **options)
+    return subprocess.Popen(
+        KEEPER + command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options
+    )
 
 
 def two_pids(stream):
@@ -41,8 +43,9 @@ def two_pids(stream):
 
 
 def all_gone(pids, limit_s=20.0):
-    return wait_for(lambda: not any(os.path.exists('/proc/{}'.format(pid)) for pid in pids),
-                    limit_s)
+    return wait_for(
+        lambda: not any(os.path.exists('/proc/{}'.format(pid)) for pid in pids), limit_s
+    )
 
 
 def test_what_ignores_every_signal_is_gone_when_the_pipe_closes(stubborn):
@@ -55,11 +58,15 @@ def test_what_ignores_every_signal_is_gone_when_the_pipe_closes(stubborn):
 
 
 def test_it_is_asked_to_end_before_it_is_forced(tmp_path):
-    keeper = begin([
-        'sh', '-c',
-        'trap "echo in order > {}; exit" INT; echo up; while :; do sleep 0.05; done'.format(
-            tmp_path / 'end')
-    ])
+    keeper = begin(
+        [
+            'sh',
+            '-c',
+            'trap "echo in order > {}; exit" INT; echo up; while :; do sleep 0.05; done'.format(
+                tmp_path / 'end'
+            ),
+        ]
+    )
     assert keeper.stdout.readline() == 'up\n'
     keeper.stdin.close()
     keeper.wait(20)
@@ -68,10 +75,18 @@ def test_it_is_asked_to_end_before_it_is_forced(tmp_path):
 
 @pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
 def test_nothing_is_left_when_whoever_started_it_is_killed(stubborn, number):
-    parent = subprocess.Popen([
-        sys.executable, '-c', 'import subprocess, sys, time; subprocess.Popen(sys.argv[1:], '
-        'stdin=subprocess.PIPE, start_new_session=True); time.sleep(600)', *KEEPER, *stubborn
-    ], stdout=subprocess.PIPE, text=True)
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            '-c',
+            'import subprocess, sys, time; subprocess.Popen(sys.argv[1:], '
+            'stdin=subprocess.PIPE, start_new_session=True); time.sleep(600)',
+            *KEEPER,
+            *stubborn,
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     pids = two_pids(parent.stdout)
     parent.send_signal(number)
     parent.wait(10)

@@ -1,4 +1,5 @@
 """Two threads publish what a machine has learned; no master."""
+
 import threading
 
 import pytest
@@ -11,7 +12,6 @@ from smach_oracle.ros.publishers import RatesPublisher
 
 
 class FakeTopic:
-
     def __init__(self, *_, **__):
         self.told = []
 
@@ -67,8 +67,9 @@ def test_what_was_learned_last_is_what_stays_latched(publisher):
 def test_a_wrapped_machine_is_published_when_its_trial_ends(publisher):
     machine = smach.StateMachine(['succeeded'])
     with machine:
-        smach.StateMachine.add('PICK', smach.CBState(lambda *_: 'succeeded',
-                                                     outcomes=['succeeded']))
+        smach.StateMachine.add(
+            'PICK', smach.CBState(lambda *_: 'succeeded', outcomes=['succeeded'])
+        )
     publisher.watch(OracleContainer.wrap(machine))
     assert machine.execute() == 'succeeded'
     assert publisher._publisher.told[-1] == 1

@@ -1,4 +1,5 @@
 """`oracle_run --check` executes no machine, reaches no master but its own, and reports."""
+
 import os
 import re
 import signal
@@ -12,11 +13,14 @@ import pytest
 from machine_scripts import MACHINES, RUNNER
 
 NOBODY = 'http://localhost:1'
-PRELUDE = '''
+PRELUDE = (
+    """
 import sys, threading, rospy, smach, smach_ros
 print('SCRIPT SAYS THIS', flush=True)
-''' + MACHINES
-GOOD = '''
+"""
+    + MACHINES
+)
+GOOD = """
 max_recoveries: 3
 states:
   PICK:
@@ -27,7 +31,7 @@ states:
     max_recoveries: 0
 interfaces:
   by_hand: {action: by_hand, states: [PICK]}
-'''
+"""
 
 
 class SpyMaster:
@@ -60,51 +64,70 @@ def spy():
 @pytest.fixture
 def check(tmp_path):
     """Check a script with settings; returns exit code, report and stderr."""
+
     def run(text, settings='', master=NOBODY, options=()):
         (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent(text))
         (tmp_path / 'oracle.yaml').write_text(settings)
         done = subprocess.run(
-            [sys.executable, '-c', RUNNER, '--check', '--config', 'oracle.yaml'] + list(options)
-            + ['task.py'], cwd=str(tmp_path), timeout=120, stdin=subprocess.DEVNULL,
+            [sys.executable, '-c', RUNNER, '--check', '--config', 'oracle.yaml']
+            + list(options)
+            + ['task.py'],
+            cwd=str(tmp_path),
+            timeout=120,
+            stdin=subprocess.DEVNULL,
             env=dict(os.environ, ROS_MASTER_URI=master, ROS_HOSTNAME='localhost'),
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            universal_newlines=True,
+        )
         assert 'STATE RUNS' not in done.stdout + done.stderr
         assert all(len(line) <= 100 for line in done.stdout.splitlines())
         return done.returncode, done.stdout, done.stderr
+
     return run
 
 
 def test_the_report_says_what_the_oracle_may_do_in_each_state(check):
-    code, report, errors = check('''
+    code, report, errors = check(
+        """
         sm = machine('HOME', 'PICK')
         with sm:
             smach.StateMachine.add('HELP', Runs(), {'aborted': 'HOME'})
         print('OUTCOME', sm.execute())
-    ''', GOOD)
+    """,
+        GOOD,
+    )
     assert code == 0, errors
     lines = [' '.join(line.split()) for line in report.splitlines()]
     for line in (
-            'TASK begins at HOME; ends in aborted, preempted, succeeded',
-            'set max_recoveries 3',
-            'HOME (Runs)', 'succeeded to PICK',
-            'aborted ends in aborted failure, the oracle takes it up',
-            'preconditions HOME', 'time limit 20 s', 'interfaces by_hand', 'set memory 4',
-            'aborted to HOME failure, the author\'s own way is kept',
-            'set max_recoveries 0', 'on a failure ask',
-            'It is not executed; the script goes on with the outcome succeeded.',
-            'All is well: no error in the settings for 1 machine.'):
+        'TASK begins at HOME; ends in aborted, preempted, succeeded',
+        'set max_recoveries 3',
+        'HOME (Runs)',
+        'succeeded to PICK',
+        'aborted ends in aborted failure, the oracle takes it up',
+        'preconditions HOME',
+        'time limit 20 s',
+        'interfaces by_hand',
+        'set memory 4',
+        "aborted to HOME failure, the author's own way is kept",
+        'set max_recoveries 0',
+        'on a failure ask',
+        'It is not executed; the script goes on with the outcome succeeded.',
+        'All is well: no error in the settings for 1 machine.',
+    ):
         assert line in lines, report
     assert 'rate below 0.4: retry or step back; 0.4 to 0.75: retry or ask; from 0.75: ask' in (
-        ' '.join(lines))
+        ' '.join(lines)
+    )
     assert 'OUTCOME succeeded' in errors and 'SAYS' not in report
 
 
 def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(check):
-    code, report, _ = check('''
+    code, report, _ = check("""
         first, second = machine('A', 'B'), machine('C')
         while True:
             assert first.execute() == second.execute() == 'succeeded'
-    ''')
+    """)
     assert code == 0
     assert 'TASK begins at A' in report and 'TASK_2 begins at C' in report
     assert 'executes a machine for the second time' in report and 'for 2 machines' in report
@@ -113,11 +136,14 @@ def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(ch
 TWO = "machine('A').execute(); machine('B').execute(); machine('A').execute()"
 
 
-@pytest.mark.parametrize('text, options, names', [
-    (TWO, (), ('TASK', 'TASK_2')),
-    (TWO, ('--name', 'kitchen'), ('kitchen', 'kitchen_2')),
-    ("rospy.init_node('cook')\n" + TWO, (), ('cook', 'cook_2')),
-])
+@pytest.mark.parametrize(
+    'text, options, names',
+    [
+        (TWO, (), ('TASK', 'TASK_2')),
+        (TWO, ('--name', 'kitchen'), ('kitchen', 'kitchen_2')),
+        ("rospy.init_node('cook')\n" + TWO, (), ('cook', 'cook_2')),
+    ],
+)
 def test_names_are_those_of_a_real_run(check, text, options, names):
     code, report, errors = check(text, options=options)
     assert code == 0, errors
@@ -128,26 +154,26 @@ def test_names_are_those_of_a_real_run(check, text, options, names):
 
 
 def test_like_machines_of_a_concurrence_have_names_of_their_own(check):
-    code, report, errors = check('''
+    code, report, errors = check("""
         both = smach.Concurrence(['succeeded'], 'succeeded')
         with both:
             smach.Concurrence.add('LEFT', machine('A'))
             smach.Concurrence.add('RIGHT', machine('A'))
         both.execute()
         machine('A').execute()
-    ''')
+    """)
     assert code == 0, errors
     assert 'TASK begins at A' in report
     assert 'TASK_2: another machine of the same structure' in report, report
     assert 'TASK: another machine of the same structure' in report, 'it runs after them'
 
 
-WRAPPED = '''
+WRAPPED = """
     from smach_oracle import OracleContainer
     rospy.init_node('task')
     for label in 'AB':
         OracleContainer.wrap(machine(label), name='SAME', settings={'memory': 7}).execute()
-'''
+"""
 
 
 def test_machines_wrapped_in_code_take_the_parameters_of_their_node(check, spy):
@@ -166,13 +192,16 @@ def test_a_wrong_parameter_of_a_machine_wrapped_in_code_is_an_error(check, spy):
     assert 'parameter /task/oracle' in last
 
 
-@pytest.mark.parametrize('settings, why', [
-    ('memory: many', "memory: 'many' is not allowed"),
-    ('states: {PICK: {preconditions: [HOEM]}}', "'HOEM' is not allowed"),
-    ('states: {PICK: {preconditions: ["python:__main__:ready"]}}', "has no 'ready'"),
-    ('oracle_label: PICK', 'oracle_label'),
-    ('on_no_answer: {jump: HOME}', 'on_no_answer'),
-])
+@pytest.mark.parametrize(
+    'settings, why',
+    [
+        ('memory: many', "memory: 'many' is not allowed"),
+        ('states: {PICK: {preconditions: [HOEM]}}', "'HOEM' is not allowed"),
+        ('states: {PICK: {preconditions: ["python:__main__:ready"]}}', "has no 'ready'"),
+        ('oracle_label: PICK', 'oracle_label'),
+        ('on_no_answer: {jump: HOME}', 'on_no_answer'),
+    ],
+)
 def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why):
     code, _, errors = check('machine("HOME", "PICK").execute()', settings)
     assert code == 2
@@ -182,7 +211,8 @@ def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why
 @pytest.mark.parametrize('kind', ['StateMachine', 'Concurrence'])
 @pytest.mark.parametrize('method', ['get_children', 'get_registered_outcomes', '__getattribute__'])
 def test_a_machine_that_raises_as_it_is_looked_at_is_refused_in_one_line(check, kind, method):
-    code, report, errors = check('''
+    code, report, errors = check(
+        """
 armed = False
 class Odd(smach.{0}):
     def {1}(self, *given):
@@ -198,7 +228,8 @@ with top:
     smach.StateMachine.add('ODD', odd)
 armed = True
 top.execute()
-'''.format(kind, method))
+""".format(kind, method)
+    )
     said = errors.splitlines()
     assert code == 2 and 'All is well' not in report, report + errors
     assert 'Traceback' not in errors
@@ -209,11 +240,13 @@ def test_a_name_that_is_no_outcome_or_state_is_told(check):
     code, report, errors = check('machine("HOME", "PICK").execute()', 'states: {PIKC: {memory: 4}}')
     assert code == 2 and 'All is well' not in report
     assert errors.splitlines()[-1].startswith(
-        "oracle_run: oracle.yaml line 1: states.PIKC: 'PIKC' is no state (did you mean PICK?)")
+        "oracle_run: oracle.yaml line 1: states.PIKC: 'PIKC' is no state (did you mean PICK?)"
+    )
 
 
 def test_the_real_master_is_asked_for_its_parameters_alone(check, spy):
-    code, report, errors = check('''
+    code, report, errors = check(
+        """
         from std_srvs.srv import Trigger
         import actionlib
         from actionlib.msg import TestAction, TestGoal
@@ -230,22 +263,32 @@ def test_the_real_master_is_asked_for_its_parameters_alone(check, spy):
         print('SPEED', rospy.get_param('speed'))
         machine('HOME').execute()
         rospy.spin()
-    ''', master=spy.uri)
+    """,
+        master=spy.uri,
+    )
     assert code == 0, errors
     assert spy.calls == [('getParam', '/')]
     assert 'SPEED 8' in errors
-    for note in ('waits for service grip', 'calls service /grip', 'waits for action server move',
-                 'sends a goal to move', 'waits for a message on scan'):
+    for note in (
+        'waits for service grip',
+        'calls service /grip',
+        'waits for action server move',
+        'sends a goal to move',
+        'waits for a message on scan',
+    ):
         assert '- ' + note in report, report
     assert 'prior 0.2' in report
 
 
-@pytest.mark.parametrize('text, code, told', [
-    ('machine("HOME")', 1, 'executed no machine'),
-    ('raise ValueError("no robot")', 1, 'ended in the error above'),
-    ('machine("HOME").execute()\nraise ValueError("no robot")', 0, 'no mistake of its own'),
-    ('machine("HOME").execute()\nsys.exit(3)', 0, 'SystemExit(3)'),
-])
+@pytest.mark.parametrize(
+    'text, code, told',
+    [
+        ('machine("HOME")', 1, 'executed no machine'),
+        ('raise ValueError("no robot")', 1, 'ended in the error above'),
+        ('machine("HOME").execute()\nraise ValueError("no robot")', 0, 'no mistake of its own'),
+        ('machine("HOME").execute()\nsys.exit(3)', 0, 'SystemExit(3)'),
+    ],
+)
 def test_the_exit_code_says_whether_a_machine_was_reached(check, text, code, told):
     found, report, errors = check(text)
     assert (found, told in ' '.join(report.split())) == (code, True), report + errors
@@ -255,16 +298,23 @@ def test_the_exit_code_says_whether_a_machine_was_reached(check, text, code, tol
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize('begin', ["rospy.init_node('task')", 'signal.signal(15, print)'])
 def test_a_signal_ends_the_check_of_a_script_that_sleeps(tmp_path, begin, number):
-    (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent('''
+    (tmp_path / 'task.py').write_text(
+        PRELUDE
+        + textwrap.dedent("""
         import signal, time
         {}
         print('SLEEPS', flush=True)
         time.sleep(600)
-    ''').format(begin))
+    """).format(begin)
+    )
     process = subprocess.Popen(
-        [sys.executable, '-c', RUNNER, '--check', 'task.py'], cwd=str(tmp_path),
+        [sys.executable, '-c', RUNNER, '--check', 'task.py'],
+        cwd=str(tmp_path),
         env=dict(os.environ, ROS_MASTER_URI=NOBODY, ROS_HOSTNAME='localhost'),
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, universal_newlines=True)
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+    )
     try:
         assert any('SLEEPS' in line for line in process.stderr)
         process.send_signal(number)
@@ -276,7 +326,8 @@ def test_a_signal_ends_the_check_of_a_script_that_sleeps(tmp_path, begin, number
 
 
 def test_what_the_oracle_may_do_in_branches_is_told(check):
-    code, report, errors = check('''
+    code, report, errors = check(
+        """
         top, tour = smach.StateMachine(['succeeded', 'aborted']), smach.Iterator(
             ['succeeded', 'aborted'], [], [], it=[1, 2], it_label='item',
             exhausted_outcome='succeeded')
@@ -285,18 +336,22 @@ def test_what_the_oracle_may_do_in_branches_is_told(check):
         with top:
             smach.StateMachine.add('TOUR', tour)
         top.execute()
-    ''', '{states: {TOUR/*: {memory: 3}}, nested: [TOUR/**], escalate: false}')
+    """,
+        '{states: {TOUR/*: {memory: 3}}, nested: [TOUR/**], escalate: false}',
+    )
     assert code == 0, errors
     lines = [' '.join(line.split()) for line in report.splitlines()]
-    for line in ('TASK/TOUR begins at VISIT; ends in aborted, succeeded',
-                 'succeeded to the next item',
-                 'policy prose; each state is on its own, so that a step back is a retry',
-                 'set memory 3'):
+    for line in (
+        'TASK/TOUR begins at VISIT; ends in aborted, succeeded',
+        'succeeded to the next item',
+        'policy prose; each state is on its own, so that a step back is a retry',
+        'set memory 3',
+    ):
         assert line in lines, report
 
 
 def test_what_contains_machines_or_serves_them_is_not_executed_either(check):
-    code, report, errors = check('''
+    code, report, errors = check("""
         both = smach.Concurrence(['succeeded', 'aborted'], 'aborted')
         with both:
             smach.Concurrence.add('LEFT', Runs())
@@ -309,6 +364,6 @@ def test_what_contains_machines_or_serves_them_is_not_executed_either(check):
         smach_ros.ActionServerWrapper('fetch', TestAction, machine('GRASP', 'LIFT'),
                                       ['succeeded'], ['aborted'], ['preempted']).run_server()
         rospy.spin()
-    ''')
+    """)
     assert code == 0, errors
     assert 'begins at REACH' in report and 'begins at GRASP' in report and '2 machines' in report

@@ -1,6 +1,7 @@
 """Scripts under oracle_run, in a process without a ROS master: they run as they run by
 themselves.
 """
+
 import os
 import subprocess
 import sys
@@ -32,14 +33,22 @@ def machine(*outcomes, cls=smach.StateMachine):
 @pytest.fixture
 def run(tmp_path):
     """Run a script under oracle_run, or directly; returns the finished process."""
+
     def run_script(text, *args, options=(), directly=False, name='task.py'):
         path = tmp_path / name
         path.write_text(PRELUDE + textwrap.dedent(text))
         command = [sys.executable] if directly else [sys.executable, '-c', RUNNER] + list(options)
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
-        return subprocess.run(command + [name] + list(args), cwd=str(tmp_path), env=environment,
-                              timeout=60, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                              universal_newlines=True)
+        return subprocess.run(
+            command + [name] + list(args),
+            cwd=str(tmp_path),
+            env=environment,
+            timeout=60,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            universal_newlines=True,
+        )
+
     return run_script
 
 
@@ -48,26 +57,34 @@ def both(run, text, *args):
     return run(text, *args), run(text, *args, directly=True)
 
 
-@pytest.mark.parametrize('text', [
-    'import sys; print(sys.argv, __file__, sys.path[0], __name__, __package__, __spec__)',
-    'import sys; print(sys.modules["__main__"].Turn is Turn)',
-    'import inspect; print(inspect.getsource(machine))',
-    'import pickle; print(type(pickle.loads(pickle.dumps(Turn("aborted")))) is Turn)',
-    'import sys; sys.exit(7)',
-    'import sys; sys.exit("no robot")',
-    'raise SystemExit',
-    'import os; os._exit(3)',
-    'import atexit; atexit.register(lambda: print(Turn))',
-    'import threading\nthreading.Timer(0.3, lambda: print("late", Turn)).start()',
-    'def deep():\n    raise ValueError("odd")\ndeep()',
-    'import sys\nsys.excepthook = lambda *error: print("mine", error[0])\nraise ValueError("odd")',
-    'raise KeyboardInterrupt',
-    'from dataclasses import dataclass\n@dataclass\nclass Pose:\n    x: float\nprint(Pose(1.0))',
-])
+@pytest.mark.parametrize(
+    'text',
+    [
+        'import sys; print(sys.argv, __file__, sys.path[0], __name__, __package__, __spec__)',
+        'import sys; print(sys.modules["__main__"].Turn is Turn)',
+        'import inspect; print(inspect.getsource(machine))',
+        'import pickle; print(type(pickle.loads(pickle.dumps(Turn("aborted")))) is Turn)',
+        'import sys; sys.exit(7)',
+        'import sys; sys.exit("no robot")',
+        'raise SystemExit',
+        'import os; os._exit(3)',
+        'import atexit; atexit.register(lambda: print(Turn))',
+        'import threading\nthreading.Timer(0.3, lambda: print("late", Turn)).start()',
+        'def deep():\n    raise ValueError("odd")\ndeep()',
+        'import sys\nsys.excepthook = lambda *error: print("mine", error[0])\n'
+        'raise ValueError("odd")',
+        'raise KeyboardInterrupt',
+        'from dataclasses import dataclass\n@dataclass\nclass Pose:\n    x: float\n'
+        'print(Pose(1.0))',
+    ],
+)
 def test_a_script_behaves_as_when_it_runs_by_itself(run, text):
     under, alone = both(run, text, '--config', 'x', '_rate:=5')
-    assert (under.returncode, under.stdout, under.stderr) == (alone.returncode, alone.stdout,
-                                                              alone.stderr)
+    assert (under.returncode, under.stdout, under.stderr) == (
+        alone.returncode,
+        alone.stdout,
+        alone.stderr,
+    )
 
 
 def test_a_syntax_error_is_shown_as_python_shows_it(run):
@@ -94,19 +111,23 @@ def test_without_an_expert_a_machine_ends_as_it_would_have(run):
 
 def test_the_scripts_handle_is_the_wrapped_machine(run):
     result = run(
-        '''
+        """
         sm = machine('aborted')
         sm.userdata.box = 3
         print(sm.execute(), type(sm).__name__, sm.name, sm.userdata.box,
               isinstance(sm, smach.StateMachine))
         print(sorted(sm.get_children()))
-    ''', name='my_task.py')
-    assert result.stdout.splitlines() == ['succeeded StateMachine MY_TASK 3 True',
-                                          "['ONLY', 'ORACLE']"], result.stderr
+    """,
+        name='my_task.py',
+    )
+    assert result.stdout.splitlines() == [
+        'succeeded StateMachine MY_TASK 3 True',
+        "['ONLY', 'ORACLE']",
+    ], result.stderr
 
 
 def test_an_execute_of_the_authors_own_runs_once(run):
-    result = run('''
+    result = run("""
         class Mine(smach.StateMachine):
             def execute(self, *args):
                 print('before')
@@ -121,13 +142,14 @@ def test_an_execute_of_the_authors_own_runs_once(run):
             pass
         print(machine('aborted', cls=Mine).execute())
         print(machine('aborted', cls=Mixed).execute())
-    ''')
-    assert result.stdout.split() == ['before', 'after', 'succeeded', 'mixed', 'in',
-                                     'succeeded'], result.stderr
+    """)
+    assert result.stdout.split() == ['before', 'after', 'succeeded', 'mixed', 'in', 'succeeded'], (
+        result.stderr
+    )
 
 
 def test_machines_in_threads_are_wrapped(run):
-    result = run('''
+    result = run("""
         import threading
         machines = [machine('aborted') for _ in range(5)]
         outcomes = []
@@ -136,29 +158,29 @@ def test_machines_in_threads_are_wrapped(run):
         for thread in threads: thread.start()
         for thread in threads: thread.join()
         print(outcomes)
-    ''')
+    """)
     assert result.stdout == str(['succeeded'] * 5) + '\n', result.stderr
 
 
 def test_a_sequence_is_wrapped(run):
-    result = run('''
+    result = run("""
         sq = smach.Sequence(outcomes=['succeeded', 'aborted', 'preempted'],
                             connector_outcome='succeeded')
         with sq:
             smach.Sequence.add('A', Turn())
             smach.Sequence.add('B', Turn('aborted'))
         print(sq.execute())
-    ''')
+    """)
     assert result.stdout == 'succeeded\n', result.stderr
 
 
-NESTED = '''
+NESTED = """
 inner = machine('aborted')
 outer = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with outer:
     smach.StateMachine.add('INNER', inner)
 print(outer.execute(), hasattr(inner, 'rates'), hasattr(outer, 'rates'), inner['ONLY'].visits)
-'''
+"""
 
 
 def test_nested_machines_are_wrapped_unless_told_otherwise(run):
@@ -166,25 +188,30 @@ def test_nested_machines_are_wrapped_unless_told_otherwise(run):
     assert run(NESTED, options=['--no-nested']).stdout == 'succeeded False True 2\n'
 
 
-@pytest.mark.parametrize('add', [
-    "top = smach.Concurrence(outcomes=['succeeded', 'aborted'], default_outcome='aborted',\n"
-    "                        outcome_map={'succeeded': {'INNER': 'succeeded'}})\n"
-    "with top:\n    smach.Concurrence.add('INNER', inner)",
-    "top = smach.Iterator(outcomes=['succeeded', 'aborted', 'preempted'], input_keys=[], "
-    "output_keys=[], it=[1, 2],\n"
-    "                     it_label='i', exhausted_outcome='succeeded')\n"
-    "with top:\n    smach.Iterator.set_contained_state('INNER', inner, "
-    "loop_outcomes=['succeeded'])",
-])
+@pytest.mark.parametrize(
+    'add',
+    [
+        "top = smach.Concurrence(outcomes=['succeeded', 'aborted'], default_outcome='aborted',\n"
+        "                        outcome_map={'succeeded': {'INNER': 'succeeded'}})\n"
+        "with top:\n    smach.Concurrence.add('INNER', inner)",
+        "top = smach.Iterator(outcomes=['succeeded', 'aborted', 'preempted'], input_keys=[], "
+        'output_keys=[], it=[1, 2],\n'
+        "                     it_label='i', exhausted_outcome='succeeded')\n"
+        "with top:\n    smach.Iterator.set_contained_state('INNER', inner, "
+        "loop_outcomes=['succeeded'])",
+    ],
+)
 def test_machines_inside_a_concurrence_or_an_iterator_at_the_top_are_wrapped(run, add):
-    result = run("inner = machine('aborted')\n" + add +
-                 "\nprint(top.execute(), hasattr(inner, 'rates'))")
+    result = run(
+        "inner = machine('aborted')\n" + add + "\nprint(top.execute(), hasattr(inner, 'rates'))"
+    )
     assert result.stdout == 'succeeded True\n', result.stderr
 
 
 @pytest.mark.parametrize('options', [[], ['--no-nested']])
 def test_a_machine_that_a_state_runs_inside_is_wrapped_too(run, options):
-    result = run('''
+    result = run(
+        """
         class RunsOne(smach.State):
             def __init__(self):
                 smach.State.__init__(self, outcomes=['succeeded', 'aborted', 'preempted'])
@@ -194,19 +221,21 @@ def test_a_machine_that_a_state_runs_inside_is_wrapped_too(run, options):
         with sm:
             smach.StateMachine.add('RUNS_ONE', RunsOne())
         print(sm.execute(), [row.failures for row in sm.rates()])
-    ''', options=options)
+    """,
+        options=options,
+    )
     assert result.stdout == 'succeeded [0]\n', result.stderr
 
 
 def test_machines_of_one_structure_share_a_name_and_others_get_their_own(run):
-    result = run('''
+    result = run("""
         other = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
         with other:
             smach.StateMachine.add('OTHER', Turn())
         machines = [machine(), machine(), other]
         for sm in machines: sm.execute()
         print([sm.name for sm in machines])
-    ''')
+    """)
     assert result.stdout == "['TASK', 'TASK', 'TASK_2']\n", result.stderr
 
 
@@ -218,31 +247,36 @@ def test_a_name_can_be_given(run):
 
 
 def test_learned_rates_are_kept_across_runs(run):
-    text = '''
+    text = """
         sm = machine('aborted')
         sm.execute()
         print([(row.successes, row.failures) for row in sm.rates()])
-    '''
+    """
     options = ['--rates-file', 'rates.json']
     assert run(text, options=options).stdout == '[(1, 1)]\n'
     assert run(text, options=options).stdout == '[(2, 2)]\n'
 
 
 def test_a_script_that_is_no_node_is_recorded_too(run, tmp_path):
-    result = run('print(machine("aborted").execute(), machine().execute())',
-                 options=['--record', 'bags'])
+    result = run(
+        'print(machine("aborted").execute(), machine().execute())', options=['--record', 'bags']
+    )
     assert result.stdout == 'succeeded succeeded\n', result.stderr
     assert len(list((tmp_path / 'bags').glob('*.bag'))) == 2
 
 
 def test_preconditions_can_be_named_in_the_script_itself(run, tmp_path):
     (tmp_path / 'oracle.yaml').write_text(
-        'states:\n  ONLY:\n    preconditions: ["python:__main__:ready"]\n')
-    result = run('''
+        'states:\n  ONLY:\n    preconditions: ["python:__main__:ready"]\n'
+    )
+    result = run(
+        """
         asked = []
         def ready(userdata):
             asked.append(userdata)
             return True
         print(machine('aborted').execute(), len(asked))
-    ''', options=['--config', 'oracle.yaml'])
+    """,
+        options=['--config', 'oracle.yaml'],
+    )
     assert result.stdout == 'succeeded 1\n', result.stderr

@@ -1,4 +1,5 @@
 """Waits that are passed through a service: what it lets pass, and what is waited for."""
+
 import threading
 import types
 
@@ -52,8 +53,9 @@ def never():
 def test_time_passes_by_the_service_in_pieces(monkeypatch):
     world = World(monkeypatch)
     world.waiting.wait(2.5, 'to try PICK again', never, lambda s: None)
-    assert world.asked == [('/world/pass_time', seconds, 'to try PICK again')
-                           for seconds in (1.0, 1.0, 0.5)]
+    assert world.asked == [
+        ('/world/pass_time', seconds, 'to try PICK again') for seconds in (1.0, 1.0, 0.5)
+    ]
     assert world.waited == [] and world.now_s == 102.5
 
 

@@ -1,6 +1,7 @@
 """A process with a ShutdownGuard ends in time, whatever its main thread does. Real processes, real
 signals.
 """
+
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ from waiting import asleep, stays, wait_for
 
 from smach_oracle.ros.shutdown import ShutdownGuard
 
-PRELUDE = '''
+PRELUDE = """
 import ctypes, signal, sys, time
 from smach_oracle.ros.shutdown import ShutdownGuard
 def say(text):
@@ -20,8 +21,8 @@ def say(text):
     sys.stdout.flush()
 guard = ShutdownGuard(lambda: say('preempt'), lambda limit_s: say('close'))
 guard.install()
-'''
-NEVER_RETURNS = '''
+"""
+NEVER_RETURNS = """
 told = False
 while True:
     try:
@@ -31,14 +32,14 @@ while True:
         time.sleep(0.5)
     except BaseException:
         pass
-'''
-IN_C_FOR_EVER = '''
+"""
+IN_C_FOR_EVER = """
 mutex = ctypes.create_string_buffer(64)
 libc = ctypes.CDLL(None)
 libc.pthread_mutex_lock(mutex)
 say('ready')
 libc.pthread_mutex_lock(mutex)
-'''
+"""
 ENDS_ON_SIGNAL = "say('ready'); time.sleep(60)"
 
 
@@ -46,9 +47,12 @@ def run_and_signal(body, number):
     """Run a program, send the signal once it is ready; returns exit code, its output and how long
     it took to end.
     """
-    process = subprocess.Popen([sys.executable, '-c', PRELUDE + textwrap.dedent(body)],
-                               stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                               universal_newlines=True)
+    process = subprocess.Popen(
+        [sys.executable, '-c', PRELUDE + textwrap.dedent(body)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+    )
     try:
         lines = [process.stdout.readline().strip()]
         assert wait_for(lambda: asleep(process.pid))
@@ -88,33 +92,43 @@ def test_a_program_that_ends_on_sigterm_is_not_held(tmp_path):
 
 
 def test_ctrl_c_is_still_a_keyboard_interrupt():
-    code, output, _ = run_and_signal('''
+    code, output, _ = run_and_signal(
+        """
         try:
             say('ready')
             time.sleep(60)
         except KeyboardInterrupt:
             say('interrupted')
-    ''', signal.SIGINT)
+    """,
+        signal.SIGINT,
+    )
     assert code == 0 and 'interrupted' in output
 
 
 def test_a_script_with_a_handler_of_its_own_keeps_it():
-    code, output, elapsed_s = run_and_signal('''
+    code, output, elapsed_s = run_and_signal(
+        """
         heard = []
         signal.signal(signal.SIGINT, lambda *_: say('mine') or heard.append(time.monotonic()))
         say('ready')
         while not heard or time.monotonic() < heard[0] + 2.5:
             time.sleep(0.1)
         say('done')
-    ''', signal.SIGINT)
+    """,
+        signal.SIGINT,
+    )
     assert (code, output) == (0, ['ready', 'mine', 'done'])
     assert elapsed_s > 2.0
 
 
 def test_only_the_first_signal_counts():
     calls = []
-    guard = ShutdownGuard(lambda: calls.append('preempt'), lambda limit_s: calls.append('close'),
-                          end=lambda code: calls.append(code), limit_s=0.4)
+    guard = ShutdownGuard(
+        lambda: calls.append('preempt'),
+        lambda limit_s: calls.append('close'),
+        end=lambda code: calls.append(code),
+        limit_s=0.4,
+    )
     guard.arm(130)
     guard.arm(143)
     assert wait_for(lambda: 130 in calls)
@@ -123,5 +137,6 @@ def test_only_the_first_signal_counts():
 
 def test_a_close_that_hangs_does_not_hold_the_end_up():
     code, _, in_time = ends_within(
-        2.0, 'guard._close = lambda limit_s: time.sleep(60)\n' + NEVER_RETURNS, signal.SIGTERM)
+        2.0, 'guard._close = lambda limit_s: time.sleep(60)\n' + NEVER_RETURNS, signal.SIGTERM
+    )
     assert code == 128 + signal.SIGTERM and in_time

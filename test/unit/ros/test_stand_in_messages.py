@@ -1,4 +1,5 @@
 """The messages that stand in for upstream's are upstream's to every other node: the same sums."""
+
 import pytest
 
 import control_msgs.msg

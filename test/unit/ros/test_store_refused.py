@@ -1,4 +1,5 @@
 """A store that cannot be used ends oracle_run with one line and exit code 2; no state runs."""
+
 import ctypes
 import os
 import subprocess
@@ -10,20 +11,24 @@ from machine_scripts import MACHINES, RUNNER
 from smach_oracle.store.holding import MachineLock
 from smach_oracle.store.store_file import StoreFile
 
-SCRIPT = 'import smach\n' + MACHINES + '''
+SCRIPT = (
+    'import smach\n'
+    + MACHINES
+    + """
 print('SCRIPT RUNS', flush=True)
 sm = machine('HOME', 'PICK')
 sm['HOME'].execute = lambda userdata: print('MOVES', flush=True) or 'succeeded'
 WORK
-'''
+"""
+)
 EXECUTES = 'sm.execute()'
 # the script takes every error for its own
 CATCHES = 'try:\n    sm.execute()\nexcept Exception as err:\n    print("CAUGHT", err)'
-IN_A_THREAD = '''
+IN_A_THREAD = """
 import threading
 threading.Thread(target=sm.execute).start()
 threading.Event().wait(60)
-'''
+"""
 LIBC = ctypes.CDLL(None, use_errno=True)
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 
@@ -40,14 +45,21 @@ def obey_modes():
 @pytest.fixture
 def run(tmp_path):
     """Run a script under oracle_run with a store; returns exit code, output and errors."""
+
     def run_script(store, text=EXECUTES, options=(), before=None):
         (tmp_path / 'task.py').write_text(SCRIPT.replace('WORK', text))
         done = subprocess.run(
             [sys.executable, '-c', RUNNER, '--checkpoint', str(store), *options, 'task.py'],
-            cwd=str(tmp_path), timeout=60, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            env=dict(os.environ, ROS_MASTER_URI='http://localhost:1'), universal_newlines=True,
-            preexec_fn=before)
+            cwd=str(tmp_path),
+            timeout=60,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=dict(os.environ, ROS_MASTER_URI='http://localhost:1'),
+            universal_newlines=True,
+            preexec_fn=before,
+        )
         return done.returncode, done.stdout, done.stderr
+
     return run_script
 
 
@@ -67,7 +79,7 @@ def damaged(path):
 
 def test_a_folder_that_is_not_there_is_told_before_the_script_runs(run, tmp_path):
     done = run(tmp_path / 'none' / 'robot.db')
-    check_refused(done, "there is no folder")
+    check_refused(done, 'there is no folder')
     assert 'SCRIPT RUNS' not in done[1]
 
 
@@ -100,10 +112,13 @@ def test_a_store_that_cannot_be_written_is_told(run, tmp_path):
 
 
 def test_a_state_to_go_on_with_that_is_not_there_is_told(run, tmp_path):
-    run(tmp_path / 'robot.db', "import os\nsm['HOME'].execute = lambda userdata: os._exit(9)\n"
-        'sm.execute()')
-    check_refused(run(tmp_path / 'robot.db', options=['--resume=state:NOWHERE']),
-                  "on_resume: 'state:NOWHERE'")
+    run(
+        tmp_path / 'robot.db',
+        "import os\nsm['HOME'].execute = lambda userdata: os._exit(9)\nsm.execute()",
+    )
+    check_refused(
+        run(tmp_path / 'robot.db', options=['--resume=state:NOWHERE']), "on_resume: 'state:NOWHERE'"
+    )
     check_refused(run(tmp_path / 'robot.db', options=['--from', '999']), 'resume_from: 999')
 
 
@@ -111,9 +126,11 @@ def test_a_map_is_given_on_the_command_line(run, tmp_path):
     store = tmp_path / 'robot.db'
     run(store, "import os\nsm['HOME'].execute = lambda userdata: os._exit(9)\nsm.execute()")
     changed = "sm = machine('START', 'PICK')\nprint('OUTCOME', sm.execute())"
-    check_refused(run(store, changed, ['--resume', '--resume-map', 'HOEM=START']),
-                  "resume_map.HOEM: 'HOEM' is not allowed; allowed: a state of the machine that "
-                  'was stopped: HOME, PICK')
+    check_refused(
+        run(store, changed, ['--resume', '--resume-map', 'HOEM=START']),
+        "resume_map.HOEM: 'HOEM' is not allowed; allowed: a state of the machine that "
+        'was stopped: HOME, PICK',
+    )
     code, _, errors = run(store, changed, ['--resume', '--resume-map', 'HOME'])
     assert code == 2 and 'OLD=NEW is wanted' in errors
     code, out, errors = run(store, changed, ['--resume', '--resume-map', 'HOME=START'])

@@ -1,4 +1,5 @@
 """What of a userdata dictionary arrives on the other side, and what is refused."""
+
 import io
 import math
 import pickle
@@ -24,10 +25,23 @@ def over_the_wire(item):
     return UserdataItem().deserialize(buffer.getvalue())
 
 
-@pytest.mark.parametrize('value', [
-    None, True, 0, -3, 1.5, '', 'Tür ✓', [], {}, [1, [2, {'a': None}]], {'x': {'y': [1.25, 'z']}},
-    10**30
-])
+@pytest.mark.parametrize(
+    'value',
+    [
+        None,
+        True,
+        0,
+        -3,
+        1.5,
+        '',
+        'Tür ✓',
+        [],
+        {},
+        [1, [2, {'a': None}]],
+        {'x': {'y': [1.25, 'z']}},
+        10**30,
+    ],
+)
 def test_plain_data_arrives_as_it_was(value):
     item = over_the_wire(encode('key', value))
     assert item.encoding == UserdataItem.JSON
@@ -64,11 +78,20 @@ def deep(levels):
     return value
 
 
-@pytest.mark.parametrize('value, type_name', [(Opaque(), __name__ + '.Opaque'), (b'bytes', 'bytes'),
-                                              ({1: 'a'}, 'dict'), ({1, 2}, 'set'),
-                                              (math.nan, 'float'), ([math.inf], 'list'),
-                                              ([1, Opaque()], 'list'), (cyclic(), 'list'),
-                                              (deep(5000), 'list')])
+@pytest.mark.parametrize(
+    'value, type_name',
+    [
+        (Opaque(), __name__ + '.Opaque'),
+        (b'bytes', 'bytes'),
+        ({1: 'a'}, 'dict'),
+        ({1, 2}, 'set'),
+        (math.nan, 'float'),
+        ([math.inf], 'list'),
+        ([1, Opaque()], 'list'),
+        (cyclic(), 'list'),
+        (deep(5000), 'list'),
+    ],
+)
 def test_what_fits_neither_is_named_and_not_sent(value, type_name):
     item = encode('key', value)
     assert (item.encoding, item.type, bytes(item.value)) == (UserdataItem.UNSENT, type_name, b'')
@@ -103,28 +126,34 @@ def message_item(**fields):
     return item
 
 
-@pytest.mark.parametrize('item, text', [
-    (json_item(b''), "'k' is not JSON"),
-    (json_item(b'{"a": '), "'k' is not JSON"),
-    (json_item(b'\xff\xfe'), "'k' is not JSON"),
-    (json_item(b'NaN'), 'NaN is not a JSON number'),
-    (json_item(b'1e999'), '1e999 is too large for a number'),
-    (json_item(b'{"x": [-1e400]}'), '-1e400 is too large for a number'),
-    (message_item(type=''), 'the type of its ROS message is missing'),
-    (json_item(b'[' * 100000), "'k' is not JSON"),
-    (json_item(pickle.dumps({'a': 1})), "'k' is not JSON"),
-    (message_item(md5sum='0' * 32), 'has md5 .* at the sender'),
-    (message_item(md5sum=''), r'\(none\) at the sender'),
-    (message_item(type='no_such_package/Thing'), 'is not installed here'),
-    (message_item(type='std_msgs/NoSuch'), 'is not installed here'),
-    (message_item(type='os.path/join'), 'not the name of a message type'),
-    (message_item(type='std_msgs/String\n'), 'not the name of a message type'),
-    (message_item(value=b'\x09'), 'bytes are no std_msgs/String'),
-    (message_item(value=b'\x09\x00\x00\x00abc'), 'are not those of a std_msgs/String'),
-    (message_item(value=b'\x01\x00\x00\x00abc'), 'are not those of a std_msgs/String'),
-    (UserdataItem(key='k', encoding=UserdataItem.UNSENT, type='set'), r'\(a set\) was not sent'),
-    (UserdataItem(key='k', encoding=9), 'encoding 9 is unknown; allowed'),
-])
+@pytest.mark.parametrize(
+    'item, text',
+    [
+        (json_item(b''), "'k' is not JSON"),
+        (json_item(b'{"a": '), "'k' is not JSON"),
+        (json_item(b'\xff\xfe'), "'k' is not JSON"),
+        (json_item(b'NaN'), 'NaN is not a JSON number'),
+        (json_item(b'1e999'), '1e999 is too large for a number'),
+        (json_item(b'{"x": [-1e400]}'), '-1e400 is too large for a number'),
+        (message_item(type=''), 'the type of its ROS message is missing'),
+        (json_item(b'[' * 100000), "'k' is not JSON"),
+        (json_item(pickle.dumps({'a': 1})), "'k' is not JSON"),
+        (message_item(md5sum='0' * 32), 'has md5 .* at the sender'),
+        (message_item(md5sum=''), r'\(none\) at the sender'),
+        (message_item(type='no_such_package/Thing'), 'is not installed here'),
+        (message_item(type='std_msgs/NoSuch'), 'is not installed here'),
+        (message_item(type='os.path/join'), 'not the name of a message type'),
+        (message_item(type='std_msgs/String\n'), 'not the name of a message type'),
+        (message_item(value=b'\x09'), 'bytes are no std_msgs/String'),
+        (message_item(value=b'\x09\x00\x00\x00abc'), 'are not those of a std_msgs/String'),
+        (message_item(value=b'\x01\x00\x00\x00abc'), 'are not those of a std_msgs/String'),
+        (
+            UserdataItem(key='k', encoding=UserdataItem.UNSENT, type='set'),
+            r'\(a set\) was not sent',
+        ),
+        (UserdataItem(key='k', encoding=9), 'encoding 9 is unknown; allowed'),
+    ],
+)
 def test_malformed_items_are_refused_with_what_is_wrong(item, text):
     with pytest.raises(UserdataCodecError, match=text) as caught:
         decode(item)

@@ -1,4 +1,5 @@
 """A warning that would repeat is said once, and a program that runs for weeks keeps few of them."""
+
 from smach_oracle.ros.log import said_once
 from smach_oracle.ros.log.said_once import SaidOnce
 

@@ -1,6 +1,7 @@
 """The scripted expert's hand and eye in one process with the world, without ROS: the same drive,
 the same outlines.
 """
+
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ from smach_oracle.simulation.physics.recognition import recognised, view_of
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 
 SETTINGS = yaml.safe_load(
-    (Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text())
+    (Path(__file__).resolve().parents[3] / 'launch/manipulation_interface.yaml').read_text()
+)
 PERIODS = 2  # of the world, for one of the hand
 
 
@@ -40,8 +42,9 @@ class DirectHand:
         self._tree = read_joints(text)
         self._names = names
         self._chain = JointChain.from_urdf(text, names['base'], names['tool'])
-        self._drive = CartesianDrive(self._chain, DriveLimits(**SETTINGS['limits']),
-                                     posture=np.array(names['posture']))
+        self._drive = CartesianDrive(
+            self._chain, DriveLimits(**SETTINGS['limits']), posture=np.array(names['posture'])
+        )
         self._targets = self._measured()
 
     def _measured(self):
@@ -86,13 +89,17 @@ class DirectWatcher:
 
     def look(self, *names):
         image = see(self._world)
-        found = recognised(view_of(self._world, image.colour),
-                           self._world.movable() + ['robot', *names])
+        found = recognised(
+            view_of(self._world, image.colour), self._world.movable() + ['robot', *names]
+        )
         wanted = self._world.scene.goal.body
-        return seen_scene(image, [
-            Outline(name, name == wanted, name in self._world.movable(), mask)
-            for name, mask in found.items()
-        ])
+        return seen_scene(
+            image,
+            [
+                Outline(name, name == wanted, name in self._world.movable(), mask)
+                for name, mask in found.items()
+            ],
+        )
 
     def look_at(self, point, *names):
         self._robot.look_at(point)

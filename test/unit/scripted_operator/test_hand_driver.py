@@ -1,4 +1,5 @@
 """Driving a hand by velocities: no hand, however odd, keeps the driver forever."""
+
 import numpy as np
 import pytest
 

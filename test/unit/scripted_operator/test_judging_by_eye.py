@@ -1,4 +1,5 @@
 """What the scripted operator knows when it decides, by looking about in the world, without ROS."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,8 +29,9 @@ def make_world():
 
 
 def pose(point):
-    return PoseStamped(Header(frame_id='base_footprint'),
-                       Pose(Point(*point), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    return PoseStamped(
+        Header(frame_id='base_footprint'), Pose(Point(*point), Quaternion(0.0, 0.0, 0.0, 1.0))
+    )
 
 
 def sight(world, plan, **userdata):
@@ -55,8 +57,10 @@ def test_a_thing_that_stands_elsewhere_than_detected_is_noticed(world):
 
 def test_what_no_hand_reaches_is_known_before_one_tries(world):
     scene = draw(2, benign=True)
-    far = tuple(body._replace(position=(0.55, 0.45, body.position[2]))
-                if body.name == 'object_0' else body for body in scene.bodies)
+    far = tuple(
+        body._replace(position=(0.55, 0.45, body.position[2])) if body.name == 'object_0' else body
+        for body in scene.bodies
+    )
     world.reset(scene._replace(bodies=far))
     plan = TAKE._replace(look=((0.6, 0.4, 0.75),))
     assert not sight(world, plan).sight.reachable
@@ -88,9 +92,16 @@ def test_nothing_is_put_down_with_an_empty_hand(world):
 def lying(world, height):
     """A scene whose object lies at a place, its middle so many m above the floor."""
     scene = draw(2, benign=True)
-    world.reset(scene._replace(bodies=tuple(
-        body._replace(position=(0.62, -0.1, height), pitch=np.pi / 2, yaw=0.3)
-        if body.name == 'object_0' else body for body in scene.bodies)))
+    world.reset(
+        scene._replace(
+            bodies=tuple(
+                body._replace(position=(0.62, -0.1, height), pitch=np.pi / 2, yaw=0.3)
+                if body.name == 'object_0'
+                else body
+                for body in scene.bodies
+            )
+        )
+    )
     world.step(60)
 
 
@@ -108,9 +119,16 @@ def test_a_thing_that_lies_on_the_table_is_seen_to_lie_and_is_not_lost(world):
 
 def test_a_thing_on_the_floor_is_looked_for_there_and_is_lost(world):
     scene = draw(2, benign=True)
-    world.reset(scene._replace(bodies=tuple(
-        body._replace(position=(0.75, -0.75, 0.05), pitch=np.pi / 2)
-        if body.name == 'object_0' else body for body in scene.bodies)))
+    world.reset(
+        scene._replace(
+            bodies=tuple(
+                body._replace(position=(0.75, -0.75, 0.05), pitch=np.pi / 2)
+                if body.name == 'object_0'
+                else body
+                for body in scene.bodies
+            )
+        )
+    )
     world.step(60)
     for plan in (TAKE, PUT, StatePlan('show', look=LOOK)):
         assert sight(world, plan, place_pose=pose((0.6, -0.35, 0.8))).sight.lost
@@ -125,9 +143,14 @@ def test_a_thing_that_stands_at_its_place_is_seen_to_be_there(world):
 
 def test_where_other_things_are_seen_nothing_hides_what_is_gone(world):
     scene = draw(2, benign=True)
-    world.reset(scene._replace(bodies=tuple(
-        body._replace(position=(-2.0, 0.0, 0.1)) if body.name == 'object_0' else body
-        for body in scene.bodies)))
+    world.reset(
+        scene._replace(
+            bodies=tuple(
+                body._replace(position=(-2.0, 0.0, 0.1)) if body.name == 'object_0' else body
+                for body in scene.bodies
+            )
+        )
+    )
     found = sight(world, StatePlan('show', look=LOOK))
     assert (found.sight.seen, found.sight.open) == (False, True)
     watcher = DirectWatcher(world)

@@ -1,6 +1,7 @@
 """The scripted operator's hand in the kitchen, without ROS: a drink taken off its shelf, and handed
 over.
 """
+
 import numpy as np
 import pytest
 from direct_hand import DirectHand, DirectWatcher
@@ -31,16 +32,24 @@ def before_the_shelf(seed):
     """A benign kitchen with its door open and the robot before the drinks."""
     scene = draw(seed, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, 1.7),))
-    joints = tuple((name, TORSO_HEIGHT if name == 'torso_lift_joint' else at)
-                   for name, at in scene.robot.joints)
-    return scene._replace(bodies=(fridge,) + scene.bodies[1:],
-                          robot=scene.robot._replace(joints=joints, base=IN_THE_FRIDGE))
+    joints = tuple(
+        (name, TORSO_HEIGHT if name == 'torso_lift_joint' else at)
+        for name, at in scene.robot.joints
+    )
+    return scene._replace(
+        bodies=(fridge,) + scene.bodies[1:],
+        robot=scene.robot._replace(joints=joints, base=IN_THE_FRIDGE),
+    )
 
 
 def attempt(world, number=0, sigma=0.004):
     generator = np.random.default_rng(number)
-    return Attempt(HandDriver(DirectHand(world, 'right')), DirectWatcher(world), number,
-                   lambda: generator.normal(0.0, sigma, 3))
+    return Attempt(
+        HandDriver(DirectHand(world, 'right')),
+        DirectWatcher(world),
+        number,
+        lambda: generator.normal(0.0, sigma, 3),
+    )
 
 
 def test_a_drink_is_taken_off_its_shelf_by_hand_and_put_on_the_palm_by_hand(world):

@@ -1,6 +1,7 @@
 """What the scripted operator tries next: a rung of a ladder, and nothing that was futile before, as
 long as all that is seen is as it was.
 """
+
 import pytest
 
 from smach_oracle.scripted_operator.ladder import (
@@ -32,7 +33,7 @@ PLANS = {
     'DETECT': StatePlan('show', hidden='ARMS', otherwise='ARMS'),
     'PICK': StatePlan('take', otherwise='DETECT'),
     'PLACE': StatePlan('put_down', place='p', lost='DETECT', otherwise='PICK'),
-    'DOOR': StatePlan('retry', otherwise='DETECT', base=(-0.1, 0.0, 0.0), leave='HOME', tries=1)
+    'DOOR': StatePlan('retry', otherwise='DETECT', base=(-0.1, 0.0, 0.0), leave='HOME', tries=1),
 }
 
 
@@ -58,10 +59,18 @@ def test_a_person_whom_the_light_dazzles_drives_the_base_and_has_the_head_turned
 
 
 SIGHTS = [
-    ('DETECT', Sight()), ('DETECT', UNSEEN), ('DETECT', UNSEEN._replace(dazzled=True)),
-    ('DETECT', UNSEEN._replace(open=True)), ('PICK', Sight()), ('PICK', Sight(crowded=True)),
-    ('PICK', UNSEEN), ('PLACE', Sight(holds=True)), ('PLACE', Sight(holds=True, blocked=True)),
-    ('PLACE', UNSEEN), ('DOOR', Sight())]
+    ('DETECT', Sight()),
+    ('DETECT', UNSEEN),
+    ('DETECT', UNSEEN._replace(dazzled=True)),
+    ('DETECT', UNSEEN._replace(open=True)),
+    ('PICK', Sight()),
+    ('PICK', Sight(crowded=True)),
+    ('PICK', UNSEEN),
+    ('PLACE', Sight(holds=True)),
+    ('PLACE', Sight(holds=True, blocked=True)),
+    ('PLACE', UNSEEN),
+    ('DOOR', Sight()),
+]
 
 
 @pytest.mark.parametrize('state, sight', SIGHTS)
@@ -73,8 +82,7 @@ def test_nothing_is_answered_twice_while_all_is_seen_to_be_as_it_was(state, sigh
             break
         memory.note(state, choices[-1], sight)
     assert choices[-1].act in (GIVE_UP, LEAVE)
-    answers = [(each.interface and each.act, each.goto, each.wait_s, each.base)
-               for each in choices]
+    answers = [(each.interface and each.act, each.goto, each.wait_s, each.base) for each in choices]
     assert len(set(answers)) == len(answers)
     assert len(choices) <= 7
 
@@ -105,14 +113,15 @@ def test_a_person_waits_once_where_the_light_may_pass_and_not_elsewhere():
 
 
 def test_what_lies_is_set_upright_on_a_table_and_at_its_place():
-    assert course('PICK', Sight(lies=True), 2, worked=True) == [(UPRIGHT, 'manipulation'),
-                                                                (BACK, 'DETECT')]
+    assert course('PICK', Sight(lies=True), 2, worked=True) == [
+        (UPRIGHT, 'manipulation'),
+        (BACK, 'DETECT'),
+    ]
     assert course('PICK', Sight(lies=True, moved=True), 1) == [(UPRIGHT, 'manipulation')]
     assert course('DETECT', Sight(lies=True), 1) == [(UPRIGHT, 'manipulation')]
     assert course('PLACE', Sight(lies=True), 1) == [(BY_HAND, 'manipulation')]
     shelf = PLANS['PICK']._replace(inside=True)
-    choice = choose(shelf, Asked('PICK', STATES, BOTH), Sight(lies=True, shelf=True),
-                    TrialMemory())
+    choice = choose(shelf, Asked('PICK', STATES, BOTH), Sight(lies=True, shelf=True), TrialMemory())
     assert choice.act == BY_HAND, 'nothing is set upright on a shelf'
 
 
@@ -128,10 +137,20 @@ def test_what_could_not_be_set_upright_is_given_up_whatever_state_is_asked_about
     assert choose(PLANS['DETECT'], Asked('DETECT', STATES, BOTH), elsewhere, memory).act == UPRIGHT
 
 
-@pytest.mark.parametrize('change, again', [
-    ({}, False), ({'place': (0.63, 0.01, 0.8)}, False), ({'place': (0.66, 0.0, 0.8)}, True),
-    ({'dim': True}, True), ({'around': ()}, True), ({'around': ((0.71, 0.09, 0.8),)}, False),
-    ({'around': ((0.7, 0.2, 0.8),)}, True), ({'place': None}, True), ({'holds': True}, True)])
+@pytest.mark.parametrize(
+    'change, again',
+    [
+        ({}, False),
+        ({'place': (0.63, 0.01, 0.8)}, False),
+        ({'place': (0.66, 0.0, 0.8)}, True),
+        ({'dim': True}, True),
+        ({'around': ()}, True),
+        ({'around': ((0.71, 0.09, 0.8),)}, False),
+        ({'around': ((0.7, 0.2, 0.8),)}, True),
+        ({'place': None}, True),
+        ({'holds': True}, True),
+    ],
+)
 def test_a_thing_that_the_eye_puts_a_little_elsewhere_has_not_moved(change, again):
     before = Sight(place=(0.61, 0.0, 0.8), around=((0.7, 0.1, 0.8),))
     memory, asked = TrialMemory(), Asked('PICK', STATES, BOTH)
@@ -212,6 +231,8 @@ def test_without_an_interface_or_a_state_to_go_to_the_rest_is_tried():
 def test_each_state_and_each_trial_has_a_memory_of_its_own():
     memory = TrialMemory()
     memory.note('PICK', NextAct(BY_HAND, interface='manipulation'), Sight())
-    assert choose(PLANS['PLACE'], Asked('PLACE', STATES, BOTH), Sight(holds=True),
-                  memory).act == BY_HAND
+    assert (
+        choose(PLANS['PLACE'], Asked('PLACE', STATES, BOTH), Sight(holds=True), memory).act
+        == BY_HAND
+    )
     assert (memory.times('PICK', BY_HAND), memory.times('PLACE', BY_HAND)) == (1, 0)

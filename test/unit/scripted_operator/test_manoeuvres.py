@@ -1,6 +1,7 @@
 """The scripted operator's hand in the world, without ROS: it takes things, puts them down, and
 knows when it failed.
 """
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -33,8 +34,12 @@ def make_world():
 
 def attempt(world, number=0, sigma=0.004):
     generator = np.random.default_rng(number)
-    return Attempt(HandDriver(DirectHand(world, 'right')), DirectWatcher(world), number,
-                   lambda: generator.normal(0.0, sigma, 3))
+    return Attempt(
+        HandDriver(DirectHand(world, 'right')),
+        DirectWatcher(world),
+        number,
+        lambda: generator.normal(0.0, sigma, 3),
+    )
 
 
 def about(world, name='object_0'):
@@ -82,17 +87,22 @@ def test_a_place_beyond_reach_is_told_with_what_stopped_the_hand(world):
 def test_grasps_avoid_what_stands_beside_and_before():
     can = UprightBox(np.array([0.6, -0.1, 0.78]), np.array([0.06, 0.06, 0.12]), 0.0)
     alone = grasps(can, [], 'right')[0]
-    before = UprightBox(alone[:3, 3] - 0.09 * alone[:3, 0] * [1, 1, 0], np.array([0.06, 0.06,
-                                                                                  0.12]), 0.0)
+    before = UprightBox(
+        alone[:3, 3] - 0.09 * alone[:3, 0] * [1, 1, 0], np.array([0.06, 0.06, 0.12]), 0.0
+    )
     past = grasps(can, [before], 'right')[0]
-    assert abs(np.arctan2(*past[1::-1, 0]) -
-               np.arctan2(*alone[1::-1, 0])) > 0.2 or past[2, 0] < alone[2, 0] - 0.2
+    assert (
+        abs(np.arctan2(*past[1::-1, 0]) - np.arctan2(*alone[1::-1, 0])) > 0.2
+        or past[2, 0] < alone[2, 0] - 0.2
+    )
     wide = can._replace(size=np.array([0.2, 0.2, 0.12]))
     assert grasps(wide, [], 'right') == []
 
 
-@pytest.mark.parametrize('tall, beside, says', [(0.12, 0.0, ''), (0.06, 0.0, 'lies at its place'),
-                                                (0.12, 0.08, '8 cm beside')])
+@pytest.mark.parametrize(
+    'tall, beside, says',
+    [(0.12, 0.0, ''), (0.06, 0.0, 'lies at its place'), (0.12, 0.08, '8 cm beside')],
+)
 def test_what_was_put_down_is_looked_at(tall, beside, says):
     place = np.array([0.6, -0.3, 0.78])
     box = UprightBox(place + [beside, 0.0, 0.0], np.array([0.06, 0.06, tall]), 0.0)

@@ -1,6 +1,7 @@
 """The scripted operator when others fail it: a world or an interface that does not answer must not
 end the trial.
 """
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,12 +22,23 @@ from smach_oracle.scripted_operator.seen_scene import SeenScene, SeenThing
 from smach_oracle.scripted_operator.state_plans import StatePlan, StatePlans
 from smach_oracle.scripted_operator.topic_hand import GoalEndedError
 
-QUESTION = SimpleNamespace(key='r/q1', status=OpenQuery.PENDING, goal=SimpleNamespace(
-    failed_state='PICK', container_path='SM', robot='r', trial_id='t', failure_kind=1))
+QUESTION = SimpleNamespace(
+    key='r/q1',
+    status=OpenQuery.PENDING,
+    goal=SimpleNamespace(
+        failed_state='PICK', container_path='SM', robot='r', trial_id='t', failure_kind=1
+    ),
+)
 
 
-CAN = SeenThing('can', True, True, (300, 200, 40, 60), np.ones((4, 4), bool),
-                UprightBox(np.array([0.6, 0.0, 0.78]), np.array([0.06, 0.06, 0.12]), 0.0))
+CAN = SeenThing(
+    'can',
+    True,
+    True,
+    (300, 200, 40, 60),
+    np.ones((4, 4), bool),
+    UprightBox(np.array([0.6, 0.0, 0.78]), np.array([0.06, 0.06, 0.12]), 0.0),
+)
 SCENE = SeenScene([CAN], None)
 
 
@@ -91,8 +103,7 @@ MEANS = SimpleNamespace(means=IdleMeans())
 
 
 @pytest.mark.parametrize('blind, looks, claims', [(0, 1, 1), (2, 3, 1), (9, 3, 0)])
-def test_a_question_is_tried_again_while_no_image_comes_but_not_for_ever(
-        blind, looks, claims):
+def test_a_question_is_tried_again_while_no_image_comes_but_not_for_ever(blind, looks, claims):
     questions, eye = Questions(10), BlindViewer(blind)
     with pytest.raises(KeyboardInterrupt):
         ScriptedOperator(SimpleNamespace(seed=1), questions, eye, MEANS).run()
@@ -116,14 +127,18 @@ class Answered(Questions):
 
 
 def test_all_time_from_when_a_question_is_taken_up_to_when_the_machine_goes_on_is_charged(
-        monkeypatch):
+    monkeypatch,
+):
     means = IdleMeans()
     means.pass_time = lambda seconds: means.charged.append('thinks')
     questions = Answered(means.charged)
     settings = SimpleNamespace(seed=1, median_s=15.0, sigma=0.5)
     operator = ScriptedOperator(settings, questions, BlindViewer(0), SimpleNamespace(means=means))
-    monkeypatch.setattr(operator, '_decide', lambda *_: (
-        NextAct('back', goto='DETECT'), SimpleNamespace(sight=Sight())))
+    monkeypatch.setattr(
+        operator,
+        '_decide',
+        lambda *_: (NextAct('back', goto='DETECT'), SimpleNamespace(sight=Sight())),
+    )
     QUESTION.goal.userdata, QUESTION.goal.text = [], 'it slipped'
     with pytest.raises(KeyboardInterrupt):
         operator.run()
@@ -133,12 +148,16 @@ def test_all_time_from_when_a_question_is_taken_up_to_when_the_machine_goes_on_i
 
 def test_the_time_is_charged_once_and_not_where_nobody_counts_it(monkeypatch):
     asked = []
-    monkeypatch.setattr(robot_means, 'call_service',
-                        lambda name, kind, request, limit_s: asked.append(request.on))
+    monkeypatch.setattr(
+        robot_means, 'call_service', lambda name, kind, request, limit_s: asked.append(request.on)
+    )
     monkeypatch.setattr(robot_means, 'GoalLink', lambda *_: None)
     monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
-    for names, charged in ((MeansNames(), [True, False]), (MeansNames(pass_time='none'), []),
-                           (MeansNames(charge_time='none'), [])):
+    for names, charged in (
+        (MeansNames(), [True, False]),
+        (MeansNames(pass_time='none'), []),
+        (MeansNames(charge_time='none'), []),
+    ):
         asked.clear()
         means = robot_means.RobotMeans(names, {}, None)
         for work in (means.begin_work, means.begin_work, means.end_work, means.end_work):
@@ -153,34 +172,53 @@ def test_a_state_that_still_runs_is_left_alone():
     assert (eye.looks, questions.claims) == (0, 0)
 
 
-@pytest.mark.parametrize('offered, told', [([
-    'eye', 'hand'
-], "PICK: means take needs an interface offered under the name 'manipulation'; offered: eye, hand"),
-                                           ([], "'manipulation'; offered: none"),
-                                           (['manipulation'], ''),
-                                           (['perception', 'manipulation'], '')])
+@pytest.mark.parametrize(
+    'offered, told',
+    [
+        (
+            ['eye', 'hand'],
+            "PICK: means take needs an interface offered under the name 'manipulation'; "
+            'offered: eye, hand',
+        ),
+        ([], "'manipulation'; offered: none"),
+        (['manipulation'], ''),
+        (['perception', 'manipulation'], ''),
+    ],
+)
 def test_where_an_interface_has_another_name_it_says_so_once_and_tries_without(
-        monkeypatch, offered, told):
+    monkeypatch, offered, told
+):
     warned = []
     monkeypatch.setattr(rospy, 'logwarn', lambda text, *what: warned.append(text % what))
     settings = SimpleNamespace(plans=StatePlans({'PICK': {'means': 'take'}}), most_questions=9)
     image = SimpleNamespace(colour=np.full((4, 4, 3), 128), depth=np.ones((4, 4)))
-    seen = SimpleNamespace(gap=lambda arm: 0.0, tall=lambda name: None,
-                           look_at=lambda point: SCENE._replace(image=image))
+    seen = SimpleNamespace(
+        gap=lambda arm: 0.0,
+        tall=lambda name: None,
+        look_at=lambda point: SCENE._replace(image=image),
+    )
     operator = ScriptedOperator(settings, None, None, SimpleNamespace(means=seen))
-    goal = SimpleNamespace(failed_state='PICK', recoveries=0, choices=[SimpleNamespace(
-        state='PICK', blocked='', container='')],
-                           interfaces=[SimpleNamespace(name=name) for name in offered])
-    answers = [
-        operator._decide(SimpleNamespace(goal=goal), {}, SCENE)[0] for _ in range(2)
-    ]
+    goal = SimpleNamespace(
+        failed_state='PICK',
+        recoveries=0,
+        choices=[SimpleNamespace(state='PICK', blocked='', container='')],
+        interfaces=[SimpleNamespace(name=name) for name in offered],
+    )
+    answers = [operator._decide(SimpleNamespace(goal=goal), {}, SCENE)[0] for _ in range(2)]
     assert all(bool(answer.interface) != bool(told) for answer in answers)
     assert len(warned) == bool(told) and told in ''.join(warned)
 
 
 def task(act):
-    return ManualTask('q1', NextAct(act), StatePlan('show'), {}, 0, np.random.default_rng(1),
-                      np.array([0.6, 0.0, 0.78]))
+    return ManualTask(
+        'q1',
+        NextAct(act),
+        StatePlan('show'),
+        {},
+        0,
+        np.random.default_rng(1),
+        np.array([0.6, 0.0, 0.78]),
+    )
 
 
 class Settled:
@@ -193,17 +231,22 @@ class Settled:
         self.gave_up.append(text)
 
 
-@pytest.mark.parametrize('fault',
-                         [GoalEndedError('no image within 20 s'),
-                          rospy.ServiceException('gone')])
+@pytest.mark.parametrize(
+    'fault', [GoalEndedError('no image within 20 s'), rospy.ServiceException('gone')]
+)
 def test_an_interface_that_fails_under_the_hands_is_given_up_so_that_the_question_is_asked_again(
-        fault):
+    fault,
+):
     def take_image(_limit_s):
         raise fault
+
     settled = Settled()
-    interfaces = SimpleNamespace(perception=SimpleNamespace(take_image=take_image),
-                                 perception_finish=settled, hand_finish=None,
-                                 means=IdleMeans())
+    interfaces = SimpleNamespace(
+        perception=SimpleNamespace(take_image=take_image),
+        perception_finish=settled,
+        hand_finish=None,
+        means=IdleMeans(),
+    )
     assert carry_out(task(MARK), interfaces) == (False, False, str(fault))
     assert settled.gave_up == [str(fault)]
 
@@ -222,10 +265,12 @@ def test_only_the_work_of_the_state_supersedes_it(monkeypatch, act, superseded):
     monkeypatch.setattr(manual_task, '_driven', lambda *_: '')
     means = IdleMeans()
     ended = means.charged = []
-    finish = SimpleNamespace(finish=lambda *_: ended.append('finished') or '',
-                             give_up=lambda text: ended.append(text))
-    result = carry_out(task(act), SimpleNamespace(hand_finish=finish, perception_finish=None,
-                                                  means=means))
+    finish = SimpleNamespace(
+        finish=lambda *_: ended.append('finished') or '', give_up=lambda text: ended.append(text)
+    )
+    result = carry_out(
+        task(act), SimpleNamespace(hand_finish=finish, perception_finish=None, means=means)
+    )
     assert ended[0] == 'ends', 'before the machine goes on'
     ended[:] = [each for each in ended if each != 'ends']
     assert (result.superseded, result.worked) == (superseded, True)

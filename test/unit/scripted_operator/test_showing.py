@@ -1,6 +1,7 @@
 """How the scripted operator marks a thing: rectangles about it, a look at what came of them,
 strokes, giving up.
 """
+
 import numpy as np
 import pytest
 
@@ -15,7 +16,7 @@ LOOKS = []  # at another image
 def outline(dx=0, grown=0):
     left, top, width, height = REGION
     mask = np.zeros((IMAGE[1], IMAGE[0]), bool)
-    mask[top - grown:top + height + grown, left + dx - grown:left + dx + width + grown] = True
+    mask[top - grown : top + height + grown, left + dx - grown : left + dx + width + grown] = True
     return mask
 
 
@@ -36,11 +37,15 @@ def test_rectangles_are_drawn_by_hand_about_the_thing_and_stay_in_the_image():
     generator = np.random.default_rng(1)
     drawn = [rectangle((300, 200, 40, 60), IMAGE, generator) for _ in range(50)]
     assert len(set(drawn)) > 40, 'no two alike'
-    assert np.mean(
-        [x <= 300 and y <= 200 and x + w >= 340 and y + h >= 260 for x, y, w, h in drawn]) > 0.9
+    assert (
+        np.mean([x <= 300 and y <= 200 and x + w >= 340 and y + h >= 260 for x, y, w, h in drawn])
+        > 0.9
+    )
     at_the_edge = [rectangle((600, 440, 40, 40), IMAGE, generator) for _ in range(50)]
-    assert all(x >= 0 and y >= 0 and x + w <= 640 and y + h <= 480 and w > 0 and h > 0
-               for x, y, w, h in at_the_edge)
+    assert all(
+        x >= 0 and y >= 0 and x + w <= 640 and y + h <= 480 and w > 0 and h > 0
+        for x, y, w, h in at_the_edge
+    )
 
 
 def test_a_good_mask_is_accepted_at_once():
@@ -52,6 +57,7 @@ def test_a_good_mask_is_accepted_at_once():
 def test_a_bad_mask_is_mended_with_strokes():
     def segment(_region, strokes):
         return marked() if strokes else marked(dx=60)
+
     calls = []
     LOOKS.clear()
     assert show(lambda *drawn: calls.append(drawn) or segment(*drawn), *showing()) == ''
@@ -60,8 +66,14 @@ def test_a_bad_mask_is_mended_with_strokes():
     assert {line.foreground for line in calls[1][1]} == {True, False}
 
 
-@pytest.mark.parametrize('wrong, says', [({'dx': 60}, 'shares 0%'), ({'grown': 20}, 'shares 30%'),
-                                         ({'ok': False, 'message': 'no depth'}, 'no depth')])
+@pytest.mark.parametrize(
+    'wrong, says',
+    [
+        ({'dx': 60}, 'shares 0%'),
+        ({'grown': 20}, 'shares 30%'),
+        ({'ok': False, 'message': 'no depth'}, 'no depth'),
+    ],
+)
 def test_what_stays_wrong_is_given_up_with_its_reason(wrong, says):
     assert says in show(lambda *_: marked(**wrong), *showing())
 

@@ -1,4 +1,5 @@
 """The scripted operator's hand with a thing that lies: taken from above, turned, set upright."""
+
 import numpy as np
 import pytest
 from direct_hand import DirectHand, DirectWatcher
@@ -24,17 +25,23 @@ def make_world():
 
 
 def attempt(world):
-    return Attempt(HandDriver(DirectHand(world, 'right')), DirectWatcher(world), 0,
-                   lambda: np.zeros(3))
+    return Attempt(
+        HandDriver(DirectHand(world, 'right')), DirectWatcher(world), 0, lambda: np.zeros(3)
+    )
 
 
 def laid(scene, name, at, on, yaw):
     """A scene in which a thing lies at (2,) m on something."""
     surface = next(body for body in scene.bodies if body.name == on)
     top = surface.position[2] + surface.size[2] / 2
-    return scene._replace(bodies=tuple(
-        body._replace(position=(*at, top + 0.035), pitch=np.pi / 2, yaw=yaw)
-        if body.name == name else body for body in scene.bodies))
+    return scene._replace(
+        bodies=tuple(
+            body._replace(position=(*at, top + 0.035), pitch=np.pi / 2, yaw=yaw)
+            if body.name == name
+            else body
+            for body in scene.bodies
+        )
+    )
 
 
 def uprightness(world, name):
@@ -45,8 +52,10 @@ def uprightness(world, name):
 def test_a_drink_that_lies_on_the_palm_is_set_upright_there(world):
     scene = draw('drink_retrieval', 7, True)
     palm = next(body for body in scene.bodies if body.name == RECEIVER).position
-    joints = tuple((name, TORSO_HEIGHT if name == 'torso_lift_joint' else at)
-                   for name, at in scene.robot.joints)
+    joints = tuple(
+        (name, TORSO_HEIGHT if name == 'torso_lift_joint' else at)
+        for name, at in scene.robot.joints
+    )
     scene = scene._replace(robot=scene.robot._replace(base=HOME, joints=joints))
     world.reset(laid(scene, 'drink_0', palm[:2], RECEIVER, 0.9))
     world.step(60)

@@ -1,4 +1,5 @@
 """Hands that come off a door, set a drink down until it stands, and reach it from elsewhere."""
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
@@ -45,8 +46,12 @@ def test_a_door_whose_handle_slips_out_of_the_hand_is_opened_all_the_same():
 def test_a_door_is_pressed_shut_and_the_hand_does_not_open_it_again():
     kitchen = draw(114, benign=True)
     fridge = kitchen.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(95.0)),))
-    world = World(kitchen._replace(bodies=(fridge,) + kitchen.bodies[1:],
-                                   robot=kitchen.robot._replace(base=(0.68, -0.30, 0.0))))
+    world = World(
+        kitchen._replace(
+            bodies=(fridge,) + kitchen.bodies[1:],
+            robot=kitchen.robot._replace(base=(0.68, -0.30, 0.0)),
+        )
+    )
     robot = DirectRobot(world)
     context = SkillContext(robot, installed_model())
     robot.torso(TORSO_HEIGHT)
@@ -61,9 +66,15 @@ def test_a_hand_that_has_found_no_grasp_does_not_look_as_if_it_held_something(mo
     world = World(scene(TABLE, CAN))
     context = SkillContext(DirectRobot(world), installed_model())
     target = UprightBox(np.array(CAN.position), np.array([0.062, 0.062, 0.12]), 0.0)
-    cage = {name: MapBox(target.centre + [x, y, z], np.array([0.08, 0.08, 0.08]), 0.0)
-            for name, x, y, z in (('before', -0.12, 0.0, 0.0), ('left', 0.0, 0.12, 0.0),
-                                  ('right', 0.0, -0.12, 0.0), ('above', 0.0, 0.0, 0.15))}
+    cage = {
+        name: MapBox(target.centre + [x, y, z], np.array([0.08, 0.08, 0.08]), 0.0)
+        for name, x, y, z in (
+            ('before', -0.12, 0.0, 0.0),
+            ('left', 0.0, 0.12, 0.0),
+            ('right', 0.0, -0.12, 0.0),
+            ('above', 0.0, 0.0, 0.15),
+        )
+    }
     with pytest.raises(NoGrasp):
         pick(context, 'right', target, {'table': UNDER_CAN, **cage})
     assert not may_hold(world.joints(), 'right')
@@ -84,6 +95,7 @@ def test_what_is_set_down_gently_stands_before_the_hand_lets_go(too_low):
         if position > 0:
             let_go_at.append(world.body_pose('can')[2, 3] - CAN.position[2])
         return gripper(arm, position, max_effort)
+
     robot.gripper = told
     support = UNDER_CAN._replace(centre=UNDER_CAN.centre - [0.0, 0.0, too_low])
     place(context, 'right', np.array([0.65, -0.25, 0.78]), held, {'table': support}, gently=True)
@@ -105,6 +117,7 @@ def test_a_drink_that_is_out_of_reach_from_one_place_is_picked_from_another(monk
         if len(tried) < len(STANCES):
             raise NoGrasp('none')
         return held
+
     monkeypatch.setattr(kitchen_skills, 'come_near', lambda *given: given[2])
     monkeypatch.setattr(trial.skills, '_pick_inside', grasp)
     trial.states[5][1]()
@@ -133,6 +146,7 @@ def test_a_hand_that_is_held_up_is_drawn_back_along_its_own_axis(monkeypatch):
         if failures:
             raise failures.pop()
         go_away(*given)
+
     monkeypatch.setattr(hand_off, 'go_away', fail_first)
     before = world.true_base()
     assert hand_off.take_hands_off(context, Kitchen())

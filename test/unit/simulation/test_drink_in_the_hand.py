@@ -1,4 +1,5 @@
 """A drink between the fingers: wet, grasped with an inclined hand, or beside others."""
+
 import numpy as np
 import pytest
 
@@ -23,8 +24,9 @@ def before_the_shelf(scene):
 
 def pick(trial, attempt):
     """Pick the drink, as after so many failures."""
-    trial.skills.pick(PickGoal('right', trial.data['drink'], trial.data['size'], FRIDGE, attempt),
-                      no_report)
+    trial.skills.pick(
+        PickGoal('right', trial.data['drink'], trial.data['size'], FRIDGE, attempt), no_report
+    )
 
 
 def tilt(world, name):
@@ -34,8 +36,10 @@ def tilt(world, name):
 
 def test_a_drink_that_creeps_between_the_fingers_is_not_lost_on_the_way_out():
     dry = draw(20, benign=True)
-    wet = [body._replace(friction=0.077, mass=0.70) if body.name == 'drink_0' else body
-           for body in dry.bodies]
+    wet = [
+        body._replace(friction=0.077, mass=0.70) if body.name == 'drink_0' else body
+        for body in dry.bodies
+    ]
     world, trial = before_the_shelf(dry._replace(bodies=tuple(wet)))
     for _, work in trial.states[5:7]:
         work()
@@ -80,5 +84,6 @@ def test_a_drink_is_reached_by_pushing_its_neighbour_once_no_other_grasp_is_left
 
 @pytest.mark.parametrize('failed, least', [(0, 0.004), (1, -0.008), (2, -0.02), (254, -0.02)])
 def test_the_hand_comes_nearer_to_other_drinks_with_each_kind_of_grasp_that_has_failed(
-        failed, least):
+    failed, least
+):
     assert np.allclose(beside(failed), [least, least, 0.004])

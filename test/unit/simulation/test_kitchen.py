@@ -1,6 +1,7 @@
 """The kitchen of the second use case: its map, its scenes, the door as it is seen, and the task
 from end to end.
 """
+
 import collections
 import itertools
 
@@ -52,15 +53,23 @@ def door_at(degrees, base=OPENING, seed=1):
     """A benign kitchen with the robot before the fridge and its door open by so much."""
     scene = draw(seed, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(degrees)),))
-    return scene._replace(bodies=(fridge,) + scene.bodies[1:],
-                          robot=scene.robot._replace(base=base))
+    return scene._replace(
+        bodies=(fridge,) + scene.bodies[1:], robot=scene.robot._replace(base=base)
+    )
 
 
-@pytest.mark.parametrize('settings, words', [({'widht': 0.6}, 'widht'), ({'width': -1}, 'width'),
-                                             ({'width': 'wide'}, 'width'),
-                                             ({'place': [1, 2]}, 'place'),
-                                             ({'drinks_shelf': 7}, 'drinks_shelf'),
-                                             ({'shelves': []}, 'shelves'), ([1], 'dictionary')])
+@pytest.mark.parametrize(
+    'settings, words',
+    [
+        ({'widht': 0.6}, 'widht'),
+        ({'width': -1}, 'width'),
+        ({'width': 'wide'}, 'width'),
+        ({'place': [1, 2]}, 'place'),
+        ({'drinks_shelf': 7}, 'drinks_shelf'),
+        ({'shelves': []}, 'shelves'),
+        ([1], 'dictionary'),
+    ],
+)
 def test_a_wrong_map_is_refused_by_the_name_of_what_is_wrong(settings, words):
     with pytest.raises(ValueError, match=words):
         kitchen_from(settings)
@@ -75,8 +84,11 @@ def test_a_map_takes_what_is_given_and_the_usual_for_the_rest():
 def test_the_handle_is_where_the_map_computes_it(degrees):
     world = World(door_at(degrees))
     kitchen = true_kitchen(world.scene.seed)
-    inside = (-kitchen.door_thickness - kitchen.handle_stand_off,
-              -(kitchen.width - kitchen.handle_inset), 1.0)
+    inside = (
+        -kitchen.door_thickness - kitchen.handle_stand_off,
+        -(kitchen.width - kitchen.handle_inset),
+        1.0,
+    )
     truth = apply(world.body_pose('fridge', 'door'), np.array(inside))
     fridge = odom_from_pose(kitchen, 0.0, 0.0, 0.0)
     angle = world.body_joint('fridge', DOOR_JOINT)
@@ -103,7 +115,8 @@ def test_all_causes_come_up_and_each_kitchen_can_be_built():
     world = World()
     for kind in counts:
         world.reset(
-            next(scene for scene in scenes if kind in [cause.kind for cause in scene.causes]))
+            next(scene for scene in scenes if kind in [cause.kind for cause in scene.causes])
+        )
         assert not judge(world, world.scene.goal).success
     world.close()
 
@@ -115,9 +128,13 @@ def test_drinks_stand_apart_on_their_shelf():
         places = [world.body_pose(name) for name in world.movable()]
         assert len(places) >= 2
         assert all(place[2, 2] > 0.999 and abs(place[2, 3] - 0.86) < 0.01 for place in places)
-        assert min(
-            np.linalg.norm(one[:2, 3] - other[:2, 3])
-            for one, other in itertools.combinations(places, 2)) > 0.09
+        assert (
+            min(
+                np.linalg.norm(one[:2, 3] - other[:2, 3])
+                for one, other in itertools.combinations(places, 2)
+            )
+            > 0.09
+        )
     world.close()
 
 
@@ -150,13 +167,16 @@ def test_a_door_that_is_not_in_view_is_not_seen():
 def test_bad_goals_are_refused_with_what_is_allowed():
     world = World(draw(1, benign=True))
     skills = KitchenSkills(SkillContext(DirectRobot(world), installed_model()), Kitchen())
-    for work, goal in ((skills.open_door, OpenDoorGoal('upper')), (skills.close_door,
-                                                                   CloseDoorGoal('upper')),
-                       (skills.hand_over, HandOverGoal('upper', PoseStamped()))):
+    for work, goal in (
+        (skills.open_door, OpenDoorGoal('upper')),
+        (skills.close_door, CloseDoorGoal('upper')),
+        (skills.hand_over, HandOverGoal('upper', PoseStamped())),
+    ):
         with pytest.raises(SkillError, match='left, right'):
             work(goal, lambda status: None)
-    nowhere = PoseStamped(Header(frame_id='base_link'),
-                          Pose(Point(0.8, -0.6, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    nowhere = PoseStamped(
+        Header(frame_id='base_link'), Pose(Point(0.8, -0.6, 1.0), Quaternion(0.0, 0.0, 0.0, 1.0))
+    )
     with pytest.raises(SkillError, match='no hand waits'):
         skills.hand_over(HandOverGoal('right', nowhere), lambda status: None)
     nowhere.header.frame_id = 'kitchen'
@@ -168,7 +188,8 @@ def test_bad_goals_are_refused_with_what_is_allowed():
 def test_the_rehearsal_goes_the_way_of_the_script():
     assert drink_retrieval.PALM == PALM
     assert drink_rehearsal.DRIVES == {
-        'MOVE_HOME': drink_retrieval.HOME, 'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE
+        'MOVE_HOME': drink_retrieval.HOME,
+        'MOVE_OUT': drink_retrieval.OUT_OF_THE_FRIDGE,
     }
     assert drink_rehearsal.TORSO_HEIGHT == drink_retrieval.TORSO_HEIGHT
     assert drink_rehearsal.ORDERED == drink_retrieval.ORDERED
@@ -185,8 +206,11 @@ def test_the_rehearsal_goes_the_way_of_the_script():
 
 def next_of(machine, label):
     """Where a state's success leads."""
-    return next(edge[2] for edge in machine.get_internal_edges()
-                if edge[0] == 'succeeded' and edge[1] == label)
+    return next(
+        edge[2]
+        for edge in machine.get_internal_edges()
+        if edge[0] == 'succeeded' and edge[1] == label
+    )
 
 
 @pytest.mark.parametrize('motions', [4, 11, 99])
@@ -292,6 +316,7 @@ def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monke
 
     def fail(*_):
         raise SkillError('caught behind the handle')
+
     monkeypatch.setattr(door, '_open', fail)
     with pytest.raises(SkillError, match='caught behind'):
         door.open_door(SkillContext(robot, installed_model()), Kitchen(), 'right')
@@ -339,10 +364,12 @@ def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeyp
     def slip(*given, **_):
         efforts.append(given[6])
         raise ObjectSlipped('it slipped')
+
     monkeypatch.setattr(kitchen_skills, 'pick_from_fridge', slip)
     monkeypatch.setattr(kitchen_skills, 'open_door', lambda *_: 1.6)
-    drink = PoseStamped(Header(frame_id='base_link'),
-                        Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
+    drink = PoseStamped(
+        Header(frame_id='base_link'), Pose(Point(0.7, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0))
+    )
     goal = PickGoal(arm='right', object=drink, size=Vector3(0.06, 0.06, 0.12), map_id='fridge')
     for _ in range(2):
         with pytest.raises(ObjectSlipped):
@@ -356,14 +383,16 @@ def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeyp
 
 def test_a_moved_drink_is_moved_to_where_there_is_room():
     scenes = [
-        scene for scene in map(draw, range(300))
+        scene
+        for scene in map(draw, range(300))
         if 'drink_moved' in [cause.kind for cause in scene.causes]
     ]
     assert len(scenes) > 10
     for scene in scenes:
         drinks = [body for body in scene.bodies if body.name.startswith('drink')]
         values = dict(
-            next(each.values for each in scene.disturbances if each.kind.startswith('nudge')))
+            next(each.values for each in scene.disturbances if each.kind.startswith('nudge'))
+        )
         there = np.add(drinks[0].position[:2], (values['dx'], values['dy']))
         assert min(np.linalg.norm(there - other.position[:2]) for other in drinks[1:]) > 0.07
         assert abs(there[1]) < Kitchen().width / 2 - 0.06

@@ -1,6 +1,7 @@
 """The launch files of the simulated PR2: each piece apart, and the world's pace where people
 answer.
 """
+
 import pytest
 from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
@@ -8,8 +9,12 @@ from roslaunch.substitution_args import resolve_args
 from smach_oracle.simulation.node.settings import read_settings
 
 PIECES = {
-    'pr2_world', 'pr2_perception', 'pr2_manipulation', 'perception_interface',
-    'manipulation_interface', 'scripted_operator'
+    'pr2_world',
+    'pr2_perception',
+    'pr2_manipulation',
+    'perception_interface',
+    'manipulation_interface',
+    'scripted_operator',
 }
 
 
@@ -17,7 +22,9 @@ def launched(name, *arguments):
     """What roslaunch would start."""
     return load_config_default(
         [(resolve_args('$(find smach_oracle)/launch/{}.launch'.format(name)), list(arguments))],
-        11311, verbose=False)
+        11311,
+        verbose=False,
+    )
 
 
 def nodes(config):
@@ -31,12 +38,18 @@ def test_the_whole_robot_is_made_of_pieces_that_can_be_launched_apart():
 
 
 @pytest.mark.parametrize('task', ['pick_and_place', 'drink_retrieval'])
-@pytest.mark.parametrize('arguments, factor, lock_step',
-                         [((), 0, True), (('scripted_operator:=false',), 1, False),
-                          (('scripted_operator:=false', 'real_time_factor:=0'), 0, True),
-                          (('real_time_factor:=2',), 2, False)])
+@pytest.mark.parametrize(
+    'arguments, factor, lock_step',
+    [
+        ((), 0, True),
+        (('scripted_operator:=false',), 1, False),
+        (('scripted_operator:=false', 'real_time_factor:=0'), 0, True),
+        (('real_time_factor:=2',), 2, False),
+    ],
+)
 def test_where_people_answer_the_world_keeps_the_walls_time_unless_told_otherwise(
-        task, arguments, factor, lock_step):
+    task, arguments, factor, lock_step
+):
     config = launched(task, *arguments)
     assert config.params['/pr2_world/real_time_factor'].value == factor
     assert config.params['/pr2_world/task'].value == task
@@ -49,8 +62,9 @@ def test_the_rates_that_are_launched_are_those_of_the_node_unless_told_otherwise
     rates = ['camera_rate', 'state_rate']
     config = launched('pr2_world', 'real_time_factor:={}'.format(factor))
     node = read_settings(lambda name, usual: factor if name == '~real_time_factor' else usual)
-    assert [config.params['/pr2_world/' + rate].value
-            for rate in rates] == [getattr(node, rate) for rate in rates]
+    assert [config.params['/pr2_world/' + rate].value for rate in rates] == [
+        getattr(node, rate) for rate in rates
+    ]
     assert launched('pr2_world', 'camera_rate:=7').params['/pr2_world/camera_rate'].value == 7
 
 

@@ -1,4 +1,5 @@
 """Goals at the refrigerator's door that are sent again, after the robot was told to stop."""
+
 import numpy as np
 import pytest
 from support.stopped_robot import stopped_after
@@ -11,10 +12,15 @@ from smach_oracle.simulation.scenes.fridge import DOOR_JOINT
 from smach_oracle.simulation.scenes.kitchen_scene import draw
 
 
-@pytest.mark.parametrize('motions, degrees, gap', [(6, (-0.1, 5), (0.02, 0.03)),
-                                                   (8, (60, 80), (0.02, 0.03)),
-                                                   (14, (88, 100), (0.02, 0.03)),
-                                                   (16, (88, 100), (0.04, 0.05))])
+@pytest.mark.parametrize(
+    'motions, degrees, gap',
+    [
+        (6, (-0.1, 5), (0.02, 0.03)),
+        (8, (60, 80), (0.02, 0.03)),
+        (14, (88, 100), (0.02, 0.03)),
+        (16, (88, 100), (0.04, 0.05)),
+    ],
+)
 def test_a_hand_that_was_stopped_at_the_handle_opens_the_door(motions, degrees, gap):
     """It has closed on the bar, pulled with the arm, with the base, and has come off it."""
     world = World(draw(3, benign=True))

@@ -1,6 +1,7 @@
 """Fixtures for tests of the engine. With $SMACH_UPSTREAM they run on upstream, without those of our
 improvements.
 """
+
 import os
 import sys
 
@@ -30,8 +31,10 @@ def log(monkeypatch):
     """
     lines = []
     for level in ('info', 'warn', 'debug', 'err'):
+
         def logger(text, level=level):
             lines.append((level, str(text)))
+
         monkeypatch.setattr(smach, 'log' + level, logger)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     yield lines

@@ -1,4 +1,5 @@
 """States and small machines that the tests of the engine are made of."""
+
 import re
 import threading
 import time

@@ -1,4 +1,5 @@
 """Several states at the same time."""
+
 import os
 import signal
 import subprocess
@@ -31,8 +32,8 @@ def flags(container):
 def test_all_children_run_at_the_same_time_and_the_slowest_ends_it(said):
     meet = threading.Barrier(2, timeout=5.0)
     both = concurrence(
-        {label: Scripted(lambda state, ud: meet.wait() is None or 'done')
-         for label in 'AB'})
+        {label: Scripted(lambda state, ud: meet.wait() is None or 'done') for label in 'AB'}
+    )
     assert both.execute() == 'done'
     assert "Concurrent Outcomes: {'A': 'done', 'B': 'done'}" in said('info')
     assert "Concurrent state 'A' returned outcome 'done' on termination." in said('info')
@@ -40,7 +41,9 @@ def test_all_children_run_at_the_same_time_and_the_slowest_ends_it(said):
 
 def test_the_satisfied_entry_with_most_conditions_wins():
     outcome_map = {
-        'done': {'A': 'done'}, 'failed': {'A': 'done', 'B': 'failed'}, 'preempted': {'B': 'done'}
+        'done': {'A': 'done'},
+        'failed': {'A': 'done', 'B': 'failed'},
+        'preempted': {'B': 'done'},
     }
     children = {'A': Fixed('done'), 'B': Fixed('failed')}
     with pytest.raises(smach.InvalidStateError):
@@ -49,8 +52,18 @@ def test_the_satisfied_entry_with_most_conditions_wins():
     assert concurrence(children, default='preempted', outcome_map=outcome_map).execute() == 'failed'
 
 
-@pytest.mark.parametrize('outcome_map', [['done'], ('done',), {'done': 'A'}, {'done': ['A']},
-                                         {'done': None}, {'done': 3}, {'done': [('A', 'done')]}])
+@pytest.mark.parametrize(
+    'outcome_map',
+    [
+        ['done'],
+        ('done',),
+        {'done': 'A'},
+        {'done': ['A']},
+        {'done': None},
+        {'done': 3},
+        {'done': [('A', 'done')]},
+    ],
+)
 def test_an_outcome_map_that_is_no_mapping_is_a_type_error_when_the_with_block_ends(outcome_map):
     made = smach.Concurrence(['done', 'failed'], 'failed', outcome_map=outcome_map)
     with pytest.raises(TypeError):
@@ -87,13 +100,19 @@ def test_the_default_counts_when_nothing_else_does():
 def test_the_outcome_callback_comes_first_if_it_gives_an_outcome(said):
     given = []
     children = {'A': Fixed('done'), 'B': Fixed('failed')}
-    both = concurrence(children,
-                       outcome_cb=lambda outcomes: given.append(dict(outcomes)) or 'failed')
+    both = concurrence(
+        children, outcome_cb=lambda outcomes: given.append(dict(outcomes)) or 'failed'
+    )
     assert both.execute() == 'failed' and given == [{'A': 'done', 'B': 'failed'}]
-    assert concurrence(children, outcome_cb=lambda outcomes: None,
-                       outcome_map={'preempted': {'A': 'done'}}).execute() == 'preempted'
-    assert any("Outcome callback returned None, using outcome 'preempted'" in text
-               for text in said('warn'))
+    assert (
+        concurrence(
+            children, outcome_cb=lambda outcomes: None, outcome_map={'preempted': {'A': 'done'}}
+        ).execute()
+        == 'preempted'
+    )
+    assert any(
+        "Outcome callback returned None, using outcome 'preempted'" in text for text in said('warn')
+    )
 
 
 def test_an_exception_in_the_outcome_callback_surfaces():
@@ -107,6 +126,7 @@ def test_a_termination_callback_may_preempt_the_others():
     def first_wins(outcomes):
         seen.append(dict(outcomes))
         return True
+
     both = concurrence({'A': Fixed(), 'B': UntilPreempted()}, child_termination_cb=first_wins)
     both.execute()
     assert seen == [{'A': 'done', 'B': None}, {'A': 'done', 'B': 'preempted'}]
@@ -121,8 +141,9 @@ def test_a_termination_callback_may_name_whom_to_preempt():
         seen.update(outcomes)
         return ['B', 'A']
 
-    three = concurrence({'A': Fixed(), 'B': UntilPreempted(), 'C': UntilPreempted(0.1)},
-                        child_termination_cb=only_b)
+    three = concurrence(
+        {'A': Fixed(), 'B': UntilPreempted(), 'C': UntilPreempted(0.1)}, child_termination_cb=only_b
+    )
     three.execute()
     assert seen == {'A': 'done', 'B': 'preempted', 'C': 'done'} and flags(three) == [False] * 3
 
@@ -130,8 +151,9 @@ def test_a_termination_callback_may_name_whom_to_preempt():
 @pytest.mark.improvement
 def test_an_exception_in_the_termination_callback_surfaces_after_the_others_ended():
     other = UntilPreempted()
-    both = concurrence({'A': after(other.started), 'B': other},
-                       child_termination_cb=lambda outcomes: 1 // 0)
+    both = concurrence(
+        {'A': after(other.started), 'B': other}, child_termination_cb=lambda outcomes: 1 // 0
+    )
     begin = time.monotonic()
     with pytest.raises(smach.InvalidUserCodeError, match='child termination callback'):
         both.execute()
@@ -143,8 +165,8 @@ def test_a_childs_exception_preempts_the_others_and_surfaces_when_they_have_ende
     begin = time.monotonic()
     with pytest.raises(smach.InvalidStateError):
         concurrence(
-            {'A': Scripted(lambda state, ud: other.started.wait(5.0) and 1 // 0),
-             'B': other}).execute()
+            {'A': Scripted(lambda state, ud: other.started.wait(5.0) and 1 // 0), 'B': other}
+        ).execute()
     assert time.monotonic() - begin < 10.0
     assert any('ZeroDivisionError' in text for text in that_name(['A'], said('err')))
 
@@ -157,8 +179,10 @@ def test_a_child_that_returns_nothing_is_an_error_not_a_hang():
 
 @pytest.mark.improvement
 def test_a_childs_unregistered_outcome_is_logged(said):
-    assert concurrence({'A': Scripted(lambda state, ud: 'surprise')},
-                       default='failed').execute() == 'failed'
+    assert (
+        concurrence({'A': Scripted(lambda state, ud: 'surprise')}, default='failed').execute()
+        == 'failed'
+    )
     assert any("'surprise', which it has not registered" in text for text in said('err'))
 
 
@@ -171,18 +195,22 @@ def test_userdata_goes_through_the_remapping_in_both_directions():
     def add(state, ud):
         ud.sum = ud.a + 1
         return 'done'
+
     both = smach.Concurrence(['done'], 'done', input_keys=['x'], output_keys=['y'])
     with both:
-        smach.Concurrence.add('A', Scripted(add, input_keys=['a'], output_keys=['sum']),
-                              {'a': 'x', 'sum': 'y'})
+        smach.Concurrence.add(
+            'A', Scripted(add, input_keys=['a'], output_keys=['sum']), {'a': 'x', 'sum': 'y'}
+        )
     parent = smach.UserData()
     parent.x = 1
     assert both.execute(parent) == 'done' and parent.y == 2
 
 
 def test_a_preempt_reaches_all_running_children_and_is_serviced(said):
-    both = concurrence({'A': UntilPreempted(), 'B': UntilPreempted(), 'ENDED': Fixed()},
-                       outcome_map={'preempted': {'A': 'preempted', 'B': 'preempted'}})
+    both = concurrence(
+        {'A': UntilPreempted(), 'B': UntilPreempted(), 'ENDED': Fixed()},
+        outcome_map={'preempted': {'A': 'preempted', 'B': 'preempted'}},
+    )
     asker = Once(lambda: sorted(both.get_active_states()) == ['A', 'B'], both.request_preempt)
     assert both.execute() == 'preempted'
     asker.join()
@@ -220,6 +248,7 @@ def test_a_child_that_ends_while_it_is_being_asked_has_serviced_the_preempt():
     def child_ended(outcomes):
         child.end_is_known.set()
         asker.join(5.0)
+
     cc = concurrence({'A': child}, default='failed', child_termination_cb=child_ended)
     asker = Once(child.started.is_set, cc.request_preempt)
     assert cc.execute() == 'preempted'
@@ -242,8 +271,12 @@ def test_a_preempt_that_comes_while_it_ends_is_not_swallowed():
     both = concurrence({'A': Fixed()}, outcome_cb=lambda outcomes: both.request_preempt() or 'done')
     sm = machine(
         ('BOTH', both, {'done': 'NEXT'}),
-        ('NEXT', Scripted(lambda state, ud: 'preempted' if state.preempt_requested() else 'failed'),
-         None))
+        (
+            'NEXT',
+            Scripted(lambda state, ud: 'preempted' if state.preempt_requested() else 'failed'),
+            None,
+        ),
+    )
     both_of_machine = sm['BOTH']
     both_of_machine.register_termination_cb(lambda ud, labels, outcome: sm.request_preempt())
     assert sm.execute() == 'preempted'
@@ -269,6 +302,7 @@ def test_hammering_it_with_preempts_neither_hangs_nor_leaves_flags_behind():
     def hammer():
         while not stop.wait(0.0005):
             both.request_preempt()
+
     thread = threading.Thread(target=hammer, daemon=True)
     thread.start()
     outcomes = {both.execute() for _ in range(30)}
@@ -284,16 +318,19 @@ def test_active_states_are_those_that_still_run():
         active.append(sorted(states))
         if active[-1] == ['B']:
             alone.set()
+
     both = concurrence({'A': Fixed(), 'B': after(alone)})
     both.register_transition_cb(note)
     both.execute()
-    assert active[:1] == [['A', 'B']] and active[-2:] == [['B'], []
-                                                          ] and both.get_active_states() == []
+    assert (
+        active[:1] == [['A', 'B']] and active[-2:] == [['B'], []] and both.get_active_states() == []
+    )
 
 
 def test_edges_are_the_conditions_of_the_outcome_map():
-    both = concurrence({'A': Fixed(), 'B': Fixed()},
-                       outcome_map={'failed': {'A': 'done', 'B': 'done'}})
+    both = concurrence(
+        {'A': Fixed(), 'B': Fixed()}, outcome_map={'failed': {'A': 'done', 'B': 'done'}}
+    )
     assert sorted(both.get_internal_edges()) == [('done', 'A', 'failed'), ('done', 'B', 'failed')]
     assert sorted(both.get_initial_states()) == ['A', 'B']
 
@@ -317,7 +354,7 @@ def test_a_shutdown_preempts_the_children_and_a_deaf_one_cannot_hold_it_up(monke
     assert any("['DEAF'] did not end" in text for text in said('err'))
 
 
-INTERRUPTED = '''
+INTERRUPTED = """
 import sys, threading
 sys.path[:0] = {paths!r}
 import smach
@@ -329,15 +366,16 @@ try:
     sm.execute()
 except KeyboardInterrupt:
     print('interrupted', sm.is_running(), child.preempt_requested())
-'''
+"""
 
 
 @pytest.mark.improvement
 def test_ctrl_c_stops_a_concurrence_in_a_machine_at_once():
     here = os.path.dirname(os.path.abspath(__file__))
     script = INTERRUPTED.format(paths=[here] + sys.path)
-    process = subprocess.Popen([sys.executable, '-c', script], stdout=subprocess.PIPE,
-                               universal_newlines=True)
+    process = subprocess.Popen(
+        [sys.executable, '-c', script], stdout=subprocess.PIPE, universal_newlines=True
+    )
     try:
         while 'started' not in process.stdout.readline():
             pass

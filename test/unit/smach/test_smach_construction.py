@@ -1,6 +1,7 @@
 """Building containers: with blocks, mistakes, callbacks, sequences, and what happens to the
 caller's own objects.
 """
+
 import copy
 import pickle
 
@@ -78,9 +79,11 @@ def test_the_callers_dictionaries_and_the_defaults_stay_untouched():
     transitions, outcomes = {}, ['x']
     machine(('A', Fixed('done'), transitions))
     iterator = smach.Iterator(outcomes, [], [], it=[1])
-    assert transitions == {} and outcomes == [
-        'x'
-    ] and 'exhausted' in iterator.get_registered_outcomes()
+    assert (
+        transitions == {}
+        and outcomes == ['x']
+        and 'exhausted' in iterator.get_registered_outcomes()
+    )
     first = smach.State(['a'])
     first._input_keys.add('key')
     assert smach.State(['a'])._input_keys == set()
@@ -88,8 +91,9 @@ def test_the_callers_dictionaries_and_the_defaults_stay_untouched():
 
 @pytest.mark.improvement
 def test_a_single_string_of_keys_is_refused_with_the_remedy():
-    with pytest.raises(TypeError,
-                       match=r"input_keys must be a list of keys, not the single string 'key'"):
+    with pytest.raises(
+        TypeError, match=r"input_keys must be a list of keys, not the single string 'key'"
+    ):
         smach.State(['a'], input_keys='key')
 
 
@@ -118,6 +122,7 @@ def test_a_callback_state_passes_arguments_and_takes_the_interface_of_its_callba
     def work(ud, first, second=0):
         ud.b = ud.a + first + second
         return 'done'
+
     state = smach.CBState(work, [10], {'second': 100}, outcomes=['other'])
     assert smach.has_smach_interface(work) and not smach.has_smach_interface(len)
     assert sorted(state.get_registered_outcomes()) == ['done', 'other']
@@ -130,13 +135,18 @@ def test_callbacks_hear_of_start_transitions_and_end():
     heard = []
     sm = machine(('A', Fixed('x'), {'x': 'B'}), ('B', Fixed('done'), None))
     sm.register_start_cb(lambda ud, states, *args: heard.append(('start', states, args)), [1])
-    sm.register_transition_cb(lambda ud, states, *args: heard.append(('transition', states, args)),
-                              cb_args=[2])
+    sm.register_transition_cb(
+        lambda ud, states, *args: heard.append(('transition', states, args)), cb_args=[2]
+    )
     sm.register_termination_cb(
-        lambda ud, states, outcome, *args: heard.append(('end', states, outcome, args)), [3])
+        lambda ud, states, outcome, *args: heard.append(('end', states, outcome, args)), [3]
+    )
     sm.execute()
-    assert heard == [('start', ['A'], (1,)), ('transition', ['B'], (2,)),
-                     ('end', ['B'], 'done', (3,))]
+    assert heard == [
+        ('start', ['A'], (1,)),
+        ('transition', ['B'], (2,)),
+        ('end', ['B'], 'done', (3,)),
+    ]
 
 
 @pytest.mark.parametrize('kind', ['start', 'transition', 'termination'])
@@ -184,8 +194,9 @@ def test_add_auto_connects_to_the_state_added_next():
 
 
 @pytest.mark.improvement
-@pytest.mark.parametrize('copier',
-                         [copy.copy, copy.deepcopy, lambda sm: pickle.loads(pickle.dumps(sm))])
+@pytest.mark.parametrize(
+    'copier', [copy.copy, copy.deepcopy, lambda sm: pickle.loads(pickle.dumps(sm))]
+)
 def test_copies_and_pickles_of_whole_trees_run(copier):
     inner = machine(('I', Fixed('done'), None))
     inner.userdata.a = [1]
@@ -214,9 +225,13 @@ def test_names_and_submodules_that_scripts_import():
         user_data,
         util,
     )
+
     assert state_machine.StateMachine is smach.StateMachine and state.CBState is smach.CBState
     assert (container.Container, sequence.Sequence, iterator.Iterator) == (
-        smach.Container, smach.Sequence, smach.Iterator)
+        smach.Container,
+        smach.Sequence,
+        smach.Iterator,
+    )
     assert concurrence_module.Concurrence is smach.Concurrence
     assert user_data.Remapper is smach.Remapper
     assert log.set_loggers is smach.set_loggers and util.cb_interface is smach.cb_interface

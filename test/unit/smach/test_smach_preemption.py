@@ -1,4 +1,5 @@
 """Asking a machine to stop, at any moment, and pausing it."""
+
 import threading
 import time
 
@@ -16,6 +17,7 @@ def preempt(sm_holder, serviced):
         if serviced:
             state.service_preempt()
         return 'done'
+
     return work
 
 
@@ -37,8 +39,9 @@ def test_a_running_state_is_asked_and_the_machine_ends_serviced():
 
 def test_a_state_that_ignores_the_request_hands_it_to_the_next_before_that_runs(said):
     holder = []
-    sm = machine(('A', Scripted(preempt(holder, False)), {'done': 'B'}),
-                 ('B', Scripted(flagged), None))
+    sm = machine(
+        ('A', Scripted(preempt(holder, False)), {'done': 'B'}), ('B', Scripted(flagged), None)
+    )
     holder.append(sm)
     assert sm.execute() == 'preempted'
     assert not sm['A'].preempt_requested() and not sm.preempt_requested()
@@ -47,8 +50,9 @@ def test_a_state_that_ignores_the_request_hands_it_to_the_next_before_that_runs(
 
 def test_a_state_that_services_the_request_and_goes_on_frees_the_rest():
     holder = []
-    sm = machine(('A', Scripted(preempt(holder, True)), {'done': 'B'}),
-                 ('B', Scripted(flagged), None))
+    sm = machine(
+        ('A', Scripted(preempt(holder, True)), {'done': 'B'}), ('B', Scripted(flagged), None)
+    )
     holder.append(sm)
     assert sm.execute() == 'done' and not sm.preempt_requested()
 
@@ -78,6 +82,7 @@ def test_a_second_request_reaches_a_state_that_serviced_the_first():
             seen.append(state.preempt_requested())
             state.service_preempt()
         return 'done'
+
     sm = machine(('A', Scripted(twice), None))
     sm.execute()
     assert seen == [True, True]
@@ -92,6 +97,7 @@ def test_a_request_a_state_ignored_and_the_parent_settled_does_not_meet_its_next
         if holder:
             holder.pop().request_preempt()
         return 'done'
+
     inner = machine(('I', Scripted(ignore_once), None))
     outer = machine(('IN', inner, {'done': 'NEXT'}), ('NEXT', Scripted(flagged), None))
     holder.append(outer)
@@ -117,6 +123,7 @@ def test_a_state_whose_request_preempt_raises_does_not_hurt_the_one_who_asks(sai
         def execute(self, ud):
             sm.request_preempt()
             return 'done'
+
     sm = machine(('A', Broken(outcomes=['done']), None))
     assert sm.execute() == 'done'
     assert any('ValueError: broken' in text for text in that_name(['A'], said('err')))
@@ -137,6 +144,7 @@ def test_a_request_reaches_a_machine_that_only_rushes_from_state_to_state():
     def rush(state, ud):
         visits.append(1)
         return flagged(state, ud)
+
     sm = machine(('A', Scripted(rush), {'done': 'A'}))
     asker = Once(lambda: len(visits) > 100, sm.request_preempt)
     begin = time.monotonic()
@@ -182,8 +190,11 @@ def test_one_request_to_a_machine_that_rushes_stops_one_state_not_two():
             asker.join(5.0)
         return 'done'
 
-    sm = machine(('A', Scripted(until_requested), {'done': 'B'}),
-                 ('B', Scripted(service), {'done': 'C'}), ('C', Scripted(service), None))
+    sm = machine(
+        ('A', Scripted(until_requested), {'done': 'B'}),
+        ('B', Scripted(service), {'done': 'C'}),
+        ('C', Scripted(service), None),
+    )
     lock = sm._state_transitioning_lock = LateLock()
     asker = Once(began.is_set, sm.request_preempt)
     assert sm.execute() == 'done'
@@ -201,6 +212,7 @@ def test_a_paused_machine_enters_no_state_until_resumed(wrap):
         if len(entered) == 3:
             sm.request_pause()
         return 'done' if len(entered) == 4 else 'again'
+
     sm = wrap(machine(('A', Scripted(enter, ['done', 'again']), {'again': 'A'})))
     thread = threading.Thread(target=sm.execute, daemon=True)
     thread.start()
@@ -218,6 +230,7 @@ def test_a_pause_reaches_the_machine_inside_and_a_preempt_ends_it():
     def pause(state, ud):
         holder[0].request_pause()
         return 'done'
+
     inner = machine(('I', Scripted(pause), {'done': 'J'}), ('J', Scripted(flagged), None))
     outer = machine(('IN', inner, None))
     holder.append(outer)
@@ -231,8 +244,9 @@ def test_a_pause_reaches_the_machine_inside_and_a_preempt_ends_it():
 def test_a_preempt_pending_when_a_concurrence_starts_reaches_its_children():
     holder = []
     children = concurrence({'A': UntilPreempted(), 'B': UntilPreempted()})
-    outer = machine(('FIRST', Scripted(preempt(holder, False)), {'done': 'BOTH'}),
-                    ('BOTH', children, None))
+    outer = machine(
+        ('FIRST', Scripted(preempt(holder, False)), {'done': 'BOTH'}), ('BOTH', children, None)
+    )
     holder.append(outer)
     begin = time.monotonic()
     assert outer.execute() == 'preempted'
@@ -263,6 +277,7 @@ def test_a_preempt_between_two_runs_stops_one_state_after_an_error_too():
             if seen == [('A', False), ('B', False)]:
                 raise RuntimeError('the first time')
             return 'ok'
+
     machine = smach.StateMachine(outcomes=['ok'])
     with machine:
         smach.StateMachine.add('A', Told('A'), {'ok': 'B'})
@@ -277,10 +292,16 @@ def test_a_preempt_between_two_runs_stops_one_state_after_an_error_too():
 @pytest.mark.improvement
 def test_a_second_request_reaches_what_runs_in_a_branch_that_has_gone_on():
     obeys, goes_on = UntilPreempted(), UntilPreempted(5.0)
-    branch = machine(('OBEYS', obeys, {'preempted': 'GOES_ON'}),
-                     ('GOES_ON', goes_on, {'done': 'failed'}))
-    outer = machine(('BOTH', concurrence({'BRANCH': branch}, outcome_map={
-        'failed': {'BRANCH': 'failed'}}), None))
+    branch = machine(
+        ('OBEYS', obeys, {'preempted': 'GOES_ON'}), ('GOES_ON', goes_on, {'done': 'failed'})
+    )
+    outer = machine(
+        (
+            'BOTH',
+            concurrence({'BRANCH': branch}, outcome_map={'failed': {'BRANCH': 'failed'}}),
+            None,
+        )
+    )
     askers = [Once(state.started.is_set, outer.request_preempt) for state in (obeys, goes_on)]
     assert outer.execute() == 'preempted'
     for asker in askers:

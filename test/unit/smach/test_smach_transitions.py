@@ -1,4 +1,5 @@
 """Where outcomes lead, and what happens when they lead nowhere."""
+
 import pytest
 from smach_states import Counting, Fixed, Scripted, machine, naming, that_name
 
@@ -11,7 +12,8 @@ def test_states_follow_their_transitions_and_the_machine_ends_with_its_outcome(s
     assert said('info') == [
         "State machine starting in initial state 'A' with userdata: \n\t[]",
         "State machine transitioning 'A':'x'-->'B'",
-        "State machine terminating 'B':'y':'done'"]
+        "State machine terminating 'B':'y':'done'",
+    ]
 
 
 def test_a_machine_can_run_again_and_keeps_its_userdata():
@@ -30,6 +32,7 @@ def test_a_target_exchanged_while_running_counts_and_an_unknown_one_falls_throug
     def redirect(state, ud):
         sm._transitions['A']['done'] = 'nowhere'
         return 'done'
+
     sm = machine(('A', Scripted(redirect, ['done']), {'done': 'failed'}))
     assert sm.execute() == 'done'
 
@@ -38,6 +41,7 @@ def test_an_outcome_that_leads_nowhere_is_an_error():
     def forget(state, ud):
         sm._outcomes = {'other'}
         return 'done'
+
     sm = machine(('A', Scripted(forget, ['done']), {'done': 'failed'}))
     with pytest.raises(smach.InvalidTransitionError, match=naming('A', 'done')):
         sm.execute()
@@ -81,6 +85,7 @@ def test_an_exception_in_a_nested_machine_surfaces_once_with_the_innermost_trace
 def test_ctrl_c_and_exit_pass_through_nested_machines_as_they_are(interrupt):
     def leave(state, ud):
         raise interrupt()
+
     inner = machine(('I', Scripted(leave), None))
     outer = machine(('IN', inner, None))
     with pytest.raises(interrupt):
@@ -110,8 +115,10 @@ def test_a_machine_stops_with_none_when_everything_is_shut_down(monkeypatch):
 
 def test_one_state_object_may_have_two_labels():
     shared = Counting(2)
-    sm = machine(('A', shared, {'again': 'B', 'done': 'failed'}),
-                 ('B', shared, {'again': 'failed', 'done': 'done'}))
+    sm = machine(
+        ('A', shared, {'again': 'B', 'done': 'failed'}),
+        ('B', shared, {'again': 'failed', 'done': 'done'}),
+    )
     sm.userdata.count = 0
     assert sm.execute() == 'done'
 
@@ -170,8 +177,9 @@ def test_a_step_patched_on_one_machine_is_used(monkeypatch):
 
 def test_a_method_patched_on_the_base_class_is_used(monkeypatch):
     calls = []
-    monkeypatch.setattr(smach.Container, 'call_transition_cbs',
-                        lambda self: calls.append(self.get_active_states()))
+    monkeypatch.setattr(
+        smach.Container, 'call_transition_cbs', lambda self: calls.append(self.get_active_states())
+    )
     machine(('A', Fixed('x'), {'x': 'B'}), ('B', Fixed('done'), None)).execute()
     assert calls == [['B']]
 
@@ -183,11 +191,12 @@ def test_a_logger_set_in_mid_run_hears_the_next_transition(said):
         smach.loginfo = heard.append
         return 'done'
 
-    machine(('A', Scripted(replace), {'done': 'B', 'failed': 'done'}),
-            ('B', Fixed('done'), None)).execute()
+    machine(
+        ('A', Scripted(replace), {'done': 'B', 'failed': 'done'}), ('B', Fixed('done'), None)
+    ).execute()
     assert heard == [
         "State machine transitioning 'A':'done'-->'B'",
-        "State machine terminating 'B':'done':'done'"
+        "State machine terminating 'B':'done':'done'",
     ]
 
 

@@ -1,4 +1,5 @@
 """Userdata, the view a state gets of it, and what crosses the border of a container."""
+
 import copy
 import enum
 import pickle
@@ -27,8 +28,9 @@ def view(values, inputs=(), outputs=(), remapping=None):
     ud = smach.UserData()
     for key, value in values.items():
         ud[key] = value
-    return ud, smach.Remapper(ud, list(inputs), list(outputs),
-                              {} if remapping is None else remapping)
+    return ud, smach.Remapper(
+        ud, list(inputs), list(outputs), {} if remapping is None else remapping
+    )
 
 
 def test_attributes_and_items_are_the_same_keys():
@@ -95,6 +97,7 @@ def test_userdata_survives_writers_and_listers_in_many_threads():
                 assert len(ud.keys()) > 0
         except Exception as err:
             errors.append(err)
+
     threads = [threading.Thread(target=write, args=(name,)) for name in 'abcd']
     for thread in threads:
         thread.start()
@@ -168,6 +171,7 @@ def test_a_state_that_sets_an_attribute_of_an_input_does_not_end_the_machine():
     def work(state, ud):
         ud.pose.x = 5
         return 'done'
+
     sm = machine(('A', Scripted(work, input_keys=['pose']), None))
     sm.userdata.pose = Pose()
     assert sm.execute() == 'done' and sm.userdata.pose.x == 1
@@ -177,6 +181,7 @@ def test_a_state_that_sets_an_attribute_of_an_input_does_not_end_the_machine():
 def test_setting_an_attribute_of_an_input_is_warned_of_once(said):
     class Goal(Pose):
         pass
+
     _, remapper = view({'goal': Goal()}, ['goal'])
     for _ in range(3):
         remapper.goal.x = 5
@@ -186,8 +191,9 @@ def test_setting_an_attribute_of_an_input_is_warned_of_once(said):
 
 
 @pytest.mark.improvement
-@pytest.mark.parametrize('copier', [copy.copy, copy.deepcopy,
-                                    lambda pose: pickle.loads(pickle.dumps(pose))])
+@pytest.mark.parametrize(
+    'copier', [copy.copy, copy.deepcopy, lambda pose: pickle.loads(pickle.dumps(pose))]
+)
 def test_a_copy_has_what_was_set_on_the_view(copier):
     pose = Pose()
     _, remapper = view({'pose': pose}, ['pose'])
@@ -201,8 +207,9 @@ def test_a_copy_has_what_was_set_on_the_view(copier):
 @pytest.mark.improvement
 def test_a_read_only_object_otherwise_behaves_like_the_object():
     pose = Pose()
-    _, remapper = view({'pose': pose, 'mode': Mode.AUTO, 'function': len},
-                       ['pose', 'mode', 'function'])
+    _, remapper = view(
+        {'pose': pose, 'mode': Mode.AUTO, 'function': len}, ['pose', 'mode', 'function']
+    )
     assert remapper.pose == pose and isinstance(remapper.pose, Pose) and remapper.pose.norm() == 1
     assert remapper.mode is Mode.AUTO and remapper.function([1]) == 1
     mine = copy.deepcopy(remapper.pose)
@@ -219,8 +226,9 @@ def test_an_object_that_is_also_an_output_is_the_object():
 
 @pytest.mark.improvement
 def test_keys_lists_the_inputs_there_are_by_the_names_of_the_state():
-    _, remapper = view({'real': 1, 'other': 2, 'plain': 3}, ['mine', 'plain', 'missing'], [],
-                       {'mine': 'real'})
+    _, remapper = view(
+        {'real': 1, 'other': 2, 'plain': 3}, ['mine', 'plain', 'missing'], [], {'mine': 'real'}
+    )
     assert remapper.keys() == ['mine', 'plain']
 
 
@@ -234,6 +242,7 @@ def test_keys_declared_between_two_visits_count():
         state.register_input_keys(['extra'])
         seen.append(None)
         return 'failed'
+
     sm = machine(('A', Scripted(work), {'failed': 'A'}))
     sm.userdata.extra = 4
     assert sm.execute() == 'done' and seen == [None, 4]
@@ -251,6 +260,7 @@ def test_private_key_sets_and_userdata_exchanged_between_visits_count():
         sm._remappings['A'] = {'a': 'b'}
         state._input_keys = {'a', 'more'}
         return 'failed'
+
     sm = machine(('A', Scripted(work, input_keys=['a']), {'failed': 'A'}))
     sm.userdata.a = 1
     assert sm.execute() == 'done' and seen == [1, 2]
@@ -260,6 +270,7 @@ def test_a_state_that_computes_its_keys_is_asked_every_time():
     class Computed(Scripted):
         def get_registered_input_keys(self):
             return ('a',)
+
     sm = machine(('A', Computed(lambda state, ud: 'done' if ud.a == 1 else 'failed'), None))
     sm.userdata.a = 1
     assert sm.execute() == 'done'
@@ -277,6 +288,7 @@ def test_inputs_are_copied_in_and_outputs_out_through_the_remapping():
     def work(state, ud):
         ud.b = ud.a + 1
         return 'done'
+
     outer, inner = nested(work, {'a': 'given', 'b': 'result'}, input_keys=['a'], output_keys=['b'])
     outer.userdata.given = 1
     inner.userdata.own = 0
@@ -295,8 +307,14 @@ def test_missing_inputs_and_outputs_are_warnings(said):
 
 def test_a_parent_userdata_is_read_and_written():
     sm = machine(
-        ('A', Scripted(lambda state, ud: setattr(ud, 'b', ud.a) or 'done',
-                       io_keys=['a', 'b']), None), input_keys=['a'], output_keys=['b'])
+        (
+            'A',
+            Scripted(lambda state, ud: setattr(ud, 'b', ud.a) or 'done', io_keys=['a', 'b']),
+            None,
+        ),
+        input_keys=['a'],
+        output_keys=['b'],
+    )
     parent = smach.UserData()
     parent.a = 3
     assert sm.execute(parent) == 'done' and parent.b == 3
@@ -317,6 +335,7 @@ def test_constants_are_keys_of_the_machine_written_before_the_state_and_kept():
     def work(state, ud):
         seen.append((ud.n, ud['n'], 'n' in ud, state.sm.userdata.answer))
         return 'done'
+
     state = Scripted(work, input_keys=['n'])
     given = {'remapping': {'n': 'answer'}, 'constants': {'answer': 42}}
     sm = state.sm = adding(('A', state, given))
@@ -332,8 +351,14 @@ def test_a_constant_may_be_written_and_is_itself_again_at_the_next_visit():
         seen.append(ud.speed)
         ud.speed = 9
         return 'failed' if len(seen) < 3 else 'done'
-    sm = adding(('A', Scripted(work, io_keys=['speed']),
-                 {'transitions': {'failed': 'A'}, 'constants': {'speed': 0.5}}))
+
+    sm = adding(
+        (
+            'A',
+            Scripted(work, io_keys=['speed']),
+            {'transitions': {'failed': 'A'}, 'constants': {'speed': 0.5}},
+        )
+    )
     sm.userdata.speed = 1
     assert sm.execute() == 'done' and seen == [0.5, 0.5, 0.5] and sm.userdata.speed == 9
 
@@ -341,17 +366,24 @@ def test_a_constant_may_be_written_and_is_itself_again_at_the_next_visit():
 def test_a_constant_stays_for_the_states_that_follow_and_needs_no_declaration():
     def read(state, ud):
         return ud.mode
-    sm = adding(('A', Scripted('failed'), {'transitions': {'failed': 'B'},
-                                           'constants': {'mode': 'done'}}),
-                ('B', Scripted(read, input_keys=['mode']), {}))
+
+    sm = adding(
+        ('A', Scripted('failed'), {'transitions': {'failed': 'B'}, 'constants': {'mode': 'done'}}),
+        ('B', Scripted(read, input_keys=['mode']), {}),
+    )
     assert sm.execute() == 'done'
 
 
 def test_constants_are_looked_at_when_the_state_runs():
     constants = {'a': 1}
     seen = []
-    sm = adding(('A', Scripted(lambda state, ud: seen.append(ud.a) or 'done', input_keys=['a']),
-                 {'constants': constants}))
+    sm = adding(
+        (
+            'A',
+            Scripted(lambda state, ud: seen.append(ud.a) or 'done', input_keys=['a']),
+            {'constants': constants},
+        )
+    )
     sm.execute()
     constants['a'] = 2
     sm.execute()
@@ -369,11 +401,20 @@ def test_constants_that_are_no_mapping_are_an_error_when_the_state_runs():
 def test_add_auto_takes_constants_too():
     def read(state, ud):
         return ud.mode
-    sm = adding(('A', Scripted(read, input_keys=['mode']),
-                 {'connector_outcomes': ['failed'], 'constants': {'mode': 'failed'}}),
-                ('B', Scripted(read, input_keys=['mode']),
-                 {'connector_outcomes': [], 'constants': {'mode': 'done'}}),
-                add=smach.StateMachine.add_auto)
+
+    sm = adding(
+        (
+            'A',
+            Scripted(read, input_keys=['mode']),
+            {'connector_outcomes': ['failed'], 'constants': {'mode': 'failed'}},
+        ),
+        (
+            'B',
+            Scripted(read, input_keys=['mode']),
+            {'connector_outcomes': [], 'constants': {'mode': 'done'}},
+        ),
+        add=smach.StateMachine.add_auto,
+    )
     assert sm.execute() == 'done' and sm.userdata.mode == 'done'
 
 
@@ -381,6 +422,9 @@ def test_add_auto_takes_constants_too():
 def test_the_states_of_a_sequence_may_have_constants():
     sequence = smach.Sequence(['done', 'failed', 'preempted'], 'done')
     with sequence:
-        smach.Sequence.add('A', Scripted(lambda state, ud: ud.mode, input_keys=['mode']),
-                           constants={'mode': 'failed'})
+        smach.Sequence.add(
+            'A',
+            Scripted(lambda state, ud: ud.mode, input_keys=['mode']),
+            constants={'mode': 'failed'},
+        )
     assert sequence.execute() == 'failed'

@@ -4,6 +4,7 @@ A program is a kind of machine and the way in which its state WORK ends. It is e
 second time WORK ends well. What is compared is all that a script can see: outcomes, exceptions,
 transitions, what each state read, and the userdata of every container.
 """
+
 import threading
 
 import pytest
@@ -13,8 +14,12 @@ import smach
 from smach_oracle.oracle import OracleContainer
 
 OUTCOMES = ['done', 'aborted', 'preempted']
-ENDINGS = {'ends well': 'done', 'fails': 'aborted', 'raises': smach.InvalidUserCodeError,
-           'is preempted': 'preempted'}
+ENDINGS = {
+    'ends well': 'done',
+    'fails': 'aborted',
+    'raises': smach.InvalidUserCodeError,
+    'is preempted': 'preempted',
+}
 ODD_ENDINGS = ('is lost', 'ignores the preempt')  # an outcome that nobody knows; a deaf state
 
 
@@ -33,9 +38,11 @@ class Stage:
         self.containers[name] = container
         if not isinstance(container, smach.Concurrence):
             container.register_transition_cb(
-                lambda ud, active: self.told.append((name, active, sorted(ud.keys()))))
+                lambda ud, active: self.told.append((name, active, sorted(ud.keys())))
+            )
             container.register_termination_cb(
-                lambda ud, last, outcome: self.told.append((name, last, outcome)))
+                lambda ud, last, outcome: self.told.append((name, last, outcome))
+            )
         return container
 
 
@@ -135,8 +142,12 @@ def nested(stage):
 
 def concurrence(stage):
     both = smach.Concurrence(
-        OUTCOMES, 'aborted', input_keys=['count'], output_keys=['count'],
-        outcome_map={'done': {'WORK': 'done', 'BESIDE': 'done'}, 'aborted': {'WORK': 'aborted'}})
+        OUTCOMES,
+        'aborted',
+        input_keys=['count'],
+        output_keys=['count'],
+        outcome_map={'done': {'WORK': 'done', 'BESIDE': 'done'}, 'aborted': {'WORK': 'aborted'}},
+    )
     with both:
         smach.Concurrence.add('WORK', Work(stage))
         smach.Concurrence.add('BESIDE', Beside(stage))
@@ -144,18 +155,30 @@ def concurrence(stage):
 
 
 def machine_in_concurrence(stage):
-    both = smach.Concurrence(OUTCOMES, 'aborted', input_keys=['count'], output_keys=['count'],
-                             outcome_map={'done': {'INNER': 'done', 'BESIDE': 'done'}})
+    both = smach.Concurrence(
+        OUTCOMES,
+        'aborted',
+        input_keys=['count'],
+        output_keys=['count'],
+        outcome_map={'done': {'INNER': 'done', 'BESIDE': 'done'}},
+    )
     with both:
-        smach.Concurrence.add('INNER', chain(stage, 'INNER', ('WORK', Work(stage)),
-                                             start=('I1', 'I2')))
+        smach.Concurrence.add(
+            'INNER', chain(stage, 'INNER', ('WORK', Work(stage)), start=('I1', 'I2'))
+        )
         smach.Concurrence.add('BESIDE', Beside(stage))
     return chain(stage, 'TOP', ('BOTH', stage.add_container('BOTH', both)))
 
 
 def iterated(stage, state):
-    each = smach.Iterator(list(OUTCOMES), ['count'], ['count'], it=[1, 2, 3], it_label='item',
-                          exhausted_outcome='done')
+    each = smach.Iterator(
+        list(OUTCOMES),
+        ['count'],
+        ['count'],
+        it=[1, 2, 3],
+        it_label='item',
+        exhausted_outcome='done',
+    )
     with each:
         smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['done'])
     return chain(stage, 'TOP', ('ALL', stage.add_container('ALL', each)))
@@ -174,8 +197,9 @@ def sequence(stage):
 
 
 def remapping(stage):
-    inner = chain(stage, 'INNER', ('WORK', Work(stage, by=True)), start=('I1', 'I2'),
-                  remapping={'by': 'step'})
+    inner = chain(
+        stage, 'INNER', ('WORK', Work(stage, by=True)), start=('I1', 'I2'), remapping={'by': 'step'}
+    )
     inner.register_input_keys(['step'])
     top = chain(stage, 'TOP', ('INNER', inner), remapping={'count': 'total', 'step': 'big_step'})
     top.userdata.total, top.userdata.big_step = 100, 20
@@ -183,14 +207,29 @@ def remapping(stage):
 
 
 def constants(stage):
-    inner = chain(stage, 'INNER', ('WORK', Work(stage, by=True)), start=('I1', 'I2'),
-                  remapping={'by': 'step'}, constants={'step': 5})
+    inner = chain(
+        stage,
+        'INNER',
+        ('WORK', Work(stage, by=True)),
+        start=('I1', 'I2'),
+        remapping={'by': 'step'},
+        constants={'step': 5},
+    )
     return chain(stage, 'TOP', ('INNER', inner), constants={'count': 50, 'mode': 'fast'})
 
 
 # with what `count` (of remapping: `total`) is after a first execution that ends well
-KINDS = {flat: 3, nested: 7, concurrence: 3, machine_in_concurrence: 5, iterator: 5,
-         machine_in_iterator: 11, sequence: 3, remapping: 122, constants: 58}
+KINDS = {
+    flat: 3,
+    nested: 7,
+    concurrence: 3,
+    machine_in_concurrence: 5,
+    iterator: 5,
+    machine_in_iterator: 11,
+    sequence: 3,
+    remapping: 122,
+    constants: 58,
+}
 
 SAID = ('State machine ', 'Iterating ', 'Concurrence starting', 'Concurrent Outcomes')
 
@@ -204,6 +243,7 @@ def ended(machine):
             results.append(machine.execute())
         except Exception as err:
             results.append(type(err))
+
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
     thread.join(30)
@@ -221,8 +261,15 @@ def story(kind, ending, log, wrap):
     runs = []
     for _ in range(2):
         result = ended(stage.top)
-        runs.append((result, {name: dict(container.userdata._data)
-                              for name, container in stage.containers.items()}))
+        runs.append(
+            (
+                result,
+                {
+                    name: dict(container.userdata._data)
+                    for name, container in stage.containers.items()
+                },
+            )
+        )
     said = [text for level, text in log if level == 'info' and text.startswith(SAID)]
     flags = {name: container.preempt_requested() for name, container in stage.containers.items()}
     return runs, stage.read, stage.told, said, flags

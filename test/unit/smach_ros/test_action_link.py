@@ -1,4 +1,5 @@
 """When a link to an action server counts as ready; no master."""
+
 import time
 
 import pytest

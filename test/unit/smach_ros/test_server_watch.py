@@ -1,4 +1,5 @@
 """When an action server is given up, and when it is not. Time and the node's answers are faked."""
+
 import pytest
 
 pytest.importorskip('rospy')
@@ -147,6 +148,7 @@ def test_status_from_a_successor_ends_all_suspicion(world):
 
 def test_probe_tells_a_closed_port_from_a_silent_one():
     import socket
+
     listener = socket.socket()
     listener.bind(('127.0.0.1', 0))
     uri = 'http://127.0.0.1:%d/' % listener.getsockname()[1]

@@ -1,4 +1,5 @@
 """Waiting that a preempt or a shutdown ends at once."""
+
 import time
 
 import pytest
@@ -11,8 +12,9 @@ pytest.importorskip('smach_ros')
 from smach_ros.waiting import Aside, Signal, seconds
 
 
-@pytest.mark.parametrize('given, meant', [(None, None), (2, 2.0), (0.5, 0.5),
-                                          (rospy.Duration(1.5), 1.5)])
+@pytest.mark.parametrize(
+    'given, meant', [(None, None), (2, 2.0), (0.5, 0.5), (rospy.Duration(1.5), 1.5)]
+)
 def test_durations_and_numbers_are_seconds(given, meant):
     assert seconds(given) == meant
 
@@ -28,6 +30,7 @@ def test_notify_wakes_at_once():
     def look():
         looks.append(1)
         return bool(happened)
+
     notifier = Once(lambda: looks, lambda: (happened.append(1), signal.notify()))
     begin = time.monotonic()
     assert signal.wait(look, longest_s=30.0)

@@ -1,4 +1,5 @@
 """Values as a store keeps them, and back."""
+
 import collections
 import dataclasses
 import enum
@@ -60,12 +61,35 @@ def there_and_back(value, codecs=None, other=None):
 
 
 VALUES = [
-    None, True, 3, -1 << 80, 0.1, 'Größe \ud800', '', [1, [2, {'a': None}]], {'$tuple': [1]},
-    {1: 'one', (2, 3): 'pair', None: 0}, (1, (2,)), {1, 2}, frozenset('ab'), b'\x00\xff',
-    b'x' * (SHORT + 1), bytearray(b'abc'), 1 + 2j, collections.OrderedDict([('b', 1), ('a', 2)]),
-    Colour.RED, Level.LOW, Doors.LEFT, Doors.LEFT | Doors.RIGHT, Doors(0), Pair(1, (2,)),
-    Thing('cup', [Pair(1, 2)]), 'x' * 10 * SHORT,
-    {'deep': {'bytes': [b'y' * 1000, b'y' * 1000]}}, float('inf'), [float('-inf')],
+    None,
+    True,
+    3,
+    -1 << 80,
+    0.1,
+    'Größe \ud800',
+    '',
+    [1, [2, {'a': None}]],
+    {'$tuple': [1]},
+    {1: 'one', (2, 3): 'pair', None: 0},
+    (1, (2,)),
+    {1, 2},
+    frozenset('ab'),
+    b'\x00\xff',
+    b'x' * (SHORT + 1),
+    bytearray(b'abc'),
+    1 + 2j,
+    collections.OrderedDict([('b', 1), ('a', 2)]),
+    Colour.RED,
+    Level.LOW,
+    Doors.LEFT,
+    Doors.LEFT | Doors.RIGHT,
+    Doors(0),
+    Pair(1, (2,)),
+    Thing('cup', [Pair(1, 2)]),
+    'x' * 10 * SHORT,
+    {'deep': {'bytes': [b'y' * 1000, b'y' * 1000]}},
+    float('inf'),
+    [float('-inf')],
 ]
 
 
@@ -91,14 +115,17 @@ def test_equal_bytes_are_kept_once():
     assert len(Codecs().encode([b'z' * 5000, b'z' * 5000]).parts) == 1
 
 
-@pytest.mark.parametrize('value, why', [
-    (Opaque(), 'no codec is registered for .*Opaque'),
-    ({'inside': [Opaque()]}, 'no codec'),
-    (open, 'no codec'),
-    (sys, 'no codec'),
-    (Unfindable(1, 2), 'its class cannot be found by its name, test_codecs:Point'),
-    ([Inside(1)], 'its class cannot be found by its name, .*:f.<locals>.Inside'),
-])
+@pytest.mark.parametrize(
+    'value, why',
+    [
+        (Opaque(), 'no codec is registered for .*Opaque'),
+        ({'inside': [Opaque()]}, 'no codec'),
+        (open, 'no codec'),
+        (sys, 'no codec'),
+        (Unfindable(1, 2), 'its class cannot be found by its name, test_codecs:Point'),
+        ([Inside(1)], 'its class cannot be found by its name, .*:f.<locals>.Inside'),
+    ],
+)
 def test_what_no_codec_knows_is_named(value, why):
     with pytest.raises(NotStorable, match=why):
         Codecs().encode(value)
@@ -146,11 +173,21 @@ def test_a_codec_that_is_none_is_refused(given):
         Codecs().register(*given)
 
 
-@pytest.mark.parametrize('text', [
-    '{"$enum": ["no.such.module:Colour", "RED"]}', '{"$data": ["os:system", {}]}',
-    '{"$named": ["subprocess:Popen", [1]]}', '{"$unheard": 1}', '{"$part": "zz"}', '[', 'nothing',
-    '{"$float": "one"}', '{"$map": [1]}', '{"$by": ["a"]}',
-])
+@pytest.mark.parametrize(
+    'text',
+    [
+        '{"$enum": ["no.such.module:Colour", "RED"]}',
+        '{"$data": ["os:system", {}]}',
+        '{"$named": ["subprocess:Popen", [1]]}',
+        '{"$unheard": 1}',
+        '{"$part": "zz"}',
+        '[',
+        'nothing',
+        '{"$float": "one"}',
+        '{"$map": [1]}',
+        '{"$by": ["a"]}',
+    ],
+)
 def test_a_damaged_or_foreign_value_is_refused(text):
     with pytest.raises(NotReadable):
         Codecs().decode(text, None, {}.__getitem__)

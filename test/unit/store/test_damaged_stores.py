@@ -1,4 +1,5 @@
 """A store that has lost some of it goes on where it stood, or is refused with what to do."""
+
 import os
 import random
 import shutil
@@ -21,8 +22,14 @@ FILES = ('', '-wal', '-mark')
 
 
 def moment(seq):
-    return NewMoment(float(seq), seq, 'STATE_START', 'TASK', 'A', (
-        Fact('TASK', 'key:a', Codecs().encode([seq, 'x' * 300])),))
+    return NewMoment(
+        float(seq),
+        seq,
+        'STATE_START',
+        'TASK',
+        'A',
+        (Fact('TASK', 'key:a', Codecs().encode([seq, 'x' * 300])),),
+    )
 
 
 def write(path, name, synchronous, moments):
@@ -80,9 +87,12 @@ def seen(path):
             found.append(str(err))
             continue
         try:
-            trial, = store.trials()
-            values = {fact.name: Codecs().decode(*fact.value, store.part)[0]
-                      for fact in store.facts(trial.number) if fact.name}
+            (trial,) = store.trials()
+            values = {
+                fact.name: Codecs().decode(*fact.value, store.part)[0]
+                for fact in store.facts(trial.number)
+                if fact.name
+            }
             assert trial.trial_id == 'abc'
             found.append((trial.moments, values['key:a']))
         except StoreError as err:
@@ -188,8 +198,12 @@ def test_a_byte_that_is_wrong_in_the_log_loses_nothing_in_silence(path, seed):
     chance = random.Random(seed)
     size = os.path.getsize(path + '-wal')
     frame = 4096 + 24
-    place = chance.choice((chance.randrange(32), 32 + frame * chance.randrange(size // frame)
-                           + chance.randrange(frame)))
+    place = chance.choice(
+        (
+            chance.randrange(32),
+            32 + frame * chance.randrange(size // frame) + chance.randrange(frame),
+        )
+    )
     flip(path + '-wal', place)
     for each in seen(path):
         assert each == (MOMENTS, MOMENTS - 1) or (isinstance(each, str) and path in each), place
@@ -229,7 +243,8 @@ def test_what_a_power_cut_may_cost_is_no_damage_where_the_setting_allows_it(tmp_
 @pytest.mark.parametrize('synchronous', ['FULL', 'NORMAL'])
 @pytest.mark.parametrize('is_same_boot', [False, True])
 def test_a_log_that_never_came_to_the_disk_is_no_damage_after_a_power_cut(
-        tmp_path, synchronous, is_same_boot):
+    tmp_path, synchronous, is_same_boot
+):
     """The mark on the disk is still that of the program before, which had closed the store."""
     there = str(tmp_path / 'robot.db')
     store = StoreFile(there)
@@ -298,12 +313,14 @@ def test_a_store_of_an_earlier_program_is_read(tmp_path, left):
     write(there, 'abc', 'FULL', 4)
     StoreFile(there).close()
     os.unlink(there + '-mark')
-    code = ('import os, sqlite3, sys\n'
-            'database = sqlite3.connect(sys.argv[1], isolation_level=None)\n'
-            'database.execute("PRAGMA journal_mode = WAL")\n'
-            'database.execute("DROP TABLE marked")\n'
-            'database.execute("UPDATE trials SET begun = 6.0")\n'
-            'os.kill(os.getpid(), 9) if sys.argv[2] else database.close()\n')
+    code = (
+        'import os, sqlite3, sys\n'
+        'database = sqlite3.connect(sys.argv[1], isolation_level=None)\n'
+        'database.execute("PRAGMA journal_mode = WAL")\n'
+        'database.execute("DROP TABLE marked")\n'
+        'database.execute("UPDATE trials SET begun = 6.0")\n'
+        'os.kill(os.getpid(), 9) if sys.argv[2] else database.close()\n'
+    )
     subprocess.run([sys.executable, '-c', code, there, left], check=False)
     assert seen(there) == [(4, 3)] * 2
     assert seen(there) == [(4, 3)] * 2
@@ -320,7 +337,8 @@ PRUNES = (
     'retention.plan(1e9)\n'
     'assert len(retention.going) == 3\n'
     'retention.drop()\n'
-    'store.close()\n')
+    'store.close()\n'
+)
 
 
 def ended(store, name, machine='TASK'):
@@ -331,8 +349,9 @@ def ended(store, name, machine='TASK'):
 
 def prune(path, way):
     code = [sys.executable, '-c', PRUNES, path, way]
-    assert subprocess.run(code, env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)),
-                          check=False).returncode == (0 if way == 'whole' else -signal.SIGKILL)
+    assert subprocess.run(
+        code, env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)), check=False
+    ).returncode == (0 if way == 'whole' else -signal.SIGKILL)
 
 
 @pytest.mark.parametrize('way', ['whole', 'killed'])
@@ -381,16 +400,23 @@ def test_trials_that_another_program_removes_meanwhile_are_not_missed(tmp_path, 
 
 def test_programs_that_open_and_close_one_store_at_once_find_no_damage(tmp_path):
     there = str(tmp_path / 'robot.db')
-    code = ('import sys\nfrom smach_oracle.store.store_file import NewTrial, StoreFile\n'
-            'for number in range(15):\n'
-            '    store = StoreFile(sys.argv[1], "OFF")\n'
-            '    trial = store.begin_trial(NewTrial("T", sys.argv[2] + str(number), '
-            '("i", ""), 0))\n'
-            '    store.end_trial(trial, 1.0, "ok")\n'
-            '    StoreFile(sys.argv[1], read_only=True).trials()\n'
-            '    store.close()\n')
-    programs = [subprocess.Popen([sys.executable, '-c', code, there, name], env=dict(
-        os.environ, PYTHONPATH=os.pathsep.join(sys.path))) for name in 'abc']
+    code = (
+        'import sys\nfrom smach_oracle.store.store_file import NewTrial, StoreFile\n'
+        'for number in range(15):\n'
+        '    store = StoreFile(sys.argv[1], "OFF")\n'
+        '    trial = store.begin_trial(NewTrial("T", sys.argv[2] + str(number), '
+        '("i", ""), 0))\n'
+        '    store.end_trial(trial, 1.0, "ok")\n'
+        '    StoreFile(sys.argv[1], read_only=True).trials()\n'
+        '    store.close()\n'
+    )
+    programs = [
+        subprocess.Popen(
+            [sys.executable, '-c', code, there, name],
+            env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)),
+        )
+        for name in 'abc'
+    ]
     assert [each.wait(120) for each in programs] == [0, 0, 0]
     store = StoreFile(there)
     assert len(store.trials()) == 45

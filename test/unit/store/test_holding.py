@@ -1,4 +1,5 @@
 """A machine of a store is held by one process at a time."""
+
 import os
 import signal
 import threading
@@ -36,6 +37,7 @@ def test_who_only_looks_makes_no_file_and_refuses_nobody(path):
     def look():
         while not looking.is_set():
             looks.is_held_elsewhere()
+
     threads = [threading.Thread(target=look) for _ in range(3)]
     for thread in threads:
         thread.start()

@@ -1,4 +1,5 @@
 """Trials of a store over a limit go, and never one that has not ended or whose machine is held."""
+
 import os
 import time
 
@@ -21,8 +22,10 @@ NOW = 100 * DAY_S
 def add(store, name, ended_days_ago=None, values=(), machine='TASK', structure='id'):
     """A trial; None: it has not ended. Returns its number."""
     number = store.begin_trial(NewTrial(machine, name, (structure, '{}'), NOW - 90 * DAY_S))
-    facts = tuple(Fact('TASK', 'key:{}'.format(key), Codecs().encode(value))
-                  for key, value in enumerate(values))
+    facts = tuple(
+        Fact('TASK', 'key:{}'.format(key), Codecs().encode(value))
+        for key, value in enumerate(values)
+    )
     store.add(number, [NewMoment(NOW, 0, 'STATE_START', 'TASK', 'A', facts)])
     if ended_days_ago is not None:
         store.end_trial(number, NOW - ended_days_ago * DAY_S, 'succeeded')
@@ -37,8 +40,11 @@ def store(tmp_path):
 
 
 def size_on_disk(store):
-    return sum(os.path.getsize(store.path + end) for end in ('', '-wal')
-               if os.path.exists(store.path + end))
+    return sum(
+        os.path.getsize(store.path + end)
+        for end in ('', '-wal')
+        if os.path.exists(store.path + end)
+    )
 
 
 def names(store):
@@ -63,7 +69,7 @@ def test_what_ended_long_ago_goes_with_all_that_only_it_had(store):
     values = [Codecs().decode(*fact.value, store.part) for fact in store.facts(new)]
     assert values == [[shared, {'deep': [b'd' * 5000] * 9}], 'y' * 300]
     assert store.description('before') == '' and store.description('id') == '{}'
-    parts, = next(store._db.execute('SELECT count(*) FROM parts'))
+    (parts,) = next(store._db.execute('SELECT count(*) FROM parts'))
     assert parts == 4, 'two values as text, and the bytes in one of them'
 
 
@@ -79,9 +85,22 @@ def test_the_structure_that_a_trial_went_on_with_stays(store):
     trial = add(store, 'stopped', structure='first')
     for structure, before in (('second', 'first'), ('third', 'second')):
         store.keep_structure((structure, '{"": {}}'))
-        store.add(trial, [NewMoment(NOW, 0, 'RESUMED', 'TASK', '', tuple(
-            Fact('', name, Codecs().encode(value))
-            for name, value in ((STRUCTURE, structure), (RENAMED, [before, {}]))))])
+        store.add(
+            trial,
+            [
+                NewMoment(
+                    NOW,
+                    0,
+                    'RESUMED',
+                    'TASK',
+                    '',
+                    tuple(
+                        Fact('', name, Codecs().encode(value))
+                        for name, value in ((STRUCTURE, structure), (RENAMED, [before, {}]))
+                    ),
+                )
+            ],
+        )
     store.keep_structure(('next', '{"": {}}'))  # of a program that begins just now
     dropped(store, days=30)
     assert names(store) == ['stopped'] and store.description('before') == ''
@@ -94,7 +113,7 @@ def test_planning_changes_nothing(store):
     retention = Retention(store, days=30, size=10)
     retention.plan(NOW)
     assert len(retention.going) == 1 and names(store) == ['old']
-    fact, = store.facts(1)
+    (fact,) = store.facts(1)
     assert Codecs().decode(*fact.value, store.part) == b'i' * 100000
 
 
@@ -113,7 +132,8 @@ def test_never_the_latest_one_of_a_machine_since_the_store_was_accepted(store):
     retention = dropped(store, days=30)
     assert names(store) == ['TASK 40', 'OTHER 40']
     assert {each.why for each in retention.kept} == {
-        'it tells that a person was asked after `oracle_state accept`'}
+        'it tells that a person was asked after `oracle_state accept`'
+    }
     add(store, 'new', 1)
     dropped(store, days=30)
     assert names(store) == ['OTHER 40', 'new']
@@ -161,8 +181,10 @@ def test_a_store_from_which_nothing_goes_is_told_of(store, capsys):
     add(store, 'new', 1)
     for more in ([], ['--delete']):
         assert main([store.path, '--keep-days', '{:.0f}'.format(time.time() / DAY_S), *more]) == 0
-        assert '{}: 0 trials would go; 0 over the limits stay\n'.format(
-            store.path) in capsys.readouterr().out
+        assert (
+            '{}: 0 trials would go; 0 over the limits stay\n'.format(store.path)
+            in capsys.readouterr().out
+        )
 
 
 def test_a_store_that_is_none_or_damaged_is_told_and_left(tmp_path, capsys):

@@ -1,4 +1,5 @@
 """A store whose last write is cut off at any byte, as by a power cut, stands at a whole moment."""
+
 import os
 import sqlite3
 
@@ -11,8 +12,14 @@ BEFORE, AFTER = {'key:a': 0}, {'key:a': 1, 'key:b': 'x'}
 
 
 def moment(seq, values):
-    return NewMoment(float(seq), seq, 'STATE_START', 'TASK', 'A', tuple(
-        Fact('TASK', name, Codecs().encode(value)) for name, value in values.items()))
+    return NewMoment(
+        float(seq),
+        seq,
+        'STATE_START',
+        'TASK',
+        'A',
+        tuple(Fact('TASK', name, Codecs().encode(value)) for name, value in values.items()),
+    )
 
 
 def held(store, trial):

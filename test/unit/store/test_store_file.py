@@ -1,4 +1,5 @@
 """The database of a store."""
+
 import os
 import sqlite3
 import sys
@@ -15,9 +16,17 @@ TRIAL = NewTrial('TASK', 'abc', ('id', 'description'), 5.0)
 
 def moment(seq, *facts):
     codecs = Codecs()
-    return NewMoment(float(seq), seq, 'STATE_START', 'TASK', 'A', tuple(
-        Fact('TASK', name, None if value is None else codecs.encode(value))
-        for name, value in facts))
+    return NewMoment(
+        float(seq),
+        seq,
+        'STATE_START',
+        'TASK',
+        'A',
+        tuple(
+            Fact('TASK', name, None if value is None else codecs.encode(value))
+            for name, value in facts
+        ),
+    )
 
 
 def held(store, trial, until=None):
@@ -37,7 +46,7 @@ def test_what_was_committed_is_there_in_another_program(path):
     number = store.begin_trial(TRIAL)
     store.add(number, [moment(0, ('key:a', 1), ('key:b', 'x' * 1000)), moment(3, ('key:a', 2))])
     other = StoreFile(path, read_only=True)
-    trial, = other.trials('TASK')
+    (trial,) = other.trials('TASK')
     assert (trial.trial_id, trial.moments, trial.ended) == ('abc', 2, None)
     assert held(other, number) == {'key:a': 2, 'key:b': 'x' * 1000}
     assert other.description('id') == 'description'
@@ -98,7 +107,7 @@ def test_an_edit_is_logged(path):
     number = store.begin_trial(TRIAL)
     store.edit(number, moment(0, ('key:a', 7))._replace(kind='EDIT'), 'anna', 'a = 7')
     assert held(store, number) == {'key:a': 7}
-    line, = store.log()
+    (line,) = store.log()
     assert (line.who, line.what) == ('anna', 'a = 7')
 
 
@@ -136,9 +145,12 @@ def test_a_log_that_cannot_be_read_where_nothing_can_be_written_is_named(path, m
 
     def fails(*given, **more):
         raise sqlite3.OperationalError('unable to open database file')
+
     monkeypatch.setattr(sqlite3, 'connect', fails)
-    for may_write, why in ((True, ''), (False, '; nothing can be written there, so copy it with '
-                                               'robot.db-wal to another folder')):
+    for may_write, why in (
+        (True, ''),
+        (False, '; nothing can be written there, so copy it with robot.db-wal to another folder'),
+    ):
         monkeypatch.setattr(os, 'access', lambda *given, may=may_write: may)
         with pytest.raises(StoreError) as told:
             StoreFile(path, read_only=True)
@@ -184,8 +196,7 @@ def test_a_store_cut_off_anywhere_has_what_was_committed_before(path, tmp_path):
         cut = StoreFile(str(copy))
         seqs = [each.seq for each in cut.moments(number)]
         values = held(cut, number)
-        assert (seqs, values) in [([0], {'key:a': 0}),
-                                  ([0, 1], {'key:a': 1, 'key:b': 'x' * 2000})]
+        assert (seqs, values) in [([0], {'key:a': 0}), ([0, 1], {'key:a': 1, 'key:b': 'x' * 2000})]
         found.add(len(seqs))
         cut.add(number, [moment(2)])
         cut.close()

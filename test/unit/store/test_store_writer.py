@@ -1,4 +1,5 @@
 """Moments are written by a thread, and no disk holds the machine up for long."""
+
 import sqlite3
 import threading
 import time
@@ -44,8 +45,9 @@ class FakeDisk:
 
 
 def moment(seq, name='key:a', value=0):
-    return NewMoment(float(seq), seq, 'STATE_START', 'TASK', 'A',
-                     (Fact('TASK', name, Codecs().encode(value)),))
+    return NewMoment(
+        float(seq), seq, 'STATE_START', 'TASK', 'A', (Fact('TASK', name, Codecs().encode(value)),)
+    )
 
 
 @pytest.fixture

@@ -1,4 +1,5 @@
 """Moments are taken out of a trial that goes on for long, and each that stays says what it said."""
+
 import json
 import random
 
@@ -28,8 +29,14 @@ def drawn(chance, moments):
             facts['execution'] = index
         if chance.random() < 0.3:
             facts['goal:{}'.format(index)] = 'server'
-        told = [Fact(path if not name.startswith('goal') else '', name,
-                     Encoded(json.dumps(value), None, {})) for name, value in facts.items()]
+        told = [
+            Fact(
+                path if not name.startswith('goal') else '',
+                name,
+                Encoded(json.dumps(value), None, {}),
+            )
+            for name, value in facts.items()
+        ]
         if chance.random() < 0.3:
             told.append(Fact('', 'goal:{}'.format(index - 1), None))
         after = chance.randint(1, index) if index and chance.random() < 0.004 else None
@@ -38,8 +45,10 @@ def drawn(chance, moments):
 
 def all_told(store, trial, moment):
     tree = read_tree(store, trial, CODECS, moment)
-    return {path: {name: value for name, value in vars(container).items() if name != 'begun'}
-            for path, container in tree.containers.items()}, tree.goals
+    return {
+        path: {name: value for name, value in vars(container).items() if name != 'begun'}
+        for path, container in tree.containers.items()
+    }, tree.goals
 
 
 def test_whatever_stays_says_what_it_said(tmp_path):
@@ -77,8 +86,19 @@ def trial_with(store, name, values):
     """A trial with one moment for each value."""
     trial = store.begin_trial(NewTrial('TOP', name, ('s', '{}'), 0.0))
     for seq, value in enumerate(values):
-        store.add(trial, [NewMoment(0.0, seq, 'TRANSITION', 'TOP', 'A', (
-            Fact('TOP', 'key:x', Codecs().encode(value)),))])
+        store.add(
+            trial,
+            [
+                NewMoment(
+                    0.0,
+                    seq,
+                    'TRANSITION',
+                    'TOP',
+                    'A',
+                    (Fact('TOP', 'key:x', Codecs().encode(value)),),
+                )
+            ],
+        )
     return trial
 
 
@@ -93,12 +113,15 @@ def test_bytes_that_another_trial_refers_to_stay(tmp_path):
     trial = trial_with(store, 'new', texts + images)
     other = trial_with(beside, 'beside', images[5:20] + texts[5:20])
     thin(store, trial)
-    for number, wanted in ((old, images[:9] + texts[:9]), (other, images[5:20] + texts[5:20]),
-                           (trial, images[-LAST:])):
+    for number, wanted in (
+        (old, images[:9] + texts[:9]),
+        (other, images[5:20] + texts[5:20]),
+        (trial, images[-LAST:]),
+    ):
         values = [Codecs().decode(*fact.value, store.part) for fact in store.facts(number)]
-        assert values[-len(wanted):] == wanted
+        assert values[-len(wanted) :] == wanted
     with transaction(store) as database:
-        left, = database.execute('SELECT count(*) FROM parts').fetchone()
+        (left,) = database.execute('SELECT count(*) FROM parts').fetchone()
     needed = {*range(20), *range(149 - LAST, 150)}  # and the texts of twenty
     assert left == len(needed) + 20
     beside.close()
@@ -111,15 +134,31 @@ def test_what_a_thinning_takes_does_not_grow_with_the_trials_before(tmp_path):
         path = str(tmp_path / '{}.db'.format(moments))
         with_old = StoreFile(path, 'OFF')
         trial = with_old.begin_trial(NewTrial('TOP', 'old', ('s', '{}'), 0.0))
-        with_old.add(trial, [NewMoment(0.0, seq, 'TRANSITION', 'TOP', 'A', (
-            Fact('TOP', 'key:x', Codecs().encode([seq, b'x' * 2000])),)) for seq in range(moments)])
+        with_old.add(
+            trial,
+            [
+                NewMoment(
+                    0.0,
+                    seq,
+                    'TRANSITION',
+                    'TOP',
+                    'A',
+                    (Fact('TOP', 'key:x', Codecs().encode([seq, b'x' * 2000])),),
+                )
+                for seq in range(moments)
+            ],
+        )
         with_old.close()
         store, steps = StoreFile(path, 'OFF'), [0]
-        trial = trial_with(store, 'new', [[seq, 'x' * 300, bytes([seq % 256, seq // 256]) * 2000]
-                                          for seq in range(300)])
+        trial = trial_with(
+            store,
+            'new',
+            [[seq, 'x' * 300, bytes([seq % 256, seq // 256]) * 2000] for seq in range(300)],
+        )
         with transaction(store) as database:
             database.set_progress_handler(
-                lambda counted=steps: counted.__setitem__(0, counted[0] + 1), 100)
+                lambda counted=steps: counted.__setitem__(0, counted[0] + 1), 100
+            )
         assert thin(store, trial) > 100
         took.append(steps[0])
         store.close()
@@ -128,6 +167,7 @@ def test_what_a_thinning_takes_does_not_grow_with_the_trials_before(tmp_path):
 
 def loops(path, rounds):
     """Run a machine of three states that goes round, one of them with a large value each time."""
+
     def work():
         for level in ('info', 'warn', 'debug'):
             setattr(smach, 'log' + level, lambda *args: None)
@@ -140,14 +180,27 @@ def loops(path, rounds):
 
         machine = smach.StateMachine(['succeeded', 'enough'])
         with machine:
-            smach.StateMachine.add('LOOK', smach.CBState(
-                look, outcomes=['succeeded', 'enough'], output_keys=['image']),
-                {'succeeded': 'POUR'})
-            smach.StateMachine.add('POUR', smach.CBState(
-                lambda userdata: 'succeeded', outcomes=['succeeded']), {'succeeded': 'LOOK'})
-        OracleContainer.wrap(machine, name='TOP', settings={
-            'checkpoint': path, 'checkpoint_synchronous': 'OFF', 'checkpoint_wait_s': 60,
-            'states': {'POUR': {'on_retry': 'never'}}}).execute()
+            smach.StateMachine.add(
+                'LOOK',
+                smach.CBState(look, outcomes=['succeeded', 'enough'], output_keys=['image']),
+                {'succeeded': 'POUR'},
+            )
+            smach.StateMachine.add(
+                'POUR',
+                smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded']),
+                {'succeeded': 'LOOK'},
+            )
+        OracleContainer.wrap(
+            machine,
+            name='TOP',
+            settings={
+                'checkpoint': path,
+                'checkpoint_synchronous': 'OFF',
+                'checkpoint_wait_s': 60,
+                'states': {'POUR': {'on_retry': 'never'}},
+            },
+        ).execute()
+
     assert in_a_process(work) is None
 
 

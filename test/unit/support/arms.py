@@ -1,4 +1,5 @@
 """A right arm among boxes, and a check of its ways that shares nothing with the planner's."""
+
 from typing import Dict, List, Mapping
 
 import numpy as np
@@ -11,9 +12,13 @@ from smach_oracle.pr2.robot import ARM_JOINTS
 from smach_oracle.pr2.skills.arms_aside import ASIDE
 
 REST = {
-    'torso_lift_joint': 0.22, 'r_gripper_l_finger_joint': 0.045, 'r_gripper_r_finger_joint': 0.045,
-    'l_gripper_l_finger_joint': 0.045, 'l_gripper_r_finger_joint': 0.045,
-    **dict(zip(ARM_JOINTS['left'], ASIDE['left'])), **dict(zip(ARM_JOINTS['right'], ASIDE['right']))
+    'torso_lift_joint': 0.22,
+    'r_gripper_l_finger_joint': 0.045,
+    'r_gripper_r_finger_joint': 0.045,
+    'l_gripper_l_finger_joint': 0.045,
+    'l_gripper_r_finger_joint': 0.045,
+    **dict(zip(ARM_JOINTS['left'], ASIDE['left'])),
+    **dict(zip(ARM_JOINTS['right'], ASIDE['right'])),
 }
 
 
@@ -49,15 +54,18 @@ def deepest(way: np.ndarray, boxes: Mapping[str, MapBox], step: float = 0.01) ->
     client = pybullet.connect(pybullet.DIRECT)
     try:
         robot = pybullet.loadURDF(str(pr2_urdf()), useFixedBase=True, physicsClientId=client)
-        infos = [pybullet.getJointInfo(robot, k, physicsClientId=client)
-                 for k in range(pybullet.getNumJoints(robot, physicsClientId=client))]
+        infos = [
+            pybullet.getJointInfo(robot, k, physicsClientId=client)
+            for k in range(pybullet.getNumJoints(robot, physicsClientId=client))
+        ]
         joints = {info[1].decode(): k for k, info in enumerate(infos)}
         links = {info[12].decode(): k for k, info in enumerate(infos)}
         for name, value in REST.items():
             pybullet.resetJointState(robot, joints[name], value, physicsClientId=client)
         bodies = [_body(client, each) for each in boxes.values()]
         arm = [
-            index for name, index in links.items()
+            index
+            for name, index in links.items()
             if name.startswith(('r_gripper', 'r_wrist', 'r_forearm_link'))
         ]
         trunk = [links[name] for name in ('base_link', 'torso_lift_link', 'head_tilt_link')]
@@ -66,14 +74,26 @@ def deepest(way: np.ndarray, boxes: Mapping[str, MapBox], step: float = 0.01) ->
             for name, value in zip(ARM_JOINTS['right'], q):
                 pybullet.resetJointState(robot, joints[name], value, physicsClientId=client)
             for body in bodies:
-                worst = min([worst] + [
-                    point[8]
-                    for point in pybullet.getClosestPoints(robot, body, 0.0, physicsClientId=client)
-                ])
+                worst = min(
+                    [worst]
+                    + [
+                        point[8]
+                        for point in pybullet.getClosestPoints(
+                            robot, body, 0.0, physicsClientId=client
+                        )
+                    ]
+                )
             for one in arm:
                 for other in trunk:
-                    worst = min([worst] + [point[8] for point in pybullet.getClosestPoints(
-                        robot, robot, 0.0, one, other, physicsClientId=client)])
+                    worst = min(
+                        [worst]
+                        + [
+                            point[8]
+                            for point in pybullet.getClosestPoints(
+                                robot, robot, 0.0, one, other, physicsClientId=client
+                            )
+                        ]
+                    )
         return -worst
     finally:
         pybullet.disconnect(client)
@@ -88,8 +108,14 @@ def _dense(way: np.ndarray, step: float) -> List[np.ndarray]:
 
 
 def _body(client: int, each: MapBox) -> int:
-    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=list(each.half),
-                                          physicsClientId=client)
-    return pybullet.createMultiBody(0, shape, -1, list(each.centre),
-                                    pybullet.getQuaternionFromEuler([0, 0, each.yaw]),
-                                    physicsClientId=client)
+    shape = pybullet.createCollisionShape(
+        pybullet.GEOM_BOX, halfExtents=list(each.half), physicsClientId=client
+    )
+    return pybullet.createMultiBody(
+        0,
+        shape,
+        -1,
+        list(each.centre),
+        pybullet.getQuaternionFromEuler([0, 0, each.yaw]),
+        physicsClientId=client,
+    )

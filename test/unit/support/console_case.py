@@ -1,4 +1,5 @@
 """One console on a free port of the loopback, for tests that attack it."""
+
 import json
 import os
 
@@ -26,8 +27,7 @@ from smach_oracle.expert.console.web.settings import ConsoleSettings
 
 os.environ.setdefault('ASYNC_TEST_TIMEOUT', '30')  # s; the machine may be loaded
 TOKENS = {
-    role: role + '-token-of-sufficient-length'
-    for role in ('viewer', 'operator', 'teleoperator')
+    role: role + '-token-of-sufficient-length' for role in ('viewer', 'operator', 'teleoperator')
 }
 
 
@@ -110,22 +110,35 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
     def get_app(self):
         text = '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items())
         tokens = AccessTokens(text, 'tokens') if self.tokens else None
-        self.audit, self.question_commands, self.sections, self.log = FakeAudit(
-        ), FakeQuestionCommands(), PageSections(), TrialLog()
-        settings = ConsoleSettings('127.0.0.1', 1, tokens, AllowedHosts([], False),
-                                   self.certificate, self.private_key)
+        self.audit, self.question_commands, self.sections, self.log = (
+            FakeAudit(),
+            FakeQuestionCommands(),
+            PageSections(),
+            TrialLog(),
+        )
+        settings = ConsoleSettings(
+            '127.0.0.1', 1, tokens, AllowedHosts([], False), self.certificate, self.private_key
+        )
         self.teleoperation = FakeTeleoperation()
-        self.access = AccessControl(settings, tokens.cookie_secret if tokens else 'secret',
-                                    self.audit)
+        self.access = AccessControl(
+            settings, tokens.cookie_secret if tokens else 'secret', self.audit
+        )
         self.machine_hand, self.down_machine_hand = FakeMachineHand(), FakeQuestionCommands()
-        self.pages = OpenPages(self.sections, self.log, self.question_commands, self.teleoperation,
-                               self.machine_hand, self.down_machine_hand)
+        self.pages = OpenPages(
+            self.sections,
+            self.log,
+            self.question_commands,
+            self.teleoperation,
+            self.machine_hand,
+            self.down_machine_hand,
+        )
         self.sensors = SensorStreams()
         self.files = ImageStore()
         self.catalogue = BagCatalogue(self.folders(), self.sections)
         recorded = RecordedTrials(self.catalogue, LayoutWorker(), self.files)
-        return make_app(self.access, self.pages, self.sensors,
-                        HistoryRequests(recorded, self.files))
+        return make_app(
+            self.access, self.pages, self.sensors, HistoryRequests(recorded, self.files)
+        )
 
     def folders(self):
         """Of bags."""
@@ -136,8 +149,9 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
 
     def get_httpserver_options(self):
         return {
-            'ssl_options': tls_context(self.access.settings), 'max_body_size': MOST_BYTES,
-            'max_header_size': 16384
+            'ssl_options': tls_context(self.access.settings),
+            'max_body_size': MOST_BYTES,
+            'max_header_size': 16384,
         }
 
     def get_http_server(self):
@@ -151,23 +165,38 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
 
     def ask(self, path, method='GET', body=None, **headers):
         given = {
-            name.replace('_', '-'): value
-            for name, value in headers.items() if value is not None
+            name.replace('_', '-'): value for name, value in headers.items() if value is not None
         }
-        return self.fetch(path, method=method, body=body, headers=given, follow_redirects=False,
-                          allow_nonstandard_methods=True, ca_certs=self.certificate or None)
+        return self.fetch(
+            path,
+            method=method,
+            body=body,
+            headers=given,
+            follow_redirects=False,
+            allow_nonstandard_methods=True,
+            ca_certs=self.certificate or None,
+        )
 
     def begin(self, **headers):
         """A fresh session: its cookie and what the server says of it."""
         answer = self.ask('/session', **headers)
-        cookie = answer.headers['Set-Cookie'].split(
-            ';')[0] if 'Set-Cookie' in answer.headers else headers['Cookie']
+        cookie = (
+            answer.headers['Set-Cookie'].split(';')[0]
+            if 'Set-Cookie' in answer.headers
+            else headers['Cookie']
+        )
         return cookie, json.loads(answer.body)
 
     def sign_in(self, role):
         cookie, info = self.begin()
-        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS[role]}), Cookie=cookie,
-                          Origin=self.origin, X_Xsrf=info['xsrf'])
+        answer = self.ask(
+            '/session',
+            'POST',
+            json.dumps({'token': TOKENS[role]}),
+            Cookie=cookie,
+            Origin=self.origin,
+            X_Xsrf=info['xsrf'],
+        )
         assert answer.code == 200
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
@@ -177,18 +206,26 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         answer = await client.fetch(self.get_url('/session'), ca_certs=self.certificate or None)
         cookie = answer.headers['Set-Cookie'].split(';')[0]
         headers = {
-            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': json.loads(answer.body)['xsrf']
+            'Cookie': cookie,
+            'Origin': self.origin,
+            'X-Xsrf': json.loads(answer.body)['xsrf'],
         }
-        answer = await client.fetch(self.get_url('/session'), method='POST', headers=headers,
-                                    ca_certs=self.certificate or None,
-                                    body=json.dumps({'token': TOKENS[role]}))
+        answer = await client.fetch(
+            self.get_url('/session'),
+            method='POST',
+            headers=headers,
+            ca_certs=self.certificate or None,
+            body=json.dumps({'token': TOKENS[role]}),
+        )
         return answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
 
     def connect(self, cookie='', **headers):
         given = dict({'Origin': self.origin, 'Cookie': cookie}, **headers)
         request = tornado.httpclient.HTTPRequest(
-            self.origin.replace('http', 'ws', 1) + '/socket', ca_certs=self.certificate or None,
-            headers={name: value for name, value in given.items() if value is not None})
+            self.origin.replace('http', 'ws', 1) + '/socket',
+            ca_certs=self.certificate or None,
+            headers={name: value for name, value in given.items() if value is not None},
+        )
         return tornado.websocket.websocket_connect(request)
 
     async def refused(self, cookie='', **headers):

@@ -1,4 +1,5 @@
 """Every shape of JSON that the console's server sends, made by the server's own code."""
+
 import json
 import math
 import tempfile
@@ -68,10 +69,10 @@ from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
 
 KEY = '/robot/expert_query q1'
-URDF = '''<robot name="arm">
+URDF = """<robot name="arm">
 <link name="base"><visual><geometry><box size="1 2 4"/></geometry></visual></link>
 <link name="hand"><visual><geometry><mesh filename="none"/></geometry></visual></link>
-<joint name="j" type="fixed"><parent link="base"/><child link="hand"/></joint></robot>'''
+<joint name="j" type="fixed"><parent link="base"/><child link="hand"/></joint></robot>"""
 
 
 def listed(status=OpenQuery.PENDING, deadline_s=math.inf, interface='', **changes):
@@ -84,14 +85,22 @@ def questions():
     """With every kind of value that a question may hold."""
     visits = tuple(Visit('PICK', 'done', result) for result in VisitResult)
     unknown = (StateChoice('PICK', math.nan, 0, 0, (), ()),)
-    userdata = {'plain': {'a': 1}, 'message': PointStamped(), 'messages': [PointStamped()],
-                'unsent': object()}
-    asked = [listed(), listed(OpenQuery.CLAIMED, 20.0, userdata=userdata, history=visits),
-             listed(OpenQuery.INTERFACE_RUNNING, interface='assist', rate=math.nan,
-                    choices=unknown),
-             listed(failure_kind=FailureKind.STILL_RUNNING, outcome='', interfaces=())]
-    return [dict(question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)), session='a1')
-            for each in asked]
+    userdata = {
+        'plain': {'a': 1},
+        'message': PointStamped(),
+        'messages': [PointStamped()],
+        'unsent': object(),
+    }
+    asked = [
+        listed(),
+        listed(OpenQuery.CLAIMED, 20.0, userdata=userdata, history=visits),
+        listed(OpenQuery.INTERFACE_RUNNING, interface='assist', rate=math.nan, choices=unknown),
+        listed(failure_kind=FailureKind.STILL_RUNNING, outcome='', interfaces=()),
+    ]
+    return [
+        dict(question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)), session='a1')
+        for each in asked
+    ]
 
 
 class NoLayouter:
@@ -112,12 +121,16 @@ def put_questions(sections):
     sections.put('questions', questions())
     put_people(sections)
     sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
-    checks = [PreconditionCheck(state='PICK', age=age, result=result) for age, result in (
-        (1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))]
+    checks = [
+        PreconditionCheck(state='PICK', age=age, result=result)
+        for age, result in ((1.0, PreconditionCheck.HOLDS), (-1.0, PreconditionCheck.UNKNOWN))
+    ]
     sections.put('preconditions', {KEY: status_view(PreconditionChecks(checks=checks), 1000.0)})
     RobotCameras(SensorStreams(), {}).write_sections(sections, ['/robot'])
-    sections.put('images', {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4))
-                                  for late_s in (None, 1.5)]})
+    sections.put(
+        'images',
+        {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4)) for late_s in (None, 1.5)]},
+    )
 
 
 def put_people(sections):
@@ -125,10 +138,17 @@ def put_people(sections):
     were.
     """
     Onlookers(sections).look(1, KEY, Person('', 'a1', 'operator', 'ann'))
-    front = SimpleNamespace(servers=['/a', '/b'], questions=lambda: [listed()], news=lambda name:
-                            ListNews(1.0, 2.0) if name == '/a' else None)
-    LastHeard(front, SimpleNamespace(follow=lambda nodes: None, heard_s=lambda node: 1.0),
-              lambda: {'/robot': ['/node']}, lambda: None).write_sections(sections)
+    front = SimpleNamespace(
+        servers=['/a', '/b'],
+        questions=lambda: [listed()],
+        news=lambda name: ListNews(1.0, 2.0) if name == '/a' else None,
+    )
+    LastHeard(
+        front,
+        SimpleNamespace(follow=lambda nodes: None, heard_s=lambda node: 1.0),
+        lambda: {'/robot': ['/node']},
+        lambda: None,
+    ).write_sections(sections)
 
 
 def put_down(sections):
@@ -137,9 +157,26 @@ def put_down(sections):
         path = folder + '/robot.db'
         store = StoreFile(path)
         number = store.begin_trial(NewTrial('TASK', 't', ('id', '{}'), 5.0))
-        store.add(number, [NewMoment(6.0, 0, 'QUERY_OPENED', 'TASK', 'A', tuple(
-            Fact('TASK', name, Codecs().encode(value)) for name, value in (
-                ('at', ['A', 'in']), ('asked', ['A', 't-1']), ('key:cup', 'red'))))])
+        store.add(
+            number,
+            [
+                NewMoment(
+                    6.0,
+                    0,
+                    'QUERY_OPENED',
+                    'TASK',
+                    'A',
+                    tuple(
+                        Fact('TASK', name, Codecs().encode(value))
+                        for name, value in (
+                            ('at', ['A', 'in']),
+                            ('asked', ['A', 't-1']),
+                            ('key:cup', 'red'),
+                        )
+                    ),
+                )
+            ],
+        )
         store.close()
         DownMachines([path, folder + '/none.db'], sections).look()
 
@@ -147,15 +184,35 @@ def put_down(sections):
 def put_machines(sections):
     """A robot that is only heard, without a layout, and one container with it."""
     alpha = FollowedRobot('/alpha')
-    alpha.on_rates(OracleRates(
-        states=[StateRate('TASK', 'A', 0.25, 1, 3, 1, 0, False),
-                StateRate('TASK', 'B', math.nan, 0, 0, 0, 0, True)],
-        transitions=[TransitionCount('TASK', 'A', 'ok', 'B', 3)]))
+    alpha.on_rates(
+        OracleRates(
+            states=[
+                StateRate('TASK', 'A', 0.25, 1, 3, 1, 0, False),
+                StateRate('TASK', 'B', math.nan, 0, 0, 0, 0, True),
+            ],
+            transitions=[TransitionCount('TASK', 'A', 'ok', 'B', 3)],
+        )
+    )
     alpha.on_event(OracleEvent(kind=OracleEvent.TRANSITION, path='TASK', state='A', target='B'))
     alpha.on_event(OracleEvent(kind=OracleEvent.FAILURE, path='TASK', state='B', rate=math.nan))
-    alpha.on_control(ControlStatus(machines=[MachineControl(
-        'TASK', True, True, 'breakpoint A', [ActiveState('TASK', 'A', 'breakpoint', True)], ['A'],
-        [], [], [], [])]))
+    alpha.on_control(
+        ControlStatus(
+            machines=[
+                MachineControl(
+                    'TASK',
+                    True,
+                    True,
+                    'breakpoint A',
+                    [ActiveState('TASK', 'A', 'breakpoint', True)],
+                    ['A'],
+                    [],
+                    [],
+                    [],
+                    [],
+                )
+            ]
+        )
+    )
     alpha.write_sections(sections, NoLayouter())
     put_down(sections)
     structure = ContainerGraph('TASK', ('A',), ('done',), (GraphEdge('A', 'ok', 'done'),), 'ORACLE')
@@ -169,27 +226,40 @@ def put_machines(sections):
 def put_sensors(sections):
     watching = SensorDiscovery(sections, FrontEnd())
     watching._perception_actions = {'/assist'}
-    watching.sensors.follow([['/assist/image', 'sensor_msgs/Image'],
-                             ['/points', 'sensor_msgs/PointCloud2'],
-                             ['/joint_states', 'sensor_msgs/JointState']])
+    watching.sensors.follow(
+        [
+            ['/assist/image', 'sensor_msgs/Image'],
+            ['/points', 'sensor_msgs/PointCloud2'],
+            ['/joint_states', 'sensor_msgs/JointState'],
+        ]
+    )
     watching.write_sections()
     assert sections.get('sensors')['perception']
 
 
 def put_interfaces(sections):
     outputs = InterfaceOutputs()
-    outputs.taker('/robot')(InterfaceOutput(
-        query_id='q1', status=InterfaceOutput.RUNNING, lines=['ready']))
+    outputs.taker('/robot')(
+        InterfaceOutput(query_id='q1', status=InterfaceOutput.RUNNING, lines=['ready'])
+    )
     sections.put('interface_output', {KEY: interface_output_view(outputs.newest('q1'))})
     held = DrivingControl()
     held.take(DrivingSession(KEY, 7, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
     stands = TeleopState(arm='left', speed=math.nan, clearance=math.inf, gripper=math.nan)
     views = {}
-    for state, control, boxes in ((None, DrivingControl(), None), (TeleopState(), held, 3),
-                                  (stands, held, 0)):
+    for state, control, boxes in (
+        (None, DrivingControl(), None),
+        (TeleopState(), held, 3),
+        (stands, held, 0),
+    ):
         hand = SimpleNamespace(
-            state=state, control=control, arm='left', arms=['left'], boxes=boxes,
-            frames=lambda arm: {'tool': 'tool', 'base': 'base', 'camera': 'camera'})
+            state=state,
+            control=control,
+            arm='left',
+            arms=['left'],
+            boxes=boxes,
+            frames=lambda arm: {'tool': 'tool', 'base': 'base', 'camera': 'camera'},
+        )
         views['{}{}'.format(KEY, len(views))] = teleoperation._view(hand)
     sections.put('manipulation', views)
 
@@ -197,8 +267,12 @@ def put_interfaces(sections):
 def put_trials(sections, log, folder):
     """One that was heard, with each kind of event, and two of bags: their shelf."""
     for kind in EventKind:
-        log.add('/robot', event_of(OracleEvent(
-            kind=int(kind), trial_id='t', seq=int(kind), path='TASK', rate=0.5)))
+        log.add(
+            '/robot',
+            event_of(
+                OracleEvent(kind=int(kind), trial_id='t', seq=int(kind), path='TASK', rate=0.5)
+            ),
+        )
     sections.put('trials', log.overview())
     recorder = TrialRecorder(folder, warn=pytest.fail)
     play(recorder, 2)
@@ -220,10 +294,11 @@ def sensor_facts():
     joints = JointState(name=['a', 'b'], position=[1.0, math.nan])
     found = []
     for name, kind, message in (
-            ('ImageFacts', 'Image', colour_image(np.zeros((4, 4, 3), np.uint8), header)),
-            ('ImageFacts', 'Image', depth_image(np.ones((4, 4), np.float32), header)),
-            ('JointFacts', 'JointState', joints),
-            ('CloudFacts', 'PointCloud2', cloud_message(np.ones((5, 3)), header))):
+        ('ImageFacts', 'Image', colour_image(np.zeros((4, 4, 3), np.uint8), header)),
+        ('ImageFacts', 'Image', depth_image(np.ones((4, 4), np.float32), header)),
+        ('JointFacts', 'JointState', joints),
+        ('CloudFacts', 'PointCloud2', cloud_message(np.ones((5, 3)), header)),
+    ):
         sensor = SensorStream(1, '/topic', 'sensor_msgs/' + kind)
         sensor.take(message)
         frame = sensor.newer(0)
@@ -231,25 +306,37 @@ def sensor_facts():
         found.append((name, json.loads(facts or encoded.body)))
         for age_s in (1.5, None):
             ages = SimpleNamespace(age_s=lambda *_, told=age_s: told)
-            found.append((name, json.loads(sample_handlers._with_age(
-                facts or encoded.body.decode(), ages, '/topic', frame))))
+            found.append(
+                (
+                    name,
+                    json.loads(
+                        sample_handlers._with_age(
+                            facts or encoded.body.decode(), ages, '/topic', frame
+                        )
+                    ),
+                )
+            )
     for place in (np.eye(4)[:3], None):
-        beside = SimpleNamespace(newer=lambda than: None,
-                                 place_of=lambda *_, at=place: (at, 'no transform'))
+        beside = SimpleNamespace(
+            newer=lambda than: None, place_of=lambda *_, at=place: (at, 'no transform')
+        )
         found.append(('CloudFacts', json.loads(sample_handlers._with_place(facts, beside, frame))))
     return found
 
 
 def model_header():
     body = RobotAppearance(URDF).encoded().body
-    return json.loads(body[4:4 + int.from_bytes(body[:4], 'little')])
+    return json.loads(body[4 : 4 + int.from_bytes(body[:4], 'little')])
 
 
 def marked():
     """What a perception interface answers: with an object, and without."""
     answer = SegmentObjectResponse(
-        ok=True, mask=mask_image(np.ones((4, 4), bool), Header()), size=Vector3(1, 2, 3),
-        cloud=cloud_message(np.ones((5, 3)), Header()))
+        ok=True,
+        mask=mask_image(np.ones((4, 4), bool), Header()),
+        size=Vector3(1, 2, 3),
+        cloud=cloud_message(np.ones((5, 3)), Header()),
+    )
     found = marked_view(answer)
     answer.ok = False
     return [found, marked_view(answer)]

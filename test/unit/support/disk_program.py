@@ -1,4 +1,5 @@
 """Run in a folder that is a small disk: does a machine with a store there do as it should?"""
+
 import os
 import signal
 import subprocess
@@ -33,10 +34,14 @@ def machine_of(calls):
     machine.userdata.done = []
     with machine:
         for number, call in enumerate(calls):
-            smach.StateMachine.add('S{}'.format(number), Does(call), {
-                'succeeded': 'S{}'.format(number + 1) if number + 1 < len(calls) else 'succeeded'})
-    return OracleContainer.wrap(machine, name='TOP', settings={
-        'checkpoint': 'robot.db', 'on_resume': 'recover'})
+            smach.StateMachine.add(
+                'S{}'.format(number),
+                Does(call),
+                {'succeeded': 'S{}'.format(number + 1) if number + 1 < len(calls) else 'succeeded'},
+            )
+    return OracleContainer.wrap(
+        machine, name='TOP', settings={'checkpoint': 'robot.db', 'on_resume': 'recover'}
+    )
 
 
 def nothing():
@@ -62,8 +67,9 @@ def full():
 
     def work():
         smach.set_loggers(*[lambda text: None, log.append] * 2)
-        return machine_of([nothing, fill, nothing, nothing, free, lambda: os.kill(
-            os.getpid(), signal.SIGKILL)]).execute()
+        return machine_of(
+            [nothing, fill, nothing, nothing, free, lambda: os.kill(os.getpid(), signal.SIGKILL)]
+        ).execute()
 
     told = in_a_process(work)
     assert told is None, told

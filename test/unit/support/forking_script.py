@@ -3,6 +3,7 @@
 
 It says the same bare and under oracle_run: that is what it is for.
 """
+
 import concurrent.futures
 import multiprocessing
 import os
@@ -65,6 +66,7 @@ def interrupted():
             time.sleep(60)  # until its parent interrupts it
         except KeyboardInterrupt:
             os._exit(9)
+
     forked(signal.SIGINT, work)
 
 
@@ -87,7 +89,8 @@ def pool(ending):
 
 def executor():
     with concurrent.futures.ProcessPoolExecutor(
-            2, mp_context=multiprocessing.get_context('fork')) as workers:
+        2, mp_context=multiprocessing.get_context('fork')
+    ) as workers:
         said(list(workers.map(abs, [-1, -2])))
         os.kill(next(iter(workers._processes)), signal.SIGTERM)
         time.sleep(0.2)  # for the executor to find its worker gone
@@ -159,8 +162,9 @@ class ChildGoesOn(Exception):
 
 def threads_fork():
     """Other threads fork and end children while the machine runs."""
-    threads = [threading.Thread(target=process, args=('fork', 'terminate', False))
-               for _ in range(8)]
+    threads = [
+        threading.Thread(target=process, args=('fork', 'terminate', False)) for _ in range(8)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -168,16 +172,24 @@ def threads_fork():
 
 
 KINDS = {
-    'fork': lambda: process('fork', 'terminate'), 'kill': lambda: process('fork', 'kill'),
+    'fork': lambda: process('fork', 'terminate'),
+    'kill': lambda: process('fork', 'kill'),
     'spawn': lambda: process('spawn', 'terminate'),
     'forkserver': lambda: process('forkserver', 'terminate'),
     'at_once': lambda: [process('fork', 'terminate', False) for _ in range(20)],
-    'os_fork': lambda: forked(signal.SIGTERM), 'interrupted': interrupted,
-    'own_group': lambda: subprocess_of(start_new_session=True), 'subprocess': subprocess_of,
+    'os_fork': lambda: forked(signal.SIGTERM),
+    'interrupted': interrupted,
+    'own_group': lambda: subprocess_of(start_new_session=True),
+    'subprocess': subprocess_of,
     'preexec': lambda: subprocess_of(preexec_fn=lambda: None),
-    'pool': lambda: pool('terminate'), 'executor': executor, 'machines': machines,
-    'machine_known_before': machine_known_before, 'a_machine_fails': a_machine_fails,
-    'unwinds': unwinds, 'returns': returns, 'threads': threads_fork
+    'pool': lambda: pool('terminate'),
+    'executor': executor,
+    'machines': machines,
+    'machine_known_before': machine_known_before,
+    'a_machine_fails': a_machine_fails,
+    'unwinds': unwinds,
+    'returns': returns,
+    'threads': threads_fork,
 }
 
 
@@ -213,6 +225,7 @@ class Drive(smach.State):
 def main():
     if 'node' in sys.argv:
         import rospy
+
         rospy.init_node('forking')
     top = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
     with top:

@@ -2,6 +2,7 @@
 
 SMACH itself compares machines while they are built, so they become hostile when a test says so.
 """
+
 import smach
 
 OUTCOMES = ['succeeded', 'aborted']
@@ -126,8 +127,10 @@ class Classes:
                 nest.add('B', self.state('B', 'aborted', ValueError('of B')))
             top.add('NEST', nest, {'succeeded': 'BOTH'})
             both = self._container(
-                self.concurrence, default_outcome='aborted',
-                outcome_map={'succeeded': {'C': 'succeeded', 'D': 'succeeded'}})
+                self.concurrence,
+                default_outcome='aborted',
+                outcome_map={'succeeded': {'C': 'succeeded', 'D': 'succeeded'}},
+            )
             with both:
                 both.add('C', self.state('C', 'aborted'))
                 inner = self._container(self.machine)
@@ -135,11 +138,13 @@ class Classes:
                     inner.add('E', self.state('E', 'aborted'))
                 both.add('D', inner)
             top.add('BOTH', both, {'succeeded': 'EACH'})
-            each = self._container(self.iterator, it=[1, 2], it_label='item',
-                                   exhausted_outcome='succeeded')
+            each = self._container(
+                self.iterator, it=[1, 2], it_label='item', exhausted_outcome='succeeded'
+            )
             with each:
-                each.set_contained_state('F', self.state('F', 'succeeded', 'aborted'),
-                                         loop_outcomes=['succeeded'])
+                each.set_contained_state(
+                    'F', self.state('F', 'succeeded', 'aborted'), loop_outcomes=['succeeded']
+                )
             top.add('EACH', each, {'succeeded': 'LAST'})
             top.add('LAST', self.state('LAST', *last))
             top.add('SPARE', self.state('SPARE'))

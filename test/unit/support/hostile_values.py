@@ -1,4 +1,5 @@
 """Values that do what no value should, as they are looked at."""
+
 import collections
 import dataclasses
 import enum
@@ -15,20 +16,47 @@ class Rude(BaseException):
         raise Rude
 
 
-ERRORS = (ValueError, KeyError, AttributeError, RecursionError, MemoryError, RuntimeError,
-          StopIteration, GeneratorExit, Rude)
+ERRORS = (
+    ValueError,
+    KeyError,
+    AttributeError,
+    RecursionError,
+    MemoryError,
+    RuntimeError,
+    StopIteration,
+    GeneratorExit,
+    Rude,
+)
 
 
 def raising(error: type) -> Any:
     """A method, or a property, that raises."""
+
     def method(*_: Any, **__: Any) -> Any:
         raise error()
+
     return method
 
 
-SPECIAL = ('__reduce__', '__reduce_ex__', '__deepcopy__', '__copy__', '__eq__', '__hash__',
-           '__iter__', '__len__', '__bool__', '__str__', '__repr__', '__getattr__', '__dir__',
-           '__getstate__', '__getitem__', '__format__', '__contains__')
+SPECIAL = (
+    '__reduce__',
+    '__reduce_ex__',
+    '__deepcopy__',
+    '__copy__',
+    '__eq__',
+    '__hash__',
+    '__iter__',
+    '__len__',
+    '__bool__',
+    '__str__',
+    '__repr__',
+    '__getattr__',
+    '__dir__',
+    '__getstate__',
+    '__getitem__',
+    '__format__',
+    '__contains__',
+)
 BASES = (object, list, dict, tuple, str, int, float, set, bytes, Exception, collections.OrderedDict)
 
 
@@ -136,20 +164,50 @@ def with_more() -> More:
 
 
 MAKERS = (
-    lambda: HalfSet('cup'), lambda: HalfSet, with_more, lambda: SlottedMore('cup'), OfList,
-    RaisingField, lambda: Pair(1, HalfSet('cup')), lambda: Mode.ON, lambda: Mode,
-    lambda: Named('Odd', (), {})(), lambda: Named('Odd', (), {}), holding_itself, deep,
-    lambda: '\ud800', lambda: {'\udcff': '\ud800'}, lambda: 10 ** 5000, lambda: float('nan'),
-    lambda: {1: 2, '1': 3}, lambda: {(1, 2): None}, lambda: memoryview(b'abc')[::2],
-    lambda: iter([1]), lambda: open, lambda: More.length, object, lambda: Rude,
-    lambda: type('Gone', (), {'__module__': 5})())
+    lambda: HalfSet('cup'),
+    lambda: HalfSet,
+    with_more,
+    lambda: SlottedMore('cup'),
+    OfList,
+    RaisingField,
+    lambda: Pair(1, HalfSet('cup')),
+    lambda: Mode.ON,
+    lambda: Mode,
+    lambda: Named('Odd', (), {})(),
+    lambda: Named('Odd', (), {}),
+    holding_itself,
+    deep,
+    lambda: '\ud800',
+    lambda: {'\udcff': '\ud800'},
+    lambda: 10**5000,
+    lambda: float('nan'),
+    lambda: {1: 2, '1': 3},
+    lambda: {(1, 2): None},
+    lambda: memoryview(b'abc')[::2],
+    lambda: iter([1]),
+    lambda: open,
+    lambda: More.length,
+    object,
+    lambda: Rude,
+    lambda: type('Gone', (), {'__module__': 5})(),
+)
 
 oddities = st.one_of(
     st.sampled_from(MAKERS).map(lambda make: make()),
-    st.builds(hostile, st.sampled_from(BASES), st.sets(st.sampled_from(SPECIAL), max_size=4),
-              st.sampled_from(ERRORS),
-              st.sampled_from((None, None, 'raises', str, int, dict, list, HalfSet, Mode))))
+    st.builds(
+        hostile,
+        st.sampled_from(BASES),
+        st.sets(st.sampled_from(SPECIAL), max_size=4),
+        st.sampled_from(ERRORS),
+        st.sampled_from((None, None, 'raises', str, int, dict, list, HalfSet, Mode)),
+    ),
+)
 values = st.recursive(
-    st.one_of(oddities, st.integers(), st.text(max_size=3)), lambda inner: st.one_of(
-        st.lists(inner, max_size=3), st.dictionaries(st.text(max_size=3), inner, max_size=3),
-        st.tuples(inner, inner)), max_leaves=6)
+    st.one_of(oddities, st.integers(), st.text(max_size=3)),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=3),
+        st.dictionaries(st.text(max_size=3), inner, max_size=3),
+        st.tuples(inner, inner),
+    ),
+    max_leaves=6,
+)

@@ -1,4 +1,5 @@
 """Machines that are killed at a chosen point and begun again, each in a process of its own."""
+
 import collections
 import json
 import os
@@ -104,31 +105,52 @@ class KilledMachine:
         self.store = str(folder / 'robot.db')
         self.diary = Diary(str(folder / 'diary'))
         self._build = build
-        self._settings = dict({'checkpoint': self.store, 'checkpoint_synchronous': 'OFF',
-                               'on_resume': 'recover',
-                               # what was not stored in time would be repeated, on a busy computer
-                               'checkpoint_wait_s': 60}, **settings)
+        self._settings = dict(
+            {
+                'checkpoint': self.store,
+                'checkpoint_synchronous': 'OFF',
+                'on_resume': 'recover',
+                # what was not stored in time would be repeated, on a busy computer
+                'checkpoint_wait_s': 60,
+            },
+            **settings,
+        )
 
     def run(self, kill_at=0, expert=None, **settings):
         """Execute it in a process of its own, killed at a point, 0: at none."""
+
         def work():
             points, log = Points(kill_at), []
             for level in ('info', 'warn'):
                 setattr(smach, 'log' + level, log.append)
-            machine = OracleContainer.wrap(self._build(self.diary, points), name=self.name,
-                                           settings=dict(self._settings, **settings),
-                                           expert=expert)
+            machine = OracleContainer.wrap(
+                self._build(self.diary, points),
+                name=self.name,
+                settings=dict(self._settings, **settings),
+                expert=expert,
+            )
             kinds, events = [], machine._oracle.events.observers
             ended_by = []
             events.append(points)
             events.append(lambda event: kinds.append((event.kind.name, event.seq, event.state)))
-            events.append(lambda event: ended_by.append(event.data['ended_by'])
-                          if event.kind is EventKind.TRIAL_END else None)
+            events.append(
+                lambda event: (
+                    ended_by.append(event.data['ended_by'])
+                    if event.kind is EventKind.TRIAL_END
+                    else None
+                )
+            )
             outcome = machine.execute()
-            return {'outcome': outcome, 'points': points.passed, 'events': kinds,
-                    'log': log, 'ended_by': ended_by[-1],
-                    'done': machine.userdata.done, 'rates': [
-                        [row.path, row.state, row.successes, row.failures]
-                        for row in machine.rates()]}
+            return {
+                'outcome': outcome,
+                'points': points.passed,
+                'events': kinds,
+                'log': log,
+                'ended_by': ended_by[-1],
+                'done': machine.userdata.done,
+                'rates': [
+                    [row.path, row.state, row.successes, row.failures] for row in machine.rates()
+                ],
+            }
 
         return in_a_process(work)

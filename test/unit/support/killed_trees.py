@@ -1,4 +1,5 @@
 """Machines to be killed: a flat one, and one of everything."""
+
 import shutil
 
 from killed_machines import KilledMachine, Noted
@@ -21,6 +22,7 @@ def flat(diary, points):
 
 def tree(diary, points):
     """A machine in a machine, a Concurrence of a state and a machine, Iterators of both."""
+
     def noted(name, *keys):
         return Noted(name, diary, points, keys=('done', *keys))
 
@@ -31,21 +33,36 @@ def tree(diary, points):
             smach.StateMachine.add(second, noted(second, *keys), ENDS)
         return inner
 
-    both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', ['done'], ['done'],
-                             outcome_map={'succeeded': {'LEFT': 'succeeded',
-                                                        'RIGHT': 'succeeded'}})
+    both = smach.Concurrence(
+        ['succeeded', 'aborted'],
+        'aborted',
+        ['done'],
+        ['done'],
+        outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
+    )
     with both:
         smach.Concurrence.add('LEFT', noted('LEFT'))
         smach.Concurrence.add('RIGHT', two('M1', 'M2'))
-    plain = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=range(3),
-                           it_label='item', exhausted_outcome='succeeded')
+    plain = smach.Iterator(
+        ['succeeded', 'aborted'],
+        ['done'],
+        ['done'],
+        it=range(3),
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with plain:
         smach.Iterator.set_contained_state('I', noted('I', 'item'), loop_outcomes=['succeeded'])
-    nested = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=[1, 2],
-                            it_label='item', exhausted_outcome='succeeded')
+    nested = smach.Iterator(
+        ['succeeded', 'aborted'],
+        ['done'],
+        ['done'],
+        it=[1, 2],
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with nested:
-        smach.Iterator.set_contained_state('JK', two('J', 'K', 'item'),
-                                           loop_outcomes=['succeeded'])
+        smach.Iterator.set_contained_state('JK', two('J', 'K', 'item'), loop_outcomes=['succeeded'])
     machine = smach.StateMachine(['succeeded', 'aborted'])
     machine.userdata.done = []
     with machine:

@@ -1,4 +1,5 @@
 """Events as lines of text, and the files that hold those of test/data/pinned."""
+
 import json
 import re
 from pathlib import Path
@@ -32,14 +33,20 @@ def line_of(event):
     if event.failure_kind:
         words.append(FailureKind(event.failure_kind).name)
     if event.kind is EventKind.FAILURE:
-        words.append('class {}, rate {:.2f}{}'.format(
-            int(event.failure_class), event.rate, ', again' if event.continuous else ''))
+        words.append(
+            'class {}, rate {:.2f}{}'.format(
+                int(event.failure_class), event.rate, ', again' if event.continuous else ''
+            )
+        )
     if event.by:
         words.append('by ' + event.by)
     if event.text:
         words.append('"{}"'.format(ADDRESS.sub('', SECONDS.sub('# s', event.text))))
-    data = {key: value for key, value in (event.data or {}).items()
-            if key not in NOT_HELD and not key.endswith('_s')}
+    data = {
+        key: value
+        for key, value in (event.data or {}).items()
+        if key not in NOT_HELD and not key.endswith('_s')
+    }
     if data:
         words.append(json.dumps(data, sort_keys=True))
     return ' '.join(words)
@@ -64,4 +71,4 @@ def _branch_of(event, concurrence):
         return ''
     path = '/'.join((event.path, event.state))
     inside = event.path == concurrence or event.path.startswith(concurrence + '/')
-    return path[len(concurrence) + 1:].split('/')[0] if inside else ''
+    return path[len(concurrence) + 1 :].split('/')[0] if inside else ''

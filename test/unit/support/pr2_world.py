@@ -1,4 +1,5 @@
 """Small worlds of a PR2 before a table, as perception sees them and as they truly are."""
+
 from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -31,11 +32,24 @@ def thing(generator: np.random.Generator, name: str, x: float, y: float) -> Body
     height = generator.uniform(0.07, 0.17)
     if generator.random() < 0.5:
         radius = generator.uniform(0.022, 0.038)
-        return Body(name, 'cylinder', (radius, radius, height), (x, y, TOP + height / 2), mass=0.3,
-                    colour=colour)
+        return Body(
+            name,
+            'cylinder',
+            (radius, radius, height),
+            (x, y, TOP + height / 2),
+            mass=0.3,
+            colour=colour,
+        )
     size = (generator.uniform(0.035, 0.075), generator.uniform(0.035, 0.075), height)
-    return Body(name, 'box', size, (x, y, TOP + height / 2), yaw=generator.uniform(0, np.pi),
-                mass=0.3, colour=colour)
+    return Body(
+        name,
+        'box',
+        size,
+        (x, y, TOP + height / 2),
+        yaw=generator.uniform(0, np.pi),
+        mass=0.3,
+        colour=colour,
+    )
 
 
 def places(generator: np.random.Generator, count: int, apart: float = 0.16) -> List[np.ndarray]:
@@ -55,18 +69,33 @@ def extents(body: Body) -> np.ndarray:
     return np.array([max(body.size[:2]), min(body.size[:2]), body.size[2]])
 
 
-def look(world: World, bodies: Sequence[Body], seed: int = 1, noise: float = 1.0,
-         joints: Sequence[Tuple[str, float]] = (), at: Sequence[float] = LOOK) -> Look:
+def look(
+    world: World,
+    bodies: Sequence[Body],
+    seed: int = 1,
+    noise: float = 1.0,
+    joints: Sequence[Tuple[str, float]] = (),
+    at: Sequence[float] = LOOK,
+) -> Look:
     """Reset the world to these bodies, point the head at the table, and see."""
     world.reset(
-        Scene('test', seed, tuple(bodies), Goal('stands_at', ''), RobotStart(joints=tuple(joints)),
-              CameraQuality(noise=noise)))
+        Scene(
+            'test',
+            seed,
+            tuple(bodies),
+            Goal('stands_at', ''),
+            RobotStart(joints=tuple(joints)),
+            CameraQuality(noise=noise),
+        )
+    )
     DirectRobot(world).look_at(at)
     image = see(world)
     shown = RenderedView(world, world.link_pose(CAMERA_FRAME), size_of(world)).bodies
     names = np.array([world.seen_as(index) for index in range(shown.max() + 1)] + [''])
     base = inverse(world.true_base())
-    return Look(image, world.joints(),
-                {body.name: base @ world.body_pose(body.name)
-                 for body in bodies}, {body.name: names[shown] == body.name
-                                       for body in bodies})
+    return Look(
+        image,
+        world.joints(),
+        {body.name: base @ world.body_pose(body.name) for body in bodies},
+        {body.name: names[shown] == body.name for body in bodies},
+    )

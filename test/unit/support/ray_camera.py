@@ -1,6 +1,7 @@
 """A camera that sees boxes and upright cylinders, a ray per pixel: exact depth, colour, and whose
 pixel it is.
 """
+
 from typing import NamedTuple, Sequence
 
 import numpy as np
@@ -31,16 +32,30 @@ def camera_at(eye: Sequence[float], target: Sequence[float]) -> np.ndarray:
     return transform(eye, np.column_stack([right, np.cross(forward, right), forward]))
 
 
-def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generator,
-        noise: float = 1.0, colour_noise: float = 6.0) -> Seen:
+def see(
+    bodies: Sequence[Body],
+    camera: np.ndarray,
+    generator: np.random.Generator,
+    noise: float = 1.0,
+    colour_noise: float = 6.0,
+) -> Seen:
     """What a Kinect-like camera sees: `noise` scales that of depth, 0 is a perfect one."""
     depth, whose = np.full((HEIGHT, WIDTH), np.inf), np.full((HEIGHT, WIDTH), -1)
     colour = np.full((HEIGHT, WIDTH, 3), 0.75)
     for index, body in enumerate(bodies):
         part = _part_of_image(body, camera)
         rows, columns = (each[part] for each in np.indices((HEIGHT, WIDTH)))
-        rays = np.stack([(columns - INTRINSICS[0, 2]) / FOCAL, (rows - INTRINSICS[1, 2]) / FOCAL,
-                         np.ones(rows.shape)], axis=-1) @ camera[:3, :3].T
+        rays = (
+            np.stack(
+                [
+                    (columns - INTRINSICS[0, 2]) / FOCAL,
+                    (rows - INTRINSICS[1, 2]) / FOCAL,
+                    np.ones(rows.shape),
+                ],
+                axis=-1,
+            )
+            @ camera[:3, :3].T
+        )
         found, normal = _cast(body, camera[:3, 3], rays)
         nearer = found < depth[part]
         depth[part][nearer], whose[part][nearer] = found[nearer], index
@@ -48,17 +63,24 @@ def see(bodies: Sequence[Body], camera: np.ndarray, generator: np.random.Generat
         colour[part][nearer] = (np.array(body.colour) * shade[..., None])[nearer]
     image = 255 * colour + generator.normal(0, colour_noise, colour.shape)
     return Seen(
-        CameraImage(1.0,
-                    np.clip(image, 0, 255).astype(np.uint8), _measured(depth, generator, noise),
-                    INTRINSICS, camera), whose)
+        CameraImage(
+            1.0,
+            np.clip(image, 0, 255).astype(np.uint8),
+            _measured(depth, generator, noise),
+            INTRINSICS,
+            camera,
+        ),
+        whose,
+    )
 
 
 def _measured(depth: np.ndarray, generator: np.random.Generator, noise: float) -> np.ndarray:
     known = np.where(np.isfinite(depth), depth, np.nan)
     if noise == 0:
         return known.astype(np.float32)
-    measured = known + generator.normal(0, 1, depth.shape) * noise * (0.0012 + 0.0019 *
-                                                                      (known - 0.4)**2)
+    measured = known + generator.normal(0, 1, depth.shape) * noise * (
+        0.0012 + 0.0019 * (known - 0.4) ** 2
+    )
     measured[generator.random(depth.shape) < 0.005 * noise] = np.nan
     jump = np.abs(np.gradient(np.where(np.isfinite(depth), depth, 9.0))).max(axis=0) > 0.03
     measured[jump & (generator.random(depth.shape) < 0.7)] = np.nan
@@ -89,8 +111,9 @@ def _cast(body: Body, eye: np.ndarray, rays: np.ndarray):
     turn = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
     start, along = turn @ (eye - body.position), rays @ turn.T
     along = np.where(np.abs(along) < 1e-9, 1e-9, along)
-    distance, normal = (_box if body.shape == 'box' else _cylinder)(np.array(body.size), start,
-                                                                    along)
+    distance, normal = (_box if body.shape == 'box' else _cylinder)(
+        np.array(body.size), start, along
+    )
     return distance, normal @ turn
 
 
@@ -106,15 +129,16 @@ def _cylinder(size, start, along):
     radius, half = size[0], size[2] / 2
     a = (along[..., :2] ** 2).sum(axis=-1)
     b = along[..., :2] @ start[:2]
-    root = b * b - a * (start[:2] @ start[:2] - radius ** 2)
+    root = b * b - a * (start[:2] @ start[:2] - radius**2)
     with np.errstate(invalid='ignore'):
         side = (-b - np.sqrt(root)) / a
     side_z = start[2] + side * along[..., 2]
     side = np.where((root > 0) & (np.abs(side_z) <= half) & (side > 0), side, np.inf)
     top = (half - start[2]) / along[..., 2]
     top_point = start[:2] + top[..., None] * along[..., :2]
-    top = np.where((top > 0) & ((top_point**2).sum(axis=-1) <= radius**2) & (start[2] > half), top,
-                   np.inf)
+    top = np.where(
+        (top > 0) & ((top_point**2).sum(axis=-1) <= radius**2) & (start[2] > half), top, np.inf
+    )
     hit = start[:2] + np.where(np.isfinite(side), side, 0)[..., None] * along[..., :2]
     normal = np.concatenate([hit / radius, np.zeros(hit.shape[:2] + (1,))], axis=-1)
     return np.minimum(side, top), np.where((top < side)[..., None], [0.0, 0.0, 1.0], normal)

@@ -1,4 +1,5 @@
 """A robot that is told to stop in the middle of a skill, as where the program behind it is gone."""
+
 from smach_oracle.pr2.robot import RobotError
 
 
@@ -14,4 +15,5 @@ def stopped_after(robot, motions, for_good=False):
         if left[0] == -1 or for_good and left[0] < 0:
             raise RobotError('the robot was told to stop')
         return do(make)
+
     robot._do = count

@@ -1,4 +1,5 @@
 """Small worlds for the tests, and what a hand must do in them."""
+
 import numpy as np
 
 from smach_oracle.geometry.chain import JointChain
@@ -8,19 +9,31 @@ from smach_oracle.pr2.robot import ARM_JOINTS, BASE_FRAME, TOOL_FRAME
 from smach_oracle.simulation.scenes.scene import Body, Goal, Scene
 
 TABLE = Body('table', 'box', (0.7, 1.4, 0.04), (0.85, 0.0, 0.70), colour=(0.55, 0.38, 0.22))
-CAN = Body('can', 'cylinder', (0.031, 0.031, 0.12), (0.70, -0.20, 0.78), mass=0.33,
-           colour=(0.8, 0.1, 0.1))
-CARTON = Body('carton', 'box', (0.06, 0.05, 0.14), (0.75, 0.10, 0.79), yaw=0.4, mass=0.25,
-              colour=(0.1, 0.3, 0.8))
+CAN = Body(
+    'can', 'cylinder', (0.031, 0.031, 0.12), (0.70, -0.20, 0.78), mass=0.33, colour=(0.8, 0.1, 0.1)
+)
+CARTON = Body(
+    'carton',
+    'box',
+    (0.06, 0.05, 0.14),
+    (0.75, 0.10, 0.79),
+    yaw=0.4,
+    mass=0.25,
+    colour=(0.1, 0.3, 0.8),
+)
 GOAL = Goal('stands_at', 'can', (0.70, -0.20, 0.78))
 
 
 def scene(*bodies, goal=GOAL, seed=3, **more):
     """A table with a can and a carton, or with what is given."""
     bodies = bodies or (TABLE, CAN, CARTON)
-    return Scene('test', seed, bodies,
-                 goal if goal.body in [body.name for body in bodies] else goal._replace(body=''),
-                 **more)
+    return Scene(
+        'test',
+        seed,
+        bodies,
+        goal if goal.body in [body.name for body in bodies] else goal._replace(body=''),
+        **more,
+    )
 
 
 def empty(**more):
@@ -34,8 +47,11 @@ class Hand:
     def __init__(self, world, robot, arm='right'):
         self.world, self.robot, self.arm = world, robot, arm
         self.chain = JointChain.from_urdf(
-            pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME[arm],
-            fixed={'torso_lift_joint': world.joints()['torso_lift_joint']})
+            pr2_urdf().read_text(),
+            BASE_FRAME,
+            TOOL_FRAME[arm],
+            fixed={'torso_lift_joint': world.joints()['torso_lift_joint']},
+        )
 
     def angles(self):
         joints = self.robot.joints()

@@ -1,4 +1,5 @@
 """What the use cases' scripts do otherwise when a state is executed again in the same trial."""
+
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Vector3
@@ -49,13 +50,17 @@ def test_after_a_look_that_saw_too_little_the_head_looks_from_elsewhere(userdata
 def test_what_was_seen_first_is_the_object_until_the_trial_ends(userdata):
     def goal():
         return pick_and_place.detect_goal(userdata, DetectTabletopGoal())
+
     assert goal().colour.a == 0
     dark = DetectTabletopResult(objects=[PoseStamped()], sizes=[Vector3()], colours=[ColorRGBA()])
     detected(userdata, GoalStatus.SUCCEEDED, dark)
     assert goal().colour.a == 0, 'too dark to tell'
     for red in (0.8, 0.1):
-        result = DetectTabletopResult(objects=[PoseStamped()], sizes=[Vector3(red, 0.1, 0.1)],
-                                      colours=[ColorRGBA(red, 0.2, 0.2, 1.0)])
+        result = DetectTabletopResult(
+            objects=[PoseStamped()],
+            sizes=[Vector3(red, 0.1, 0.1)],
+            colours=[ColorRGBA(red, 0.2, 0.2, 1.0)],
+        )
         detected(userdata, GoalStatus.SUCCEEDED, result)
         assert (goal().colour.r, goal().size.x) == (0.8, 0.8)
     pick_and_place.begin(userdata)
@@ -89,8 +94,9 @@ def test_what_was_picked_and_could_not_be_placed_is_held_otherwise_at_once(userd
 
 
 def test_a_look_that_failed_empties_nothing_that_was_seen(userdata):
-    seen = DetectTabletopResult(table=PoseStamped(), objects=[PoseStamped()], sizes=[Vector3()],
-                                colours=[ColorRGBA()])
+    seen = DetectTabletopResult(
+        table=PoseStamped(), objects=[PoseStamped()], sizes=[Vector3()], colours=[ColorRGBA()]
+    )
     detected(userdata, GoalStatus.SUCCEEDED, seen)
     detected(userdata, GoalStatus.ABORTED, DetectTabletopResult())
     assert (userdata.objects, userdata.sizes) == (seen.objects, seen.sizes)
@@ -116,6 +122,7 @@ def test_the_shelf_is_looked_at_from_another_place_after_two_misses(userdata):
         target = drink_retrieval.move_in_goal(userdata, MoveBaseGoal()).target_pose
         assert target.header.frame_id == drink_retrieval.ODOM
         return target.pose.position.x, target.pose.position.y
+
     usual, beside = drink_retrieval.IN_THE_FRIDGE[:2], drink_retrieval.BESIDE_THE_DOOR[:2]
     for expected in (usual, usual, beside, usual):
         assert place() == expected == place()
@@ -123,9 +130,15 @@ def test_the_shelf_is_looked_at_from_another_place_after_two_misses(userdata):
 
 
 def test_what_a_trial_remembers_can_be_stored(userdata):
-    detected(userdata, GoalStatus.SUCCEEDED, DetectTabletopResult(
-        objects=[PoseStamped()], sizes=[Vector3(0.125, 0.125, 0.125)],
-        colours=[ColorRGBA(0.75, 0.25, 0.25, 1.0)]))
+    detected(
+        userdata,
+        GoalStatus.SUCCEEDED,
+        DetectTabletopResult(
+            objects=[PoseStamped()],
+            sizes=[Vector3(0.125, 0.125, 0.125)],
+            colours=[ColorRGBA(0.75, 0.25, 0.25, 1.0)],
+        ),
+    )
     detected(userdata, GoalStatus.ABORTED, DetectTabletopResult(look_at=PointStamped()))
     offer_ros_codecs()
     text, whole, parts = CODECS.encode(userdata.memory)

@@ -1,6 +1,7 @@
 """The use cases' scripts, and the launch file that runs any script: what is missing is told in one
 line.
 """
+
 import pytest
 import rospy
 from roslaunch.config import load_config_default
@@ -14,6 +15,7 @@ from smach_oracle.tasks import drink_retrieval, inspection, pick_and_place
 def test_without_a_world_a_task_names_the_launch_file_that_has_one(task, monkeypatch):
     def never_comes(name, limit_s):
         raise rospy.ROSException('timeout exceeded while waiting for service')
+
     monkeypatch.setattr(rospy, 'init_node', lambda name: None)
     monkeypatch.setattr(rospy, 'wait_for_service', never_comes)
     monkeypatch.setattr(task, 'make_machine', lambda: None)
@@ -22,14 +24,15 @@ def test_without_a_world_a_task_names_the_launch_file_that_has_one(task, monkeyp
     name = task.__name__.split('.')[-1]
     text = caught.value.code
     assert isinstance(text, str), 'printed by Python, with exit code 1'
-    assert text.startswith(name +
-                           ': no world here') and name + '.launch' in text and '\n' not in text
+    assert (
+        text.startswith(name + ': no world here') and name + '.launch' in text and '\n' not in text
+    )
 
 
 def arguments_of(*given):
     """The command line of the node that the launch file starts."""
     path = resolve_args('$(find smach_oracle)/launch/oracle_run.launch')
-    node, = load_config_default([(path, list(given))], 11311, verbose=False).nodes
+    (node,) = load_config_default([(path, list(given))], 11311, verbose=False).nodes
     return [word.strip('"') for word in node.args.split()]
 
 

@@ -1,4 +1,5 @@
 """Machines of every kind of container, whose states all succeed."""
+
 import smach
 
 OUTCOMES = ('succeeded', 'aborted', 'preempted')
@@ -49,8 +50,9 @@ def nested_machine():
 
 def concurrence_machine():
     """PICK beside LOOK in the Concurrence BOTH."""
-    both = smach.Concurrence(OUTCOMES, 'aborted', outcome_map={
-        'succeeded': {'PICK': 'succeeded', 'LOOK': 'succeeded'}})
+    both = smach.Concurrence(
+        OUTCOMES, 'aborted', outcome_map={'succeeded': {'PICK': 'succeeded', 'LOOK': 'succeeded'}}
+    )
     with both:
         smach.Concurrence.add('PICK', Works())
         smach.Concurrence.add('LOOK', Works())
@@ -62,8 +64,14 @@ def concurrence_machine():
 
 def iterator_machine():
     """PICK for each of three items in the Iterator EACH."""
-    each = smach.Iterator(['succeeded', 'aborted', 'preempted'], [], [], it=[1, 2, 3],
-                          it_label='item', exhausted_outcome='succeeded')
+    each = smach.Iterator(
+        ['succeeded', 'aborted', 'preempted'],
+        [],
+        [],
+        it=[1, 2, 3],
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with each:
         smach.Iterator.set_contained_state('PICK', Works(), loop_outcomes=['succeeded'])
     machine = smach.StateMachine(OUTCOMES)

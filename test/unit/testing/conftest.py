@@ -1,4 +1,5 @@
 """Fixtures for tests of the test kit; the machines they use are in bench_machines.py."""
+
 import os
 import sys
 

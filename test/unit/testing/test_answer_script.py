@@ -1,4 +1,5 @@
 """An expert by script answers what its script says, and nothing else."""
+
 import pytest
 from bench_machines import OUTCOMES, Works, fetch_machine, nested_machine
 
@@ -19,8 +20,12 @@ ASKS = {'max_recoveries': 0}
 
 
 def trial_with(script, *faults, machine=None, **settings):
-    with Bench(machine or fetch_machine(), faults or [fail('PICK', visit=1)], expert=script,
-               settings=dict(ASKS, **settings)) as bench:
+    with Bench(
+        machine or fetch_machine(),
+        faults or [fail('PICK', visit=1)],
+        expert=script,
+        settings=dict(ASKS, **settings),
+    ) as bench:
         return bench.run()
 
 
@@ -31,8 +36,9 @@ def test_goto_leads_to_a_state():
 
 def test_supersede_writes_outputs():
     machine = fetch_machine(pick=Works(output_keys=['grip']))
-    trial_with(expert(supersede('succeeded', outputs={'grip': 3})), machine=machine) \
-        .assert_recovered('PICK').assert_visited(['PICK', 'PLACE'])
+    trial_with(
+        expert(supersede('succeeded', outputs={'grip': 3})), machine=machine
+    ).assert_recovered('PICK').assert_visited(['PICK', 'PLACE'])
     assert machine.userdata.grip == 3
 
 
@@ -42,26 +48,35 @@ def test_giving_up_is_no_recovery():
 
 
 def test_no_answer_takes_no_time_and_falls_back():
-    trial_with(expert(no_answer()), deadline_s=0, on_no_answer={'goto': 'DETECT'}) \
-        .assert_jumped('PICK', to='DETECT').assert_recovered()
+    trial_with(expert(no_answer()), deadline_s=0, on_no_answer={'goto': 'DETECT'}).assert_jumped(
+        'PICK', to='DETECT'
+    ).assert_recovered()
 
 
 def test_an_interface_hands_its_result_over():
-    trial = trial_with(expert(use_interface('arm', 'succeeded')),
-                       interfaces={'arm': {'action': '/arm'}})
+    trial = trial_with(
+        expert(use_interface('arm', 'succeeded')), interfaces={'arm': {'action': '/arm'}}
+    )
     assert 'interface arm ends: succeeded' in str(trial.assert_recovered('PICK'))
 
 
 def test_answers_come_in_their_order_and_anew_in_each_trial():
-    with Bench(fetch_machine(), [fail('PICK', visit=(1, 2))], settings=ASKS,
-               expert=expert([goto('DETECT'), goto('PLACE')])) as bench:
+    with Bench(
+        fetch_machine(),
+        [fail('PICK', visit=(1, 2))],
+        settings=ASKS,
+        expert=expert([goto('DETECT'), goto('PLACE')]),
+    ) as bench:
         for _ in range(2):
             bench.run().assert_visited(['DETECT', 'PICK', 'DETECT', 'PICK', 'PLACE'], exactly=True)
 
 
 def test_a_function_answers_all_questions():
-    trial = trial_with(expert(lambda question: goto(question.failed_state)),
-                       fail('PICK', visit=(1, 2)), fail('PLACE', visit=1))
+    trial = trial_with(
+        expert(lambda question: goto(question.failed_state)),
+        fail('PICK', visit=(1, 2)),
+        fail('PLACE', visit=1),
+    )
     trial.assert_asked_about('PICK', times=2).assert_asked_about('PLACE', times=1)
 
 
@@ -86,23 +101,32 @@ def test_an_expert_without_answers_expects_no_question():
 
 
 def test_a_question_about_another_state_fails_the_test():
-    with pytest.raises(ScriptError, match='expects a question about PLACE, and this is the '
-                                          'question about SM_ROOT/PICK'):
+    with pytest.raises(
+        ScriptError,
+        match='expects a question about PLACE, and this is the question about SM_ROOT/PICK',
+    ):
         trial_with(expert(goto('DETECT', about='PLACE')))
 
 
 def test_the_state_asked_about_may_be_given_by_its_path():
-    trial = trial_with(expert(supersede('succeeded', about='KITCHEN/PICK')),
-                       machine=nested_machine(), escalate=False)
+    trial = trial_with(
+        expert(supersede('succeeded', about='KITCHEN/PICK')),
+        machine=nested_machine(),
+        escalate=False,
+    )
     trial.assert_recovered('KITCHEN/PICK')
 
 
-@pytest.mark.parametrize('answer, said', [
-    (goto('DETECCT'), "no state 'DETECCT' to go to"),
-    (supersede('done'), "no outcome 'done' to supersede it with"),
-    (supersede('succeeded', outputs={'x': 1}), 'PICK has no output keys x'),
-    (give_up('lost'), "no outcome 'lost' to give up with"),
-    (use_interface('arm', 'succeeded'), "no interface 'arm' is on offer")])
+@pytest.mark.parametrize(
+    'answer, said',
+    [
+        (goto('DETECCT'), "no state 'DETECCT' to go to"),
+        (supersede('done'), "no outcome 'done' to supersede it with"),
+        (supersede('succeeded', outputs={'x': 1}), 'PICK has no output keys x'),
+        (give_up('lost'), "no outcome 'lost' to give up with"),
+        (use_interface('arm', 'succeeded'), "no interface 'arm' is on offer"),
+    ],
+)
 def test_an_answer_that_does_not_fit_fails_the_test(answer, said):
     with pytest.raises(ScriptError) as raised:
         trial_with(expert(answer))
@@ -161,22 +185,40 @@ def three_levels():
     return machine
 
 
-@pytest.mark.parametrize('container, ended', [
-    ('PICK', 'SM_ROOT/PICK'), ('SM_ROOT/PICK', 'SM_ROOT/PICK'), ('SM_ROOT', 'SM_ROOT'),
-    ('ARM', 'SM_ROOT/PICK/ARM'), ('PICK/ARM', 'SM_ROOT/PICK/ARM'), ('', 'SM_ROOT/PICK/ARM')])
+@pytest.mark.parametrize(
+    'container, ended',
+    [
+        ('PICK', 'SM_ROOT/PICK'),
+        ('SM_ROOT/PICK', 'SM_ROOT/PICK'),
+        ('SM_ROOT', 'SM_ROOT'),
+        ('ARM', 'SM_ROOT/PICK/ARM'),
+        ('PICK/ARM', 'SM_ROOT/PICK/ARM'),
+        ('', 'SM_ROOT/PICK/ARM'),
+    ],
+)
 def test_a_level_above_may_be_given_up(container, ended):
-    trial = trial_with(expert(give_up('succeeded', container=container)),
-                       fail('GRASP', visit=1), machine=three_levels())
+    trial = trial_with(
+        expert(give_up('succeeded', container=container)),
+        fail('GRASP', visit=1),
+        machine=three_levels(),
+    )
     trial.assert_ended_with('succeeded')
-    given_up, = [event for event in trial.events if event.kind.name == 'GIVE_UP']
+    (given_up,) = [event for event in trial.events if event.kind.name == 'GIVE_UP']
     assert (given_up.path, given_up.outcome) == (ended, 'succeeded')
     assert ('TABLE' in trial.visits()) == (container != 'SM_ROOT')
 
 
-@pytest.mark.parametrize('answer, said', [
-    (give_up('lost', container='PICK'), "SM_ROOT/PICK has no outcome 'lost' to give up with"),
-    (give_up(container='PICK'), "SM_ROOT/PICK has no outcome '' to give up with"),
-    (give_up('succeeded', container='TABLE'), "TABLE has no outcome 'succeeded' to give up with")])
+@pytest.mark.parametrize(
+    'answer, said',
+    [
+        (give_up('lost', container='PICK'), "SM_ROOT/PICK has no outcome 'lost' to give up with"),
+        (give_up(container='PICK'), "SM_ROOT/PICK has no outcome '' to give up with"),
+        (
+            give_up('succeeded', container='TABLE'),
+            "TABLE has no outcome 'succeeded' to give up with",
+        ),
+    ],
+)
 def test_a_level_that_cannot_be_given_up_so_fails_the_test(answer, said):
     with pytest.raises(ScriptError) as raised:
         trial_with(expert(answer), fail('GRASP', visit=1), machine=three_levels())

@@ -1,4 +1,5 @@
 """The bench runs a machine under the oracle and gives it back."""
+
 import threading
 
 import pytest
@@ -51,8 +52,9 @@ def test_a_machine_comes_off_the_bench_as_it_was():
 
 def test_a_wrapped_machine_keeps_its_oracle_its_settings_and_its_expert():
     own = expert(goto('DETECT'))
-    machine = OracleContainer.wrap(fetch_machine(), settings={'max_recoveries': 2}, expert=own,
-                                   name='FETCH')
+    machine = OracleContainer.wrap(
+        fetch_machine(), settings={'max_recoveries': 2}, expert=own, name='FETCH'
+    )
     with Bench(machine, [fail('PICK')], settings={'max_recoveries': 0}) as bench:
         assert oracle_of(machine).settings.defaults.max_recoveries == 0
         bench.run([fail('PICK', visit=1)]).assert_asked_about('PICK', times=1).assert_recovered()
@@ -136,9 +138,10 @@ def test_without_an_expert_the_question_is_noted_and_no_time_passes():
     with Bench(fetch_machine(), [fail('PICK')], settings={'max_recoveries': 0}) as bench:
         trial = bench.run()
     trial.assert_asked_about('PICK', times=1).assert_ended_with('aborted')
-    question, = trial.questions
+    (question,) = trial.questions
     assert question.failed_state == 'PICK' and 'DETECT' in [
-        choice.state for choice in question.choices]
+        choice.state for choice in question.choices
+    ]
 
 
 def test_an_expert_of_ones_own_is_asked():
@@ -146,8 +149,9 @@ def test_an_expert_of_ones_own_is_asked():
         def ask(self, question, cancelled, progress):
             return goto('DETECT').answer
 
-    with Bench(fetch_machine(), [fail('PICK', visit=1)], expert=Own(),
-               settings={'max_recoveries': 0}) as bench:
+    with Bench(
+        fetch_machine(), [fail('PICK', visit=1)], expert=Own(), settings={'max_recoveries': 0}
+    ) as bench:
         bench.run().assert_jumped('PICK', to='DETECT').assert_recovered('PICK')
 
 
@@ -171,22 +175,31 @@ def test_a_fault_that_fits_no_state_leaves_the_machine_bare():
 
 
 def test_a_hang_with_a_time_limit_is_an_overrun():
-    with Bench(fetch_machine(), [hang('PICK', visit=1)],
-               settings={'states': {'PICK': {'time_limit_s': 1.0}}}) as bench:
+    with Bench(
+        fetch_machine(),
+        [hang('PICK', visit=1)],
+        settings={'states': {'PICK': {'time_limit_s': 1.0}}},
+    ) as bench:
         trial = bench.run().assert_recovered('PICK').assert_failed('PICK', times=1)
     assert 'FAILS: time limit' in str(trial)
 
 
 def test_a_state_that_takes_longer_than_its_limit_fails():
-    with Bench(fetch_machine(), [overrun('PICK', 600, visit=1)],
-               settings={'states': {'PICK': {'time_limit_s': 1.0}}}) as bench:
+    with Bench(
+        fetch_machine(),
+        [overrun('PICK', 600, visit=1)],
+        settings={'states': {'PICK': {'time_limit_s': 1.0}}},
+    ) as bench:
         bench.run().assert_recovered('PICK')
 
 
 def test_a_hang_for_good_is_let_go_at_the_end_of_the_trial():
     threads = set(threading.enumerate())
-    with Bench(fetch_machine(), [hang('PICK', visit=1, for_good=True)], settings={
-            'states': {'PICK': {'time_limit_s': 0.05, 'grace_period_s': 0.05}}}) as bench:
+    with Bench(
+        fetch_machine(),
+        [hang('PICK', visit=1, for_good=True)],
+        settings={'states': {'PICK': {'time_limit_s': 0.05, 'grace_period_s': 0.05}}},
+    ) as bench:
         trial = bench.run()
     trial.assert_failed('PICK').assert_asked_about('PICK')  # it still runs: it cannot be entered
     for thread in set(threading.enumerate()) - threads:
@@ -217,8 +230,9 @@ def test_a_state_beside_another_recovers_by_itself():
 
 
 def test_states_without_an_oracle_are_seen_though_no_event_tells_of_them():
-    with Bench(concurrence_machine(), [crash('BOTH/PICK', visit=1)],
-               settings={'nested': False}) as bench:
+    with Bench(
+        concurrence_machine(), [crash('BOTH/PICK', visit=1)], settings={'nested': False}
+    ) as bench:
         trial = bench.run().assert_recovered('BOTH').assert_failed('BOTH/PICK', times=1)
     assert trial.visits().count('BOTH/LOOK') == 2
     assert 'raises RuntimeError: a fault of this test' in str(trial)

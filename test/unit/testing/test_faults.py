@@ -1,4 +1,5 @@
 """Faults in machines of every kind, which stay as they were."""
+
 import threading
 
 import pytest
@@ -24,8 +25,10 @@ def state_of(machine, label):
 def everything_in(machine):
     """What a machine consists of, as far as faults could change it."""
     places = places_of(machine)
-    return [(place.path, id(place.state), type(place.state), 'execute' in vars(place.state))
-            for place in places] + [type(machine)]
+    return [
+        (place.path, id(place.state), type(place.state), 'execute' in vars(place.state))
+        for place in places
+    ] + [type(machine)]
 
 
 @pytest.mark.parametrize('build', BUILDERS)
@@ -72,12 +75,15 @@ def test_a_state_that_hangs_waits_for_its_preempt(build):
     assert machine.execute() == 'succeeded'
 
 
-@pytest.mark.parametrize('build, label', [
-    (nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')])
+@pytest.mark.parametrize(
+    'build, label',
+    [(nested_machine, 'KITCHEN'), (concurrence_machine, 'BOTH'), (iterator_machine, 'EACH')],
+)
 @pytest.mark.parametrize('fault', [fail, crash, hang])
 def test_a_container_fails_as_a_state_does_and_works_the_next_time(build, label, fault):
-    machine = OracleContainer.wrap(build(), settings={
-        'states': {label: {'time_limit_s': 1.0 if fault is hang else 60}}})
+    machine = OracleContainer.wrap(
+        build(), settings={'states': {label: {'time_limit_s': 1.0 if fault is hang else 60}}}
+    )
     with faults(machine, [fault(label, visit=1)]) as injection:
         assert machine.execute() == 'succeeded'
     assert injection.armed[0].happened == 1
@@ -114,8 +120,9 @@ def test_an_overrun_comes_before_the_work():
 
 
 def test_an_overrun_that_is_preempted_does_no_work():
-    machine = OracleContainer.wrap(fetch_machine(), settings={
-        'states': {'PICK': {'time_limit_s': 0.05, 'max_recoveries': 0}}})
+    machine = OracleContainer.wrap(
+        fetch_machine(), settings={'states': {'PICK': {'time_limit_s': 0.05, 'max_recoveries': 0}}}
+    )
     with faults(machine, [overrun('PICK', 600)]):
         assert machine.execute() == 'aborted'
     assert state_of(machine, 'PICK').runs == 0
@@ -173,13 +180,23 @@ def test_a_machine_may_be_wrapped_while_faults_are_in_it():
     assert injection.armed[0].happened == 1
 
 
-@pytest.mark.parametrize('fault, said', [
-    (lambda: fail('PIKC'), "a fault: there is no state 'PIKC'; there are KITCHEN, "
-                           'KITCHEN/DETECT, KITCHEN/PICK, KITCHEN/PLACE'),
-    (lambda: fail('HALL/PICK'), "there is no state 'HALL/PICK'"),
-    (lambda: fail('PICK', outcome='abroted'), "a fault: KITCHEN/PICK has no outcome 'abroted'; "
-     "name one of 'aborted', 'preempted', 'succeeded'"),
-    (lambda: 'PICK', "'PICK' is not a fault; make one with fail, crash, hang or overrun")])
+@pytest.mark.parametrize(
+    'fault, said',
+    [
+        (
+            lambda: fail('PIKC'),
+            "a fault: there is no state 'PIKC'; there are KITCHEN, "
+            'KITCHEN/DETECT, KITCHEN/PICK, KITCHEN/PLACE',
+        ),
+        (lambda: fail('HALL/PICK'), "there is no state 'HALL/PICK'"),
+        (
+            lambda: fail('PICK', outcome='abroted'),
+            "a fault: KITCHEN/PICK has no outcome 'abroted'; "
+            "name one of 'aborted', 'preempted', 'succeeded'",
+        ),
+        (lambda: 'PICK', "'PICK' is not a fault; make one with fail, crash, hang or overrun"),
+    ],
+)
 def test_a_fault_that_fits_no_state_names_what_is_there(fault, said):
     machine = nested_machine()
     before = everything_in(machine)
@@ -211,33 +228,48 @@ def test_a_label_that_is_there_twice_needs_its_path():
 
 
 def test_an_outcome_is_to_be_named_where_several_are_failures_or_none():
-    machine = fetch_machine(pick=Works(['succeeded', 'slip_failed', 'grasp_failed']),
-                            place=Works(['succeeded', 'dropped']))
-    with pytest.raises(FaultError, match="PICK has 2 outcomes that are named like a failure; name "
-                                         "one of 'grasp_failed', 'slip_failed', 'succeeded'"):
+    machine = fetch_machine(
+        pick=Works(['succeeded', 'slip_failed', 'grasp_failed']),
+        place=Works(['succeeded', 'dropped']),
+    )
+    with pytest.raises(
+        FaultError,
+        match='PICK has 2 outcomes that are named like a failure; name '
+        "one of 'grasp_failed', 'slip_failed', 'succeeded'",
+    ):
         faults(machine, [fail('PICK')]).__enter__()
     with pytest.raises(FaultError, match='PLACE has no outcomes that are named like a failure'):
         faults(machine, [fail('PLACE')]).__enter__()
 
 
-@pytest.mark.parametrize('make, said', [
-    (lambda: fail('PICK', visit=0), 'visit 0 is not there; the first visit is 1'),
-    (lambda: hang('PICK', visit=[2, -1]), 'visit -1 is not there'),
-    (lambda: crash('PICK', visit=[]), 'the first visit is 1'),
-    (lambda: fail('PICK', probability=1.5), 'probability 1.5 is not within 0 to 1'),
-    (lambda: overrun('PICK', -1), '-1 s is not a time')])
+@pytest.mark.parametrize(
+    'make, said',
+    [
+        (lambda: fail('PICK', visit=0), 'visit 0 is not there; the first visit is 1'),
+        (lambda: hang('PICK', visit=[2, -1]), 'visit -1 is not there'),
+        (lambda: crash('PICK', visit=[]), 'the first visit is 1'),
+        (lambda: fail('PICK', probability=1.5), 'probability 1.5 is not within 0 to 1'),
+        (lambda: overrun('PICK', -1), '-1 s is not a time'),
+    ],
+)
 def test_what_no_fault_can_be_is_refused_at_once(make, said):
     with pytest.raises(FaultError) as refused:
         make()
     assert said in str(refused.value) and 'PICK' in str(refused.value)
 
 
-@pytest.mark.parametrize('fault, words', [
-    (fail('PICK', visit=2, outcome='aborted'), "PICK ends in 'aborted' at visit 2"),
-    (crash('PICK'), "PICK raises RuntimeError('a fault of this test') at every visit"),
-    (hang('A/B', for_good=True), 'A/B hangs for good at every visit'),
-    (hang('PICK', visit=(1, 3)), 'PICK hangs until it is preempted at visit 1, 3'),
-    (overrun('PICK', 2.5, probability=0.25),
-     'PICK takes 2.5 s longer at every visit with probability 0.25')])
+@pytest.mark.parametrize(
+    'fault, words',
+    [
+        (fail('PICK', visit=2, outcome='aborted'), "PICK ends in 'aborted' at visit 2"),
+        (crash('PICK'), "PICK raises RuntimeError('a fault of this test') at every visit"),
+        (hang('A/B', for_good=True), 'A/B hangs for good at every visit'),
+        (hang('PICK', visit=(1, 3)), 'PICK hangs until it is preempted at visit 1, 3'),
+        (
+            overrun('PICK', 2.5, probability=0.25),
+            'PICK takes 2.5 s longer at every visit with probability 0.25',
+        ),
+    ],
+)
 def test_a_fault_reads_as_a_sentence(fault, words):
     assert str(fault) == words

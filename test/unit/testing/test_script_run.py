@@ -1,4 +1,5 @@
 """Scripts as they are, with their machines on the bench."""
+
 import sys
 
 import pytest
@@ -6,7 +7,7 @@ import pytest
 import smach
 from smach_oracle.testing import FaultError, ScriptError, crash, expert, fail, goto, run_script
 
-SCRIPT = '''
+SCRIPT = """
 import sys
 import smach
 
@@ -37,7 +38,7 @@ def main():
 
 if __name__ == '__main__':
     main()
-'''
+"""
 PLAIN = "smach.StateMachine(['succeeded', 'aborted'])"
 
 
@@ -80,8 +81,12 @@ def test_an_error_of_the_machine_reaches_the_script(tmp_path):
 
 def test_a_question_too_many_fails_the_test(tmp_path):
     with pytest.raises(ScriptError):
-        run_script(script(tmp_path), faults=[fail('PLACE')], expert=expert(goto('PLACE')),
-                   settings={'max_recoveries': 0})
+        run_script(
+            script(tmp_path),
+            faults=[fail('PLACE')],
+            expert=expert(goto('PLACE')),
+            settings={'max_recoveries': 0},
+        )
 
 
 def test_everything_is_put_back(tmp_path):

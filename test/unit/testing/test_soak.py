@@ -1,4 +1,5 @@
 """A soak finds the failures that never recover, and each of its trials can be run again."""
+
 import pytest
 from bench_machines import OUTCOMES, Works, concurrence_machine, fetch_machine, nested_machine
 
@@ -26,7 +27,9 @@ CUP_IS_LOST = {'PLACE': [lambda userdata: False]}  # the hand is empty
 def test_a_failure_that_never_recovers_is_found_and_named():
     report = soak(machine_with_one_cup, trials=60, seed=5, preconditions=CUP_IS_LOST)
     assert [(row.state, row.kind) for row in report.never_recovered] == [
-        ('PLACE', 'exception'), ('PLACE', "outcome 'aborted'")]
+        ('PLACE', 'exception'),
+        ('PLACE', "outcome 'aborted'"),
+    ]
     row = report.never_recovered[1]
     assert row.recovered == 0 and row.trials == len(row.not_recovered) > 5
     assert {each.state for each in report.always_recovered} == {'DETECT', 'PICK'}
@@ -99,22 +102,38 @@ def test_each_trial_finds_the_machine_as_it_was(wrapped):
 
 def test_what_was_learned_in_one_trial_is_not_known_in_the_next():
     machine = OracleContainer.wrap(fetch_machine())
-    report = soak(machine, trials=30, states=['PICK'], most_in_row=1,
-                  settings={'moderate_from': 0.25, 'high_from': 0.3})
+    report = soak(
+        machine,
+        trials=30,
+        states=['PICK'],
+        most_in_row=1,
+        settings={'moderate_from': 0.25, 'high_from': 0.3},
+    )
     assert not any(trial.asked for trial in report.trials)
 
 
 def test_a_failure_at_every_visit_needs_the_expert():
-    report = soak(fetch_machine, trials=10, states=['PICK'], most_in_row=None,
-                  expert=expert(lambda question: goto('PLACE')))
+    report = soak(
+        fetch_machine,
+        trials=10,
+        states=['PICK'],
+        most_in_row=None,
+        expert=expert(lambda question: goto('PLACE')),
+    )
     assert report.assert_all_recovered() and all(trial.asked for trial in report.trials)
     assert 'the expert asked in' in str(report)
 
 
 def test_sometimes_is_neither_never_nor_always():
-    report = soak(fetch_machine, trials=30, states=['PICK'], most_in_row=2,
-                  kinds=[FaultKind.OUTCOME], settings={'max_recoveries': 1})
-    row, = report.sometimes_recovered
+    report = soak(
+        fetch_machine,
+        trials=30,
+        states=['PICK'],
+        most_in_row=2,
+        kinds=[FaultKind.OUTCOME],
+        settings={'max_recoveries': 1},
+    )
+    (row,) = report.sometimes_recovered
     assert 0 < row.recovered < row.trials
     assert report.assert_every_failure_can_recover()
     with pytest.raises(AssertionError, match='some trials did not recover'):
@@ -122,9 +141,15 @@ def test_sometimes_is_neither_never_nor_always():
 
 
 def test_hangs_and_overruns_go_with_time_limits():
-    report = soak(fetch_machine, trials=4, states=['PICK'], most_in_row=1, overrun_s=600,
-                  kinds=[FaultKind.HANG, FaultKind.OVERRUN],
-                  settings={'states': {'PICK': {'time_limit_s': 0.7}}})
+    report = soak(
+        fetch_machine,
+        trials=4,
+        states=['PICK'],
+        most_in_row=1,
+        overrun_s=600,
+        kinds=[FaultKind.HANG, FaultKind.OVERRUN],
+        settings={'states': {'PICK': {'time_limit_s': 0.7}}},
+    )
     assert report.assert_all_recovered()
     assert {row.kind for row in report.rows} == {'hang', 'overrun'}
 
@@ -144,18 +169,24 @@ def test_a_machine_that_fails_by_itself_is_no_machine_to_soak():
         soak(broken, trials=1)
 
 
-@pytest.mark.parametrize('machine, more, said', [
-    (fetch_machine, {'states': ['PIKC']}, "a soak: there is no state 'PIKC'; there are DETECT"),
-    (lambda: 3, {}, '3 is no StateMachine, nor a function that builds one'),
-    (lambda: fetch_machine(), {'states': ['PICK'], 'kinds': []}, 'nothing can fail by no kind')])
+@pytest.mark.parametrize(
+    'machine, more, said',
+    [
+        (fetch_machine, {'states': ['PIKC']}, "a soak: there is no state 'PIKC'; there are DETECT"),
+        (lambda: 3, {}, '3 is no StateMachine, nor a function that builds one'),
+        (lambda: fetch_machine(), {'states': ['PICK'], 'kinds': []}, 'nothing can fail by no kind'),
+    ],
+)
 def test_what_cannot_be_soaked_is_refused(machine, more, said):
     with pytest.raises(FaultError) as refused:
         soak(machine, trials=1, **more)
     assert said in str(refused.value)
 
 
-@pytest.mark.parametrize('given', [{'trials': 0}, {'trials': -1}, {'most_in_row': 0},
-                                   {'trials': 2.0}, {'most_in_row': True}])
+@pytest.mark.parametrize(
+    'given',
+    [{'trials': 0}, {'trials': -1}, {'most_in_row': 0}, {'trials': 2.0}, {'most_in_row': True}],
+)
 def test_a_soak_that_would_show_nothing_is_refused(given):
     name, value = list(given.items())[0]
     with pytest.raises(FaultError, match='{} is {!r}; give a whole number'.format(name, value)):

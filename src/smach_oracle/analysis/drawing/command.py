@@ -4,6 +4,7 @@ FOLDER is that of `run_trials --protocol`, or one with its results.csv files bel
 needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, each with a
 PNG, and tables.md, as far as there are rows of them.
 """
+
 import argparse
 import sys
 from functools import partial
@@ -40,11 +41,17 @@ def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
 
 def tables_page(found: Mapping[str, Sequence[TrialRow]]) -> str:
     """Return a page of Markdown with the tables of all figures."""
-    parts = ['# Tables of the experiment\n\nThe command `draw_results` has made this page from the '
-             'rows of {:,} trials.\n'.format(sum(map(len, found.values())))]
+    parts = [
+        '# Tables of the experiment\n\nThe command `draw_results` has made this page from the '
+        'rows of {:,} trials.\n'.format(sum(map(len, found.values())))
+    ]
     for kind, rows in found.items():
-        parts.append('## {}\n\n{}'.format(kind.capitalize(), '\n'.join(
-            filter(None, [format_sweeps(kind, rows), format_tables(rows, kind)]))))
+        parts.append(
+            '## {}\n\n{}'.format(
+                kind.capitalize(),
+                '\n'.join(filter(None, [format_sweeps(kind, rows), format_tables(rows, kind)])),
+            )
+        )
     return '\n'.join(parts)
 
 
@@ -57,8 +64,10 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
     from .looks import save
     from .main_figure import draw_main, draw_same_seeds, same_seeds
     from .sweep_figures import draw_memory, draw_persistence
-    draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(zip(KINDS, (
-        draw_main, draw_persistence, draw_memory, draw_hours)))
+
+    draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(
+        zip(KINDS, (draw_main, draw_persistence, draw_memory, draw_hours))
+    )
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']
     paths[0].write_text(tables_page(found), encoding='utf-8')
@@ -74,8 +83,11 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
-    parser = argparse.ArgumentParser(prog='draw_results', description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        prog='draw_results',
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument('folder', metavar='FOLDER', type=path_of)
     parser.add_argument('output', metavar='OUT', type=path_of)
     args = parser.parse_args(argv)

@@ -1,4 +1,5 @@
 """Continuous operation over its hours: attempts and questions, what was needed, learned rates."""
+
 import json
 from typing import Any, Dict, List, Mapping, Sequence, Tuple
 
@@ -23,22 +24,33 @@ HEIGHT_IN = 5.6
 CURVES: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('oracle recovered', BLUE, '-', lambda row: row.recovered),
     ('intervention', VERMILLION, '--', lambda row: row.intervened),
-    ('not a true success', BLACK, ':', lambda row: not row.succeeded))
+    ('not a true success', BLACK, ':', lambda row: not row.succeeded),
+)
 LIGHT = {'glare': '#F0E442', 'dim_light': '#BBBBBB'}  # behind the events of trials with such light
 PALE = 0.6
 LOST_LOOK: Mapping[str, Any] = dict(color=BLACK, marker='x', linestyle='none', markersize=5)
 MOST_STATES = 6  # whose rates are drawn, those that failed most
 # colours of Okabe and Ito's palette that are left, and dashes, so that lines are told apart
-RATE_LOOKS = ((BLUE, '-'), (VERMILLION, '--'), (GREEN, '-.'), (BLACK, ':'),
-              ('#CC79A7', (0, (5, 1, 1, 1, 1, 1))), ('#E69F00', (0, (2, 1))))
+RATE_LOOKS = (
+    (BLUE, '-'),
+    (VERMILLION, '--'),
+    (GREEN, '-.'),
+    (BLACK, ':'),
+    ('#CC79A7', (0, (5, 1, 1, 1, 1, 1))),
+    ('#E69F00', (0, (2, 1))),
+)
 
 
 def draw_hours(rows: Sequence[TrialRow]) -> Figure:
     """Draw a column of panels for each task, over the hours of its run."""
     known = [row for row in rows if row.hour is not None]
     tasks = tasks_of(known)
-    figure, made = panels([title_of(task) for task in tasks], HEIGHT_IN, rows=3, margins=dict(
-        left=0.09, bottom=0.08, top=0.91, hspace=0.42))
+    figure, made = panels(
+        [title_of(task) for task in tasks],
+        HEIGHT_IN,
+        rows=3,
+        margins=dict(left=0.09, bottom=0.08, top=0.91, hspace=0.42),
+    )
     for column, task in enumerate(tasks):
         mine = sorted((row for row in known if row.task == task), key=lambda row: row.seed)
         events, needed, rates = (line[column] for line in made)
@@ -49,8 +61,11 @@ def draw_hours(rows: Sequence[TrialRow]) -> Figure:
             axes.set_xlim(0, max(_hours(mine)[-1], 1e-3))
         rates.set_xlabel('Hour of the run')
         if column == 0:
-            for axes, label in ((events, 'Attempts (up),\nquestions (down)'),
-                                (needed, 'Trials so far'), (rates, 'Learned failure rate')):
+            for axes, label in (
+                (events, 'Attempts (up),\nquestions (down)'),
+                (needed, 'Trials so far'),
+                (rates, 'Learned failure rate'),
+            ):
                 axes.set_ylabel(label)
     legend_above(figure, made[1][0], (), _beside(known))
     return figure
@@ -61,7 +76,9 @@ def _beside(rows: Sequence[TrialRow]) -> List[Tuple[Any, str]]:
     lights = {kind for row in rows for kind in lights_of(row)}
     found: List[Tuple[Any, str]] = [
         (Patch(color=colour, alpha=PALE, linewidth=0), kind.replace('_', ' '))
-        for kind, colour in LIGHT.items() if kind in lights]
+        for kind, colour in LIGHT.items()
+        if kind in lights
+    ]
     if any(row.ending == LOST for row in rows):
         found.append((Line2D([], [], **LOST_LOOK), 'lost'))
     return found
@@ -72,8 +89,11 @@ def lights_of(row: TrialRow) -> List[str]:
 
     A row without a log has those that it lists.
     """
-    kinds = [cause.kind for cause in causes_in(row.cause_log) if cause.began_s is not None
-             ] if row.cause_log else row.causes.split()
+    kinds = (
+        [cause.kind for cause in causes_in(row.cause_log) if cause.began_s is not None]
+        if row.cause_log
+        else row.causes.split()
+    )
     return [kind for kind in LIGHT if kind in kinds]
 
 
@@ -99,9 +119,16 @@ def _draw_events(axes: Any, rows: Sequence[TrialRow]) -> None:
 def _draw_needed(axes: Any, rows: Sequence[TrialRow]) -> None:
     """Draw in how many trials so far something happened."""
     for label, colour, dashes, happened in CURVES:
-        counts = [sum(map(happened, rows[:number + 1])) for number in range(len(rows))]
-        axes.step([0.0, *_hours(rows)], [0, *counts], where='post', color=colour, linestyle=dashes,
-                  linewidth=1.1, label=label)
+        counts = [sum(map(happened, rows[: number + 1])) for number in range(len(rows))]
+        axes.step(
+            [0.0, *_hours(rows)],
+            [0, *counts],
+            where='post',
+            color=colour,
+            linestyle=dashes,
+            linewidth=1.1,
+            label=label,
+        )
     axes.set_ylim(bottom=0)
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True))
 
@@ -113,11 +140,27 @@ def _draw_rates(axes: Any, rows: Sequence[TrialRow]) -> None:
     for number, state in enumerate(ranked[:MOST_STATES]):
         colour, dashes = RATE_LOOKS[number % len(RATE_LOOKS)]
         hours, rates = zip(*series[state])
-        axes.step(hours, [rate + 0.006 * number for rate in rates], where='post', color=colour,
-                  linestyle=dashes, linewidth=1.0, label=state)
+        axes.step(
+            hours,
+            [rate + 0.006 * number for rate in rates],
+            where='post',
+            color=colour,
+            linestyle=dashes,
+            linewidth=1.0,
+            label=state,
+        )
     axes.set_ylim(0, 1.04)
-    axes.legend(loc='lower left', bbox_to_anchor=(0, 1.0), ncol=3, frameon=False, fontsize=6,
-                borderaxespad=0.0, handlelength=2.2, columnspacing=0.8, handletextpad=0.4)
+    axes.legend(
+        loc='lower left',
+        bbox_to_anchor=(0, 1.0),
+        ncol=3,
+        frameon=False,
+        fontsize=6,
+        borderaxespad=0.0,
+        handlelength=2.2,
+        columnspacing=0.8,
+        handletextpad=0.4,
+    )
 
 
 def learned_rates(rows: Sequence[TrialRow]) -> Dict[str, List[Tuple[float, float]]]:
@@ -146,6 +189,7 @@ def _rate(row: TrialRow, learned: Mapping[str, Any]) -> float:
     estimator = make_estimator(
         learned.get('estimator', FailureRate.kind),
         USUAL.memory if row.memory is None else row.memory,
-        USUAL.prior if row.prior is None else row.prior)
+        USUAL.prior if row.prior is None else row.prior,
+    )
     estimator.restore(learned)
     return estimator.rate

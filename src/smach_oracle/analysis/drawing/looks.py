@@ -1,4 +1,5 @@
 """The looks of an experiment's figures: sizes, colours, and how a file is written."""
+
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 
@@ -13,7 +14,9 @@ from ..trial_rows import TrialRow
 
 # a variant looks the same in all figures: colour, marker, dashes
 LOOKS: Dict[str, Tuple[str, str, str]] = {
-    'bare': (BLACK, 'd', '-.'), 'default': (BLUE, 'o', '-'), 'restart': (VERMILLION, 's', '--')
+    'bare': (BLACK, 'd', '-.'),
+    'default': (BLUE, 'o', '-'),
+    'restart': (VERMILLION, 's', '--'),
 }
 OTHERS = (GREEN, '^', ':')
 Happened = Callable[[TrialRow], bool]
@@ -39,7 +42,8 @@ class Percent:
         shares = [100.0 * sum(part) / len(part) for part in parts.values()]
         # the smallest and the largest of a replicate. None means there are no two
         self.replicates: Optional[Interval] = (
-            (min(shares), max(shares)) if len(shares) > 1 else None)
+            (min(shares), max(shares)) if len(shares) > 1 else None
+        )
 
     @property
     def reach(self) -> Tuple[float, float]:
@@ -47,8 +51,12 @@ class Percent:
         return max(0.0, self.share - self.interval[0]), max(0.0, self.interval[1] - self.share)
 
 
-def panels(titles: Sequence[str], height_in: float, rows: int = 1,
-           margins: Optional[Dict[str, float]] = None) -> Tuple[Figure, List[List[Any]]]:
+def panels(
+    titles: Sequence[str],
+    height_in: float,
+    rows: int = 1,
+    margins: Optional[Dict[str, float]] = None,
+) -> Tuple[Figure, List[List[Any]]]:
     """Return a figure as wide as two columns of a paper, with axes row by row.
 
     :param titles: one for each column.
@@ -56,26 +64,43 @@ def panels(titles: Sequence[str], height_in: float, rows: int = 1,
     """
     figure = Figure(figsize=(COLUMN_IN[2], height_in))
     FigureCanvasAgg(figure)
-    made = [[figure.add_subplot(rows, len(titles), 1 + row * len(titles) + column)
-             for column in range(len(titles))] for row in range(rows)]
+    made = [
+        [
+            figure.add_subplot(rows, len(titles), 1 + row * len(titles) + column)
+            for column in range(len(titles))
+        ]
+        for row in range(rows)
+    ]
     for axes, title in zip(made[0], titles):
         axes.set_title(title, loc='left')
-    figure.subplots_adjust(**{**dict(left=0.08, right=0.98, bottom=0.17, top=0.80, wspace=0.22),
-                              **(margins or {})})
+    figure.subplots_adjust(
+        **{**dict(left=0.08, right=0.98, bottom=0.17, top=0.80, wspace=0.22), **(margins or {})}
+    )
     return figure, made
 
 
-def legend_above(figure: Figure, axes: Any, shown: Sequence[str] = (),
-                 more: Sequence[Tuple[Any, str]] = ()) -> None:
+def legend_above(
+    figure: Figure, axes: Any, shown: Sequence[str] = (), more: Sequence[Tuple[Any, str]] = ()
+) -> None:
     """Put the legend of some axes above all, where it covers no data.
 
     :param shown: its labels. None are all.
     :param more: further entries: what is drawn, and its label.
     """
-    found = [(handle, label) for handle, label in zip(*axes.get_legend_handles_labels())
-             if label in (shown or (label,))] + list(more)
-    figure.legend([handle for handle, _ in found], [label for _, label in found],
-                  loc='upper center', ncol=6, frameon=False, borderpad=0.2, columnspacing=1.4)
+    found = [
+        (handle, label)
+        for handle, label in zip(*axes.get_legend_handles_labels())
+        if label in (shown or (label,))
+    ] + list(more)
+    figure.legend(
+        [handle for handle, _ in found],
+        [label for _, label in found],
+        loc='upper center',
+        ncol=6,
+        frameon=False,
+        borderpad=0.2,
+        columnspacing=1.4,
+    )
 
 
 def save(draw: Callable[[], Figure], stem: Path) -> List[Path]:

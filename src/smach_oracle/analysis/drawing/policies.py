@@ -1,4 +1,5 @@
 """Names of variants that differ in their memory."""
+
 import re
 from typing import Optional
 

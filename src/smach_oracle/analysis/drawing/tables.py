@@ -1,4 +1,5 @@
 """The figures of an experiment as Markdown tables: a line for each figure, a column a variant."""
+
 from typing import Dict, List, Optional, Sequence, Tuple
 
 from ..comparison import (
@@ -18,8 +19,15 @@ from .cause_tables import by_cause, by_class, by_log
 from .markdown import titled
 from .titles import tasks_of, title_of
 
-SHARES = ('true success', 'interventions', 'a question asked', 'recovered', 'with attempts',
-          'false success', 'lost or hung')
+SHARES = (
+    'true success',
+    'interventions',
+    'a question asked',
+    'recovered',
+    'with attempts',
+    'false success',
+    'lost or hung',
+)
 OVER_REPLICATES = ('true success', 'interventions', 'a question asked', 'recovered')
 # of Costs, and what it is called
 COSTS: Tuple[Tuple[str, str], ...] = (
@@ -33,7 +41,8 @@ COSTS: Tuple[Tuple[str, str], ...] = (
     ('expert_s_per_hour', 'expert s a robot hour'),
     ('completion_s', 's to completion, median'),
     ('trials_between', 'trials between interventions'),
-    ('hours_between', 'robot hours between interventions'))
+    ('hours_between', 'robot hours between interventions'),
+)
 SUMMARY = ('true success', 'interventions', 'a question asked', 'recovered')
 # of Costs, in the summary
 SUMMED_UP = ('damage', 'expert_s', 'completion_s')
@@ -71,11 +80,19 @@ def _summary(title: str, variants: Dict[str, List[TrialRow]]) -> str:
     lines = []
     for name, rows in variants.items():
         shares, costs = {share.name: share for share in shares_of(rows)}, costs_of(rows)
-        lines.append([name.replace('_', ' '), str(len(rows)),
-                      *(percent(shares[each]) for each in SUMMARY),
-                      *(number(getattr(costs, each)) for each in SUMMED_UP)])
-    return titled(title + ', in short', [
-        'variant', 'trials', *SUMMARY, *(dict(COSTS)[each] for each in SUMMED_UP)], lines)
+        lines.append(
+            [
+                name.replace('_', ' '),
+                str(len(rows)),
+                *(percent(shares[each]) for each in SUMMARY),
+                *(number(getattr(costs, each)) for each in SUMMED_UP),
+            ]
+        )
+    return titled(
+        title + ', in short',
+        ['variant', 'trials', *SUMMARY, *(dict(COSTS)[each] for each in SUMMED_UP)],
+        lines,
+    )
 
 
 def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
@@ -90,22 +107,36 @@ def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
         lines.append([head, *(number(getattr(each, name)) for each in costs)])
         if name == 'completion_s':
             lines += _completion(variants)
-    return titled(title, _heads(variants), lines, [
-        'In parentheses: 95% Wilson intervals over trials.', *(
-            ['Replicates: the smallest and the largest share of a replicate. In parentheses: '
-             "Student's 95% interval of their mean."]
-            if any(line[0].endswith('replicates') for line in lines) else []),
-        'A robot hour is one of world time in which a trial runs. ' + (
-            'The time between trials counts, too: the world goes on.'
-            if any(row.hour is not None for rows in variants.values() for row in rows)
-            else 'The time between trials does not count.')])
+    return titled(
+        title,
+        _heads(variants),
+        lines,
+        [
+            'In parentheses: 95% Wilson intervals over trials.',
+            *(
+                [
+                    'Replicates: the smallest and the largest share of a replicate. In '
+                    "parentheses: Student's 95% interval of their mean."
+                ]
+                if any(line[0].endswith('replicates') for line in lines)
+                else []
+            ),
+            'A robot hour is one of world time in which a trial runs. '
+            + (
+                'The time between trials counts, too: the world goes on.'
+                if any(row.hour is not None for rows in variants.values() for row in rows)
+                else 'The time between trials does not count.'
+            ),
+        ],
+    )
 
 
 def _completion(variants: Dict[str, List[TrialRow]]) -> List[List[str]]:
     seeds, medians = common_completion(variants)
     head = 's to completion, median, on the {} seeds that bare, default and restart completed'
-    return [[head.format(seeds), *(number(medians.get(name)) for name in variants)]
-            ] if seeds else []
+    return (
+        [[head.format(seeds), *(number(medians.get(name)) for name in variants)]] if seeds else []
+    )
 
 
 def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
@@ -114,12 +145,29 @@ def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
     for first, second in pairs_to_test(list(variants)):
         counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
         if sum(counts):
-            lines.append(['{} against {}'.format(first, second).replace('_', ' '),
-                          *map(str, (sum(counts), *counts)), '{:.2g}'.format(counts.p_value)])
+            lines.append(
+                [
+                    '{} against {}'.format(first, second).replace('_', ' '),
+                    *map(str, (sum(counts), *counts)),
+                    '{:.2g}'.format(counts.p_value),
+                ]
+            )
     heads = ['', 'pairs', 'both', 'the first alone', 'the second alone', 'neither', 'p']
-    return [titled(title + ': interventions, paired by seed', heads, lines, [
-        "p: McNemar's exact test, two-sided, on the pairs that differ, without a correction for "
-        'their number.'])] if lines else []
+    return (
+        [
+            titled(
+                title + ': interventions, paired by seed',
+                heads,
+                lines,
+                [
+                    "p: McNemar's exact test, two-sided, on the pairs that differ, without a "
+                    'correction for their number.'
+                ],
+            )
+        ]
+        if lines
+        else []
+    )
 
 
 def _same_seeds(title: str, rows: Sequence[TrialRow]) -> List[str]:
@@ -128,11 +176,17 @@ def _same_seeds(title: str, rows: Sequence[TrialRow]) -> List[str]:
     if not found:
         return []
     shares = [{share.name: share for share in shares_of(mine)} for mine in found.values()]
-    return [titled('{}: the {} seeds that all variants ran'.format(title, len(found[HINDSIGHT])),
-                   _heads(found), [[name, *(percent(each[name]) for each in shares)]
-                                   for name in SAME_SEEDS],
-                   ['Hindsight is the best that any variant did on each of these seeds: a bound, '
-                    'and no variant.'])]
+    return [
+        titled(
+            '{}: the {} seeds that all variants ran'.format(title, len(found[HINDSIGHT])),
+            _heads(found),
+            [[name, *(percent(each[name]) for each in shares)] for name in SAME_SEEDS],
+            [
+                'Hindsight is the best that any variant did on each of these seeds: a bound, '
+                'and no variant.'
+            ],
+        )
+    ]
 
 
 def _heads(variants: Dict[str, List[TrialRow]]) -> List[str]:
@@ -147,8 +201,11 @@ def percent(share: Share) -> str:
 def over_replicates(share: Share) -> str:
     """Return the smallest and largest share of a replicate, and their mean's interval."""
     over, mean = share.over_replicates, share.of_mean
-    return '-' if over is None or mean is None else '{:.1%} to {:.1%} ({:.0%} to {:.0%})'.format(
-        *over, *mean)
+    return (
+        '-'
+        if over is None or mean is None
+        else '{:.1%} to {:.1%} ({:.0%} to {:.0%})'.format(*over, *mean)
+    )
 
 
 def number(value: Optional[float]) -> str:

@@ -1,4 +1,5 @@
 """Names of tasks and variants as figures and tables have them, in which order."""
+
 from typing import List, Sequence
 
 from ..trial_rows import TrialRow
@@ -13,9 +14,14 @@ def title_of(task: str) -> str:
 
 def tasks_of(rows: Sequence[TrialRow]) -> List[str]:
     """Return the tasks in the order in which the paper has them."""
-    return sorted({row.task for row in rows},
-                  key=lambda task: (task not in TITLES, list(TITLES).index(task)
-                                    if task in TITLES else 0, task))
+    return sorted(
+        {row.task for row in rows},
+        key=lambda task: (
+            task not in TITLES,
+            list(TITLES).index(task) if task in TITLES else 0,
+            task,
+        ),
+    )
 
 
 def variants_of(rows: Sequence[TrialRow]) -> List[str]:

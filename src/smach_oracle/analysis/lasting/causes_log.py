@@ -1,4 +1,5 @@
 """The world's log of the causes of a trial, as it stands in a row."""
+
 import json
 from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
 
@@ -22,15 +23,22 @@ def causes_of(told: object) -> Optional[List[LoggedCause]]:
     """Return the causes that a line of truth tells. None where it lacks their times."""
     if not isinstance(told, list) or not all(map(_is_logged, told)):
         return None
-    return [LoggedCause(each['kind'], each['lasting'], each['began_s'], each['ended_s'])
-            for each in told]
+    return [
+        LoggedCause(each['kind'], each['lasting'], each['began_s'], each['ended_s'])
+        for each in told
+    ]
 
 
 def _is_logged(cause: Any) -> bool:
-    return (isinstance(cause, Mapping) and isinstance(cause.get('lasting'), bool)
-            and isinstance(cause.get('kind'), str)
-            and all(name in cause and isinstance(cause[name], (int, float, type(None)))
-                    for name in ('began_s', 'ended_s')))
+    return (
+        isinstance(cause, Mapping)
+        and isinstance(cause.get('lasting'), bool)
+        and isinstance(cause.get('kind'), str)
+        and all(
+            name in cause and isinstance(cause[name], (int, float, type(None)))
+            for name in ('began_s', 'ended_s')
+        )
+    )
 
 
 def causes_text(causes: Sequence[LoggedCause]) -> str:

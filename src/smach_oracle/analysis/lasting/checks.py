@@ -4,6 +4,7 @@ A cause lasts in a trial if it was still there at the second try of the state th
 at that state again after the script was started over. A trial in which no state failed, or in which
 that state was not tried again, tells nothing.
 """
+
 from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Sequence
 
 from ..trial_rows import TrialRow
@@ -43,22 +44,36 @@ def check_of(row: TrialRow) -> Optional[TrialCheck]:
     if not row.cause_log or not row.tries:
         return None
     causes, tries = causes_in(row.cause_log), tries_in(row.tries)
-    failed = min((each for each in tries if each.failed_s is not None), default=None,
-                 key=lambda each: (each.failed_s or 0.0, each.began_s))
+    failed = min(
+        (each for each in tries if each.failed_s is not None),
+        default=None,
+        key=lambda each: (each.failed_s or 0.0, each.began_s),
+    )
     if failed is None:
         return TrialCheck(causes, False, None, None)
-    later = [each for each in tries
-             if each.state == failed.state and each.began_s >= (failed.failed_s or 0.0)]
-    return TrialCheck(causes, True, _there(causes, later),
-                      _there(causes, [each for each in later if each.restarts > failed.restarts]))
+    later = [
+        each
+        for each in tries
+        if each.state == failed.state and each.began_s >= (failed.failed_s or 0.0)
+    ]
+    return TrialCheck(
+        causes,
+        True,
+        _there(causes, later),
+        _there(causes, [each for each in later if each.restarts > failed.restarts]),
+    )
 
 
 def _there(causes: Iterable[LoggedCause], tries: Sequence[StateTry]) -> Optional[FrozenSet[str]]:
     """Return the kinds that were there at the first of some tries. None means there is no try."""
     if not tries:
         return None
-    return frozenset(cause.kind for cause in causes if cause.there_at(tries[0].began_s)
-                     and (cause.kind not in OPEN_ENDED or cause.ended_s is not None))
+    return frozenset(
+        cause.kind
+        for cause in causes
+        if cause.there_at(tries[0].began_s)
+        and (cause.kind not in OPEN_ENDED or cause.ended_s is not None)
+    )
 
 
 def checks_of(rows: Iterable[TrialRow]) -> List[TrialCheck]:

@@ -1,4 +1,5 @@
 """The tries of the states that failed in a trial: when each began, and when it failed."""
+
 import json
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -60,15 +61,19 @@ def tries_of(events: Sequence[Event], stamps: Sequence[float]) -> List[StateTry]
 
 def _below(top: str, place: Tuple[str, str]) -> str:
     path = '/'.join(place)
-    return path[len(top) + 1:] if path.startswith(top + '/') else path
+    return path[len(top) + 1 :] if path.startswith(top + '/') else path
 
 
 def in_world_time(tries: Sequence[StateTry], clock: WorldClock) -> List[StateTry]:
     """Return the tries with times of the world, s since the trial began."""
+
     def told(second: Optional[float]) -> Optional[float]:
         return None if second is None else round(clock.world_s(second), 2)
-    return [each._replace(began_s=told(each.began_s) or 0.0, failed_s=told(each.failed_s))
-            for each in tries]
+
+    return [
+        each._replace(began_s=told(each.began_s) or 0.0, failed_s=told(each.failed_s))
+        for each in tries
+    ]
 
 
 def tries_text(tries: Sequence[StateTry]) -> str:
@@ -81,11 +86,11 @@ def tries_in(text: str) -> List[StateTry]:
 
     :raises ValueError or TypeError: where the text is none of tries_text().
     """
-    return [StateTry(str(state), float(began), _optional(failed), int(restarts))
-            for state, began, failed, restarts in json.loads(text)]
+    return [
+        StateTry(str(state), float(began), _optional(failed), int(restarts))
+        for state, began, failed, restarts in json.loads(text)
+    ]
 
 
 def _optional(value: object) -> Optional[float]:
     return None if value is None else float(str(value))
-
-

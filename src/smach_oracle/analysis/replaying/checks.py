@@ -1,4 +1,5 @@
 """Holds a replay against the record that it follows."""
+
 from typing import Callable, List, Optional, Sequence
 
 from smach_oracle.oracle.records import facts
@@ -27,7 +28,7 @@ def beginnings(trials: Sequence[Sequence[Event]], begin: Callable[[], Replay]) -
         # the last one that was found may have begun earlier than its first failures tell
         for first in range(number, found[-2] if len(found) > 1 else 0, -1):
             own = begin()
-            if all(_follow(own, each) is None for each in trials[first:number + 1]):
+            if all(_follow(own, each) is None for each in trials[first : number + 1]):
                 found = [each for each in found if each < first] + [first]
                 break
         else:
@@ -69,10 +70,14 @@ def _check_rate(own: Replay, event: Event) -> None:
         raise BagError(
             '{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}. The '
             'state may have settings of its own, rates may be kept in a file, or trials may be '
-            'missing'.format(event.trial_id, event.state, event.rate, own.rate(event)))
+            'missing'.format(event.trial_id, event.state, event.rate, own.rate(event))
+        )
 
 
 def _check_decision(done: str, event: Event) -> None:
     if done not in (event.outcome, NOT_KNOWN):
-        raise BagError('{}: {}: it decided {}, where its own settings say {}'.format(
-            event.trial_id, event.state, event.outcome, done))
+        raise BagError(
+            '{}: {}: it decided {}, where its own settings say {}'.format(
+                event.trial_id, event.state, event.outcome, done
+            )
+        )

@@ -1,4 +1,5 @@
 """Follows recorded trials as an oracle does, and says what it would decide."""
+
 from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple
 
 from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, make_estimator
@@ -29,8 +30,9 @@ class _LearnedState:
     """An oracle's knowledge of a state: what it learns, and what it knows of this failure."""
 
     def __init__(self, settings: Mapping[str, Any]) -> None:
-        self.estimator = make_estimator(settings['estimator'], settings['memory'],
-                                        settings['prior'])
+        self.estimator = make_estimator(
+            settings['estimator'], settings['memory'], settings['prior']
+        )
         self.context: Optional[FailureContext] = None
         self.held_back = False  # the present question is about no failure
         self.recoveries = 0  # of this trial, as recorded
@@ -151,8 +153,10 @@ class Replay:
             self._visited(event, VisitResult.SUCCESS)
 
     def _visited(self, event: Event, result: VisitResult) -> None:
-        self._history(event).visited(Visit(event.state, event.outcome, result),
-                                          self._conditioned.get((event.path, event.state), False))
+        self._history(event).visited(
+            Visit(event.state, event.outcome, result),
+            self._conditioned.get((event.path, event.state), False),
+        )
 
     def _begin_visit(self, event: Event) -> None:
         """Note that a state is about to run."""
@@ -163,18 +167,25 @@ class Replay:
         state = self._state(event)
         if decided_by(event) in _OUTSIDE_POLICIES:
             return (Action.ASK if self._policy.asks else Action.GIVE_UP).value
-        failure_class = classify(state.estimator.rate, self._settings['moderate_from'],
-                                 self._settings['high_from'])
+        failure_class = classify(
+            state.estimator.rate, self._settings['moderate_from'], self._settings['high_from']
+        )
         preconditions = self._preconditions(event, state, failure_class)
         if preconditions is None or state.context is None:
             return NOT_KNOWN
-        actions = self._policy.may_do(Situation(
-            failure_class, preconditions, self._policy.is_continuous(state.context),
-            Past(state.recoveries, self._restarts)))
+        actions = self._policy.may_do(
+            Situation(
+                failure_class,
+                preconditions,
+                self._policy.is_continuous(state.context),
+                Past(state.recoveries, self._restarts),
+            )
+        )
         return actions[0].value if len(actions) == 1 else NOT_KNOWN  # it would be drawn
 
-    def _preconditions(self, event: Event, state: _LearnedState,
-                       failure_class: FailureClass) -> Optional[Preconditions]:
+    def _preconditions(
+        self, event: Event, state: _LearnedState, failure_class: FailureClass
+    ) -> Optional[Preconditions]:
         if self._conditioned.get((event.path, event.state)) is False:
             return Preconditions.NONE
         if not self._policy.runs_preconditions(failure_class):
@@ -186,9 +197,10 @@ class Replay:
 
 def policy_of(settings: Mapping[str, Any]) -> Policy:
     prefix = 'policy.'
-    return policy_named(settings['policy'], {key[len(prefix):]: value
-                                             for key, value in settings.items()
-                                             if key.startswith(prefix)})
+    return policy_named(
+        settings['policy'],
+        {key[len(prefix) :]: value for key, value in settings.items() if key.startswith(prefix)},
+    )
 
 
 def conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
@@ -201,7 +213,10 @@ def conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
         key = (event.path, event.state)
         if event.kind == EventKind.PRECONDITION_START:
             known[key] = True
-        elif (event.kind == EventKind.DECISION and decided_by(event) is Decider.POLICY
-              and policy.runs_preconditions(FailureClass(event.failure_class))):
+        elif (
+            event.kind == EventKind.DECISION
+            and decided_by(event) is Decider.POLICY
+            and policy.runs_preconditions(FailureClass(event.failure_class))
+        ):
             known.setdefault(key, False)
     return known

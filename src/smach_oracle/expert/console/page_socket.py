@@ -1,4 +1,5 @@
 """The socket of one page: sections go out as they change, commands come in."""
+
 import asyncio
 import itertools
 import json
@@ -46,9 +47,15 @@ TOO_OLD = 4002  # the page asks for the token by itself, and keeps what the pers
 class OpenPages:
     """The objects that the sockets of all pages share."""
 
-    def __init__(self, sections: PageSections, log: TrialLog, question_commands: QuestionCommands,
-                 teleoperation: Teleoperation, machine_hand: MachineHand,
-                 down_machine_hand: DownMachineHand) -> None:
+    def __init__(
+        self,
+        sections: PageSections,
+        log: TrialLog,
+        question_commands: QuestionCommands,
+        teleoperation: Teleoperation,
+        machine_hand: MachineHand,
+        down_machine_hand: DownMachineHand,
+    ) -> None:
         self.sections = sections
         self.log = log
         self.question_commands = question_commands
@@ -69,8 +76,11 @@ class OpenPages:
             return self.machine_hand.carry_out
         if command.name in STORED_COMMANDS:
             return self.down_machine_hand.carry_out
-        return (self.teleoperation.carry_out if command.name in DRIVING_COMMANDS
-                else self.question_commands.carry_out)
+        return (
+            self.teleoperation.carry_out
+            if command.name in DRIVING_COMMANDS
+            else self.question_commands.carry_out
+        )
 
     def close(self, session: sessions.BrowserSession) -> None:
         """Close the pages of a session that has ended.
@@ -86,7 +96,8 @@ class OpenPages:
         with self._trials_lock:
             version = self.log.version
             if version != self._trials_version and any(
-                    socket.lists.looks for socket in list(self.sockets)):
+                socket.lists.looks for socket in list(self.sockets)
+            ):
                 self._trials_version = version
                 self.sections.put('trials', self.log.overview())
 
@@ -107,8 +118,9 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self.session: Optional[sessions.BrowserSession] = None
         self._name = ''
         self._number = next(pages.numbers)
-        self._limits = SocketRateLimits(RateLimit(10.0, 40.0), RateLimit(70.0, 70.0),
-                                        RateLimit(0.5, 20.0))
+        self._limits = SocketRateLimits(
+            RateLimit(10.0, 40.0), RateLimit(70.0, 70.0), RateLimit(0.5, 20.0)
+        )
         self._sent_version = 0
         self._watched = ''
         self._watched_from = 0
@@ -142,7 +154,8 @@ class PageSocket(tornado.websocket.WebSocketHandler):
     def _has_room(self) -> bool:
         session = self.session
         own = [
-            each for each in self._pages.open
+            each
+            for each in self._pages.open
             if session and each.session and each.session.id == session.id
         ]
         return len(self._pages.open) < MOST_SOCKETS and len(own) < MOST_OF_A_SESSION
@@ -227,10 +240,14 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         return self.ws_connection is None or self.ws_connection.is_closing()
 
     def _bucket(self, message: Union[str, bytes]) -> RateLimit:
-        driving = isinstance(message,
-                             str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
-        return self._limits.driving if driving and self._pages.teleoperation.drives(
-            self._number) else self._limits.commands
+        driving = (
+            isinstance(message, str) and len(message) <= LONGEST_DRIVE and '"drive"' in message
+        )
+        return (
+            self._limits.driving
+            if driving and self._pages.teleoperation.drives(self._number)
+            else self._limits.commands
+        )
 
     def _at_once(self, command: PageCommand) -> Optional[CommandReply]:
         """Reply to what needs no robot's word, and to what is refused. Return None for the rest."""
@@ -239,8 +256,15 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if self._person is None:
             return CommandReply(False, 'say hello first')
         if not may(self._person.role, needed_role(command.name)):
-            return self._note(command, CommandReply(False, '{}s may not {} (sign in as {})'.format(
-                self._person.role, command.name.replace('_', ' '), needed_role(command.name))))
+            return self._note(
+                command,
+                CommandReply(
+                    False,
+                    '{}s may not {} (sign in as {})'.format(
+                        self._person.role, command.name.replace('_', ' '), needed_role(command.name)
+                    ),
+                ),
+            )
         if not self._person.expert and not _by_anybody(command):
             return self._note(command, CommandReply(False, NAME_FIRST))
         if command.name == 'view':
@@ -278,8 +302,9 @@ class PageSocket(tornado.websocket.WebSocketHandler):
     async def _work(self, person: Person, command: PageCommand) -> CommandReply:
         try:
             loop = asyncio.get_running_loop()
-            return await loop.run_in_executor(self._pages.workers, self._pages.worker(command),
-                                              command, person, self._number)
+            return await loop.run_in_executor(
+                self._pages.workers, self._pages.worker(command), command, person, self._number
+            )
         finally:
             if self._gone:  # while the robot was asked
                 self._pages.question_commands.leave(self._number)
@@ -287,8 +312,13 @@ class PageSocket(tornado.websocket.WebSocketHandler):
 
     def _hello(self, command: PageCommand) -> CommandReply:
         session, identity = self.session, self._access.identity(self.session)
-        if session is None or identity is None or not sessions.same(
-                command.arguments['xsrf'], sessions.xsrf_token(session, self._access.secret)):
+        if (
+            session is None
+            or identity is None
+            or not sessions.same(
+                command.arguments['xsrf'], sessions.xsrf_token(session, self._access.secret)
+            )
+        ):
             self._note(None, CommandReply(False, 'forged'))
             self.close(FORGED, 'forged')
             return CommandReply(False, 'forged')
@@ -303,18 +333,23 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         """Record in the audit a command that went no further than this socket."""
         session = self.session.short if self.session else ''
         person = self._person or Person(self.request.remote_ip or '', session, '', '')
-        arguments = {name: value
-                     for name, value in command.arguments.items()
-                     if name != 'xsrf'} if command else {}
-        self._access.audit.record(person, command.name if command else 'unknown', reply.ok,
-                              reply.message, arguments)
+        arguments = (
+            {name: value for name, value in command.arguments.items() if name != 'xsrf'}
+            if command
+            else {}
+        )
+        self._access.audit.record(
+            person, command.name if command else 'unknown', reply.ok, reply.message, arguments
+        )
         return reply
 
     def _reply(self, number: int, reply: CommandReply) -> None:
         answer = {'re': number, 'ok': reply.ok, 'message': reply.message}
         self._send(
-            json.dumps(answer if reply.data is None else dict(answer, data=reply.data),
-                       allow_nan=False))
+            json.dumps(
+                answer if reply.data is None else dict(answer, data=reply.data), allow_nan=False
+            )
+        )
 
     def push(self) -> None:
         """Send what has changed, unless the last batch is still on its way.
@@ -324,8 +359,11 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if self._writing or self._person is None:
             return
         version, changed = self._pages.sections.since(self._sent_version)
-        new = self._pages.log.events(self._watched, self._watched_from,
-                                     MOST_EVENTS_AT_ONCE) if self._watched else []
+        new = (
+            self._pages.log.events(self._watched, self._watched_from, MOST_EVENTS_AT_ONCE)
+            if self._watched
+            else []
+        )
         lists = self.lists.changes(self._pages.sections.lists)
         if not changed and not new and not lists:
             return
@@ -334,13 +372,18 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             if not self._sent_version:
                 # of an earlier connection the page may know sections that are gone
                 parts.append('"all":true')
-            parts.append('"sections":{%s}' % ','.join('{}:{}'.format(json.dumps(name), text)
-                                                      for name, text in changed))
+            parts.append(
+                '"sections":{%s}'
+                % ','.join('{}:{}'.format(json.dumps(name), text) for name, text in changed)
+            )
         if lists:
             parts.append('"lists":' + lists)
         if new:
-            parts.append('"events":{{"trial":{},"from":{},"events":[{}]}}'.format(
-                json.dumps(self._watched), self._watched_from, ','.join(new)))
+            parts.append(
+                '"events":{{"trial":{},"from":{},"events":[{}]}}'.format(
+                    json.dumps(self._watched), self._watched_from, ','.join(new)
+                )
+            )
         self._sent_version = version
         self._watched_from += len(new)
         self._writing = True
@@ -357,6 +400,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
                 pass
             if done is not None:
                 done()
+
         asyncio.get_running_loop().create_task(send())
 
 

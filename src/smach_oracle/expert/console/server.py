@@ -1,4 +1,5 @@
 """The node `expert_console`: a web page to watch robots and to answer their questions."""
+
 import secrets
 import socket
 import ssl
@@ -59,31 +60,47 @@ PING_S = 5.0
 PONG_LIMIT_S = 15.0
 
 
-def make_app(access: AccessControl, pages: OpenPages, sensors: SensorStreams,
-             history: HistoryRequests,
-             ages: Optional[ImageAges] = None) -> tornado.web.Application:
+def make_app(
+    access: AccessControl,
+    pages: OpenPages,
+    sensors: SensorStreams,
+    history: HistoryRequests,
+    ages: Optional[ImageAges] = None,
+) -> tornado.web.Application:
     """Return the web application. Its handlers run in the thread of the loop that serves it."""
     shared = SensorRequests(sensors, ages)
     static = {'path': str(STATIC)}
     return tornado.web.Application(
-        [(r'/session', SessionHandler, {'close': pages.close}),
-         (r'/socket', PageSocket, {'pages': pages}),
-         (r'/sample/([0-9]{1,9})', SampleHandler, {'shared': shared}),
-         (r'/model/([0-9]{1,9})', RobotAppearanceHandler, {'shared': shared}),
-         (r'/recorded/([0-9]{1,9})', RecordedHandler, {'shared': history}),
-         (r'/image/([0-9]{1,9})', QuestionImageHandler, {'shared': history}),
-         (r'/()', PageFileHandler, dict(static, default_filename='index.html')),
-         (r'/static/(.+)', PageFileHandler, static)],
-        access=access, default_handler_class=NotFoundHandler, cookie_secret=access.secret,
-        websocket_ping_interval=PING_S, websocket_ping_timeout=PONG_LIMIT_S,
-        websocket_max_message_size=MOST_BYTES, log_function=_log_request)
+        [
+            (r'/session', SessionHandler, {'close': pages.close}),
+            (r'/socket', PageSocket, {'pages': pages}),
+            (r'/sample/([0-9]{1,9})', SampleHandler, {'shared': shared}),
+            (r'/model/([0-9]{1,9})', RobotAppearanceHandler, {'shared': shared}),
+            (r'/recorded/([0-9]{1,9})', RecordedHandler, {'shared': history}),
+            (r'/image/([0-9]{1,9})', QuestionImageHandler, {'shared': history}),
+            (r'/()', PageFileHandler, dict(static, default_filename='index.html')),
+            (r'/static/(.+)', PageFileHandler, static),
+        ],
+        access=access,
+        default_handler_class=NotFoundHandler,
+        cookie_secret=access.secret,
+        websocket_ping_interval=PING_S,
+        websocket_ping_timeout=PONG_LIMIT_S,
+        websocket_max_message_size=MOST_BYTES,
+        log_function=_log_request,
+    )
 
 
 def _log_request(handler: tornado.web.RequestHandler) -> None:
     status = handler.get_status()
     log = rospy.logdebug if status < 400 else rospy.logwarn
-    log('%d %s %r from %s', status, handler.request.method, handler.request.path[:100],
-        handler.request.remote_ip)
+    log(
+        '%d %s %r from %s',
+        status,
+        handler.request.method,
+        handler.request.path[:100],
+        handler.request.remote_ip,
+    )
 
 
 class Console:
@@ -105,38 +122,61 @@ class Console:
         layouts = LayoutWorker()
         self._clocks = RobotClocks()
         stop_calls = StopCalls()
-        self._robots = FollowedRobots(self._sections, self._log, layouts, self._clocks,
-                                      stop_calls.look_up)
+        self._robots = FollowedRobots(
+            self._sections, self._log, layouts, self._clocks, stop_calls.look_up
+        )
         self._down = DownMachines(settings.stores, self._sections)
         self._front_end = FrontEnd('expert_console')
         self._discovery = SensorDiscovery(self._sections, self._front_end, settings.cameras)
         self._preconditions = PreconditionStatuses()
         files = ImageStore()
-        self._question_images = QuestionImages(files, self._discovery.sensors,
-                                                self._discovery.cameras)
+        self._question_images = QuestionImages(
+            files, self._discovery.sensors, self._discovery.cameras
+        )
         self._catalogue = BagCatalogue(settings.bags, self._sections)
         self._teleoperation = Teleoperation(self._sections, self._front_end, self._audit)
         master = start_master_watch()
-        self._last_heard = LastHeard(self._front_end, NodePulse(), self._robots.nodes,
-                                     lambda: master.heard_s, self._clocks)
-        questions = QuestionCommands(self._front_end, self._audit,
-                                     InterfaceCommands(self._teleoperation.is_interface).commands,
-                                     self._last_heard.refusal)
-        self._question_sections = QuestionSections(self._front_end, self._log,
-                                                   questions.sessions.session_of)
-        self._machine_hand = MachineHand(self._robots.holdable, self._audit,
-                                         self._last_heard.robot_refusal, stop_calls)
-        self._pages = OpenPages(self._sections, self._log, questions, self._teleoperation,
-                                self._machine_hand,
-                                DownMachineHand(self._down, self._audit))
+        self._last_heard = LastHeard(
+            self._front_end, NodePulse(), self._robots.nodes, lambda: master.heard_s, self._clocks
+        )
+        questions = QuestionCommands(
+            self._front_end,
+            self._audit,
+            InterfaceCommands(self._teleoperation.is_interface).commands,
+            self._last_heard.refusal,
+        )
+        self._question_sections = QuestionSections(
+            self._front_end, self._log, questions.sessions.session_of
+        )
+        self._machine_hand = MachineHand(
+            self._robots.holdable, self._audit, self._last_heard.robot_refusal, stop_calls
+        )
+        self._pages = OpenPages(
+            self._sections,
+            self._log,
+            questions,
+            self._teleoperation,
+            self._machine_hand,
+            DownMachineHand(self._down, self._audit),
+        )
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         access = AccessControl(settings._replace(port=port), secret, self._audit)
-        app = make_app(access, self._pages, self._discovery.sensors,
-                       HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files),
-                       ImageAges(self._clocks, self._discovery.cameras))
-        server = LimitedServer(app, ssl_options=tls, max_body_size=MOST_BYTES,
-                               max_header_size=16384, body_timeout=10.0,
-                               idle_connection_timeout=60.0, max_buffer_size=4 * MOST_BYTES)
+        app = make_app(
+            access,
+            self._pages,
+            self._discovery.sensors,
+            HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files),
+            ImageAges(self._clocks, self._discovery.cameras),
+        )
+        server = LimitedServer(
+            app,
+            ssl_options=tls,
+            max_body_size=MOST_BYTES,
+            max_header_size=16384,
+            body_timeout=10.0,
+            idle_connection_timeout=60.0,
+            max_buffer_size=4 * MOST_BYTES,
+        )
         server.connections = access.connections
         server.add_sockets(sockets)
         self._overview_s = -OVERVIEW_PERIOD_S
@@ -167,7 +207,8 @@ class Console:
             self._audit.prepare(self._front_end.servers)
             self._pages.write_trials()
             self._discovery.cameras.write_sections(
-                self._sections, {*self._robots.nodes(), *(each.goal.robot for each in questions)})
+                self._sections, {*self._robots.nodes(), *(each.goal.robot for each in questions)}
+            )
 
 
 def _listen(settings: ConsoleSettings) -> List[socket.socket]:
@@ -175,8 +216,10 @@ def _listen(settings: ConsoleSettings) -> List[socket.socket]:
         return tornado.netutil.bind_sockets(settings.port, settings.address)
     except OSError as err:
         raise SettingsError(
-            '~address, ~port', '{}, {}'.format(settings.address, settings.port),
-            'an address of this machine and a port that is free ({})'.format(err)) from err
+            '~address, ~port',
+            '{}, {}'.format(settings.address, settings.port),
+            'an address of this machine and a port that is free ({})'.format(err),
+        ) from err
 
 
 def tls_context(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
@@ -193,22 +236,30 @@ def tls_context(settings: ConsoleSettings) -> Optional[ssl.SSLContext]:
             with open(path, 'rb'):
                 pass
         except OSError as err:
-            raise SettingsError(name, path,
-                              'a PEM file that can be read ({})'.format(err.strerror)) from err
+            raise SettingsError(
+                name, path, 'a PEM file that can be read ({})'.format(err.strerror)
+            ) from err
     context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     try:
         context.load_cert_chain(settings.certificate, settings.private_key, _ask_nobody)
     except ssl.SSLError as err:
-        raise SettingsError('~certificate, ~private_key', ', '.join(path for _, path in files),
-                          'a certificate and the key that it was made with, both PEM ({})'.format(
-                              err.reason or err)) from err
+        raise SettingsError(
+            '~certificate, ~private_key',
+            ', '.join(path for _, path in files),
+            'a certificate and the key that it was made with, both PEM ({})'.format(
+                err.reason or err
+            ),
+        ) from err
     return context
 
 
 def _ask_nobody() -> str:
-    raise SettingsError('~private_key', 'a key with a passphrase',
-                      'one without, in a file that its owner alone may read')
+    raise SettingsError(
+        '~private_key',
+        'a key with a passphrase',
+        'one without, in a file that its owner alone may read',
+    )
 
 
 def _shown(address: str) -> str:

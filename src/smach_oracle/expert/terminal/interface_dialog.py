@@ -1,4 +1,5 @@
 """The terminal's conversation while an interface runs that the expert has chosen."""
+
 import time
 from typing import Callable, List, Optional, Sequence
 
@@ -17,9 +18,13 @@ SHOWN_LINES = 20
 class InterfaceDialog:
     """Shows what the interface prints and how it stands, and ends it: finished or given up."""
 
-    def __init__(self, interface: RunningInterface, prompts: Prompts,
-                 say: Callable[[str, str], None],
-                 find: Callable[[str], Optional[ListedQuestion]]) -> None:
+    def __init__(
+        self,
+        interface: RunningInterface,
+        prompts: Prompts,
+        say: Callable[[str, str], None],
+        find: Callable[[str], Optional[ListedQuestion]],
+    ) -> None:
         """`find` returns an open question by its key."""
         self._interface = interface
         self._prompts = prompts
@@ -31,10 +36,15 @@ class InterfaceDialog:
     def run(self, listed: ListedQuestion) -> None:
         """Talk until the interface has ended, or the expert leaves it to itself."""
         outcomes = [choice.outcome for choice in listed.goal.supersede_outcomes]
-        choices: List[Choice] = [('f{}'.format(number), 'finish with ' + outcome)
-                                 for number, outcome in enumerate(outcomes, 1)]
-        choices += [('g', 'give up: the oracle asks again'), ('o', 'show what it prints'),
-                    ('l', 'leave it to itself')]
+        choices: List[Choice] = [
+            ('f{}'.format(number), 'finish with ' + outcome)
+            for number, outcome in enumerate(outcomes, 1)
+        ]
+        choices += [
+            ('g', 'give up: the oracle asks again'),
+            ('o', 'show what it prints'),
+            ('l', 'leave it to itself'),
+        ]
         for key, meaning in choices:
             self._say('  {:3} {}'.format(key, clean(meaning)), 'cyan')
         try:
@@ -53,11 +63,15 @@ class InterfaceDialog:
                 self._show_output()
             elif line == 'g':
                 return self._ended(
-                    self._interface.give_up(self._ask('  reason (optional): ', listed)))
+                    self._interface.give_up(self._ask('  reason (optional): ', listed))
+                )
             elif number.isdigit() and 1 <= int(number) <= len(outcomes):
                 return self._ended(
-                    self._interface.finish(outcomes[int(number) - 1],
-                                           self._ask('  for the record (optional): ', listed)))
+                    self._interface.finish(
+                        outcomes[int(number) - 1],
+                        self._ask('  for the record (optional): ', listed),
+                    )
+                )
             elif line:
                 allowed = 'f1 to f{}, g, o, l'.format(len(outcomes))
                 self._say('{!r} is not one of {}'.format(line, allowed), 'red')
@@ -75,8 +89,9 @@ class InterfaceDialog:
         return not why_not
 
     def _ask(self, message: str, listed: ListedQuestion, choices: Sequence[Choice] = ()) -> str:
-        return self._prompts.ask(message, self._interface.status_line,
-                                 lambda: self._why_to_stop(listed), choices)
+        return self._prompts.ask(
+            message, self._interface.status_line, lambda: self._why_to_stop(listed), choices
+        )
 
     def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
         self._interface.follow_hand()
@@ -91,4 +106,5 @@ class InterfaceDialog:
         lines = self._interface.lines()[-SHOWN_LINES:]
         self._say(
             '\n'.join('  | ' + line for line in lines) if lines else '  It has printed nothing.',
-            'dim')
+            'dim',
+        )

@@ -1,4 +1,5 @@
 """The steps of a robot after an answer, from its oracle/events."""
+
 import queue
 import time
 from typing import Iterator
@@ -7,11 +8,20 @@ from smach_oracle.msg import OracleEvent
 
 from ..robot_topics import RobotTopic
 
-_SHOWN_KINDS = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
-                OracleEvent.INTERFACE_START, OracleEvent.WARNING, OracleEvent.STATE_START,
-                OracleEvent.TRIAL_END, OracleEvent.HEALTH_WAIT_START,
-                OracleEvent.HEALTH_WAIT_END, OracleEvent.HOLD_START, OracleEvent.HOLD_END,
-                OracleEvent.SENT)
+_SHOWN_KINDS = (
+    OracleEvent.JUMP,
+    OracleEvent.SUPERSEDE,
+    OracleEvent.GIVE_UP,
+    OracleEvent.INTERFACE_START,
+    OracleEvent.WARNING,
+    OracleEvent.STATE_START,
+    OracleEvent.TRIAL_END,
+    OracleEvent.HEALTH_WAIT_START,
+    OracleEvent.HEALTH_WAIT_END,
+    OracleEvent.HOLD_START,
+    OracleEvent.HOLD_END,
+    OracleEvent.SENT,
+)
 _LAST_KINDS = (OracleEvent.STATE_START, OracleEvent.TRIAL_END, OracleEvent.INTERFACE_START)
 
 

@@ -3,6 +3,7 @@
 Calls go to all robots at once: one that hangs delays no other. `pause` and `preempt` need no
 master. They reach the robots that it has known before.
 """
+
 from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import rosgraph
@@ -70,24 +71,31 @@ def _autonomy(by: str, pattern: str, level: str = '') -> SetAutonomyRequest:
 
 
 _WORDS: Dict[str, _Word] = {
-    'pause': _Word('hold at the next state', 1, 0, 'pause', CommandMachine, True, _machine,
-                   stops=True),
+    'pause': _Word(
+        'hold at the next state', 1, 0, 'pause', CommandMachine, True, _machine, stops=True
+    ),
     'resume': _Word('lift the pause', 1, 0, 'resume', CommandMachine, False, _machine),
     'step': _Word('enter one state [PATH]', 1, 0, 'step', CommandMachine, False, _machine),
-    'confirm': _Word('let a state be entered [PATH]', 1, 0, 'confirm', CommandMachine, False,
-                     _machine),
-    'preempt': _Word('stop the machine', 1, 0, 'preempt', CommandMachine, True, _machine,
-                     stops=True),
+    'confirm': _Word(
+        'let a state be entered [PATH]', 1, 0, 'confirm', CommandMachine, False, _machine
+    ),
+    'preempt': _Word(
+        'stop the machine', 1, 0, 'preempt', CommandMachine, True, _machine, stops=True
+    ),
     'goto': _Word('PATH STATE [repeat]: go there', 3, 2, 'go_to', SendMachine, False, _send),
-    'break': _Word('PATTERN: pause before these states', 1, 1, 'breakpoint', SetBreakpoint, False,
-                   _breakpoint),
-    'unbreak': _Word('PATTERN: not any more', 1, 1, 'breakpoint', SetBreakpoint, False,
-                     _no_breakpoint),
-    'autonomy': _Word('PATTERN run, announce or confirm', 2, 1, 'autonomy', SetAutonomy, False,
-                      _autonomy),
+    'break': _Word(
+        'PATTERN: pause before these states', 1, 1, 'breakpoint', SetBreakpoint, False, _breakpoint
+    ),
+    'unbreak': _Word(
+        'PATTERN: not any more', 1, 1, 'breakpoint', SetBreakpoint, False, _no_breakpoint
+    ),
+    'autonomy': _Word(
+        'PATTERN run, announce or confirm', 2, 1, 'autonomy', SetAutonomy, False, _autonomy
+    ),
 }
 OPERATOR_WORDS = [(word, each.meaning) for word, each in _WORDS.items()] + [
-    ('status', 'what runs, what waits')]
+    ('status', 'what runs, what waits')
+]
 
 
 class _UsageError(Exception):
@@ -101,18 +109,23 @@ def robots_of_master() -> Sequence[str]:
     """
     try:
         published = outside_main_thread(
-            lambda: timed_master(_MASTER_LIMIT_S).getPublishedTopics(''))
+            lambda: timed_master(_MASTER_LIMIT_S).getPublishedTopics('')
+        )
     except (OSError, rosgraph.MasterException) as err:
         raise ServerGoneError('the master does not answer: {}'.format(err)) from err
-    return sorted(topic[:-len(TOPIC)] for topic, kind in published
-                  if kind == ControlStatus._type and topic.endswith(TOPIC))
+    return sorted(
+        topic[: -len(TOPIC)]
+        for topic, kind in published
+        if kind == ControlStatus._type and topic.endswith(TOPIC)
+    )
 
 
 class OperatorCommands:
     """Carries out the lines of one expert."""
 
-    def __init__(self, expert: str, robots: Robots = robots_of_master,
-                 stop_calls: Optional[StopCalls] = None) -> None:
+    def __init__(
+        self, expert: str, robots: Robots = robots_of_master, stop_calls: Optional[StopCalls] = None
+    ) -> None:
         """`expert`: the name under which to command."""
         self._expert = expert
         self._robots = robots
@@ -125,8 +138,11 @@ class OperatorCommands:
         :raises ServerGoneError: where the master does not answer.
         """
         listed = self._robots()
-        self._unlisted = {robot: 0 if robot in listed else looks + 1 for robot, looks in {
-            **dict.fromkeys(listed, 0), **self._unlisted}.items() if looks < _FORGET_LOOKS}
+        self._unlisted = {
+            robot: 0 if robot in listed else looks + 1
+            for robot, looks in {**dict.fromkeys(listed, 0), **self._unlisted}.items()
+            if looks < _FORGET_LOOKS
+        }
         self._stop_calls.look_up(listed)
 
     def carry_out(self, line: str) -> Optional[Told]:
@@ -163,14 +179,24 @@ class OperatorCommands:
                 raise
             return sorted(known)
 
-    def _call(self, robots: Sequence[str], word: _Word, words: List[str]) -> Iterator[
-            Tuple[str, str]]:
+    def _call(
+        self, robots: Sequence[str], word: _Word, words: List[str]
+    ) -> Iterator[Tuple[str, str]]:
         if not word.fewest <= len(words) <= word.most:
             raise _UsageError(word.meaning)
         request = word.request(self._expert, *words)
-        calls = [(robot, ServiceCall('{}/oracle/{}'.format(robot, word.service), word.kind,
-                                     request, self._stop_calls.address_of(robot)
-                                     if word.stops else '')) for robot in robots]
+        calls = [
+            (
+                robot,
+                ServiceCall(
+                    '{}/oracle/{}'.format(robot, word.service),
+                    word.kind,
+                    request,
+                    self._stop_calls.address_of(robot) if word.stops else '',
+                ),
+            )
+            for robot in robots
+        ]
         for robot, call in calls:
             try:
                 response = call.result(CALL_LIMIT_S)
@@ -189,17 +215,35 @@ def _status_of(robot: str) -> Told:
 
 def machine_lines(robot: str, machine: MachineControl) -> Told:
     """Return how a machine stands, in lines."""
-    how = 'paused by ' + (machine.paused_by or 'somebody') if machine.paused else (
-        'runs' if machine.running else 'does not run')
+    how = (
+        'paused by ' + (machine.paused_by or 'somebody')
+        if machine.paused
+        else ('runs' if machine.running else 'does not run')
+    )
     lines = [('  {} {}: {}'.format(robot, machine.path, how), 'bold')]
     for each in machine.active:
-        waits = ' waits ({}{})'.format(
-            each.held_by, ', to be confirmed' if each.waits_for_confirmation
-            and each.held_by != 'confirm' else '') if each.held_by else ' runs'
-        lines.append(('    {}/{}{}'.format(each.path, each.state, waits),
-                      'yellow' if each.held_by else 'dim'))
+        waits = (
+            ' waits ({}{})'.format(
+                each.held_by,
+                ', to be confirmed'
+                if each.waits_for_confirmation and each.held_by != 'confirm'
+                else '',
+            )
+            if each.held_by
+            else ' runs'
+        )
+        lines.append(
+            (
+                '    {}/{}{}'.format(each.path, each.state, waits),
+                'yellow' if each.held_by else 'dim',
+            )
+        )
     lines += [('    breakpoint {}'.format(each), 'dim') for each in machine.breakpoints]
-    lines += [('    autonomy {} {}'.format(pattern, level), 'dim') for pattern, level in zip(
-        machine.autonomy_patterns, machine.autonomy_levels)]
-    return lines + [('    {} is to go to {}'.format(path, state), 'dim') for path, state in zip(
-        machine.jump_containers, machine.jump_states)]
+    lines += [
+        ('    autonomy {} {}'.format(pattern, level), 'dim')
+        for pattern, level in zip(machine.autonomy_patterns, machine.autonomy_levels)
+    ]
+    return lines + [
+        ('    {} is to go to {}'.format(path, state), 'dim')
+        for path, state in zip(machine.jump_containers, machine.jump_states)
+    ]

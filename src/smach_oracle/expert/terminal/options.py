@@ -1,4 +1,5 @@
 """The answers that an expert may give to a question, and how they are typed. Pure."""
+
 from typing import List, NamedTuple
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, StateChoice
@@ -20,24 +21,36 @@ class AnswerOption(NamedTuple):
 
     def decision(self) -> ExpertDecision:
         """Return a decision without outputs or reason."""
-        field = {ExpertDecision.GOTO: 'state',
-                 ExpertDecision.INTERFACE: 'interface'}.get(self.kind, 'outcome')
+        field = {ExpertDecision.GOTO: 'state', ExpertDecision.INTERFACE: 'interface'}.get(
+            self.kind, 'outcome'
+        )
         return ExpertDecision(kind=self.kind, container=self.container, **{field: self.name})
 
 
 def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
     """Return all possible answers, in the order in which they are shown."""
     found = [
-        AnswerOption(str(number), _goto_words(goal, choice), ExpertDecision.GOTO,
-                     choice.state, choice.blocked, choice.container)
+        AnswerOption(
+            str(number),
+            _goto_words(goal, choice),
+            ExpertDecision.GOTO,
+            choice.state,
+            choice.blocked,
+            choice.container,
+        )
         for number, choice in enumerate(goal.choices, 1)
     ]
     states = {choice.state for choice in goal.choices if not choice.container}
     # first those with which the machine goes on: s1 is then seldom the failure itself
     outcomes = sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)
     found += [
-        AnswerOption('s{}'.format(number), 'supersede ' + choice.outcome, ExpertDecision.SUPERSEDE,
-               choice.outcome) for number, choice in enumerate(outcomes, 1)
+        AnswerOption(
+            's{}'.format(number),
+            'supersede ' + choice.outcome,
+            ExpertDecision.SUPERSEDE,
+            choice.outcome,
+        )
+        for number, choice in enumerate(outcomes, 1)
     ]
     found.append(AnswerOption('g', 'give_up', ExpertDecision.GIVE_UP, ''))
     found += [
@@ -45,13 +58,20 @@ def options(goal: ExpertQueryGoal) -> List[AnswerOption]:
         for number, outcome in enumerate(goal.give_up_outcomes, 1)
     ]
     found += [
-        AnswerOption('g{}'.format(number), 'give_up {}/{}'.format(each.container, each.outcome),
-                     ExpertDecision.GIVE_UP, each.outcome, container=each.container)
+        AnswerOption(
+            'g{}'.format(number),
+            'give_up {}/{}'.format(each.container, each.outcome),
+            ExpertDecision.GIVE_UP,
+            each.outcome,
+            container=each.container,
+        )
         for number, each in enumerate(goal.give_up_above, 1 + len(goal.give_up_outcomes))
     ]
     found += [
-        AnswerOption('i{}'.format(number), 'interface ' + offer.name, ExpertDecision.INTERFACE,
-               offer.name) for number, offer in enumerate(goal.interfaces, 1)
+        AnswerOption(
+            'i{}'.format(number), 'interface ' + offer.name, ExpertDecision.INTERFACE, offer.name
+        )
+        for number, offer in enumerate(goal.interfaces, 1)
     ]
     return found
 
@@ -81,23 +101,34 @@ def choose(text: str, available: List[AnswerOption]) -> AnswerOption:
     typed = ' '.join(text.split())
     matching = _matching(typed, available)
     if not matching:
-        raise AnswerError('{!r} is no answer here; allowed: {}'.format(
-            typed, ', '.join(option.key for option in available if not option.blocked)))
+        raise AnswerError(
+            '{!r} is no answer here; allowed: {}'.format(
+                typed, ', '.join(option.key for option in available if not option.blocked)
+            )
+        )
     if len(matching) > 1:
-        raise AnswerError('{!r} could mean {}'.format(
-            typed, names(['{} ({})'.format(option.words, option.key) for option in matching])))
+        raise AnswerError(
+            '{!r} could mean {}'.format(
+                typed, names(['{} ({})'.format(option.words, option.key) for option in matching])
+            )
+        )
     if matching[0].blocked:
-        raise AnswerError('{} cannot be entered now: {}'.format(matching[0].name,
-                                                                matching[0].blocked))
+        raise AnswerError(
+            '{} cannot be entered now: {}'.format(matching[0].name, matching[0].blocked)
+        )
     return matching[0]
 
 
 def _matching(typed: str, available: List[AnswerOption]) -> List[AnswerOption]:
-    for fits in (lambda option: option.key == typed.lower(), lambda option: option.words == typed,
-                 lambda option: typed != '' and option.name == typed and not option.container,
-                 lambda option: typed != '' and typed in (
-                     option.name, '{}/{}'.format(option.container, option.name)),
-                 lambda option: typed.lower() in ('s', 'i') and option.key[0] == typed.lower()):
+    for fits in (
+        lambda option: option.key == typed.lower(),
+        lambda option: option.words == typed,
+        lambda option: typed != '' and option.name == typed and not option.container,
+        lambda option: (
+            typed != '' and typed in (option.name, '{}/{}'.format(option.container, option.name))
+        ),
+        lambda option: typed.lower() in ('s', 'i') and option.key[0] == typed.lower(),
+    ):
         matching = [option for option in available if fits(option)]
         if matching:
             return matching

@@ -1,4 +1,5 @@
 """The precondition status of a question's choices, as its robot publishes it, in words."""
+
 import time
 from typing import List, Optional, Tuple
 
@@ -8,8 +9,10 @@ from ..robot_topics import RobotTopic
 from ..wording import clean
 from .text import duration
 
-_WORDS = {PreconditionCheck.HOLDS: ('✓', 'holds', 'green'),
-          PreconditionCheck.DOES_NOT_HOLD: ('✗', 'does not hold', 'bold red')}
+_WORDS = {
+    PreconditionCheck.HOLDS: ('✓', 'holds', 'green'),
+    PreconditionCheck.DOES_NOT_HOLD: ('✗', 'does not hold', 'bold red'),
+}
 _UNKNOWN = ('?', 'unknown', 'yellow')
 Line = Tuple[str, str]  # text, style
 
@@ -22,8 +25,7 @@ class PreconditionStatusListener:
         self._query_id = query_id
         self._newest: Optional[PreconditionChecks] = None
         self._heard_s = 0.0
-        self._listener = RobotTopic(robot, '/oracle/preconditions', PreconditionChecks,
-                                    self.take)
+        self._listener = RobotTopic(robot, '/oracle/preconditions', PreconditionChecks, self.take)
 
     def take(self, message: PreconditionChecks) -> None:
         """Note that the robot has checked them."""
@@ -49,5 +51,6 @@ def _line(check: PreconditionCheck, since_s: float) -> Line:
     sign, word, style = _WORDS.get(check.result, _UNKNOWN)
     age = ' ({} ago)'.format(duration(check.age + since_s)) if check.age >= 0 else ''
     why = ': ' + clean(check.text) if check.text and check.result != PreconditionCheck.HOLDS else ''
-    return '  {} {} of {} {}{}{}'.format(sign, clean(check.name), clean(check.state), word, age,
-                                         why), style
+    return '  {} {} of {} {}{}{}'.format(
+        sign, clean(check.name), clean(check.state), word, age, why
+    ), style

@@ -2,6 +2,7 @@
 
 A prompt ends when the thing that it asks about is over.
 """
+
 import asyncio
 from typing import Callable, List, Optional, Sequence, Tuple
 
@@ -38,13 +39,20 @@ class PromptInterrupted(Exception):
 class Prompts:
     """Asks for lines: `toolbar` gives the text below them, `why_to_stop` a reason to end."""
 
-    def __init__(self, terminal_input: Optional[Input] = None,
-                 terminal_output: Optional[Output] = None) -> None:
+    def __init__(
+        self, terminal_input: Optional[Input] = None, terminal_output: Optional[Output] = None
+    ) -> None:
         self._input = terminal_input
         self._output = terminal_output
 
-    def ask(self, message: str, toolbar: Callable[[], str], why_to_stop: Reason,
-            choices: Sequence[Choice] = (), validator: Optional[Validator] = None) -> str:
+    def ask(
+        self,
+        message: str,
+        toolbar: Callable[[], str],
+        why_to_stop: Reason,
+        choices: Sequence[Choice] = (),
+        validator: Optional[Validator] = None,
+    ) -> str:
         """Return one line, stripped.
 
         :raises PromptInterrupted: as soon as `why_to_stop` gives a reason.
@@ -53,13 +61,18 @@ class Prompts:
         """
         # one session a line: what one prompt is given would otherwise stay for the next
         session: 'PromptSession[str]' = PromptSession(
-            input=self._input, output=self._output, style=_STYLE, refresh_interval=0.5)
+            input=self._input, output=self._output, style=_STYLE, refresh_interval=0.5
+        )
         return session.prompt(
             [('class:prompt', message)],
             bottom_toolbar=lambda: [('class:bottom-toolbar', ' ' + clean(toolbar()))],
-            completer=_Choices(choices), complete_while_typing=bool(choices), validator=validator,
-            validate_while_typing=False, reserve_space_for_menu=6 if choices else 0,
-            pre_run=lambda: _watch(session, why_to_stop)).strip()
+            completer=_Choices(choices),
+            complete_while_typing=bool(choices),
+            validator=validator,
+            validate_while_typing=False,
+            reserve_space_for_menu=6 if choices else 0,
+            pre_run=lambda: _watch(session, why_to_stop),
+        ).strip()
 
 
 def _watch(session: 'PromptSession[str]', why_to_stop: Reason) -> None:
@@ -89,8 +102,9 @@ class JsonValidator(Validator):
             load_json(text)
         except (ValueError, RecursionError) as err:
             position = getattr(err, 'pos', len(text))
-            raise ValidationError(position,
-                                  'not JSON: {}; strings need "quotes"'.format(err)) from err
+            raise ValidationError(
+                position, 'not JSON: {}; strings need "quotes"'.format(err)
+            ) from err
 
 
 class _Choices(Completer):
@@ -99,18 +113,25 @@ class _Choices(Completer):
     def __init__(self, choices: Sequence[Choice]) -> None:
         self._choices: List[Choice] = list(choices)
 
-    def get_completions(self, document: Document,
-                        complete_event: CompleteEvent) -> List[Completion]:
+    def get_completions(
+        self, document: Document, complete_event: CompleteEvent
+    ) -> List[Completion]:
         """Return all choices that fit: by the beginning of the key, or of a word of the meaning."""
         typed = document.text_before_cursor.lstrip().lower()
         return [
-            Completion(key, -len(document.text_before_cursor), display=clean(key),
-                       display_meta=clean(meaning)) for key, meaning in self._choices
+            Completion(
+                key,
+                -len(document.text_before_cursor),
+                display=clean(key),
+                display_meta=clean(meaning),
+            )
+            for key, meaning in self._choices
             if _fits(typed, key, meaning)
         ]
 
 
 def _fits(typed: str, key: str, meaning: str) -> bool:
     words = meaning.lower().split()
-    return key.lower().startswith(typed) or any(' '.join(words[start:]).startswith(typed)
-                                                for start in range(len(words)))
+    return key.lower().startswith(typed) or any(
+        ' '.join(words[start:]).startswith(typed) for start in range(len(words))
+    )

@@ -2,6 +2,7 @@
 
 Everything that a robot has sent goes through `clean` into Text objects, never through markup.
 """
+
 import math
 from typing import Iterable, List, Sequence
 
@@ -26,8 +27,12 @@ from ..wording import clean, failure_words, still_runs
 from .options import AnswerOption, is_wait_on, options
 from .text import CLASS_NAMES, duration, rate_bar, rate_colour
 
-_VISITS = {VisitedState.SUCCESS: ('✓', '#2e9e3f'), VisitedState.FAILURE: ('✗', '#cc3333'),
-           VisitedState.SUPERSEDED: ('☞', '#3b7dd8'), VisitedState.PREEMPTED: ('⏹', 'dim')}
+_VISITS = {
+    VisitedState.SUCCESS: ('✓', '#2e9e3f'),
+    VisitedState.FAILURE: ('✗', '#cc3333'),
+    VisitedState.SUPERSEDED: ('☞', '#3b7dd8'),
+    VisitedState.PREEMPTED: ('⏹', 'dim'),
+}
 _SHOWN_VISITS = 12
 _SHOWN_LINES = 12
 _FIRST_LINES = 3
@@ -42,11 +47,17 @@ def question(goal: ExpertQueryGoal, age_s: float = 0.0) -> RenderableType:
     found = options(goal)
     parts += [_heading('Go to'), _states(goal, found)]
     if still_runs(goal):
-        parts.append(Text('{} is preempted by every answer but to wait on'.format(
-            clean(goal.failed_state)), 'dim'))
+        parts.append(
+            Text(
+                '{} is preempted by every answer but to wait on'.format(clean(goal.failed_state)),
+                'dim',
+            )
+        )
     if goal.supersede_outcomes:
-        parts += [_heading('Supersede {} (you did its work)'.format(clean(goal.failed_state))),
-                  _supersede(goal, found)]
+        parts += [
+            _heading('Supersede {} (you did its work)'.format(clean(goal.failed_state))),
+            _supersede(goal, found),
+        ]
     parts += [_heading('Give up'), _give_up(goal, found)]
     if goal.interfaces:
         parts += [_heading('Shared-autonomy interfaces'), _interfaces(goal, found)]
@@ -63,9 +74,15 @@ def overview(listed: Sequence[ListedQuestion], now_s: float) -> Table:
         table.add_column(title, overflow='fold')
     for number, each in enumerate(listed, 1):
         left = '' if each.deadline_s == math.inf else duration(each.deadline_s - now_s)
-        table.add_row(str(number), Text(clean(each.goal.robot)), _place(each.goal),
-                      Text('{:.0f}%'.format(100 * each.goal.rate), rate_colour(each.goal.rate)),
-                      duration(now_s - each.asked_s), left, Text(_holder(each)))
+        table.add_row(
+            str(number),
+            Text(clean(each.goal.robot)),
+            _place(each.goal),
+            Text('{:.0f}%'.format(100 * each.goal.rate), rate_colour(each.goal.rate)),
+            duration(now_s - each.asked_s),
+            left,
+            Text(_holder(each)),
+        )
     return table
 
 
@@ -88,12 +105,18 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
     if goal.text:
         lines.append(Text(_without_middle(goal.text), 'italic'))
     facts = Text.assemble(
-        'failure rate ', rate_bar(goal.rate), ' ',
-        (CLASS_NAMES.get(goal.failure_class, '?'), 'bold ' + rate_colour(goal.rate)))
+        'failure rate ',
+        rate_bar(goal.rate),
+        ' ',
+        (CLASS_NAMES.get(goal.failure_class, '?'), 'bold ' + rate_colour(goal.rate)),
+    )
     if goal.continuous:
         facts.append(' · continuous', 'bold')
-    facts.append(' · {} {} so far'.format(goal.recoveries,
-                                          'recovery' if goal.recoveries == 1 else 'recoveries'))
+    facts.append(
+        ' · {} {} so far'.format(
+            goal.recoveries, 'recovery' if goal.recoveries == 1 else 'recoveries'
+        )
+    )
     lines.append(facts)
     if not still_runs(goal):  # there the text says it
         lines.append(Text('asked because ' + clean(goal.reason)))
@@ -101,17 +124,28 @@ def _failure(goal: ExpertQueryGoal, age_s: float) -> Panel:
         lines.append(Text('tried: ' + ', '.join(clean(step) for step in goal.tried)))
     if goal.deadline > 0:
         lines.append(
-            Text('unanswered: {}'.format(clean(goal.fallback) or 'the fallback happens'), 'dim'))
-    title = Text.assemble((clean(goal.robot), 'bold'), ' asks about ',
-                          (clean(goal.container_path), 'bold'))
-    return Panel(Group(*lines), title=title, title_align='left',
-                 border_style=rate_colour(goal.rate), padding=(0, 1),
-                 subtitle=Text('asked {} ago'.format(duration(age_s))), subtitle_align='right')
+            Text('unanswered: {}'.format(clean(goal.fallback) or 'the fallback happens'), 'dim')
+        )
+    title = Text.assemble(
+        (clean(goal.robot), 'bold'), ' asks about ', (clean(goal.container_path), 'bold')
+    )
+    return Panel(
+        Group(*lines),
+        title=title,
+        title_align='left',
+        border_style=rate_colour(goal.rate),
+        padding=(0, 1),
+        subtitle=Text('asked {} ago'.format(duration(age_s))),
+        subtitle_align='right',
+    )
 
 
 def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
-    keys = {(option.container, option.name): option.key
-            for option in found if option.kind == ExpertDecision.GOTO}
+    keys = {
+        (option.container, option.name): option.key
+        for option in found
+        if option.kind == ExpertDecision.GOTO
+    }
     table = _table('', 'state', 'success', 'class', 'visits', 'on arrival')
     for choice in goal.choices:
         dim = 'dim' if choice.blocked else ''
@@ -123,9 +157,14 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
             name = Text.assemble((clean(choice.container) + '/', 'dim'), name)
         if is_wait_on(goal, choice):
             name = Text.assemble(('wait on', 'bold green'), ' (', name, ' runs on)')
-        table.add_row(keys[choice.container, choice.state], name, bar,
-                      Text(CLASS_NAMES.get(choice.failure_class, '?'), dim or rate_colour(rate)),
-                      str(choice.visits), _arrival(choice))
+        table.add_row(
+            keys[choice.container, choice.state],
+            name,
+            bar,
+            Text(CLASS_NAMES.get(choice.failure_class, '?'), dim or rate_colour(rate)),
+            str(choice.visits),
+            _arrival(choice),
+        )
     return table
 
 
@@ -150,8 +189,11 @@ def _supersede(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Renderab
     targets = {choice.outcome: choice.target for choice in goal.supersede_outcomes}
     for option in found:
         if option.kind == ExpertDecision.SUPERSEDE:
-            table.add_row(option.key, Text(clean(option.name), 'bold'),
-                          Text('→ ' + clean(targets[option.name])))
+            table.add_row(
+                option.key,
+                Text(clean(option.name), 'bold'),
+                Text('→ ' + clean(targets[option.name])),
+            )
     if not goal.output_keys:
         return table
     return Group(table, Text('with output userdata: ' + _list(goal.output_keys), 'dim'))
@@ -163,9 +205,14 @@ def _give_up(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
         if option.kind == ExpertDecision.GIVE_UP:
             table.add_row(
                 option.key,
-                Text(clean(option.name), 'bold') if option.name else Text(
+                Text(clean(option.name), 'bold')
+                if option.name
+                else Text(
                     'end as {} failure would have ended {}'.format(
-                        'a' if still_runs(goal) else 'the', clean(goal.container_path))))
+                        'a' if still_runs(goal) else 'the', clean(goal.container_path)
+                    )
+                ),
+            )
     return table
 
 
@@ -174,8 +221,9 @@ def _interfaces(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     described = {offer.name: offer.description for offer in goal.interfaces}
     for option in found:
         if option.kind == ExpertDecision.INTERFACE:
-            table.add_row(option.key, Text(clean(option.name), 'bold'),
-                          Text(clean(described[option.name])))
+            table.add_row(
+                option.key, Text(clean(option.name), 'bold'), Text(clean(described[option.name]))
+            )
     return table
 
 
@@ -193,13 +241,17 @@ def _value(item: UserdataItem) -> Text:
     if item.encoding == UserdataItem.UNSENT:
         return Text('({}, not sent)'.format(clean(item.type)), 'dim')
     return Text(
-        '({}{})'.format(clean(item.type),
-                        '[]' if item.encoding == UserdataItem.ROS_MESSAGES else ''), 'dim')
+        '({}{})'.format(
+            clean(item.type), '[]' if item.encoding == UserdataItem.ROS_MESSAGES else ''
+        ),
+        'dim',
+    )
 
 
 def _place(goal: ExpertQueryGoal) -> Text:
-    return Text.assemble((clean(goal.container_path) + '/', 'dim'),
-                         (clean(goal.failed_state), 'bold'))
+    return Text.assemble(
+        (clean(goal.container_path) + '/', 'dim'), (clean(goal.failed_state), 'bold')
+    )
 
 
 def _holder(each: ListedQuestion) -> str:
@@ -209,12 +261,18 @@ def _holder(each: ListedQuestion) -> str:
 
 
 def _table(*titles: str, header: bool = True) -> Table:
-    table = Table(box=None, pad_edge=False, show_header=header, header_style='dim',
-                  padding=(0, 2, 0, 0))
+    table = Table(
+        box=None, pad_edge=False, show_header=header, header_style='dim', padding=(0, 2, 0, 0)
+    )
     for index, title in enumerate(titles):
         key = index == 0 and not title
-        table.add_column(title, style='bold cyan' if key else '', no_wrap=key,
-                         min_width=2 if key else None, overflow='fold')
+        table.add_column(
+            title,
+            style='bold cyan' if key else '',
+            no_wrap=key,
+            min_width=2 if key else None,
+            overflow='fold',
+        )
     return table
 
 
@@ -228,8 +286,7 @@ def _list(items: Iterable[str]) -> str:
 
 def _without_middle(text: str) -> str:
     """A long text without its middle: of a traceback the call, and what was raised and why."""
-    lines = [shortened(line, _LONGEST_LINE)
-             for line in clean(text.strip(), lines=True).split('\n')]
+    lines = [shortened(line, _LONGEST_LINE) for line in clean(text.strip(), lines=True).split('\n')]
     if len(lines) <= _SHOWN_LINES:
         return '\n'.join(lines)
     tail = _SHOWN_LINES - _FIRST_LINES

@@ -1,4 +1,5 @@
 """Follows an interface that runs for a question: its output, its status, its end."""
+
 import math
 from typing import List, Optional
 
@@ -42,8 +43,10 @@ class RunningInterface:
         :raises ServerGoneError: where the interface does not answer.
         """
         answer = call_service(
-            self._action + '/finish', FinishInterface,
-            FinishInterfaceRequest(outcome=outcome, text=text, query_id=self._query_id))
+            self._action + '/finish',
+            FinishInterface,
+            FinishInterfaceRequest(outcome=outcome, text=text, query_id=self._query_id),
+        )
         return '' if answer.ok else str(answer.message)
 
     def give_up(self, text: str) -> str:
@@ -52,8 +55,9 @@ class RunningInterface:
         :returns: why that cannot be, or ''.
         :raises ServerGoneError: where the interface does not answer.
         """
-        answer = call_service(self._action + '/give_up', GiveUpInterface,
-                              GiveUpInterfaceRequest(text, self._query_id))
+        answer = call_service(
+            self._action + '/give_up', GiveUpInterface, GiveUpInterfaceRequest(text, self._query_id)
+        )
         return '' if answer.ok else str(answer.message)
 
     def lines(self) -> List[str]:
@@ -69,11 +73,17 @@ class RunningInterface:
         state = self._state
         if state is not None:
             motion = state.limit or ('moves' if state.moving else 'stands')
-            near = '' if math.isinf(state.clearance) else ', {:.0f} cm clear'.format(
-                100 * state.clearance)
+            near = (
+                ''
+                if math.isinf(state.clearance)
+                else ', {:.0f} cm clear'.format(100 * state.clearance)
+            )
             return '{} hand {}{}{}'.format(
-                clean(state.arm), clean(motion), near,
-                ', driven by ' + clean(state.operator) if state.operator else '')
+                clean(state.arm),
+                clean(motion),
+                near,
+                ', driven by ' + clean(state.operator) if state.operator else '',
+            )
         lines = [line for line in self.lines() if line.strip()]
         return clean(lines[-1]) if lines else ''
 
@@ -86,8 +96,9 @@ class RunningInterface:
         except (OSError, rosgraph.MasterException):
             return
         if types.get(self._action + '/state') == TeleopState._type:
-            self._state_subscriber = rospy.Subscriber(self._action + '/state', TeleopState,
-                                                      self._on_state, queue_size=2)
+            self._state_subscriber = rospy.Subscriber(
+                self._action + '/state', TeleopState, self._on_state, queue_size=2
+            )
 
     def stop(self) -> None:
         """Listen no longer."""

@@ -1,4 +1,5 @@
 """The start of the terminal front end, before it is a node: its command line, and a master."""
+
 import argparse
 import getpass
 import socket
@@ -12,14 +13,22 @@ from rich.text import Text
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Parse the command line."""
-    parser = argparse.ArgumentParser(prog='expert_terminal',
-                                     description='Answers the questions of robots.')
+    parser = argparse.ArgumentParser(
+        prog='expert_terminal', description='Answers the questions of robots.'
+    )
     parser.add_argument(
-        '--server', action='append', default=[], metavar='NAME',
+        '--server',
+        action='append',
+        default=[],
+        metavar='NAME',
         help='expert query server to follow, e.g. /robot/expert_query; may be given several times '
-        '(default: all that the master knows)')
-    parser.add_argument('--name', default='{}@{}'.format(_user(), socket.gethostname()),
-                        help='your name, as robots and other experts see it (default: %(default)s)')
+        '(default: all that the master knows)',
+    )
+    parser.add_argument(
+        '--name',
+        default='{}@{}'.format(_user(), socket.gethostname()),
+        help='your name, as robots and other experts see it (default: %(default)s)',
+    )
     return parser.parse_args(arguments)
 
 
@@ -38,7 +47,10 @@ def wait_for_master(console: Console) -> None:
     """Wait for the master, and say so. rospy would wait without a word."""
     if not rosgraph.is_master_online():
         console.print(
-            Text('No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()),
-                 'yellow'))
+            Text(
+                'No ROS master at {}; waiting. (Ctrl-C quits)'.format(rosgraph.get_master_uri()),
+                'yellow',
+            )
+        )
     while not rosgraph.is_master_online():
         time.sleep(0.5)

@@ -1,4 +1,5 @@
 """The terminal front end: shows open questions, one at a time, and takes an expert's answers."""
+
 import json
 import math
 import sys
@@ -32,10 +33,13 @@ from .running_interface import RunningInterface
 from .start import parse, wait_for_master
 from .text import duration
 
-_COMMANDS: List[Choice] = [('l', 'leave it to others, back to the list'),
-                           ('t', 'take it over from who holds it'),
-                           ('p', 'show how the preconditions stand now'),
-                           ('r', 'show the question again'), ('q', 'quit')]
+_COMMANDS: List[Choice] = [
+    ('l', 'leave it to others, back to the list'),
+    ('t', 'take it over from who holds it'),
+    ('p', 'show how the preconditions stand now'),
+    ('r', 'show the question again'),
+    ('q', 'quit'),
+]
 _FIRST_LIST_S = 1.0
 _RETURN_S = 20.0  # how long a server may take to come back, and its robots to ask it again
 
@@ -43,12 +47,18 @@ _RETURN_S = 20.0  # how long a server may take to come back, and its robots to a
 class Terminal:
     """A conversation with one expert. Claims are given back however it ends."""
 
-    def __init__(self, front_end: FrontEnd, console: Console, prompts: Prompts,
-                 next_steps: Callable[[str, str], NextSteps] = NextSteps,
-                 interface: Callable[[ListedQuestion, str], RunningInterface] = RunningInterface,
-                 preconditions: Callable[[str, str],
-                                         PreconditionStatusListener] = PreconditionStatusListener,
-                 operator: Optional[OperatorCommands] = None) -> None:
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        console: Console,
+        prompts: Prompts,
+        next_steps: Callable[[str, str], NextSteps] = NextSteps,
+        interface: Callable[[ListedQuestion, str], RunningInterface] = RunningInterface,
+        preconditions: Callable[
+            [str, str], PreconditionStatusListener
+        ] = PreconditionStatusListener,
+        operator: Optional[OperatorCommands] = None,
+    ) -> None:
         self._next_steps = next_steps
         self._interface = interface
         self._listen_to_preconditions = preconditions
@@ -77,7 +87,8 @@ class Terminal:
         while True:
             waiting = self._waiting()
             fresh = [
-                each for each in waiting
+                each
+                for each in waiting
                 if each.key not in self._left_to_others and each.status == OpenQuery.PENDING
             ]
             if len(waiting) == 1 and fresh:
@@ -95,8 +106,12 @@ class Terminal:
     def _wait_for_questions(self) -> None:
         self._say('No open questions; waiting. (q quits)', 'dim')
         while True:
-            line = self._prompts.ask('', self._servers_line, lambda: 'a question'
-                                     if self._waiting() else None, OPERATOR_WORDS)
+            line = self._prompts.ask(
+                '',
+                self._servers_line,
+                lambda: 'a question' if self._waiting() else None,
+                OPERATOR_WORDS,
+            )
             _quit_on(line)
             self._operate(line)
 
@@ -111,10 +126,16 @@ class Terminal:
         self._console.print(render.overview(waiting, time.monotonic()))
         keys = [each.key for each in waiting]
         line = self._prompts.ask(
-            'question [1-{}]: '.format(len(waiting)), self._servers_line,
+            'question [1-{}]: '.format(len(waiting)),
+            self._servers_line,
             lambda: 'changed' if [each.key for each in self._waiting()] != keys else None,
-            [(str(number), '{} {}'.format(each.goal.robot, each.goal.failed_state))
-             for number, each in enumerate(waiting, 1)] + [('q', 'quit')] + OPERATOR_WORDS)
+            [
+                (str(number), '{} {}'.format(each.goal.robot, each.goal.failed_state))
+                for number, each in enumerate(waiting, 1)
+            ]
+            + [('q', 'quit')]
+            + OPERATOR_WORDS,
+        )
         _quit_on(line)
         if self._operate(line):
             return None
@@ -125,7 +146,8 @@ class Terminal:
 
     def _waiting(self) -> List[ListedQuestion]:
         return [
-            each for each in self._front_end.questions()
+            each
+            for each in self._front_end.questions()
             if each.status != OpenQuery.INTERFACE_RUNNING
         ]
 
@@ -133,8 +155,7 @@ class Terminal:
         """Claim, show and answer one question."""
         self._missing_since_s = math.inf
         steps = self._next_steps(listed.goal.robot, listed.goal.trial_id)
-        self._preconditions = self._listen_to_preconditions(listed.goal.robot,
-                                                            listed.goal.query_id)
+        self._preconditions = self._listen_to_preconditions(listed.goal.robot, listed.goal.query_id)
         try:
             self._claim_first(listed)
             self._console.rule(style='dim')
@@ -172,9 +193,11 @@ class Terminal:
     def _answered(self, listed: ListedQuestion, steps: NextSteps) -> bool:
         """Ask for one line and act on it. Return whether that has settled the question."""
         available = options(listed.goal)
-        line = self._ask(listed, '\nanswer: ',
-                         [(option.key, option.words) for option in available] + _COMMANDS
-                         + OPERATOR_WORDS)
+        line = self._ask(
+            listed,
+            '\nanswer: ',
+            [(option.key, option.words) for option in available] + _COMMANDS + OPERATOR_WORDS,
+        )
         try:
             if self._command(listed, line):
                 return False
@@ -213,8 +236,12 @@ class Terminal:
         decision = option.decision()
         if option.kind == ExpertDecision.SUPERSEDE:
             for key in listed.goal.output_keys:
-                text = self._ask(listed, '  {} as JSON (empty: not set): '.format(clean(key)), [],
-                                 JsonValidator())
+                text = self._ask(
+                    listed,
+                    '  {} as JSON (empty: not set): '.format(clean(key)),
+                    [],
+                    JsonValidator(),
+                )
                 if text:
                     decision.outputs.append(encode(key, json.loads(text)))
         decision.why = self._ask(listed, '  reason (optional): ', [])
@@ -225,14 +252,16 @@ class Terminal:
             return self._send_interface(listed, decision, steps)
         return self._settle(listed, decision, steps)
 
-    def _send_interface(self, listed: ListedQuestion, decision: ExpertDecision,
-                        steps: NextSteps) -> bool:
+    def _send_interface(
+        self, listed: ListedQuestion, decision: ExpertDecision, steps: NextSteps
+    ) -> bool:
         interface = self._interface(listed, decision.interface)
         try:
             settled = self._settle(listed, decision, steps)
             if settled:
-                InterfaceDialog(interface, self._prompts, self._say,
-                                self._front_end.find).run(listed)
+                InterfaceDialog(interface, self._prompts, self._say, self._front_end.find).run(
+                    listed
+                )
                 self._show_next_steps(listed, steps)
             return settled
         finally:
@@ -256,12 +285,25 @@ class Terminal:
         if silent:
             self._say(
                 '  What it does next is not known: no events on {}/oracle/events.'.format(
-                    listed.goal.robot), 'dim')
+                    listed.goal.robot
+                ),
+                'dim',
+            )
 
-    def _ask(self, listed: ListedQuestion, message: str, choices: Sequence[Choice],
-             validator: Optional[JsonValidator] = None) -> str:
-        return self._prompts.ask(message, lambda: self._status_line(listed),
-                                 lambda: self._why_to_stop(listed), choices, validator)
+    def _ask(
+        self,
+        listed: ListedQuestion,
+        message: str,
+        choices: Sequence[Choice],
+        validator: Optional[JsonValidator] = None,
+    ) -> str:
+        return self._prompts.ask(
+            message,
+            lambda: self._status_line(listed),
+            lambda: self._why_to_stop(listed),
+            choices,
+            validator,
+        )
 
     def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
         """Return why to stop working on a question, or None as long as it is ours to answer."""
@@ -302,8 +344,12 @@ class Terminal:
 
     def _status_line(self, listed: ListedQuestion) -> str:
         now = self._front_end.find(listed.key) or listed
-        parts = [self._front_end.expert, 'no time limit' if now.deadline_s == math.inf
-                 else '{} left'.format(duration(now.deadline_s - time.monotonic()))]
+        parts = [
+            self._front_end.expert,
+            'no time limit'
+            if now.deadline_s == math.inf
+            else '{} left'.format(duration(now.deadline_s - time.monotonic())),
+        ]
         if not self._front_end.connected(listed.server):
             parts.append('{} is gone; waiting for it'.format(listed.server))
         elif not self._claimed:
@@ -315,14 +361,18 @@ class Terminal:
         return ' · '.join(parts)
 
     def _servers_line(self) -> str:
-        servers = ['{}{}'.format(name, '' if self._front_end.connected(name) else ' (gone)')
-                   for name in self._front_end.servers]
+        servers = [
+            '{}{}'.format(name, '' if self._front_end.connected(name) else ' (gone)')
+            for name in self._front_end.servers
+        ]
         running = [
             'interface {} runs for {}'.format(each.goal.interface, each.goal.failed_state)
-            for each in self._front_end.questions() if each.status == OpenQuery.INTERFACE_RUNNING
+            for each in self._front_end.questions()
+            if each.status == OpenQuery.INTERFACE_RUNNING
         ]
-        return ' · '.join([self._front_end.expert, ', '.join(servers) or 'no server found yet'] +
-                          running)
+        return ' · '.join(
+            [self._front_end.expert, ', '.join(servers) or 'no server found yet'] + running
+        )
 
     def _say(self, text: str, style: str) -> None:
         self._console.print(Text(clean(text, lines=True), style))
@@ -340,13 +390,15 @@ def main() -> None:
     try:
         wait_for_master(console)
         # a name of its own each. Ctrl-C is ours. The log stays off the screen (its file has it)
-        rospy.init_node('expert_terminal', anonymous=True, disable_signals=True,
-                        log_level=rospy.FATAL)
+        rospy.init_node(
+            'expert_terminal', anonymous=True, disable_signals=True, log_level=rospy.FATAL
+        )
     except KeyboardInterrupt:
         return
     start_master_watch()
     operator = OperatorCommands(options_given.name)
     repeat(operator.look_up, LOOK_UP_PERIOD_S)
-    Terminal(FrontEnd(options_given.name, options_given.server), console, Prompts(),
-             operator=operator).run()
+    Terminal(
+        FrontEnd(options_given.name, options_given.server), console, Prompts(), operator=operator
+    ).run()
     rospy.signal_shutdown('the expert has left')

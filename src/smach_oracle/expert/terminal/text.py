@@ -1,4 +1,5 @@
 """Failure rates and durations as text for a terminal. Pure."""
+
 import colorsys
 
 from rich.text import Text
@@ -20,8 +21,10 @@ def rate_colour(rate: float) -> str:
 def rate_bar(rate: float, width: int = 10) -> Text:
     """Return a bar and a percentage in the rate's colour."""
     filled = round(min(max(rate, 0.0), 1.0) * width)
-    return Text('{}{} {:3.0f}%'.format(_FULL * filled, _EMPTY * (width - filled), 100 * rate),
-                rate_colour(rate))
+    return Text(
+        '{}{} {:3.0f}%'.format(_FULL * filled, _EMPTY * (width - filled), 100 * rate),
+        rate_colour(rate),
+    )
 
 
 def duration(seconds: float) -> str:

@@ -1,4 +1,5 @@
 """The topics that the robot's hardware publishes."""
+
 from typing import Optional
 
 import numpy as np
@@ -40,34 +41,54 @@ class HardwareTopics:
         self._motors = rospy.Publisher('motors', Bool, queue_size=2, latch=True)
         self._battery = rospy.Publisher('battery', BatteryState, queue_size=2)
         self._diagnostics = rospy.Publisher('/diagnostics', DiagnosticArray, queue_size=2)
-        self._start = rospy.Publisher('initialpose', PoseWithCovarianceStamped, queue_size=2,
-                                      latch=True)
+        self._start = rospy.Publisher(
+            'initialpose', PoseWithCovarianceStamped, queue_size=2, latch=True
+        )
         self._frames = tf2_ros.TransformBroadcaster()
         self._fixed = tf2_ros.StaticTransformBroadcaster()
         self._fixed.sendTransform(
-            TransformStamped(Header(frame_id=BASE), CAMERA,
-                             Transform(Vector3(0.0, 0.0, CAMERA_HEIGHT), LOOKS_FORWARD)))
+            TransformStamped(
+                Header(frame_id=BASE),
+                CAMERA,
+                Transform(Vector3(0.0, 0.0, CAMERA_HEIGHT), LOOKS_FORWARD),
+            )
+        )
         self._told_motors: Optional[bool] = None
         self._diagnostics_due = rospy.Time()
         self.publish_start()
 
     def publish_start(self) -> None:
         """Tell where the robot has been set down, as a person does who sets it down."""
-        self._start.publish(PoseWithCovarianceStamped(
-            Header(frame_id=MAP), PoseWithCovariance(pose=pose_message(START))))
+        self._start.publish(
+            PoseWithCovarianceStamped(
+                Header(frame_id=MAP), PoseWithCovariance(pose=pose_message(START))
+            )
+        )
 
     def publish_state(self, world: InspectionWorld, scan: np.ndarray, now: rospy.Time) -> None:
         """Publish everything but the image."""
         base = world.base
         twist = TwistMessage(Vector3(base.wheels.v, 0.0, 0.0), Vector3(0.0, 0.0, base.wheels.w))
-        self._odometry.publish(Odometry(Header(stamp=now, frame_id=ODOM), BASE,
-                                        PoseWithCovariance(pose=pose_message(base.odometry)),
-                                        TwistWithCovariance(twist=twist)))
+        self._odometry.publish(
+            Odometry(
+                Header(stamp=now, frame_id=ODOM),
+                BASE,
+                PoseWithCovariance(pose=pose_message(base.odometry)),
+                TwistWithCovariance(twist=twist),
+            )
+        )
         self._frames.sendTransform(transform(ODOM, BASE, base.odometry, now))
-        self._scan.publish(LaserScan(
-            header=Header(stamp=now, frame_id=BASE), angle_min=BEAMS[0], angle_max=BEAMS[-1],
-            angle_increment=BEAMS[1] - BEAMS[0], range_min=0.0, range_max=SCANNER_RANGE,
-            ranges=scan.tolist()))
+        self._scan.publish(
+            LaserScan(
+                header=Header(stamp=now, frame_id=BASE),
+                angle_min=BEAMS[0],
+                angle_max=BEAMS[-1],
+                angle_increment=BEAMS[1] - BEAMS[0],
+                range_min=0.0,
+                range_max=SCANNER_RANGE,
+                ranges=scan.tolist(),
+            )
+        )
         if base.powered != self._told_motors:
             self._told_motors = base.powered
             self._motors.publish(Bool(base.powered))
@@ -76,13 +97,17 @@ class HardwareTopics:
             self._publish_health(world, now)
 
     def _publish_health(self, world: InspectionWorld, now: rospy.Time) -> None:
-        self._battery.publish(BatteryState(header=Header(stamp=now), voltage=world.voltage,
-                                           present=True))
+        self._battery.publish(
+            BatteryState(header=Header(stamp=now), voltage=world.voltage, present=True)
+        )
         powered = world.base.powered
         status = DiagnosticStatus(
-            DiagnosticStatus.OK if powered else DiagnosticStatus.ERROR, OF_THE_BASE,
-            'running' if powered else 'the battery is low: the motors are off', 'base',
-            [KeyValue('voltage', '{:.1f} V'.format(world.voltage))])
+            DiagnosticStatus.OK if powered else DiagnosticStatus.ERROR,
+            OF_THE_BASE,
+            'running' if powered else 'the battery is low: the motors are off',
+            'base',
+            [KeyValue('voltage', '{:.1f} V'.format(world.voltage))],
+        )
         self._diagnostics.publish(DiagnosticArray(Header(stamp=now), [status]))
 
     def publish_image(self, world: InspectionWorld, now: rospy.Time) -> None:
@@ -91,9 +116,25 @@ class HardwareTopics:
             return
         header = Header(stamp=now, frame_id=CAMERA)
         matrix = intrinsics()
-        self._info.publish(CameraInfo(
-            header=header, height=HEIGHT, width=WIDTH, distortion_model='plumb_bob', D=[0.0] * 5,
-            K=matrix.ravel().tolist(), R=np.eye(3).ravel().tolist(),
-            P=np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist()))
-        self._image.publish(Image(header=header, height=HEIGHT, width=WIDTH, encoding='rgb8',
-                                  step=3 * WIDTH, data=world.image().tobytes()))
+        self._info.publish(
+            CameraInfo(
+                header=header,
+                height=HEIGHT,
+                width=WIDTH,
+                distortion_model='plumb_bob',
+                D=[0.0] * 5,
+                K=matrix.ravel().tolist(),
+                R=np.eye(3).ravel().tolist(),
+                P=np.hstack([matrix, np.zeros((3, 1))]).ravel().tolist(),
+            )
+        )
+        self._image.publish(
+            Image(
+                header=header,
+                height=HEIGHT,
+                width=WIDTH,
+                encoding='rgb8',
+                step=3 * WIDTH,
+                data=world.image().tobytes(),
+            )
+        )

@@ -1,4 +1,5 @@
 """Reads the panel before the robot: the service `inspect`."""
+
 import numpy as np
 import rospy
 from sensor_msgs.msg import Image
@@ -47,8 +48,10 @@ class Inspector:
 
 def main() -> None:
     """Entry point of the node."""
-    parameters_of('Node: reads the gauge before the inspection robot. It has no parameters; see '
-                  'doc/second_robot.md.')
+    parameters_of(
+        'Node: reads the gauge before the inspection robot. It has no parameters; see '
+        'doc/second_robot.md.'
+    )
     rospy.init_node('inspection_inspector')
     inspector = Inspector()
     rospy.loginfo('%s: ready, %s', rospy.get_name(), type(inspector).__name__)

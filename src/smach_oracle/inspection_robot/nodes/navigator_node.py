@@ -1,4 +1,5 @@
 """Drives to poses in the map: the action `move_base`, and the service `localise`."""
+
 import threading
 from typing import Optional, Tuple
 
@@ -151,8 +152,9 @@ class Navigator:
         self._command.publish(Twist(Vector3(command.v, 0.0, 0.0), Vector3(0.0, 0.0, command.w)))
         with self._lock:
             self._frames.sendTransform(transform(MAP, ODOM, self._odom_in_map, stamp))
-        self._server.publish_feedback(MoveBaseFeedback(
-            PoseStamped(Header(stamp=stamp, frame_id=MAP), pose_message(pose))))
+        self._server.publish_feedback(
+            MoveBaseFeedback(PoseStamped(Header(stamp=stamp, frame_id=MAP), pose_message(pose)))
+        )
 
     def _stop(self) -> None:
         self._command.publish(Twist())
@@ -171,8 +173,10 @@ def _stands(odometry: Odometry) -> bool:
 
 def main() -> Optional[int]:
     """Entry point of the node."""
-    parameters_of('Node: drives the inspection robot, as the action move_base. '
-                  'Parameters: ~blocked_limit_s, ~drive_limit_s; see doc/second_robot.md.')
+    parameters_of(
+        'Node: drives the inspection robot, as the action move_base. '
+        'Parameters: ~blocked_limit_s, ~drive_limit_s; see doc/second_robot.md.'
+    )
     rospy.init_node('inspection_navigator')
     try:
         navigator = Navigator()

@@ -1,4 +1,5 @@
 """The newest message of a topic, and waiting for one that comes after a moment."""
+
 import threading
 import time
 from typing import Any, Callable, Optional
@@ -14,8 +15,9 @@ class NewestMessage:
     def __init__(self, topic: str, spec: type) -> None:
         self.message: Any = None
         self._changed = threading.Condition()
-        self._subscriber = rospy.Subscriber(topic, spec, self._keep, queue_size=1,
-                                            buff_size=1 << 21, tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(
+            topic, spec, self._keep, queue_size=1, buff_size=1 << 21, tcp_nodelay=True
+        )
 
     def after(self, stamp: rospy.Time, limit_s: float) -> Optional[Any]:
         """The first message that is stamped later.
@@ -23,8 +25,9 @@ class NewestMessage:
         :param limit_s: wall time.
         :returns: None where none comes in time.
         """
-        return self._wait(lambda: self.message is not None
-                          and self.message.header.stamp > stamp, limit_s)
+        return self._wait(
+            lambda: self.message is not None and self.message.header.stamp > stamp, limit_s
+        )
 
     def any(self, limit_s: float) -> Optional[Any]:
         """The newest message, or None where there is none within so much wall time (s)."""

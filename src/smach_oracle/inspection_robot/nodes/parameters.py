@@ -1,4 +1,5 @@
 """Private parameters of the nodes, and their command line."""
+
 import argparse
 import math
 from typing import List
@@ -21,10 +22,16 @@ def number_in(name: str, default: float, low: float, high: float) -> float:
     :raises ParameterError: where it is not.
     """
     value = rospy.get_param('~' + name, default)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (
-            math.isfinite(value) and low <= value <= high):
-        raise ParameterError('{}: {!r} is not allowed; allowed: a number from {:g} to {:g}'.format(
-            rospy.resolve_name('~' + name), value, low, high))
+    if (
+        isinstance(value, bool)
+        or not isinstance(value, (int, float))
+        or not (math.isfinite(value) and low <= value <= high)
+    ):
+        raise ParameterError(
+            '{}: {!r} is not allowed; allowed: a number from {:g} to {:g}'.format(
+                rospy.resolve_name('~' + name), value, low, high
+            )
+        )
     return float(value)
 
 
@@ -35,6 +42,7 @@ def words_in(name: str, default: str) -> List[str]:
     """
     value = rospy.get_param('~' + name, default)
     if not isinstance(value, str):
-        raise ParameterError('{}: {!r} is not allowed; allowed: words'.format(
-            rospy.resolve_name('~' + name), value))
+        raise ParameterError(
+            '{}: {!r} is not allowed; allowed: words'.format(rospy.resolve_name('~' + name), value)
+        )
     return value.split()

@@ -1,4 +1,5 @@
 """Poses in the plane as messages, and back."""
+
 import math
 from typing import Tuple
 
@@ -37,15 +38,21 @@ def pose_of(message: PoseMessage) -> Pose:
 
 def transform(parent: str, child: str, pose: Pose, stamp: rospy.Time) -> TransformStamped:
     """Return the message that says where a frame is in its parent."""
-    return TransformStamped(Header(stamp=stamp, frame_id=parent), child,
-                            Transform(Vector3(pose[0], pose[1], 0.0), turn_about_z(pose[2])))
+    return TransformStamped(
+        Header(stamp=stamp, frame_id=parent),
+        child,
+        Transform(Vector3(pose[0], pose[1], 0.0), turn_about_z(pose[2])),
+    )
 
 
 def joined(first: Pose, second: Pose) -> Pose:
     """The pose that is at `second` as seen from `first`."""
     cosine, sine = math.cos(first[2]), math.sin(first[2])
-    return (first[0] + second[0] * cosine - second[1] * sine,
-            first[1] + second[0] * sine + second[1] * cosine, wrapped(first[2] + second[2]))
+    return (
+        first[0] + second[0] * cosine - second[1] * sine,
+        first[1] + second[0] * sine + second[1] * cosine,
+        wrapped(first[2] + second[2]),
+    )
 
 
 def between(pose: Pose, seen_as: Pose) -> Pose:

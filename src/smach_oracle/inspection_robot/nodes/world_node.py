@@ -1,4 +1,5 @@
 """The hall and the robot's hardware as a ROS node: base, laser scanner, camera, battery, clock."""
+
 import json
 import re
 import threading
@@ -37,8 +38,11 @@ class InspectionWorldNode:
         causes = words_in('causes', DRAWN)
         self._only = None if causes == [DRAWN] else [each for each in causes if each != 'none']
         if not set(self._only or ()) <= set(CHANCE):
-            raise ParameterError('{}: allowed are {}, none, or some of {}'.format(
-                rospy.resolve_name('~causes'), DRAWN, ', '.join(CHANCE)))
+            raise ParameterError(
+                '{}: allowed are {}, none, or some of {}'.format(
+                    rospy.resolve_name('~causes'), DRAWN, ', '.join(CHANCE)
+                )
+            )
         self._truth_file = str(rospy.get_param('~truth_file', 'none'))
         self._lock = threading.Lock()
         self._world = InspectionWorld(draw(self._seed, self._only))
@@ -113,17 +117,26 @@ class InspectionWorldNode:
             return
         world = self._world
         lacking = world.shortcomings()
-        line = json.dumps({'seed': world.scene.seed, 'task': 'inspection', 'success': not lacking,
-                           'why': '; '.join(lacking), 'causes': list(world.scene.causes),
-                           'sim_s': round(world.time_s, 2)})
+        line = json.dumps(
+            {
+                'seed': world.scene.seed,
+                'task': 'inspection',
+                'success': not lacking,
+                'why': '; '.join(lacking),
+                'causes': list(world.scene.causes),
+                'sim_s': round(world.time_s, 2),
+            }
+        )
         with Path(self._truth_file).expanduser().open('a', encoding='utf-8') as stream:
             stream.write(line + '\n')
 
 
 def main() -> Optional[int]:
     """Entry point of the node."""
-    parameters_of('Node: the hall of the inspection robot, its base, its sensors, and the clock. '
-                  'Parameters: ~speed, ~seed, ~causes, ~truth_file; see doc/second_robot.md.')
+    parameters_of(
+        'Node: the hall of the inspection robot, its base, its sensors, and the clock. '
+        'Parameters: ~speed, ~seed, ~causes, ~truth_file; see doc/second_robot.md.'
+    )
     rospy.init_node('inspection_world')
     try:
         node = InspectionWorldNode()

@@ -1,4 +1,5 @@
 """The robot's pose, from one scan and the plan: the one at which the scan lies on the walls."""
+
 import math
 from typing import Tuple
 
@@ -34,12 +35,13 @@ class Localiser:
 
     def __init__(self) -> None:
         self._shape = tuple(int((size + 2 * BORDER) / CELL) for size in SIZE)
-        i, j = np.mgrid[0:self._shape[0], 0:self._shape[1]]
+        i, j = np.mgrid[0 : self._shape[0], 0 : self._shape[1]]
         middles = np.stack([i, j], axis=-1) * CELL - BORDER
         self._distances = np.concatenate([_wall_distances(part) for part in middles[:, None]])
 
-    def locate(self, believed: Pose, ranges: np.ndarray, angles: np.ndarray,
-               longest: float) -> Pose:
+    def locate(
+        self, believed: Pose, ranges: np.ndarray, angles: np.ndarray, longest: float
+    ) -> Pose:
         """The pose in the map.
 
         :param believed: the search goes SEARCH_M and SEARCH_RAD around it.
@@ -64,14 +66,21 @@ class Localiser:
         best: Tuple[float, Pose] = (math.inf, believed)
         for turn in np.arange(-SEARCH_RAD, SEARCH_RAD + 0.01, 0.08):
             placed = _placed((believed[0], believed[1], believed[2] + turn), points)
-            moved = placed[None, None] + np.stack(np.meshgrid(shifts, shifts, indexing='ij'),
-                                                  axis=-1)[:, :, None]
+            moved = (
+                placed[None, None]
+                + np.stack(np.meshgrid(shifts, shifts, indexing='ij'), axis=-1)[:, :, None]
+            )
             cost = np.minimum(self._looked_up(moved), 0.3).mean(axis=-1)
             i, j = np.unravel_index(int(np.argmin(cost)), cost.shape)
             if cost[i, j] < best[0]:
-                best = (float(cost[i, j]), (believed[0] + float(shifts[i]),
-                                            believed[1] + float(shifts[j]),
-                                            believed[2] + float(turn)))
+                best = (
+                    float(cost[i, j]),
+                    (
+                        believed[0] + float(shifts[i]),
+                        believed[1] + float(shifts[j]),
+                        believed[2] + float(turn),
+                    ),
+                )
         return best[1]
 
     def _looked_up(self, points: np.ndarray) -> np.ndarray:
@@ -82,8 +91,9 @@ class Localiser:
 
     @staticmethod
     def _refined(pose: Pose, points: np.ndarray) -> Pose:
-        found = least_squares(lambda each: _wall_distances(_placed(each, points)), pose,
-                              loss='soft_l1', f_scale=SOFT).x
+        found = least_squares(
+            lambda each: _wall_distances(_placed(each, points)), pose, loss='soft_l1', f_scale=SOFT
+        ).x
         return float(found[0]), float(found[1]), wrapped(float(found[2]))
 
 

@@ -1,4 +1,5 @@
 """Finds the panel in a camera image and reads its gauge, or says why it cannot be read."""
+
 import math
 from typing import List, NamedTuple, Optional
 
@@ -40,8 +41,9 @@ def read(image: np.ndarray) -> GaugeReading:
     if height < SMALLEST:
         raise ReadingError('the panel is too far off: {:.0f} pixels high'.format(height))
     if width / height < NARROWEST:
-        raise ReadingError('the panel is seen at a slant: {:.0f} x {:.0f} pixels'.format(
-            width, height))
+        raise ReadingError(
+            'the panel is seen at a slant: {:.0f} x {:.0f} pixels'.format(width, height)
+        )
     panel = _straightened(image, corners)
     _check_light(panel)
     _check_sharpness(panel)
@@ -77,8 +79,11 @@ def _in_order(corners: np.ndarray) -> np.ndarray:
 
 def _is_whole(corners: np.ndarray, shape: tuple) -> bool:
     """Whether nothing of it is cut off by the edge of the image."""
-    return bool((corners > 1.5).all() and (corners[:, 0] < shape[1] - 2.5).all()
-                and (corners[:, 1] < shape[0] - 2.5).all())
+    return bool(
+        (corners > 1.5).all()
+        and (corners[:, 0] < shape[1] - 2.5).all()
+        and (corners[:, 1] < shape[0] - 2.5).all()
+    )
 
 
 def _straightened(image: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -90,7 +95,7 @@ def _straightened(image: np.ndarray, corners: np.ndarray) -> np.ndarray:
 def _ring(grey: np.ndarray, share: float) -> np.ndarray:
     """The pixels of a square line so far (share of a side) from the edge."""
     at = int(share * SIDE)
-    inner = grey[at:SIDE - at, at:SIDE - at]
+    inner = grey[at : SIDE - at, at : SIDE - at]
     return np.concatenate([inner[0], inner[-1], inner[:, 0], inner[:, -1]])
 
 
@@ -119,10 +124,10 @@ def _check_light(panel: np.ndarray) -> None:
 def _check_sharpness(panel: np.ndarray) -> None:
     """:raises ReadingError: where the upright edges of the frame are drawn out."""
     grey = cv2.cvtColor(panel, cv2.COLOR_RGB2GRAY).astype(float)
-    rows = grey[int(0.2 * SIDE):int(0.8 * SIDE)].mean(axis=0)
+    rows = grey[int(0.2 * SIDE) : int(0.8 * SIDE)].mean(axis=0)
     edge = int(FRAME * SIDE)
     steps = np.abs(np.diff(rows))
-    sharpness = min(steps[edge - 8:edge + 9].max(), steps[-edge - 9:-edge + 8].max())
+    sharpness = min(steps[edge - 8 : edge + 9].max(), steps[-edge - 9 : -edge + 8].max())
     if sharpness < SHARPEST:
         raise ReadingError('the image is blurred by motion')
 
@@ -133,8 +138,10 @@ def _number(panel: np.ndarray) -> int:
     number = 0
     for digit, (x, y, size) in enumerate(CELLS):
         half = int(0.25 * size * SIDE)
-        cell = grey[int(y * SIDE) - half:int(y * SIDE) + half + 1,
-                    int(x * SIDE) - half:int(x * SIDE) + half + 1]
+        cell = grey[
+            int(y * SIDE) - half : int(y * SIDE) + half + 1,
+            int(x * SIDE) - half : int(x * SIDE) + half + 1,
+        ]
         number |= int(cell.mean() < 110) << digit
     if not number:
         raise ReadingError('the number of the panel is covered')
@@ -155,8 +162,9 @@ def _needle(panel: np.ndarray) -> float:
     whole = (NEEDLE[1] - NEEDLE[0]) * 0.03 * SIDE**2
     if on_needle.sum() < LEAST_NEEDLE * whole:
         raise ReadingError('the needle is not to be seen: something covers the dial')
-    angle = math.atan2(float((up / radius)[on_needle].mean()),
-                       float((right / radius)[on_needle].mean()))
+    angle = math.atan2(
+        float((up / radius)[on_needle].mean()), float((right / radius)[on_needle].mean())
+    )
     # 0 to 2 pi clockwise from the middle of the gap below the dial
     turned = (1.5 * math.pi - angle) % (2 * math.pi)
     share = (turned - (1.5 * math.pi - ZERO_ANGLE)) / SWEEP

@@ -1,4 +1,5 @@
 """A way through the hall, from its plan: straight legs that keep clear of the walls."""
+
 import heapq
 import math
 from typing import Dict, List, Sequence, Tuple
@@ -23,8 +24,9 @@ class RoutePlanner:
 
     def __init__(self) -> None:
         shape = (int(SIZE[0] / CELL), int(SIZE[1] / CELL))
-        self._room = np.array([[clearance(*_middle((i, j)), WALLS) for j in range(shape[1])]
-                               for i in range(shape[0])])
+        self._room = np.array(
+            [[clearance(*_middle((i, j)), WALLS) for j in range(shape[1])] for i in range(shape[0])]
+        )
 
     def legs(self, start: Sequence[float], goal: Sequence[float]) -> List[Point]:
         """The ends of straight legs (m), the goal last.
@@ -42,9 +44,15 @@ class RoutePlanner:
 
     def _free_cell(self, point: Sequence[float]) -> Cell:
         """The nearest cell with room for the robot."""
-        away = np.array([[math.hypot(x - point[0], y - point[1])
-                          for x, y in (_middle((i, j)) for j in range(self._room.shape[1]))]
-                         for i in range(self._room.shape[0])])
+        away = np.array(
+            [
+                [
+                    math.hypot(x - point[0], y - point[1])
+                    for x, y in (_middle((i, j)) for j in range(self._room.shape[1]))
+                ]
+                for i in range(self._room.shape[0])
+            ]
+        )
         away[self._room < MARGIN] = np.inf
         i, j = np.unravel_index(int(np.argmin(away)), away.shape)
         return int(i), int(j)
@@ -67,20 +75,32 @@ class RoutePlanner:
                     way[reached], came_from[reached] = longer, cell
                     left = math.hypot(goal[0] - reached[0], goal[1] - reached[1])
                     heapq.heappush(waiting, (longer + left, reached))
-        raise RouteError('there is no way from {:.1f}, {:.1f} to {:.1f}, {:.1f}'.format(
-            *_middle(start), *_middle(goal)))
+        raise RouteError(
+            'there is no way from {:.1f}, {:.1f} to {:.1f}, {:.1f}'.format(
+                *_middle(start), *_middle(goal)
+            )
+        )
 
     def _is_free(self, cell: Cell) -> bool:
-        return (0 <= cell[0] < self._room.shape[0] and 0 <= cell[1] < self._room.shape[1]
-                and bool(self._room[cell] >= MARGIN))
+        return (
+            0 <= cell[0] < self._room.shape[0]
+            and 0 <= cell[1] < self._room.shape[1]
+            and bool(self._room[cell] >= MARGIN)
+        )
 
     @staticmethod
     def _straightened(points: List[Point]) -> List[Point]:
         """Fewer legs: each as long as the walls let it be. Without the start."""
         legs, here = [], 0
         while here < len(points) - 1:
-            there = next((end for end in range(len(points) - 1, here + 1, -1)
-                          if _is_clear(points[here], points[end])), here + 1)
+            there = next(
+                (
+                    end
+                    for end in range(len(points) - 1, here + 1, -1)
+                    if _is_clear(points[here], points[end])
+                ),
+                here + 1,
+            )
             legs.append(points[there])
             here = there
         return legs
@@ -100,6 +120,10 @@ def _traced(came_from: Dict[Cell, Cell], goal: Cell) -> List[Cell]:
 def _is_clear(start: Point, end: Point) -> bool:
     """Whether the robot fits along a straight line."""
     steps = max(2, int(math.hypot(end[0] - start[0], end[1] - start[1]) / 0.1))
-    return all(clearance(start[0] + share * (end[0] - start[0]),
-                         start[1] + share * (end[1] - start[1]), WALLS) >= MARGIN
-               for share in np.linspace(0.0, 1.0, steps))
+    return all(
+        clearance(
+            start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]), WALLS
+        )
+        >= MARGIN
+        for share in np.linspace(0.0, 1.0, steps)
+    )

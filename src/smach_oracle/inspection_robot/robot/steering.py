@@ -1,4 +1,5 @@
 """From a pose, the legs of a route and a scan to the next command, pure."""
+
 import math
 from typing import List, NamedTuple, Sequence, Tuple
 

@@ -1,4 +1,5 @@
 """The robot's base: wheels that follow commands, a floor that may be wet, and odometry."""
+
 import math
 from typing import NamedTuple, Optional, Sequence, Tuple
 
@@ -37,8 +38,11 @@ def _toward(value: float, wanted: float, most: float) -> float:
 
 def _moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
     yaw = pose[2] + 0.5 * dt_s * twist.w
-    return (pose[0] + dt_s * twist.v * math.cos(yaw), pose[1] + dt_s * twist.v * math.sin(yaw),
-            wrapped(pose[2] + dt_s * twist.w))
+    return (
+        pose[0] + dt_s * twist.v * math.cos(yaw),
+        pose[1] + dt_s * twist.v * math.sin(yaw),
+        wrapped(pose[2] + dt_s * twist.w),
+    )
 
 
 class WheeledBase:
@@ -63,16 +67,19 @@ class WheeledBase:
     def on_wet_floor(self) -> bool:
         """Whether it stands in the puddle."""
         wet = self._wet
-        return wet is not None and math.hypot(self.pose[0] - wet.x,
-                                              self.pose[1] - wet.y) < wet.radius
+        return (
+            wet is not None and math.hypot(self.pose[0] - wet.x, self.pose[1] - wet.y) < wet.radius
+        )
 
     def step(self, dt_s: float, people: Sequence[Tuple[float, float, float]] = ()) -> None:
         """Let time pass (s). `people`: x, y and radius in m. It cannot drive through them."""
         self._silent_s += dt_s
         running = self.powered and self._silent_s < COMMAND_LIMIT_S
         wanted = self._wanted if running else Twist()
-        self.wheels = Twist(_toward(self.wheels.v, wanted.v, ACCELERATION * dt_s),
-                            _toward(self.wheels.w, wanted.w, TURN_ACCELERATION * dt_s))
+        self.wheels = Twist(
+            _toward(self.wheels.v, wanted.v, ACCELERATION * dt_s),
+            _toward(self.wheels.w, wanted.w, TURN_ACCELERATION * dt_s),
+        )
         self.odometry = _moved(self.odometry, self.wheels, dt_s)
         self.twist = self._on_the_floor(dt_s)
         moved = _moved(self.pose, self.twist, dt_s)

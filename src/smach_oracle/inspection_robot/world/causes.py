@@ -1,4 +1,5 @@
 """Causes that may make a trial fail, drawn from its seed: things in the world, never a failure."""
+
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -10,12 +11,21 @@ from .people import Errand
 
 # of each cause, by itself
 CHANCE = {
-    'person_in_the_way': 0.35, 'person_at_the_panel': 0.3, 'wet_floor': 0.35, 'glare': 0.3,
-    'low_battery': 0.25
+    'person_in_the_way': 0.35,
+    'person_at_the_panel': 0.3,
+    'wet_floor': 0.35,
+    'glare': 0.3,
+    'low_battery': 0.25,
 }
 # on the robot's ways: where people stop for a talk (m), and when a robot without trouble passes (s)
-CROSSINGS = ((1.5, 3.6, 4.0), (2.9, 5.3, 12.0), (4.3, 4.0, 15.0), (4.8, 2.4, 17.0),
-             (6.5, 2.1, 25.0), (8.0, 3.9, 29.0))
+CROSSINGS = (
+    (1.5, 3.6, 4.0),
+    (2.9, 5.3, 12.0),
+    (4.3, 4.0, 15.0),
+    (4.8, 2.4, 17.0),
+    (6.5, 2.1, 25.0),
+    (8.0, 3.9, 29.0),
+)
 AT_PANEL_S = {1: 8.0, 2: 20.0, 3: 32.0}  # when it looks at each panel
 PUDDLES = ((1.7, 4.6), (4.4, 3.2), (4.9, 2.2), (7.4, 2.6), (8.0, 4.2))
 # where people who walk about come from, and go to
@@ -63,22 +73,29 @@ def draw(seed: int, only: Optional[Sequence[str]] = None) -> TrialScene:
     rng = np.random.default_rng(seed)
     drawn = {kind: rng.random() < chance for kind, chance in CHANCE.items()}
     causes = tuple(kind for kind in CHANCE if (drawn[kind] if only is None else kind in only))
-    readings = {panel.number: round(float(rng.uniform(0.5, GAUGE_RANGE - 0.5)), 2)
-                for panel in PANELS}
+    readings = {
+        panel.number: round(float(rng.uniform(0.5, GAUGE_RANGE - 0.5)), 2) for panel in PANELS
+    }
     # each is drawn in any case: a seed's puddle is where it is, with or without other causes
     wet, glare, sag = _wet(rng), _glare(rng), _sag(rng)
     blocking, looking, strolling = _blocking(rng), _looking(rng), _strolling(rng)
     errands = [strolling] + [
-        errand for errand, kind in ((blocking, 'person_in_the_way'),
-                                    (looking, 'person_at_the_panel')) if kind in causes]
-    return TrialScene(seed, causes, readings, tuple(errands),
-                      wet=wet if 'wet_floor' in causes else None,
-                      glare=glare if 'glare' in causes else None,
-                      sag=sag if 'low_battery' in causes else None)
+        errand
+        for errand, kind in ((blocking, 'person_in_the_way'), (looking, 'person_at_the_panel'))
+        if kind in causes
+    ]
+    return TrialScene(
+        seed,
+        causes,
+        readings,
+        tuple(errands),
+        wet=wet if 'wet_floor' in causes else None,
+        glare=glare if 'glare' in causes else None,
+        sag=sag if 'low_battery' in causes else None,
+    )
 
 
-def _pick(rng: np.random.Generator,
-          places: Sequence[Tuple[float, float]]) -> Tuple[float, float]:
+def _pick(rng: np.random.Generator, places: Sequence[Tuple[float, float]]) -> Tuple[float, float]:
     return places[int(rng.integers(len(places)))]
 
 
@@ -91,8 +108,12 @@ def _wet(rng: np.random.Generator) -> WetPatch:
 def _glare(rng: np.random.Generator) -> Glare:
     panel = PANELS[int(rng.integers(len(PANELS)))]
     begins_s = float(rng.uniform(0.0, 20.0))
-    return Glare(panel.number, math.radians(rng.uniform(-8.0, 8.0)), begins_s,
-                 begins_s + float(rng.uniform(15.0, 35.0)))
+    return Glare(
+        panel.number,
+        math.radians(rng.uniform(-8.0, 8.0)),
+        begins_s,
+        begins_s + float(rng.uniform(15.0, 35.0)),
+    )
 
 
 def _sag(rng: np.random.Generator) -> Sag:
@@ -122,10 +143,13 @@ def _there_and_back(where: Tuple[float, float], begins_s: float, stands_s: float
 
 def _strolling(rng: np.random.Generator) -> Errand:
     """Somebody walks to and fro in a room, across the robot's way, and stands next to it."""
-    rooms: List[Tuple[Tuple[float, float], ...]] = [((0.6, 3.7), (2.9, 3.4)),
-                                                    ((4.1, 1.6), (5.9, 3.8)),
-                                                    ((7.1, 5.9), (9.4, 1.6))]
+    rooms: List[Tuple[Tuple[float, float], ...]] = [
+        ((0.6, 3.7), (2.9, 3.4)),
+        ((4.1, 1.6), (5.9, 3.8)),
+        ((7.1, 5.9), (9.4, 1.6)),
+    ]
     ends = rooms[int(rng.integers(len(rooms)))]
     places = tuple(ends[turn % 2] for turn in range(8))
-    return Errand(float(rng.uniform(0.0, 5.0)), places,
-                  tuple(float(rng.uniform(2.0, 8.0)) for _ in places))
+    return Errand(
+        float(rng.uniform(0.0, 5.0)), places, tuple(float(rng.uniform(2.0, 8.0)) for _ in places)
+    )

@@ -1,4 +1,5 @@
 """A panel's looks: a dark frame, a white plate, a dial with a red needle, a number in cells."""
+
 import math
 
 import cv2
@@ -22,15 +23,26 @@ def painted(number: int, reading: float) -> np.ndarray:
     for digit, (x, y, size) in enumerate(CELLS):
         half = int(0.5 * size * SIDE)
         corner = (int(x * SIDE) - half, int(y * SIDE) - half)
-        cv2.rectangle(image, corner, (corner[0] + 2 * half, corner[1] + 2 * half), BLACK,
-                      cv2.FILLED if number >> digit & 1 else 2)
+        cv2.rectangle(
+            image,
+            corner,
+            (corner[0] + 2 * half, corner[1] + 2 * half),
+            BLACK,
+            cv2.FILLED if number >> digit & 1 else 2,
+        )
     return image
 
 
-def _line(image: np.ndarray, reading: float, inner: float, outer: float, colour: tuple,
-          width: int) -> None:
+def _line(
+    image: np.ndarray, reading: float, inner: float, outer: float, colour: tuple, width: int
+) -> None:
     """A line along the radius at a reading. Both ends in shares of a side from the middle."""
     angle = ZERO_ANGLE - SWEEP * reading / GAUGE_RANGE
-    ends = [(int(SIDE * (DIAL[0] + share * math.cos(angle))),
-             int(SIDE * (DIAL[1] - share * math.sin(angle)))) for share in (inner, outer)]
+    ends = [
+        (
+            int(SIDE * (DIAL[0] + share * math.cos(angle))),
+            int(SIDE * (DIAL[1] - share * math.sin(angle))),
+        )
+        for share in (inner, outer)
+    ]
     cv2.line(image, ends[0], ends[1], colour, width, cv2.LINE_AA)

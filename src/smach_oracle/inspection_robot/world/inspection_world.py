@@ -1,4 +1,5 @@
 """One trial's world, and how time passes in it."""
+
 from typing import Dict, List, Optional
 
 import numpy as np
@@ -26,8 +27,9 @@ class InspectionWorld:
         self.base = WheeledBase(START, scene.wet)
         self.reported: Dict[int, float] = {}  # bar, by the number of the panel
         self._people = [Walker(errand) for errand in scene.errands]
-        self._fronts = {panel.number: painted(panel.number, scene.readings[panel.number])
-                        for panel in PANELS}
+        self._fronts = {
+            panel.number: painted(panel.number, scene.readings[panel.number]) for panel in PANELS
+        }
         self._rng = np.random.default_rng(scene.seed + 1)
 
     @property
@@ -79,6 +81,9 @@ class InspectionWorld:
             if reading is None:
                 told.append('panel {} was not reported'.format(panel.number))
             elif abs(reading - true) > CLOSE_ENOUGH:
-                told.append('panel {} was reported as {:.2f} and shows {:.2f} bar'.format(
-                    panel.number, reading, true))
+                told.append(
+                    'panel {} was reported as {:.2f} and shows {:.2f} bar'.format(
+                        panel.number, reading, true
+                    )
+                )
         return told

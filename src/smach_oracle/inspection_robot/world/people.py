@@ -1,4 +1,5 @@
 """People who walk through the hall, and stand where their errand takes them."""
+
 import math
 from typing import NamedTuple, Sequence, Tuple
 
@@ -61,8 +62,7 @@ class Walker:
         gap = math.hypot(ahead[0] - robot[0], ahead[1] - robot[1])
         return gap >= KEEPS_AWAY or gap > math.hypot(self.x - robot[0], self.y - robot[1])
 
-    def _walk_around(self, way: float, robot: Sequence[float],
-                     target: Tuple[float, float]) -> None:
+    def _walk_around(self, way: float, robot: Sequence[float], target: Tuple[float, float]) -> None:
         """One step along a circle around the robot, on the side on which the target is."""
         angle = math.atan2(self.y - robot[1], self.x - robot[0])
         wanted = math.atan2(target[1] - robot[1], target[0] - robot[0])

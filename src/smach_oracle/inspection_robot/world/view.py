@@ -1,4 +1,5 @@
 """The camera's view: walls, panels, people, sunlight, and the blur of the robot's own motion."""
+
 import math
 from typing import Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -34,8 +35,14 @@ def intrinsics() -> np.ndarray:
     return np.array([[FOCAL, 0.0, 0.5 * WIDTH], [0.0, FOCAL, 0.5 * HEIGHT], [0.0, 0.0, 1.0]])
 
 
-def view(pose: Pose, twist: Twist, fronts: Mapping[int, np.ndarray], people: Sequence[Circle],
-         light: Optional[Sunlight], rng: np.random.Generator) -> np.ndarray:
+def view(
+    pose: Pose,
+    twist: Twist,
+    fronts: Mapping[int, np.ndarray],
+    people: Sequence[Circle],
+    light: Optional[Sunlight],
+    rng: np.random.Generator,
+) -> np.ndarray:
     """(HEIGHT, WIDTH, 3) uint8 RGB.
 
     :param pose: of the camera, which looks forward, level.
@@ -63,7 +70,7 @@ def _hall(walls: np.ndarray) -> np.ndarray:
     """Floor, walls and ceiling. Walls are darker far away, and at every joint of their slabs."""
     image = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     image[:] = (118, 112, 104)
-    image[:HEIGHT // 2] = (206, 208, 212)
+    image[: HEIGHT // 2] = (206, 208, 212)
     shade = (176 - 7 * np.minimum(walls, 9.0))[None, :, None] * np.array([1.0, 1.0, 0.96])
     below, above = FOCAL * CAMERA_HEIGHT / walls, FOCAL * (WALL_HEIGHT - CAMERA_HEIGHT) / walls
     on_wall = (_ROWS < below) & (_ROWS > -above)
@@ -77,8 +84,9 @@ def _in_camera(pose: Pose, x: float, y: float) -> Tuple[float, float]:
     return ahead * cosine + left * sine, ahead * sine - left * cosine
 
 
-def _hang(image: np.ndarray, pose: Pose, panel: GaugePanel, front: np.ndarray,
-          walls: np.ndarray) -> None:
+def _hang(
+    image: np.ndarray, pose: Pose, panel: GaugePanel, front: np.ndarray, walls: np.ndarray
+) -> None:
     """Paint a panel where the camera looks at its front, and no wall is before it."""
     x = panel.x + PANEL_DEPTH * math.cos(panel.facing)
     y = panel.y + PANEL_DEPTH * math.sin(panel.facing)
@@ -90,10 +98,13 @@ def _hang(image: np.ndarray, pose: Pose, panel: GaugePanel, front: np.ndarray,
     if min(left[0], right[0]) < 0.15 or toward <= 0:
         return
     half = 0.5 * PANEL_SIDE
-    corners = np.array([(0.5 * WIDTH + FOCAL * end[1] / end[0],
-                         0.5 * HEIGHT + FOCAL * up / end[0])
-                        for end, up in ((left, -half), (right, -half), (right, half),
-                                        (left, half))], np.float32)
+    corners = np.array(
+        [
+            (0.5 * WIDTH + FOCAL * end[1] / end[0], 0.5 * HEIGHT + FOCAL * up / end[0])
+            for end, up in ((left, -half), (right, -half), (right, half), (left, half))
+        ],
+        np.float32,
+    )
     side = front.shape[0]
     texture = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
     # where the panel is small, its picture is averaged first, or lines would break into dots
@@ -124,7 +135,7 @@ def _glare(pose: Pose, light: Sunlight) -> np.ndarray:
     seen_from = math.atan2(pose[1] - panel.y, pose[0] - panel.x) - panel.facing
     off = math.remainder(seen_from - light.angle, 2 * math.pi) / GLARE_WIDTH
     strength = 420.0 * math.exp(-0.5 * off * off)
-    across = (np.arange(WIDTH)[None, :] + 0.5 - 0.5 * WIDTH - FOCAL * right / ahead)
+    across = np.arange(WIDTH)[None, :] + 0.5 - 0.5 * WIDTH - FOCAL * right / ahead
     spread = 0.45 * FOCAL * PANEL_SIDE / ahead
     blot = np.exp(-0.5 * (across**2 + _ROWS**2) / spread**2)
     return (strength * (blot + 0.08))[..., None].astype(np.float32)

@@ -1,4 +1,5 @@
 """A robot's arm on ROS: joint states in, joint targets out, a gripper action."""
+
 import math
 import threading
 import time
@@ -38,8 +39,10 @@ class ArmNames(NamedTuple):
         """
         if not isinstance(value, Mapping) or set(value) - {'posture'} != set(_FIELDS):
             raise SettingsError(
-                key, value,
-                'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)))
+                key,
+                value,
+                'a mapping with the keys {}, and posture or not'.format(', '.join(_FIELDS)),
+            )
         for field in _FIELDS:
             if not isinstance(value[field], str) or not value[field]:
                 raise checks.no_name('{}.{}'.format(key, field), value[field], 'a name')
@@ -59,8 +62,9 @@ class JointListener:
         self._positions: Dict[str, float] = {}
         self._heard_s: Dict[str, float] = {}  # monotonic
         self._stamp = rospy.Time()
-        self._subscriber = rospy.Subscriber(topic, JointState, self._heard, queue_size=100,
-                                            tcp_nodelay=True)
+        self._subscriber = rospy.Subscriber(
+            topic, JointState, self._heard, queue_size=100, tcp_nodelay=True
+        )
 
     def now(self) -> Tuple[Dict[str, float], rospy.Time]:
         """Positions by joint (rad or m), and their time."""
@@ -75,8 +79,13 @@ class JointListener:
         with self._changed:
             return time.monotonic() - min(self._heard_s.get(name, -math.inf) for name in names)
 
-    def wait_for_period(self, before: Optional[Mapping[str, float]], since: rospy.Time,
-                        period_s: float, limit_s: float) -> bool:
+    def wait_for_period(
+        self,
+        before: Optional[Mapping[str, float]],
+        since: rospy.Time,
+        period_s: float,
+        limit_s: float,
+    ) -> bool:
         """Wait until joints are reported a period after `since`. Return whether they were.
 
         Where `before` is given, they must be elsewhere than that.
@@ -87,8 +96,11 @@ class JointListener:
         after = since + rospy.Duration(0.9 * period_s)
 
         def passed() -> bool:
-            return self._stamp > after and (before is None or any(
-                self._positions.get(name) != value for name, value in before.items()))
+            return self._stamp > after and (
+                before is None
+                or any(self._positions.get(name) != value for name, value in before.items())
+            )
+
         with self._changed:
             return self._changed.wait_for(passed, limit_s)
 
@@ -160,10 +172,14 @@ class GripperPort:
         if event is not None and not event.status:
             return False
         self._sent = None
-        if (event is None or event.result is None
-                or event.status in (GoalStatus.LOST, GoalStatus.REJECTED)):
+        if (
+            event is None
+            or event.result is None
+            or event.status in (GoalStatus.LOST, GoalStatus.REJECTED)
+        ):
             self.report = GripperReport(
-                problem='gripper {}: its motion got lost'.format(self._link.name))
+                problem='gripper {}: its motion got lost'.format(self._link.name)
+            )
         else:
             self.report = GripperReport(event.result.position, event.result.stalled)
         return True
@@ -184,6 +200,9 @@ class ArmPort:
 
     def send(self, positions: np.ndarray, velocities: np.ndarray, period_s: float) -> None:
         """Be at `positions` (n,), rad, `period_s` from now, moving at `velocities` (n,), rad/s."""
-        point = JointTrajectoryPoint(positions=positions.tolist(), velocities=velocities.tolist(),
-                                     time_from_start=rospy.Duration(period_s))
+        point = JointTrajectoryPoint(
+            positions=positions.tolist(),
+            velocities=velocities.tolist(),
+            time_from_start=rospy.Duration(period_s),
+        )
         self._publisher.publish(JointTrajectory(joint_names=self._joints, points=[point]))

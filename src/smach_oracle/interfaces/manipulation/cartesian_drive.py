@@ -5,6 +5,7 @@ gets slower. ROS-free. Lengths in m, angles in rad, times in s. Twists are (6,):
 angular, along the axes of the chain's base, about the tool's origin. The teleoperation of the
 paper, section V-A.
 """
+
 from functools import partial
 from typing import Callable, List, NamedTuple, Optional, Protocol, Sequence, Tuple
 
@@ -90,9 +91,13 @@ class CartesianDrive:
     Stateless: each step starts from the joints that it is given.
     """
 
-    def __init__(self, arm: ArmKinematics, limits: Optional[DriveLimits] = None,
-                 near: Optional[ClearanceProbe] = None,
-                 posture: Optional[np.ndarray] = None) -> None:
+    def __init__(
+        self,
+        arm: ArmKinematics,
+        limits: Optional[DriveLimits] = None,
+        near: Optional[ClearanceProbe] = None,
+        posture: Optional[np.ndarray] = None,
+    ) -> None:
         """
         :param near: returns, for joint positions (n,), the nearest things that the arm could hit,
             one of a kind at most.
@@ -106,13 +111,16 @@ class CartesianDrive:
         self._upper = arm.upper - self.limits.joint_margin
         finite = np.isfinite(arm.lower) & np.isfinite(arm.upper)
         self._middle = np.where(
-            finite, (np.where(finite, arm.lower, 0) + np.where(finite, arm.upper, 0)) / 2, 0.0)
+            finite, (np.where(finite, arm.lower, 0) + np.where(finite, arm.upper, 0)) / 2, 0.0
+        )
         self._posture = posture
-        self._half_range = np.where(finite,
-                                    np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf)
+        self._half_range = np.where(
+            finite, np.where(finite, arm.upper - arm.lower, 1.0) / 2, np.inf
+        )
 
-    def step(self, joints: np.ndarray, twist: np.ndarray, period: float,
-             turn_freely: bool = False) -> DriveStep:
+    def step(
+        self, joints: np.ndarray, twist: np.ndarray, period: float, turn_freely: bool = False
+    ) -> DriveStep:
         """Return where the joints (n,) go within one period for the tool to move by `twist` (6,).
 
         :param turn_freely: only the linear part counts. Meanwhile, also where it is zero, tool and
@@ -132,22 +140,31 @@ class CartesianDrive:
         rows = slice(0, 3 if turn_freely else 6)
         velocities, why, rest = self._joint_velocities(joints, jacobian[rows], wanted[rows])
         limit, share = why or limit, share * rest
-        brakes: List[Brake] = [self._joint_speed, self._joint_room, self._workspace,
-                               partial(self._obstacles, nearest)]
+        brakes: List[Brake] = [
+            self._joint_speed,
+            self._joint_room,
+            self._workspace,
+            partial(self._obstacles, nearest),
+        ]
         for brake in brakes:
             scale, why = brake(joints, velocities, period)
             if scale < 1.0:
                 velocities, limit, share = velocities * scale, why, share * scale
-        return DriveStep(joints + velocities * period, velocities, jacobian @ velocities, share,
-                         limit, clearance)
+        return DriveStep(
+            joints + velocities * period, velocities, jacobian @ velocities, share, limit, clearance
+        )
 
     def _within_tool_limits(self, twist: np.ndarray) -> Tuple[np.ndarray, str, float]:
-        scale = min(1.0, _ratio(self.limits.linear, _length(twist[:3])),
-                    _ratio(self.limits.angular, _length(twist[3:])))
-        return twist * scale, 'the tool\'s speed limit' if scale < 1.0 else '', scale
+        scale = min(
+            1.0,
+            _ratio(self.limits.linear, _length(twist[:3])),
+            _ratio(self.limits.angular, _length(twist[3:])),
+        )
+        return twist * scale, "the tool's speed limit" if scale < 1.0 else '', scale
 
-    def _joint_velocities(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray
-                          ) -> Tuple[np.ndarray, str, float]:
+    def _joint_velocities(
+        self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray
+    ) -> Tuple[np.ndarray, str, float]:
         """Velocities for the twist. Joints at their limits rest as long as the others can do it.
 
         :returns: velocities (n,), the limit met or '', and the share of the twist that is left
@@ -157,8 +174,10 @@ class CartesianDrive:
         stuck = ''
         while free.any():
             velocities, damped = self._least_squares(joints, jacobian, twist, free)
-            blocked = free & (((velocities > 0) & (joints > self._upper - _ROOM))
-                              | ((velocities < 0) & (joints < self._lower + _ROOM)))
+            blocked = free & (
+                ((velocities > 0) & (joints > self._upper - _ROOM))
+                | ((velocities < 0) & (joints < self._lower + _ROOM))
+            )
             if not blocked.any():
                 break
             free &= ~blocked
@@ -169,17 +188,21 @@ class CartesianDrive:
         lost = _length(jacobian @ velocities - twist) / wanted if twist.any() else 0.0
         if stuck and lost > self.limits.off_course:
             return np.zeros(len(joints)), stuck, 0.0
-        along = float(np.clip(jacobian @ velocities @ twist /
-                              wanted**2, 0.0, 1.0)) if twist.any() else 1.0
+        along = (
+            float(np.clip(jacobian @ velocities @ twist / wanted**2, 0.0, 1.0))
+            if twist.any()
+            else 1.0
+        )
         return velocities, 'singular posture' if damped and lost > 0.02 else '', along
 
-    def _least_squares(self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray,
-                       free: np.ndarray) -> Tuple[np.ndarray, bool]:
+    def _least_squares(
+        self, joints: np.ndarray, jacobian: np.ndarray, twist: np.ndarray, free: np.ndarray
+    ) -> Tuple[np.ndarray, bool]:
         """Least squares over the free joints, damped in nearly singular directions alone."""
         left, values, right = np.linalg.svd(jacobian[:, free], full_matrices=False)
         nearness = np.clip(1.0 - (values / self.limits.singular_below) ** 2, 0.0, 1.0)
-        damping = self.limits.damping ** 2 * nearness
-        solution = right.T @ (values / (values ** 2 + damping) * (left.T @ twist))
+        damping = self.limits.damping**2 * nearness
+        solution = right.T @ (values / (values**2 + damping) * (left.T @ twist))
         spare = self._spare(joints, twist)[free]
         solution += spare - right.T @ (right @ spare)
         velocities = np.zeros(len(joints))
@@ -194,53 +217,70 @@ class CartesianDrive:
         """
         offset = (joints - self._middle) / self._half_range
         if len(twist) == 6:
-            effort = min(1.0, _length(twist[:3]) / self.limits.linear
-                         + _length(twist[3:]) / self.limits.angular)
-            return -effort * self.limits.posture_gain * np.sign(offset) * np.maximum(
-                np.abs(offset) - 0.6, 0.0)
-        away = offset if self._posture is None else np.arctan2(np.sin(joints - self._posture),
-                                                               np.cos(joints - self._posture))
+            effort = min(
+                1.0,
+                _length(twist[:3]) / self.limits.linear + _length(twist[3:]) / self.limits.angular,
+            )
+            return (
+                -effort
+                * self.limits.posture_gain
+                * np.sign(offset)
+                * np.maximum(np.abs(offset) - 0.6, 0.0)
+            )
+        away = (
+            offset
+            if self._posture is None
+            else np.arctan2(np.sin(joints - self._posture), np.cos(joints - self._posture))
+        )
         return -np.clip(_EASE_GAIN * away, -_EASE_SPEED, _EASE_SPEED)
 
-    def _joint_speed(self, joints: np.ndarray, velocities: np.ndarray,
-                     period: float) -> Tuple[float, str]:
+    def _joint_speed(
+        self, joints: np.ndarray, velocities: np.ndarray, period: float
+    ) -> Tuple[float, str]:
         shares = np.abs(velocities) / (self.arm.velocity * self.limits.joint_share)
         fastest = int(np.argmax(shares))
         return _ratio(1.0, shares[fastest]), 'speed limit of ' + self.arm.names[fastest]
 
-    def _joint_room(self, joints: np.ndarray, velocities: np.ndarray,
-                    period: float) -> Tuple[float, str]:
+    def _joint_room(
+        self, joints: np.ndarray, velocities: np.ndarray, period: float
+    ) -> Tuple[float, str]:
         room = np.where(velocities > 0, self._upper - joints, joints - self._lower)
         way = np.abs(velocities) * period
         shares = np.where(way > 0, np.maximum(room, 0.0) / np.where(way > 0, way, 1.0), np.inf)
         nearest = int(np.argmin(shares))
         return min(1.0, float(shares[nearest])), 'joint limit of ' + self.arm.names[nearest]
 
-    def _workspace(self, joints: np.ndarray, velocities: np.ndarray,
-                   period: float) -> Tuple[float, str]:
+    def _workspace(
+        self, joints: np.ndarray, velocities: np.ndarray, period: float
+    ) -> Tuple[float, str]:
         low, high = (np.array(corner) for corner in self.limits.workspace)
         here = self.arm.forward(joints)[:3, 3]
         way = self.arm.forward(joints + velocities * period)[:3, 3] - here
         room = np.where(way > 0, high - here, here - low)
         shares = np.where(
-            np.abs(way) > 1e-9,
-            np.maximum(room, 0.0) / np.maximum(np.abs(way), 1e-9), np.inf)
+            np.abs(way) > 1e-9, np.maximum(room, 0.0) / np.maximum(np.abs(way), 1e-9), np.inf
+        )
         nearest = int(np.argmin(shares))
         return min(1.0, float(shares[nearest])), 'end of the workspace in ' + 'xyz'[nearest]
 
-    def _obstacles(self, now: Sequence[Clearance], joints: np.ndarray, velocities: np.ndarray,
-                   period: float) -> Tuple[float, str]:
+    def _obstacles(
+        self, now: Sequence[Clearance], joints: np.ndarray, velocities: np.ndarray, period: float
+    ) -> Tuple[float, str]:
         near = [each for each in now if each.distance < self.limits.slow_below]
         if self._near is None or not near:
             return 1.0, ''
         then = {each.touchable: each.distance for each in self._near(joints + velocities * period)}
-        shares = [(self._share_left(each), 'near: ' + each.between) for each in near
-                  if then.get(each.touchable, float('inf')) < each.distance]
+        shares = [
+            (self._share_left(each), 'near: ' + each.between)
+            for each in near
+            if then.get(each.touchable, float('inf')) < each.distance
+        ]
         return min(shares, default=(1.0, ''))
 
     def _share_left(self, near: Clearance) -> float:
-        share = (near.distance - self.limits.stop_below) / (self.limits.slow_below -
-                                                            self.limits.stop_below)
+        share = (near.distance - self.limits.stop_below) / (
+            self.limits.slow_below - self.limits.stop_below
+        )
         return float(np.clip(share, self.limits.creep if near.touchable else 0.0, 1.0))
 
 
@@ -260,14 +300,16 @@ def _ratio(limit: float, value: float) -> float:
     return 1.0 if value <= limit else float(limit / value)
 
 
-def _checked(joints: np.ndarray, twist: np.ndarray, period: float,
-             count: int) -> Tuple[np.ndarray, np.ndarray]:
+def _checked(
+    joints: np.ndarray, twist: np.ndarray, period: float, count: int
+) -> Tuple[np.ndarray, np.ndarray]:
     joints, twist = np.asarray(joints, dtype=float), np.asarray(twist, dtype=float)
     if joints.shape != (count,) or not np.isfinite(joints).all():
         raise ValueError('joints must be {} finite numbers, not {}'.format(count, joints.tolist()))
     if twist.shape != (6,) or not np.isfinite(twist).all():
-        raise ValueError('a twist must be 6 finite numbers (m/s, rad/s), not {}'.format(
-            twist.tolist()))
+        raise ValueError(
+            'a twist must be 6 finite numbers (m/s, rad/s), not {}'.format(twist.tolist())
+        )
     if not 0.0 < period < float('inf'):
         raise ValueError('a period must be more than 0 s, not {}'.format(period))
     return joints, twist

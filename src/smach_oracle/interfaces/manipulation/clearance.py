@@ -2,6 +2,7 @@
 
 A PyBullet world of its own, without physics: it only measures distances between convex shapes.
 """
+
 import os
 import tempfile
 from types import ModuleType
@@ -70,8 +71,7 @@ class ClearanceModel:
             self._joints[info[1].decode()] = index
             self._links[info[12].decode()] = index
         if base not in self._links and base not in {
-                joint.parent
-                for joint in self._joint_of_link.values()
+            joint.parent for joint in self._joint_of_link.values()
         }:
             raise ClearanceError('robot description: no link {!r}'.format(base))
         self._names = {index: name for name, index in self._links.items()}
@@ -81,11 +81,15 @@ class ClearanceModel:
 
     def set_joints(self, positions: Mapping[str, float]) -> None:
         """Set where the joints are (rad or m). Names that the model does not have are left out."""
-        known = [(self._joints[name], [position]) for name, position in positions.items()
-                 if name in self._joints]
+        known = [
+            (self._joints[name], [position])
+            for name, position in positions.items()
+            if name in self._joints
+        ]
         if known:
-            self._bullet.resetJointStatesMultiDof(self._robot, *map(list, zip(*known)),
-                                                  physicsClientId=self._client)
+            self._bullet.resetJointStatesMultiDof(
+                self._robot, *map(list, zip(*known)), physicsClientId=self._client
+            )
 
     def set_boxes(self, boxes: Sequence[CollisionBox]) -> None:
         """Replace the boxes around the robot."""
@@ -112,24 +116,32 @@ class ClearanceModel:
     def own_pairs(self, moving: Set[int]) -> List[Pair]:
         """Pairs of a moving link and another one of the robot that both have a shape."""
         shaped = [
-            index for index in self._names
+            index
+            for index in self._names
             if self._bullet.getCollisionShapeData(self._robot, index, physicsClientId=self._client)
         ]
-        return [(first, second) for first in shaped if first in moving for second in shaped
-                if second not in moving]
+        return [
+            (first, second)
+            for first in shaped
+            if first in moving
+            for second in shaped
+            if second not in moving
+        ]
 
     def distance(self, pair: Pair, within: float) -> float:
         """Distance (m) between two links, inf from `within` on."""
-        points = self._bullet.getClosestPoints(self._robot, self._robot, within, *pair,
-                                               physicsClientId=self._client)
+        points = self._bullet.getClosestPoints(
+            self._robot, self._robot, within, *pair, physicsClientId=self._client
+        )
         return min((point[8] for point in points), default=float('inf'))
 
     def near_boxes(self, moving: Set[int], within: float) -> Optional[Tuple[float, str]]:
         """The least distance (m) between a moving link and a box, with the names of both."""
         best: Optional[Tuple[float, str]] = None
         for body, name in self._boxes:
-            for point in self._bullet.getClosestPoints(self._robot, body, within,
-                                                       physicsClientId=self._client):
+            for point in self._bullet.getClosestPoints(
+                self._robot, body, within, physicsClientId=self._client
+            ):
                 if point[3] in moving and (best is None or point[8] < best[0]):
                     best = point[8], '{} and {}'.format(self._names[point[3]], name)
         return best
@@ -148,30 +160,43 @@ class ClearanceModel:
             with open(path, 'w', encoding='utf-8') as file:
                 file.write(urdf)
             try:
-                robot: int = self._bullet.loadURDF(path, useFixedBase=True,
-                                                   physicsClientId=self._client)
+                robot: int = self._bullet.loadURDF(
+                    path, useFixedBase=True, physicsClientId=self._client
+                )
             except self._bullet.error as err:
                 raise ClearanceError(
                     'robot description: PyBullet cannot load it ({}); are its meshes there?'.format(
-                        err)) from err
+                        err
+                    )
+                ) from err
         return robot
 
     def _box(self, box: CollisionBox) -> int:
-        shape = self._bullet.createCollisionShape(self._bullet.GEOM_BOX,
-                                                  halfExtents=[side / 2 for side in box.size],
-                                                  physicsClientId=self._client)
+        shape = self._bullet.createCollisionShape(
+            self._bullet.GEOM_BOX,
+            halfExtents=[side / 2 for side in box.size],
+            physicsClientId=self._client,
+        )
         world_from_box = self._world_from_base() @ box.base_from_box
-        body: int = self._bullet.createMultiBody(0, shape, -1, world_from_box[:3, 3].tolist(),
-                                                 quaternion(world_from_box).tolist(),
-                                                 physicsClientId=self._client)
+        body: int = self._bullet.createMultiBody(
+            0,
+            shape,
+            -1,
+            world_from_box[:3, 3].tolist(),
+            quaternion(world_from_box).tolist(),
+            physicsClientId=self._client,
+        )
         return body
 
     def _world_from_base(self) -> np.ndarray:
         result = np.eye(4)
         if self._base in self._links:
-            state = self._bullet.getLinkState(self._robot, self._links[self._base],
-                                              computeForwardKinematics=True,
-                                              physicsClientId=self._client)
+            state = self._bullet.getLinkState(
+                self._robot,
+                self._links[self._base],
+                computeForwardKinematics=True,
+                physicsClientId=self._client,
+            )
             result[:3, 3] = state[4]
             result[:3, :3] = np.array(self._bullet.getMatrixFromQuaternion(state[5])).reshape(3, 3)
         return result
@@ -192,8 +217,9 @@ class ArmClearance:
         """The nearest of the robot itself and of the boxes, where near, at joint positions (n,)."""
         self._model.set_joints(dict(zip(self._chain.names, joints)))
         apart = ((self._model.distance(pair, self._within), pair) for pair in self._pairs)
-        distance, pair = min((each for each in apart if each[0] > _OVERLAP),
-                             default=(float('inf'), (-1, -1)))
+        distance, pair = min(
+            (each for each in apart if each[0] > _OVERLAP), default=(float('inf'), (-1, -1))
+        )
         found = []
         if distance < self._within:
             found.append(Clearance(distance, self._model.pair_name(pair), False))

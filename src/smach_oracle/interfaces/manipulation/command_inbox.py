@@ -1,4 +1,5 @@
 """Commands as they come in, each with the time at which it came."""
+
 import threading
 import time
 from collections import deque

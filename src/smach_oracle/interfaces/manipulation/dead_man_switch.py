@@ -2,6 +2,7 @@
 
 Pure. Times are monotonic, in s.
 """
+
 import math
 
 # silence that counts as letting go, where the handle was taken from a hand that pressed it
@@ -39,8 +40,10 @@ class DeadManSwitch:
             return '{} drives; one at a time'.format(holder)
         if operator == self._dropped and now_s < self._silent_until_s:
             self._silent_until_s = now_s + _LET_GO_S
-            return ('let go of the dead-man first: it was pressed before this goal began, or '
-                    'somebody has stopped the hand')
+            return (
+                'let go of the dead-man first: it was pressed before this goal began, or '
+                'somebody has stopped the hand'
+            )
         self._operator, self._until_s = operator, now_s + self._watchdog_s
         self._leased_until_s = now_s + self._lease_s
         return ''

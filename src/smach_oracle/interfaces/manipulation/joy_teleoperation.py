@@ -2,6 +2,7 @@
 
 The joystick is any that publishes sensor_msgs/Joy, such as a SpaceNav or a gamepad.
 """
+
 import math
 import threading
 import time
@@ -50,31 +51,41 @@ class JoySettings(NamedTuple):
         """
         axes = given.get('axes')
         if not isinstance(axes, Mapping) or not axes:
-            raise SettingsError('~axes', axes,
-                              'a mapping of {} to [index, speed]'.format(', '.join(AXES)))
+            raise SettingsError(
+                '~axes', axes, 'a mapping of {} to [index, speed]'.format(', '.join(AXES))
+            )
         buttons = given.get('buttons', {})
         if not isinstance(buttons, Mapping) or 'dead_man' not in buttons:
             raise SettingsError(
-                '~buttons', buttons,
-                'a mapping with dead_man, and open, close or toggle where there are '
-                'such')
+                '~buttons',
+                buttons,
+                'a mapping with dead_man, and open, close or toggle where there are such',
+            )
         unknown = sorted(set(buttons) - set(BUTTONS), key=str)
         if unknown:
-            raise SettingsError('~buttons/{}'.format(unknown[0]), buttons[unknown[0]],
-                              'the keys ' + ', '.join(BUTTONS))
+            raise SettingsError(
+                '~buttons/{}'.format(unknown[0]),
+                buttons[unknown[0]],
+                'the keys ' + ', '.join(BUTTONS),
+            )
         pressed = {
             name: _index('~buttons/' + name, buttons.get(name, -1), 0 if name == 'dead_man' else -1)
             for name in BUTTONS
         }
-        return cls({name: _axis(name, value) for name, value in axes.items()},
-                   pressed['dead_man'], pressed['open'], pressed['close'], pressed['toggle'],
-                   _number('~gripper_open', given.get('gripper_open', GRIPPER_OPEN), 0.0, 1.0),
-                   _number('~dead_zone', given.get('dead_zone', 0.05), 0.0, 0.9),
-                   _number('~silent_s', given.get('silent_s', 0.3), 0.02, 2.0),
-                   _number('~rate_hz', given.get('rate_hz', 50.0), 30.0, 200.0),
-                   _text('~frame', given.get('frame'), 'the name of a link of the robot'),
-                   _text('~arm', given.get('arm', ''), 'the name of an arm, or none', 0),
-                   _text('~operator', given.get('operator', 'joystick'), 'a name'))
+        return cls(
+            {name: _axis(name, value) for name, value in axes.items()},
+            pressed['dead_man'],
+            pressed['open'],
+            pressed['close'],
+            pressed['toggle'],
+            _number('~gripper_open', given.get('gripper_open', GRIPPER_OPEN), 0.0, 1.0),
+            _number('~dead_zone', given.get('dead_zone', 0.05), 0.0, 0.9),
+            _number('~silent_s', given.get('silent_s', 0.3), 0.02, 2.0),
+            _number('~rate_hz', given.get('rate_hz', 50.0), 30.0, 200.0),
+            _text('~frame', given.get('frame'), 'the name of a link of the robot'),
+            _text('~arm', given.get('arm', ''), 'the name of an arm, or none', 0),
+            _text('~operator', given.get('operator', 'joystick'), 'a name'),
+        )
 
 
 class JoystickCommand(NamedTuple):
@@ -89,8 +100,9 @@ class JoystickCommand(NamedTuple):
 RELEASED = JoystickCommand(False, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), None)
 
 
-def joystick_command(settings: JoySettings, axes: Sequence[float],
-                     buttons: Sequence[int]) -> JoystickCommand:
+def joystick_command(
+    settings: JoySettings, axes: Sequence[float], buttons: Sequence[int]
+) -> JoystickCommand:
     """The command of a joystick's message. An axis that is missing or not finite moves nothing."""
     if not _pressed(buttons, settings.dead_man):
         return RELEASED
@@ -100,13 +112,15 @@ def joystick_command(settings: JoySettings, axes: Sequence[float],
         value = axes[index] if 0 <= index < len(axes) else 0.0
         if not math.isfinite(value):
             return RELEASED
-        speeds.append(0.0 if abs(value) <= settings.dead_zone else max(-1.0, min(1.0, value)) *
-                      most)
+        speeds.append(
+            0.0 if abs(value) <= settings.dead_zone else max(-1.0, min(1.0, value)) * most
+        )
     gripper = None
     if _pressed(buttons, settings.open) != _pressed(buttons, settings.close):
         gripper = settings.gripper_open if _pressed(buttons, settings.open) else 0.0
-    return JoystickCommand(True, (speeds[0], speeds[1], speeds[2]),
-                           (speeds[3], speeds[4], speeds[5]), gripper)
+    return JoystickCommand(
+        True, (speeds[0], speeds[1], speeds[2]), (speeds[3], speeds[4], speeds[5]), gripper
+    )
 
 
 class GripperToggle:
@@ -147,7 +161,7 @@ class JoyTeleoperation:
         self._publisher = rospy.Publisher('command', TeleopCommand, queue_size=2, tcp_nodelay=True)
         self._subscribers = [
             rospy.Subscriber('state', TeleopState, self._on_state, queue_size=2),
-            rospy.Subscriber('joy', Joy, self._on_joy, queue_size=1, tcp_nodelay=True)
+            rospy.Subscriber('joy', Joy, self._on_joy, queue_size=1, tcp_nodelay=True),
         ]
 
     def run(self) -> None:
@@ -165,15 +179,22 @@ class JoyTeleoperation:
     def _send(self, command: JoystickCommand) -> None:
         self._seq += 1
         self._publisher.publish(
-            TeleopCommand(header=Header(frame_id=self._settings.frame, stamp=rospy.Time.now()),
-                          operator=self._settings.operator, seq=self._seq, arm=self._arm,
-                          dead_man=command.held, twist=Twist(Vector3(*command.linear),
-                                                             Vector3(*command.angular)),
-                          move_gripper=command.gripper is not None, gripper=command.gripper or 0.0))
+            TeleopCommand(
+                header=Header(frame_id=self._settings.frame, stamp=rospy.Time.now()),
+                operator=self._settings.operator,
+                seq=self._seq,
+                arm=self._arm,
+                dead_man=command.held,
+                twist=Twist(Vector3(*command.linear), Vector3(*command.angular)),
+                move_gripper=command.gripper is not None,
+                gripper=command.gripper or 0.0,
+            )
+        )
 
     def _on_joy(self, message: Joy) -> None:
         command = self._toggle.applied(
-            joystick_command(self._settings, message.axes, message.buttons), message.buttons)
+            joystick_command(self._settings, message.axes, message.buttons), message.buttons
+        )
         with self._lock:
             self._command, self._came_s = command, time.monotonic()
 
@@ -215,8 +236,15 @@ def _text(key: str, value: object, allowed: str, least: int = 1) -> str:
 
 def _parameters() -> Dict[str, Any]:
     names: List[str] = [
-        'axes', 'buttons', 'gripper_open', 'dead_zone', 'silent_s', 'rate_hz', 'frame', 'arm',
-        'operator'
+        'axes',
+        'buttons',
+        'gripper_open',
+        'dead_zone',
+        'silent_s',
+        'rate_hz',
+        'frame',
+        'arm',
+        'operator',
     ]
     return {name: rospy.get_param('~' + name) for name in names if rospy.has_param('~' + name)}
 
@@ -225,7 +253,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: a joystick (topic joy) drives a manipulation interface (topics command and state). '
-        'Parameters: ~axes, ~buttons, ~frame and more; see launch/joy_teleoperation.yaml.')
+        'Parameters: ~axes, ~buttons, ~frame and more; see launch/joy_teleoperation.yaml.'
+    )
     rospy.init_node('joy_teleoperation')
     start_master_watch()
     try:

@@ -4,6 +4,7 @@ A SharedAutonomy action beside `~command` (TeleopCommand), `~state` (TeleopState
 `~give_up`, for any robot with a robot_description, joint_states, arms that take joint trajectories
 and grippers of control_msgs.
 """
+
 import threading
 import time
 from typing import Any, Collection, Dict, Mapping, Optional, Tuple
@@ -41,8 +42,12 @@ class TeleoperationServer:
     :raises SettingsError: for a setting or a robot description that cannot be used.
     """
 
-    def __init__(self, settings: TeleoperationSettings, arms: Dict[str, TeleoperatedArm],
-                 surroundings: Optional[Surroundings] = None) -> None:
+    def __init__(
+        self,
+        settings: TeleoperationSettings,
+        arms: Dict[str, TeleoperatedArm],
+        surroundings: Optional[Surroundings] = None,
+    ) -> None:
         """`arms` by name."""
         self._settings = settings
         self._arms = arms
@@ -50,25 +55,34 @@ class TeleoperationServer:
         self._last_arm = next(iter(arms))  # the one moved last
         # in lock-step nothing moves between commands. A slow sender must not change what its
         # commands do, but one that is dead does not keep the others out
-        self._dead_man = (DeadManSwitch(float('inf'), settings.lease_s) if settings.lock_step
-                          else DeadManSwitch(settings.watchdog_s))
+        self._dead_man = (
+            DeadManSwitch(float('inf'), settings.lease_s)
+            if settings.lock_step
+            else DeadManSwitch(settings.watchdog_s)
+        )
         self._held: Optional[TeleopCommand] = None
         # m and N, sent to the gripper since it is held
         self._gripped: Optional[Tuple[float, float]] = None
         self._commands = CommandInbox()
         self._published_s, self._published_question = 0.0, ''
         self._unsure = True  # whether others may have moved the robot since our last command
-        self._snapshot = (rospy.ServiceProxy(settings.snapshot, Snapshot)
-                          if settings.lock_step and settings.snapshot != NO_SNAPSHOT else None)
+        self._snapshot = (
+            rospy.ServiceProxy(settings.snapshot, Snapshot)
+            if settings.lock_step and settings.snapshot != NO_SNAPSHOT
+            else None
+        )
         self._seq, self._sender, self._refused, self._step = 0, '', '', no_motion()
-        self._state = rospy.Publisher('~state', TeleopState, queue_size=10, latch=True,
-                                      tcp_nodelay=True)
+        self._state = rospy.Publisher(
+            '~state', TeleopState, queue_size=10, latch=True, tcp_nodelay=True
+        )
         self._goal = InterfaceGoal(rospy.get_name(), self._begun, self._ended)
         self._services = FinishServices(self._goal, self.outputs)
-        self._boxes = rospy.Subscriber('collision_map', CollisionBoxes, self._on_boxes,
-                                       queue_size=1)
-        self._subscriber = rospy.Subscriber('~command', TeleopCommand, self._put,
-                                            queue_size=10, tcp_nodelay=True)
+        self._boxes = rospy.Subscriber(
+            'collision_map', CollisionBoxes, self._on_boxes, queue_size=1
+        )
+        self._subscriber = rospy.Subscriber(
+            '~command', TeleopCommand, self._put, queue_size=10, tcp_nodelay=True
+        )
         self._thread = threading.Thread(target=self._run, name='teleoperation', daemon=True)
         self._thread.start()
 
@@ -91,9 +105,11 @@ class TeleoperationServer:
         """
         node = sender_of(command)
         if command.dead_man and node and not listens(self._state, node):
-            rospy.logwarn_throttle(10.0, '{}: ignored commands of {}, which does not listen to the '
-                                   'state. A bag that is played does that'.format(
-                                       rospy.get_name(), node))
+            rospy.logwarn_throttle(
+                10.0,
+                '{}: ignored commands of {}, which does not listen to the '
+                'state. A bag that is played does that'.format(rospy.get_name(), node),
+            )
         else:
             self._commands.put(command)
 
@@ -136,8 +152,12 @@ class TeleoperationServer:
     def _fail(self, err: Exception) -> None:
         """After any error: arm and gripper stop, and the next command is taken."""
         self._dead_man.refuse(self._dead_man.holder(time.monotonic()))
-        self._held, self._gripped, self._step, self._refused = None, None, no_motion(
-        ), 'error: {}'.format(err)
+        self._held, self._gripped, self._step, self._refused = (
+            None,
+            None,
+            no_motion(),
+            'error: {}'.format(err),
+        )
         for arm in self._arms.values():
             arm.gripper.stop()
 
@@ -179,17 +199,21 @@ class TeleoperationServer:
         if self._goal.goal is None:
             return NO_GOAL
         if command.arm not in self._arms:
-            return 'unknown arm {!r}; allowed: {}'.format(command.arm,
-                                                          ', '.join(sorted(self._arms)))
+            return 'unknown arm {!r}; allowed: {}'.format(
+                command.arm, ', '.join(sorted(self._arms))
+            )
         if not command.operator and command.dead_man:
             return 'a command needs the name of its operator'
         if not command.dead_man:
             return ''
         arm = self._arms[command.arm]
-        goes_on = self._dead_man.holder(
-            arrived.at_s) == command.operator and command.arm == self._last_arm
-        why = (arm.why_not(command, self._settings.lock_step)
-               or self._dead_man.press(command.operator, arrived.at_s))
+        goes_on = (
+            self._dead_man.holder(arrived.at_s) == command.operator
+            and command.arm == self._last_arm
+        )
+        why = arm.why_not(command, self._settings.lock_step) or self._dead_man.press(
+            command.operator, arrived.at_s
+        )
         if why:
             return why
         if self._driver() != command.operator:
@@ -241,8 +265,12 @@ class TeleoperationServer:
     def _in_lock_step(self, command: TeleopCommand, arm: TeleoperatedArm) -> None:
         """Carry the command out for one period, and publish when the world has done it."""
         until_s = time.monotonic() + _GRIPPER_S
-        while arm.gripper.moving and time.monotonic() < until_s and self._driver(
-        ) and not rospy.is_shutdown():
+        while (
+            arm.gripper.moving
+            and time.monotonic() < until_s
+            and self._driver()
+            and not rospy.is_shutdown()
+        ):
             self._poll_gripper(arm, 0.02)
         if not self._driver():
             self._refused = NO_GOAL
@@ -280,8 +308,9 @@ class TeleoperationServer:
             arm = self._arms[command.arm]
             if self._surroundings is not None:
                 self._surroundings.update()
-            self._step = arm.move(command, self._settings.period_s,
-                                  lambda: self._driver() == operator)
+            self._step = arm.move(
+                command, self._settings.period_s, lambda: self._driver() == operator
+            )
         for each in self._arms.values():
             self._poll_gripper(each, 0.0)
         self._publish_state()
@@ -294,8 +323,9 @@ class TeleoperationServer:
         for arm in self._arms.values():
             self._poll_gripper(arm, 0.0)
         question_id = self._question_id()
-        if question_id != self._published_question or (question_id
-                                                       and now_s - self._published_s >= _IDLE_S):
+        if question_id != self._published_question or (
+            question_id and now_s - self._published_s >= _IDLE_S
+        ):
             self._publish_state()
 
     def _question_id(self) -> str:
@@ -306,13 +336,20 @@ class TeleoperationServer:
         arm = self._arms[self._last_arm]
         self._published_s, self._published_question = time.monotonic(), self._question_id()
         state = TeleopState(
-            query_id=self._published_question, arm=self._last_arm, seq=self._seq,
+            query_id=self._published_question,
+            arm=self._last_arm,
+            seq=self._seq,
             sender=self._sender,
             operator='' if self._dead_man.lapsed(self._published_s) else self._driver(),
-            refused=self._refused, moving=bool(self._step.velocities.any()), speed=self._step.speed,
-            limit=self._step.limit or arm.gripper.report.problem, clearance=self._step.clearance,
-            gripper=arm.gripper.report.position, gripper_stalled=arm.gripper.report.stalled,
-            gripper_moving=arm.gripper.moving)
+            refused=self._refused,
+            moving=bool(self._step.velocities.any()),
+            speed=self._step.speed,
+            limit=self._step.limit or arm.gripper.report.problem,
+            clearance=self._step.clearance,
+            gripper=arm.gripper.report.position,
+            gripper_stalled=arm.gripper.report.stalled,
+            gripper_moving=arm.gripper.moving,
+        )
         pose = arm.tool_pose()
         state.header = Header(frame_id=pose.header.frame_id, stamp=pose.header.stamp)
         state.tool_pose = pose.pose
@@ -323,9 +360,11 @@ class TeleoperationServer:
 
 def main() -> None:
     """Entry point of the node `manipulation_interface`."""
-    parameters_only('Node: a person drives the robot\'s arms in place of a failed state. '
-                    'Parameters: ~arms, ~states, ~limits, ~nice and more; see '
-                    'doc/shared_autonomy.md.')
+    parameters_only(
+        "Node: a person drives the robot's arms in place of a failed state. "
+        'Parameters: ~arms, ~states, ~limits, ~nice and more; see '
+        'doc/shared_autonomy.md.'
+    )
     rospy.init_node('manipulation_interface')
     start_master_watch()
     try:

@@ -1,4 +1,5 @@
 """The settings of the manipulation interface, from its node's parameters."""
+
 import re
 import time
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
@@ -66,19 +67,31 @@ class TeleoperationSettings(NamedTuple):
         """
         arms = mapping_of('~arms')
         if not arms:
-            raise SettingsError(rospy.resolve_name('~arms'), arms,
-                              'one arm or more; see manipulation_interface.yaml')
+            raise SettingsError(
+                rospy.resolve_name('~arms'),
+                arms,
+                'one arm or more; see manipulation_interface.yaml',
+            )
         names = {name: ArmNames.parse('~arms/' + name, value) for name, value in arms.items()}
         states = {
-            state: _state(state, value, names)
-            for state, value in mapping_of('~states').items()
+            state: _state(state, value, names) for state, value in mapping_of('~states').items()
         }
-        return cls(names, name_of('~base_frame', 'base_footprint'), _limits(), states,
-                   names_of('~arm_keys', ['arm']), names_of('~success', ['succeeded']), _rate_hz(),
-                   number_of('~watchdog_s', 0.06, 0.01, 0.5), number_of('~lease_s', 3.0, 0.5, 60.0),
-                   number_of('~lead', 0.12, 0.01, 1.0),
-                   number_of('~gripper_effort', 60.0, 1.0, 500.0), flag_of('~lock_step', False),
-                   name_of('~snapshot', NO_SNAPSHOT), flag_of('~clearance', True))
+        return cls(
+            names,
+            name_of('~base_frame', 'base_footprint'),
+            _limits(),
+            states,
+            names_of('~arm_keys', ['arm']),
+            names_of('~success', ['succeeded']),
+            _rate_hz(),
+            number_of('~watchdog_s', 0.06, 0.01, 0.5),
+            number_of('~lease_s', 3.0, 0.5, 60.0),
+            number_of('~lead', 0.12, 0.01, 1.0),
+            number_of('~gripper_effort', 60.0, 1.0, 500.0),
+            flag_of('~lock_step', False),
+            name_of('~snapshot', NO_SNAPSHOT),
+            flag_of('~clearance', True),
+        )
 
     @property
     def period_s(self) -> float:
@@ -128,16 +141,21 @@ def _need_pybullet() -> None:
         load_pybullet()
     except ClearanceError as err:
         raise SettingsError(
-            rospy.resolve_name('~clearance'), True,
+            rospy.resolve_name('~clearance'),
+            True,
             'false, with which all works but slowing down near '
-            'the robot\'s own body and the collision map; true {}'.format(err)) from err
+            "the robot's own body and the collision map; true {}".format(err),
+        ) from err
 
 
 def _description() -> object:
     """The robot description, which another node of the same launch may still be about to set."""
     until_s = time.monotonic() + _DESCRIPTION_S
-    while time.monotonic(
-    ) < until_s and not rospy.is_shutdown() and not rospy.has_param('robot_description'):
+    while (
+        time.monotonic() < until_s
+        and not rospy.is_shutdown()
+        and not rospy.has_param('robot_description')
+    ):
         time.sleep(0.1)
     return rospy.get_param('robot_description', '')
 
@@ -146,9 +164,10 @@ def _rate_hz() -> float:
     rate_hz = number_of('~rate_hz', _WORLD_HZ, 30.0, 500.0)
     if flag_of('~lock_step', False) and _WORLD_HZ % rate_hz:
         raise SettingsError(
-            rospy.resolve_name('~rate_hz'), rate_hz,
-            '30 or 60 in lock-step: a period is a whole number of the world\'s, of which a second '
-            'has 60'
+            rospy.resolve_name('~rate_hz'),
+            rate_hz,
+            "30 or 60 in lock-step: a period is a whole number of the world's, of which a second "
+            'has 60',
         )
     return rate_hz
 
@@ -158,8 +177,9 @@ def _limits() -> DriveLimits:
     workspace = given.pop('workspace', None)
     unknown = sorted(set(given) - set(DriveLimits._fields))
     if unknown:
-        raise SettingsError('~limits/' + unknown[0], given[unknown[0]],
-                          'the keys ' + ', '.join(DriveLimits._fields))
+        raise SettingsError(
+            '~limits/' + unknown[0], given[unknown[0]], 'the keys ' + ', '.join(DriveLimits._fields)
+        )
     values: Dict[str, Any] = {
         key: checked_number('~limits/' + key, value, 1e-3 if key in _NEVER_ZERO else 0.0, 100.0)
         for key, value in given.items()
@@ -189,8 +209,9 @@ def _state(state: str, value: object, arms: Mapping[str, ArmNames]) -> StateTele
     found = dict(checked_mapping(key, value))
     unknown = sorted(set(found) - {'arm', 'outputs'})
     if unknown:
-        raise SettingsError('{}/{}'.format(key, unknown[0]), found[unknown[0]],
-                          'the keys arm, outputs')
+        raise SettingsError(
+            '{}/{}'.format(key, unknown[0]), found[unknown[0]], 'the keys arm, outputs'
+        )
     if found.get('arm', next(iter(arms))) not in list(arms):  # a list: it need not be hashable
         raise SettingsError(key + '/arm', found['arm'], ', '.join(sorted(arms)))
     outputs = checked_mapping(key + '/outputs', found.get('outputs', {}))

@@ -1,4 +1,5 @@
 """The surroundings of a driven arm, kept up to date from joint_states and the collision map."""
+
 import math
 import re
 import threading
@@ -58,10 +59,14 @@ class Surroundings:
 
     def _boxes(self, message: CollisionBoxes) -> List[CollisionBox]:
         if not len(message.names) == len(message.poses) == len(message.sizes):
-            raise ValueError('{} names, {} poses, {} sizes'.format(
-                len(message.names), len(message.poses), len(message.sizes)))
-        base_from_map = link_pose(self._tree, self._robot.base, message.header.frame_id,
-                                  self._robot.listener.now()[0])
+            raise ValueError(
+                '{} names, {} poses, {} sizes'.format(
+                    len(message.names), len(message.poses), len(message.sizes)
+                )
+            )
+        base_from_map = link_pose(
+            self._tree, self._robot.base, message.header.frame_id, self._robot.listener.now()[0]
+        )
         boxes = []
         for name, pose, size in zip(message.names, message.poses, message.sizes):
             at, turn = pose.position, pose.orientation
@@ -79,8 +84,9 @@ def openable(urdf: str) -> str:
     """
     packs = rospkg.RosPack()
     try:
-        named = re.sub(r'package://([^/"]+)', lambda match: str(packs.get_path(match.group(1))),
-                       urdf)
+        named = re.sub(
+            r'package://([^/"]+)', lambda match: str(packs.get_path(match.group(1))), urdf
+        )
     except rospkg.ResourceNotFound as err:
         raise ClearanceError('robot description: no package {}'.format(err)) from err
     return named.replace('file://', '')

@@ -1,4 +1,5 @@
 """One arm that a person drives: commands in, one control period of motion out."""
+
 from typing import Callable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -37,8 +38,9 @@ class DescribedRobot(NamedTuple):
 class TeleoperatedArm:
     """One arm. Only one thread may move it."""
 
-    def __init__(self, robot: DescribedRobot, names: ArmNames, limits: DriveLimits,
-                 lead: float) -> None:
+    def __init__(
+        self, robot: DescribedRobot, names: ArmNames, limits: DriveLimits, lead: float
+    ) -> None:
         """`lead`: rad by which the targets may be ahead of the measured joints.
 
         :raises ValueError: where the arm's links are not in the robot description.
@@ -49,8 +51,11 @@ class TeleoperatedArm:
         self.chain = JointChain.from_urdf(robot.urdf, names.base, names.tool)
         self._limits = limits
         if len(names.posture) not in (0, len(self.chain.names)):
-            raise ValueError('posture of {}: {} angles for {} joints'.format(
-                names.tool, len(names.posture), len(self.chain.names)))
+            raise ValueError(
+                'posture of {}: {} angles for {} joints'.format(
+                    names.tool, len(names.posture), len(self.chain.names)
+                )
+            )
         self._drive = self._driven(None)
         self._port = ArmPort(names.command, self.chain.names)
         self.gripper = GripperPort(names.gripper)
@@ -92,17 +97,23 @@ class TeleoperatedArm:
         twist = _array(command.twist)
         if not np.isfinite(twist).all():
             return 'twist {} is not finite'.format(twist.tolist())
-        if command.move_gripper and not (0.0 <= command.gripper < np.inf
-                                         and 0.0 <= command.gripper_effort < np.inf):
+        if command.move_gripper and not (
+            0.0 <= command.gripper < np.inf and 0.0 <= command.gripper_effort < np.inf
+        ):
             return 'gripper {} m with {} N: both must be finite and 0 or more'.format(
-                command.gripper, command.gripper_effort)
+                command.gripper, command.gripper_effort
+            )
         try:
             needed = joints_between(self._tree, self._robot.base, command.header.frame_id)
         except ValueError as err:
             return 'frame {!r}: {}; allowed: {}, {} or another link of the robot'.format(
-                command.header.frame_id, err, self._names.tool, self._robot.base)
-        return (self._unknown(needed, frozen) or self._port.why_not()
-                or (self.gripper.why_not() if command.move_gripper else ''))
+                command.header.frame_id, err, self._names.tool, self._robot.base
+            )
+        return (
+            self._unknown(needed, frozen)
+            or self._port.why_not()
+            or (self.gripper.why_not() if command.move_gripper else '')
+        )
 
     def _unknown(self, more: Sequence[str], frozen: bool) -> str:
         """Return why positions of the arm's joints, or of `more`, are unknown, '' if known."""
@@ -116,8 +127,11 @@ class TeleoperatedArm:
         if odd:
             return 'joint_states of {} are not finite'.format(', '.join(odd))
         silent_s = self._robot.listener.silent_s(needed)
-        return '' if frozen or silent_s < _SILENT_S else 'no joint_states for {:.1f} s'.format(
-            silent_s)
+        return (
+            ''
+            if frozen or silent_s < _SILENT_S
+            else 'no joint_states for {:.1f} s'.format(silent_s)
+        )
 
     def move(self, command: TeleopCommand, period_s: float, held: Callable[[], bool]) -> DriveStep:
         """Send the joints where the tool is one period later, if it moves as commanded.
@@ -126,13 +140,19 @@ class TeleoperatedArm:
         """
         positions, _ = self._robot.listener.now()
         measured = self.measured(positions)
-        targets = measured if self._targets is None else pulled_back(self._targets, measured,
-                                                                     self._lead)
+        targets = (
+            measured if self._targets is None else pulled_back(self._targets, measured, self._lead)
+        )
         twist = _array(command.twist)
-        axes = self._axes(self._names.base, positions).T @ self._axes(command.header.frame_id,
-                                                                      positions)
-        step = self._drive.step(targets, np.concatenate([axes @ twist[:3], axes @ twist[3:]]),
-                                period_s, command.turn_freely)
+        axes = self._axes(self._names.base, positions).T @ self._axes(
+            command.header.frame_id, positions
+        )
+        step = self._drive.step(
+            targets,
+            np.concatenate([axes @ twist[:3], axes @ twist[3:]]),
+            period_s,
+            command.turn_freely,
+        )
         if not held():
             return no_motion()
         if step.velocities.any():
@@ -140,8 +160,9 @@ class TeleoperatedArm:
         self._targets = step.joints
         return step
 
-    def move_and_wait(self, command: TeleopCommand, period_s: float,
-                      limit_s: float) -> Tuple[DriveStep, bool]:
+    def move_and_wait(
+        self, command: TeleopCommand, period_s: float, limit_s: float
+    ) -> Tuple[DriveStep, bool]:
         """Move in lock-step with a world that stands still between commands.
 
         :returns: the step, and whether the world has carried it out.
@@ -166,8 +187,10 @@ class TeleoperatedArm:
         """Return the pose of the tool now, in the robot's base frame."""
         positions, stamp = self._robot.listener.now()
         pose = link_pose(self._tree, self._robot.base, self._names.tool, positions)
-        return PoseStamped(Header(frame_id=self._robot.base, stamp=stamp),
-                           Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
+        return PoseStamped(
+            Header(frame_id=self._robot.base, stamp=stamp),
+            Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))),
+        )
 
     def in_base(self, twist: np.ndarray) -> Twist:
         """A twist (6,), m/s and rad/s, from the axes of the arm's base to those of the robot's."""
@@ -185,5 +208,13 @@ class TeleoperatedArm:
 
 
 def _array(twist: Twist) -> np.ndarray:
-    return np.array([twist.linear.x, twist.linear.y, twist.linear.z,
-                     twist.angular.x, twist.angular.y, twist.angular.z])
+    return np.array(
+        [
+            twist.linear.x,
+            twist.linear.y,
+            twist.linear.z,
+            twist.angular.x,
+            twist.angular.y,
+            twist.angular.z,
+        ]
+    )

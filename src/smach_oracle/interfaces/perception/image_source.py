@@ -2,6 +2,7 @@
 
 It listens only while an image is wanted: a camera without listeners costs nothing.
 """
+
 import threading
 import time
 from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
@@ -46,8 +47,15 @@ class TakenImage(NamedTuple):
 class ImageSource:
     """Takes images from three topics and tf."""
 
-    def __init__(self, rgb: str, depth: str, camera_info: str, base_frame: str,
-                 snapshot: str = NO_SNAPSHOT, limit_s: float = 20.0) -> None:
+    def __init__(
+        self,
+        rgb: str,
+        depth: str,
+        camera_info: str,
+        base_frame: str,
+        snapshot: str = NO_SNAPSHOT,
+        limit_s: float = 20.0,
+    ) -> None:
         """
         :param rgb: topics. Depth must be registered to colour.
         :param base_frame: the frame of all poses that are handed out. Its z axis points up.
@@ -57,7 +65,9 @@ class ImageSource:
         """
         self.base_frame = base_frame
         self._topics = {
-            'rgb': (rgb, Image), 'depth': (depth, Image), 'info': (camera_info, CameraInfo)
+            'rgb': (rgb, Image),
+            'depth': (depth, Image),
+            'info': (camera_info, CameraInfo),
         }
         self._snapshot = None if snapshot == NO_SNAPSHOT else rospy.resolve_name(snapshot)
         self._limit_s = limit_s
@@ -81,18 +91,23 @@ class ImageSource:
         until_s = time.monotonic() + self._limit_s
         while not subscriptions.connected():
             if time.monotonic() > until_s or rospy.is_shutdown():
-                raise ImageSourceError('nobody publishes {}'.format(
-                    ', '.join(subscriptions.unpublished()) or '/tf'))
+                raise ImageSourceError(
+                    'nobody publishes {}'.format(', '.join(subscriptions.unpublished()) or '/tf')
+                )
             time.sleep(POLL_S)
         while time.monotonic() < until_s and not rospy.is_shutdown():
             taken = self._attempt(subscriptions, until_s)
             if taken is not None:
                 return taken
-        raise ImageSourceError('no image within {:.0f} s: {}'.format(
-            self._limit_s, subscriptions.lacking(self.base_frame)))
+        raise ImageSourceError(
+            'no image within {:.0f} s: {}'.format(
+                self._limit_s, subscriptions.lacking(self.base_frame)
+            )
+        )
 
-    def _attempt(self, subscriptions: '_CameraSubscriptions',
-                 until_s: float) -> Optional[TakenImage]:
+    def _attempt(
+        self, subscriptions: '_CameraSubscriptions', until_s: float
+    ) -> Optional[TakenImage]:
         stamp = self._snap(max(until_s - time.monotonic(), POLL_S))
         until_s = min(until_s, time.monotonic() + ATTEMPT_S)
         while time.monotonic() < until_s and not rospy.is_shutdown():
@@ -123,8 +138,7 @@ class _CameraSubscriptions:
         """`topics`: name and type of the topics 'rgb', 'depth' and 'info'."""
         self._lock = threading.Lock()
         self._seen: Dict[str, Dict[rospy.Time, Union[Image, CameraInfo]]] = {
-            name: {}
-            for name in topics
+            name: {} for name in topics
         }
         self._grace = ConnectionGrace()
         self._buffer = tf2_ros.Buffer(debug=False)
@@ -142,7 +156,8 @@ class _CameraSubscriptions:
     def connected(self) -> bool:
         """Whether every topic has a publisher. It waits until new ones send to this node."""
         trees = [
-            each for tree in (self._transforms.tf_sub, self._transforms.tf_static_sub)
+            each
+            for tree in (self._transforms.tf_sub, self._transforms.tf_static_sub)
             for each in live_connections(tree)
         ]
         cameras = [live_connections(each) for each in self._subscribers]
@@ -167,24 +182,30 @@ class _CameraSubscriptions:
             if not infos or not depths:
                 return []
             pairs = [(each, _nearest(each, depths)) for each in wanted if each in colours]
-            return [{'rgb': colours[each], 'depth': depths[depth], 'info': infos[max(infos)]}
-                    for each, depth in pairs if abs((depth - each).to_sec()) <= slack_s]
+            return [
+                {'rgb': colours[each], 'depth': depths[depth], 'info': infos[max(infos)]}
+                for each, depth in pairs
+                if abs((depth - each).to_sec()) <= slack_s
+            ]
 
     def pose(self, base_frame: str, header: Header) -> Optional[np.ndarray]:
         """4x4: the base from the camera at the moment of a header, None while not known."""
         try:
-            found = self._buffer.lookup_transform_core(base_frame, header.frame_id.lstrip('/'),
-                                                       header.stamp).transform
+            found = self._buffer.lookup_transform_core(
+                base_frame, header.frame_id.lstrip('/'), header.stamp
+            ).transform
         except tf2_ros.TransformException:
             return None
         return from_quaternion(
             (found.translation.x, found.translation.y, found.translation.z),
-            (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w))
+            (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w),
+        )
 
     def lacking(self, base_frame: str) -> str:
         """Return why there is no image."""
         silent = [
-            each.resolved_name for each, name in zip(self._subscribers, self._seen)
+            each.resolved_name
+            for each, name in zip(self._subscribers, self._seen)
             if not self._seen[name]
         ]
         if silent:
@@ -193,7 +214,8 @@ class _CameraSubscriptions:
         if not found:
             return 'colour and depth never had the same stamp'
         return 'no transform from {} to {} at the time of the image'.format(
-            found[0]['rgb'].header.frame_id or '(no frame)', base_frame)
+            found[0]['rgb'].header.frame_id or '(no frame)', base_frame
+        )
 
     def _keep(self, message: Union[Image, CameraInfo], name: str) -> None:
         with self._lock:
@@ -213,17 +235,25 @@ def _camera_image(messages: CameraMessages, base_from_camera: np.ndarray) -> Cam
     if colour.shape[:2] != depth.shape:
         raise ImageError(
             'colour is {1} x {0}, depth {3} x {2}: depth must be registered to colour'.format(
-                *colour.shape[:2], *depth.shape))
-    return CameraImage(messages['rgb'].header.stamp.to_sec(), colour, depth,
-                       intrinsics_of(messages['info']), base_from_camera)
+                *colour.shape[:2], *depth.shape
+            )
+        )
+    return CameraImage(
+        messages['rgb'].header.stamp.to_sec(),
+        colour,
+        depth,
+        intrinsics_of(messages['info']),
+        base_from_camera,
+    )
 
 
 def cloud_of(taken: TakenImage, base_frame: str) -> PointCloud2:
     """An image as a coloured cloud in the frame of the base, of about CLOUD_COLUMNS columns."""
     image = taken.image
     stride = image.stride(CLOUD_COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics,
-                       image.base_from_camera, stride=stride)
+    points = points_of(
+        image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera, stride=stride
+    )
     known = np.isfinite(points[..., 2])
     header = Header(stamp=taken.message.header.stamp, frame_id=base_frame)
     return cloud_message(points[known], header, image.colour[::stride, ::stride][known])

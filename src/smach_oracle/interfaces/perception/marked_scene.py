@@ -1,4 +1,5 @@
 """The surface that a marked object stands on, and the other things there."""
+
 from typing import List, NamedTuple
 
 import numpy as np
@@ -42,10 +43,13 @@ def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
         raise MarkedSceneError('what the object stands on cannot be made out around it')
     stride = image.stride(COLUMNS)
     depth = image.depth[::stride, ::stride].copy()
-    depth[ndimage.binary_dilation(segmented.mask, iterations=GROWN)[::stride, ::stride] |
-          (depth > REACH)] = np.nan
-    points = points_of(depth, image.intrinsics, image.base_from_camera,
-                       stride=stride).reshape(-1, 3)
+    depth[
+        ndimage.binary_dilation(segmented.mask, iterations=GROWN)[::stride, ::stride]
+        | (depth > REACH)
+    ] = np.nan
+    points = points_of(depth, image.intrinsics, image.base_from_camera, stride=stride).reshape(
+        -1, 3
+    )
     points = points[np.isfinite(points[:, 2])]
     patch = largest_patch(points[np.abs(plane.height(points)) < OFF_SURFACE])
     if len(patch) < 3:

@@ -1,4 +1,5 @@
 """The images that an expert draws on while a goal is active, and the object cut out of one."""
+
 import threading
 from typing import Callable, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
 
@@ -20,7 +21,8 @@ from .segmentation import SegmentationError, SegmentedObject, Stroke, segment
 
 NO_MARK = (
     'no object is marked, so {} cannot be filled in: mark it (call segment) first, give them with '
-    'the outcome, choose another outcome, or give up')
+    'the outcome, choose another outcome, or give up'
+)
 
 # a value of output userdata
 OutputMessage = Union[PoseStamped, Vector3, PointCloud2, List[PoseStamped], List[Vector3]]
@@ -38,8 +40,13 @@ class ObjectInImage(NamedTuple):
 class ObjectMarking:
     """The marking for one goal. A thread of its own takes the first image, which may last."""
 
-    def __init__(self, template: StateTemplate, take: Callable[[], TakenImage], base_frame: str,
-                 show: Callable[[TakenImage], None]) -> None:
+    def __init__(
+        self,
+        template: StateTemplate,
+        take: Callable[[], TakenImage],
+        base_frame: str,
+        show: Callable[[TakenImage], None],
+    ) -> None:
         """
         :param take: returns a fresh image, or raises ImageSourceError.
         :param show: publishes the image that is in use.
@@ -90,7 +97,9 @@ class ObjectMarking:
         if not stamp.is_zero() and stamp != used:
             raise ImageSourceError(
                 'drawn on the image of {:.3f} s, but that of {:.3f} s is in use'.format(
-                    stamp.to_sec(), used.to_sec()))
+                    stamp.to_sec(), used.to_sec()
+                )
+            )
         return taken
 
     def mark(self, taken: TakenImage, region: np.ndarray, strokes: List[Stroke]) -> ObjectInImage:
@@ -128,8 +137,9 @@ class ObjectMarking:
             raise InterfaceGoalError(NO_MARK.format(', '.join(sorted(wanted))))
         of_scene = [key for key, part in wanted.items() if part in OF_THE_SCENE]
         if of_scene and marked.scene is None:
-            raise InterfaceGoalError('{}: {}'.format(', '.join(sorted(of_scene)),
-                                                     marked.why_no_scene))
+            raise InterfaceGoalError(
+                '{}: {}'.format(', '.join(sorted(of_scene)), marked.why_no_scene)
+            )
         messages = output_messages(marked)
         return {key: messages[part] for key, part in wanted.items()}
 
@@ -158,13 +168,17 @@ def output_messages(marked: ObjectInImage) -> Dict[str, OutputMessage]:
     messages: Dict[str, OutputMessage] = {'object': pose, 'size': size, 'cloud': cloud}
     if marked.scene is not None:
         others = [box_messages(box, marked.header) for box in marked.scene.others]
-        messages.update(surface=box_messages(marked.scene.surface, marked.header)[0],
-                        objects=[pose] + [each for each, _ in others],
-                        sizes=[size] + [each for _, each in others])
+        messages.update(
+            surface=box_messages(marked.scene.surface, marked.header)[0],
+            objects=[pose] + [each for each, _ in others],
+            sizes=[size] + [each for _, each in others],
+        )
     return messages
 
 
 def box_messages(box: UprightBox, header: Header) -> Tuple[PoseStamped, Vector3]:
     """Pose of the centre and extents (m) of a box, in the frame of `header`."""
-    return (PoseStamped(header, Pose(Point(*box.centre),
-                                     Quaternion(*quaternion(box.matrix)))), Vector3(*box.size))
+    return (
+        PoseStamped(header, Pose(Point(*box.centre), Quaternion(*quaternion(box.matrix)))),
+        Vector3(*box.size),
+    )

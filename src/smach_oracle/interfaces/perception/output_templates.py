@@ -1,4 +1,5 @@
 """The outputs that a marked object gives, by state: keys, each with a part of the marking."""
+
 from typing import Dict, Mapping, NamedTuple
 
 from smach_oracle.oracle.errors import SettingsError
@@ -40,22 +41,26 @@ def templates_from(settings: object) -> Dict[str, StateTemplate]:
 
 def _template(where: str, value: object) -> StateTemplate:
     if not isinstance(value, Mapping):
-        raise SettingsError(where, value,
-                          'a dictionary with outputs and, where it is not succeeded, outcome')
+        raise SettingsError(
+            where, value, 'a dictionary with outputs and, where it is not succeeded, outcome'
+        )
     unknown = sorted(set(map(str, value)) - {'outcome', 'outputs'})
     if unknown:
-        raise SettingsError('{}.{}'.format(where, unknown[0]), value[unknown[0]],
-                          'only outcome and outputs')
+        raise SettingsError(
+            '{}.{}'.format(where, unknown[0]), value[unknown[0]], 'only outcome and outputs'
+        )
     outcome, outputs = value.get('outcome', 'succeeded'), value.get('outputs')
     if not isinstance(outcome, str) or not outcome:
         raise checks.no_name(where + '.outcome', outcome, 'the name of an outcome')
     if not isinstance(outputs, Mapping) or not outputs:
-        raise SettingsError(where + '.outputs', outputs,
-                          'a dictionary from output keys to ' + ', '.join(OUTPUT_PARTS))
+        raise SettingsError(
+            where + '.outputs',
+            outputs,
+            'a dictionary from output keys to ' + ', '.join(OUTPUT_PARTS),
+        )
     for key, part in outputs.items():
         if not isinstance(part, str) or part not in OUTPUT_PARTS:
-            raise SettingsError('{}.outputs.{}'.format(where, key), part,
-                              'one of ' + ', '.join(OUTPUT_PARTS))
-    return StateTemplate(outcome,
-                         {str(key): str(part)
-                          for key, part in outputs.items()})
+            raise SettingsError(
+                '{}.outputs.{}'.format(where, key), part, 'one of ' + ', '.join(OUTPUT_PARTS)
+            )
+    return StateTemplate(outcome, {str(key): str(part) for key, part in outputs.items()})

@@ -3,6 +3,7 @@
 Works on any image that has colour, depth, intrinsics and the camera's pose. It knows no ROS. The
 same image and drawing give the same object. The segmentation interface of the paper, section V-A.
 """
+
 from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 import cv2
@@ -63,11 +64,13 @@ def rectangle(left: float, top: float, width: float, height: float) -> np.ndarra
     """(4, 2) px: a rectangle as a region."""
     return np.array(
         [[left, top], [left + width, top], [left + width, top + height], [left, top + height]],
-        float)
+        float,
+    )
 
 
-def segment(image: CameraImage, region: np.ndarray,
-            strokes: Sequence[Stroke] = ()) -> SegmentedObject:
+def segment(
+    image: CameraImage, region: np.ndarray, strokes: Sequence[Stroke] = ()
+) -> SegmentedObject:
     """Cut out the object.
 
     :param region: (n, 2) px, corners of a polygon that holds the whole object, n >= 3.
@@ -93,14 +96,17 @@ def _filled(image: CameraImage, region: np.ndarray) -> np.ndarray:
     if low[0] >= width or low[1] >= height or high[0] <= 0 or high[1] <= 0:
         raise SegmentationError(
             'the region lies outside the image: x {:.0f} to {:.0f}, y {:.0f} to {:.0f}; the image '
-            'is {} x {}'.format(low[0], high[0], low[1], high[1], width, height))
+            'is {} x {}'.format(low[0], high[0], low[1], high[1], width, height)
+        )
     inside = np.zeros((height, width), np.uint8)
     cv2.fillPoly(inside, _polygon(np.clip(region, -1e4, 1e4)), (1.0,))
     columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
     if len(columns) < LEAST_SIDE or len(rows) < LEAST_SIDE:
         raise SegmentationError(
             'the region is too small: {} x {} px inside the image; it needs {} x {}'.format(
-                len(columns), len(rows), LEAST_SIDE, LEAST_SIDE))
+                len(columns), len(rows), LEAST_SIDE, LEAST_SIDE
+            )
+        )
     return inside.astype(bool)
 
 
@@ -109,15 +115,19 @@ def _around(inside: np.ndarray, share: float, least: int) -> Corners:
     columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
     across = max(least, int(share * len(columns)))
     down = max(least, int(share * len(rows)))
-    return (max(0, columns[0] - across), max(0, rows[0] - down),
-            min(inside.shape[1], columns[-1] + 1 + across), min(inside.shape[0],
-                                                                rows[-1] + 1 + down))
+    return (
+        max(0, columns[0] - across),
+        max(0, rows[0] - down),
+        min(inside.shape[1], columns[-1] + 1 + across),
+        min(inside.shape[0], rows[-1] + 1 + down),
+    )
 
 
 def _points(image: CameraImage, crop: Corners) -> np.ndarray:
     left, top, right, bottom = crop
-    return points_of(image.depth[top:bottom, left:right], image.intrinsics,
-                     image.base_from_camera, (left, top))
+    return points_of(
+        image.depth[top:bottom, left:right], image.intrinsics, image.base_from_camera, (left, top)
+    )
 
 
 def _surface(image: CameraImage, inside: np.ndarray, crop: Corners) -> Optional[Plane]:
@@ -131,8 +141,13 @@ def _surface(image: CameraImage, inside: np.ndarray, crop: Corners) -> Optional[
     return find_plane(points, np.random.default_rng(1), least=max(150, len(points) // 12))
 
 
-def _grab_cut(image: CameraImage, inside: np.ndarray, crop: Corners, strokes: Sequence[Stroke],
-              surface: Optional[Plane]) -> np.ndarray:
+def _grab_cut(
+    image: CameraImage,
+    inside: np.ndarray,
+    crop: Corners,
+    strokes: Sequence[Stroke],
+    surface: Optional[Plane],
+) -> np.ndarray:
     """(h, w) bool."""
     left, top, right, bottom = crop
     known = np.where(inside, cv2.GC_PR_FGD, cv2.GC_BGD).astype(np.uint8)
@@ -151,7 +166,8 @@ def _grab_cut(image: CameraImage, inside: np.ndarray, crop: Corners, strokes: Se
     if mask.sum() < least:
         raise SegmentationError(
             'the mask collapsed to {} of the {} px of the region, {} are needed: draw a stroke '
-            'on the object, or the region closer around it'.format(int(mask.sum()), area, least))
+            'on the object, or the region closer around it'.format(int(mask.sum()), area, least)
+        )
     return mask
 
 
@@ -168,8 +184,15 @@ def _labelled(colour: np.ndarray, labels: np.ndarray) -> np.ndarray:
         return cv2.resize(object_there.astype(np.uint8), (width, height)).astype(bool)
     cv2.setNumThreads(1)
     cv2.setRNGSeed(1)
-    cv2.grabCut(colour, labels, _NO_RECTANGLE, np.zeros((1, 65)), np.zeros((1, 65)), ITERATIONS,
-                cv2.GC_INIT_WITH_MASK)
+    cv2.grabCut(
+        colour,
+        labels,
+        _NO_RECTANGLE,
+        np.zeros((1, 65)),
+        np.zeros((1, 65)),
+        ITERATIONS,
+        cv2.GC_INIT_WITH_MASK,
+    )
     found = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD)).astype(np.float32)
     if scale < 1.0:
         found = np.asarray(cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR))
@@ -181,8 +204,9 @@ def _draw(known: np.ndarray, stroke: Stroke) -> None:
     if points.ndim != 2 or points.shape[1] != 2 or not len(points) or not np.isfinite(points).all():
         raise SegmentationError('a stroke needs one point or more, each with a finite x and y')
     if not (np.isfinite(stroke.width) and 0 <= stroke.width <= 1000):
-        raise SegmentationError('a stroke has a width of {} px; allowed: 0 to 1000'.format(
-            stroke.width))
+        raise SegmentationError(
+            'a stroke has a width of {} px; allowed: 0 to 1000'.format(stroke.width)
+        )
     value = cv2.GC_FGD if stroke.foreground else cv2.GC_BGD
     width = max(1, int(round(stroke.width or STROKE_WIDTH)))
     if len(points) == 1:
@@ -199,14 +223,22 @@ def _with_depth(image: CameraImage, mask: np.ndarray, surface: Optional[Plane]) 
     if known < LEAST_DEPTH or known < LEAST_DEPTH_SHARE * total:
         raise SegmentationError(
             'too little depth on the object: {} of its {} px have one, {} are needed'.format(
-                known, total, max(LEAST_DEPTH, int(np.ceil(LEAST_DEPTH_SHARE * total)))), mask)
+                known, total, max(LEAST_DEPTH, int(np.ceil(LEAST_DEPTH_SHARE * total)))
+            ),
+            mask,
+        )
     found = object_above(points[chosen], surface, ON_SURFACE)
     if found is None or int(found.chosen.sum()) < LEAST_DEPTH:
-        raise SegmentationError('nothing under the mask stands out from the surface around it',
-                                mask)
-    return SegmentedObject(mask, found.box, points[chosen][found.chosen],
-                           image.colour[top:bottom,
-                                        left:right][chosen][found.chosen], found.surface)
+        raise SegmentationError(
+            'nothing under the mask stands out from the surface around it', mask
+        )
+    return SegmentedObject(
+        mask,
+        found.box,
+        points[chosen][found.chosen],
+        image.colour[top:bottom, left:right][chosen][found.chosen],
+        found.surface,
+    )
 
 
 def _polygon(points: np.ndarray) -> List[Any]:

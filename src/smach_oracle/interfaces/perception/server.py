@@ -4,6 +4,7 @@ A SharedAutonomy action beside `~image` and `~cloud` (the image in use), `~segme
 `~finish` and `~give_up`, for any robot with a camera that gives colour and registered depth, and a
 tf tree from it to the base.
 """
+
 import time
 from typing import Collection, List, Mapping, Optional
 
@@ -55,7 +56,7 @@ class SegmentationServer:
         self._finish_services = FinishServices(self._goal, self._outputs)
         self._services = [
             rospy.Service('~segment', SegmentObject, self._segment, buff_size=1 << 20),
-            rospy.Service('~use_frame', UseFrame, self._use_frame)
+            rospy.Service('~use_frame', UseFrame, self._use_frame),
         ]
 
     def watch(self) -> None:
@@ -66,10 +67,14 @@ class SegmentationServer:
 
     def _begun(self, goal: SharedAutonomyGoal) -> None:
         if goal.state not in self._templates:
-            raise ValueError('state {!r}: no outputs are known for it; known: {}'.format(
-                goal.state, names(sorted(self._templates))))
-        self._marking = ObjectMarking(self._templates[goal.state], self._source.take,
-                                      self._source.base_frame, self._show)
+            raise ValueError(
+                'state {!r}: no outputs are known for it; known: {}'.format(
+                    goal.state, names(sorted(self._templates))
+                )
+            )
+        self._marking = ObjectMarking(
+            self._templates[goal.state], self._source.take, self._source.base_frame, self._show
+        )
 
     def _ended(self) -> None:
         marking, self._marking = self._marking, None
@@ -91,8 +96,11 @@ class SegmentationServer:
             return UseFrameResponse(ok=False, message=NO_GOAL)
         if request.frame not in (UseFrameRequest.AT_GOAL, UseFrameRequest.FRESH):
             return UseFrameResponse(
-                ok=False, message='frame {} is unknown; allowed: AT_GOAL (0), FRESH (1)'.format(
-                    request.frame))
+                ok=False,
+                message='frame {} is unknown; allowed: AT_GOAL (0), FRESH (1)'.format(
+                    request.frame
+                ),
+            )
         try:
             taken = marking.use(request.frame == UseFrameRequest.FRESH)
         except ImageSourceError as err:
@@ -117,8 +125,12 @@ class SegmentationServer:
             response.ok, response.message, mask = True, marked.why_no_scene, marked.segmented.mask
             response.object, response.size = parts['object'], parts['size']
             response.cloud = parts['cloud']
-            self._goal.tell(0.8, 'an object of {:.0f} x {:.0f} x {:.0f} cm is marked'.format(
-                *(100 * marked.segmented.box.size)))
+            self._goal.tell(
+                0.8,
+                'an object of {:.0f} x {:.0f} x {:.0f} cm is marked'.format(
+                    *(100 * marked.segmented.box.size)
+                ),
+            )
         if mask is not None and taken is not None:
             response.mask = mask_image(mask, taken.message.header)
         response.elapsed = time.monotonic() - begun_s
@@ -132,13 +144,15 @@ def region_of(request: SegmentObjectRequest) -> np.ndarray:
     """
     corners, box = request.polygon.points, request.region
     if len(corners) > MOST_POINTS:
-        raise SegmentationError('the polygon has {} corners; allowed: {}'.format(
-            len(corners), MOST_POINTS))
+        raise SegmentationError(
+            'the polygon has {} corners; allowed: {}'.format(len(corners), MOST_POINTS)
+        )
     if corners:
         return np.array([[point.x, point.y] for point in corners], float)
     if not box.width or not box.height:
         raise SegmentationError(
-            'no region: a rectangle with width and height, or a polygon, is needed')
+            'no region: a rectangle with width and height, or a polygon, is needed'
+        )
     return rectangle(box.x_offset, box.y_offset, box.width, box.height)
 
 
@@ -150,9 +164,11 @@ def strokes_of(messages: List[SegmentStroke]) -> List[Stroke]:
     if sum(len(message.points) for message in messages) > MOST_POINTS:
         raise SegmentationError('the strokes have more than {} points'.format(MOST_POINTS))
     return [
-        Stroke(message.foreground,
-               np.array([[point.x, point.y]
-                         for point in message.points], float).reshape(-1, 2), message.width)
+        Stroke(
+            message.foreground,
+            np.array([[point.x, point.y] for point in message.points], float).reshape(-1, 2),
+            message.width,
+        )
         for message in messages
     ]
 
@@ -162,7 +178,8 @@ def main() -> None:
     parameters_only(
         'Node: a person marks objects in camera images in place of a failed detection. '
         'Parameters: ~rgb, ~depth, ~camera_info, ~snapshot, ~base_frame, ~frame_limit_s, '
-        '~states, ~nice; see doc/perception.md.')
+        '~states, ~nice; see doc/perception.md.'
+    )
     rospy.init_node('perception_interface')
     start_master_watch()
     try:
@@ -176,8 +193,11 @@ def main() -> None:
 
 
 def _source() -> ImageSource:
-    return ImageSource(name_of('~rgb', 'head_camera/rgb/image_raw'),
-                       name_of('~depth', 'head_camera/depth_registered/image_raw'),
-                       name_of('~camera_info', 'head_camera/rgb/camera_info'),
-                       name_of('~base_frame', 'base_footprint'), name_of('~snapshot', NO_SNAPSHOT),
-                       number_of('~frame_limit_s', 20.0, 0.1, 600.0))
+    return ImageSource(
+        name_of('~rgb', 'head_camera/rgb/image_raw'),
+        name_of('~depth', 'head_camera/depth_registered/image_raw'),
+        name_of('~camera_info', 'head_camera/rgb/camera_info'),
+        name_of('~base_frame', 'base_footprint'),
+        name_of('~snapshot', NO_SNAPSHOT),
+        number_of('~frame_limit_s', 20.0, 0.1, 600.0),
+    )

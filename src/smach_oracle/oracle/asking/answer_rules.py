@@ -1,4 +1,5 @@
 """Checks that an answer fits its question: one rule for executive, servers and interfaces. Pure."""
+
 from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence, Tuple
 
 from ..errors import AnswerError
@@ -79,13 +80,16 @@ class AnswerChoices(NamedTuple):
 
 def choices_of(question: AskedQuestion) -> AnswerChoices:
     """Return what an answer to a question may choose from."""
-    return AnswerChoices(question.container_path, question.failed_state,
-                         {(choice.container, choice.state): choice.blocked
-                          for choice in question.choices},
-                         [choice.outcome for choice in question.supersede_outcomes],
-                         question.give_up_outcomes, [offer.name for offer in question.interfaces],
-                         question.output_keys,
-                         [(each.container, each.outcome) for each in question.give_up_above])
+    return AnswerChoices(
+        question.container_path,
+        question.failed_state,
+        {(choice.container, choice.state): choice.blocked for choice in question.choices},
+        [choice.outcome for choice in question.supersede_outcomes],
+        question.give_up_outcomes,
+        [offer.name for offer in question.interfaces],
+        question.output_keys,
+        [(each.container, each.outcome) for each in question.give_up_above],
+    )
 
 
 def checked_type(given: object) -> Answer:
@@ -152,11 +156,15 @@ def check_output_keys(state: str, keys: Iterable[str], allowed: Sequence[str]) -
     given: List[str] = list(keys)
     unknown = [key for key in given if key not in allowed]
     if unknown:
-        raise AnswerError('{} has no output keys {}; allowed: {}'.format(
-            state, names(unknown), names(allowed)))
+        raise AnswerError(
+            '{} has no output keys {}; allowed: {}'.format(state, names(unknown), names(allowed))
+        )
     if len(set(given)) < len(given):
-        raise AnswerError('output keys come twice: {}'.format(
-            names({key for key in given if given.count(key) > 1})))
+        raise AnswerError(
+            'output keys come twice: {}'.format(
+                names({key for key in given if given.count(key) > 1})
+            )
+        )
 
 
 def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:
@@ -165,23 +173,37 @@ def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:
     :raises AnswerError: where it may not.
     """
     if outcome not in allowed:
-        raise AnswerError('{} has no outcome {!r} to supersede it with; allowed: {}'.format(
-            state, outcome, names(allowed)))
+        raise AnswerError(
+            '{} has no outcome {!r} to supersede it with; allowed: {}'.format(
+                state, outcome, names(allowed)
+            )
+        )
 
 
 def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
     container = answer.container
     target = (container, answer.state)
-    free = [label for (path, label), blocked in choices.states.items()
-            if path == container and not blocked]
+    free = [
+        label
+        for (path, label), blocked in choices.states.items()
+        if path == container and not blocked
+    ]
     if target not in choices.states:
         elsewhere = [path for path, label in choices.states if label == answer.state]
-        raise AnswerError('{} has no state {!r} to go to; allowed: {}{}'.format(
-            container or choices.container, answer.state, names(free),
-            '; it is in {}: name the container'.format(names(elsewhere)) if elsewhere else ''))
+        raise AnswerError(
+            '{} has no state {!r} to go to; allowed: {}{}'.format(
+                container or choices.container,
+                answer.state,
+                names(free),
+                '; it is in {}: name the container'.format(names(elsewhere)) if elsewhere else '',
+            )
+        )
     if choices.states[target]:
-        raise AnswerError('{} cannot be entered now: {}; allowed: {}'.format(
-            answer.state, choices.states[target], names(free)))
+        raise AnswerError(
+            '{} cannot be entered now: {}; allowed: {}'.format(
+                answer.state, choices.states[target], names(free)
+            )
+        )
 
 
 def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
@@ -193,18 +215,26 @@ def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:
     if container:
         allowed = [outcome for path, outcome in choices.give_up_above if path == container]
         if answer.outcome not in allowed:
-            raise AnswerError('{} has no outcome {!r} to give up with; allowed: {}'.format(
-                container, answer.outcome, names(allowed)))
+            raise AnswerError(
+                '{} has no outcome {!r} to give up with; allowed: {}'.format(
+                    container, answer.outcome, names(allowed)
+                )
+            )
     elif answer.outcome and answer.outcome not in choices.give_up_outcomes:
         raise AnswerError(
             '{} has no outcome {!r} to give up with; allowed: {}, or none at all'.format(
-                choices.container, answer.outcome, names(choices.give_up_outcomes)))
+                choices.container, answer.outcome, names(choices.give_up_outcomes)
+            )
+        )
 
 
 def _check_interface(answer: Answer, choices: AnswerChoices) -> None:
     if answer.interface not in choices.interfaces:
-        raise AnswerError('no interface {!r} is on offer for {}; allowed: {}'.format(
-            answer.interface, choices.failed_state, names(choices.interfaces)))
+        raise AnswerError(
+            'no interface {!r} is on offer for {}; allowed: {}'.format(
+                answer.interface, choices.failed_state, names(choices.interfaces)
+            )
+        )
 
 
 _CHECKS: Dict[AnswerKind, Callable[[Answer, AnswerChoices], None]] = {

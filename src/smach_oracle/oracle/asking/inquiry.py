@@ -1,4 +1,5 @@
 """Asking the expert until an answer fits or the deadline is over (paper, section V)."""
+
 import threading
 import time
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
@@ -60,8 +61,9 @@ class _StopWatch:
         self._cancelled = cancelled
         self._latest = None if end is None else end + _OVERTIME_S
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name='smach_oracle shutdown watch',
-                                        daemon=True)
+        self._thread = threading.Thread(
+            target=self._watch, name='smach_oracle shutdown watch', daemon=True
+        )
 
     def __enter__(self) -> '_StopWatch':
         self._thread.start()
@@ -128,20 +130,26 @@ class Inquiry:
         self._unfit += 1
         pause_s = 0.0
         if self._unfit > 1:
-            pause_s = min(_MAX_PAUSE_S, 0.05 * 2.0**min(self._unfit, 10))
+            pause_s = min(_MAX_PAUSE_S, 0.05 * 2.0 ** min(self._unfit, 10))
         self._cancelled.wait(pause_s if self._end is None else min(pause_s, self._remaining_s()))
 
     def _answer_to(self, question: Question) -> Optional[Answer]:
         """Return the answer to one question, None where it did not fit."""
         try:
             given = self._guarded(
-                lambda progress: self._expert.ask(question, self._cancelled, progress))
+                lambda progress: self._expert.ask(question, self._cancelled, progress)
+            )
             if given is None:
                 raise _NoAnswer('no answer by the deadline')
             answer = addressed(checked_type(given), choices_of(question))
             self._check(answer, question)
-            self._emit(EventKind.QUERY_ANSWERED, outcome=answer.kind.name.lower(),
-                       target=answer.named(), by=answer.by, text=answer.why)
+            self._emit(
+                EventKind.QUERY_ANSWERED,
+                outcome=answer.kind.name.lower(),
+                target=answer.named(),
+                by=answer.by,
+                text=answer.why,
+            )
             if answer.kind is AnswerKind.INTERFACE:
                 return self._try_interface(answer, question)
             return answer
@@ -158,6 +166,7 @@ class Inquiry:
         What it raises beside AnswerError is its fault and no answer. What it tells or returns too
         late is dropped.
         """
+
         def progress(what: str, by: str, text: str) -> None:
             if not port.left:
                 self._progress(what, by, text)
@@ -174,15 +183,17 @@ class Inquiry:
             if port.error is not None:
                 raise port.error
             return port.result
-        self._asker.warn('the expert\'s port failed: {}'.format(repr_of(port.error)))
-        raise _NoAnswer('the expert\'s port failed') from port.error
+        self._asker.warn("the expert's port failed: {}".format(repr_of(port.error)))
+        raise _NoAnswer("the expert's port failed") from port.error
 
     def _wait_for(self, port: BackgroundCall) -> None:
         """Wait for the expert's port, and not long once its question has been taken back."""
         while not port.done.wait(_WATCH_PERIOD_S):
             if self._cancelled.is_set() and not port.done.wait(_PATIENCE_S) and port.leave():
-                self._asker.warn('the expert\'s port goes on although its question was taken back; '
-                                 'it is left behind')
+                self._asker.warn(
+                    "the expert's port goes on although its question was taken back; "
+                    'it is left behind'
+                )
                 raise _NoAnswer('no answer by the deadline')
 
     def _try_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
@@ -198,8 +209,11 @@ class Inquiry:
         self._emit(EventKind.INTERFACE_START, target=offer.name, by=answer.by)
         outcome, done = '', None
         try:
-            given = self._guarded(lambda progress: self._expert.run_interface(
-                offer, question, self._cancelled, progress))
+            given = self._guarded(
+                lambda progress: self._expert.run_interface(
+                    offer, question, self._cancelled, progress
+                )
+            )
             if given is not None:
                 done = checked_type(given)
                 self._check_done(done, question)

@@ -1,4 +1,5 @@
 """Questions of the oracle, and answers to them (paper, section V). No ROS, no smach."""
+
 import threading
 import warnings
 from enum import IntEnum
@@ -132,8 +133,9 @@ class Answer(NamedTuple):
 
         A name in another container than the failed state's has its path in front.
         """
-        name = {AnswerKind.GOTO: self.state,
-                AnswerKind.INTERFACE: self.interface}.get(self.kind, self.outcome)
+        name = {AnswerKind.GOTO: self.state, AnswerKind.INTERFACE: self.interface}.get(
+            self.kind, self.outcome
+        )
         return '{}/{}'.format(self.container, name) if self.container else name
 
 
@@ -148,8 +150,9 @@ class Expert:
     ros/ implements it with the ExpertQuery action. Tests implement it in a few lines.
     """
 
-    def ask(self, question: Question, cancelled: threading.Event,
-            progress: Progress) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Progress
+    ) -> Optional[Answer]:
         """Return the answer, or None where nobody answered by the deadline or `cancelled` was set.
 
         It is called in its own thread. It must return soon (tens of milliseconds) after `cancelled`
@@ -160,8 +163,13 @@ class Expert:
         """
         raise NotImplementedError
 
-    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
-                      progress: Progress) -> Optional[Answer]:
+    def run_interface(
+        self,
+        offer: InterfaceOffer,
+        question: Question,
+        cancelled: threading.Event,
+        progress: Progress,
+    ) -> Optional[Answer]:
         """Run a shared-autonomy interface.
 
         It is called, and left behind, as `ask` is. It returns a SUPERSEDE answer, or None where the

@@ -1,4 +1,5 @@
 """Gives the plain states of the Concurrences and Iterators of a wrapped tree their machines."""
+
 from typing import Callable, Dict, Iterator, Optional, Tuple, cast
 
 import smach
@@ -33,13 +34,15 @@ def release_branches(machine: object) -> None:
         take_border_away(container)
 
 
-def _new_border(parent: TreeNode, below: Labels, container: smach.Container
-                ) -> Optional[Border]:
+def _new_border(parent: TreeNode, below: Labels, container: smach.Container) -> Optional[Border]:
     try:
         put_border(container)
     except TypeError as err:
-        smach.logwarn('{}/{}: its states get no oracle, since its class cannot be extended '
-                      '({})'.format(parent.path, '/'.join(below), err))
+        smach.logwarn(
+            '{}/{}: its states get no oracle, since its class cannot be extended ({})'.format(
+                parent.path, '/'.join(below), err
+            )
+        )
     return border_of(container)
 
 
@@ -66,18 +69,24 @@ def _plain_states(border: Border) -> Iterator[Tuple[str, smach.State]]:
             yield label, state
 
 
-def _new_machine(border: Border, label: str, state: smach.State, parent: TreeNode, below: Labels,
-                 put_under: PutUnder) -> WrappedMachine:
+def _new_machine(
+    border: Border,
+    label: str,
+    state: smach.State,
+    parent: TreeNode,
+    below: Labels,
+    put_under: PutUnder,
+) -> WrappedMachine:
     container = border.container
     is_iterator = isinstance(container, smach.Iterator)
     bare = BranchMachine(label, is_alone=is_iterator)
     bare.take(state, container.userdata, {})
     kind: Callable[[smach.Container, str], Branch] = (
-        IteratorBranch if is_iterator else ConcurrenceBranch)
+        IteratorBranch if is_iterator else ConcurrenceBranch
+    )
     machine = put_under(bare, parent)
     node = machine._oracle
     node.branch = kind(container, label)
     node.parent, node.below = parent, below
     node.configure(parent.settings)
     return machine
-

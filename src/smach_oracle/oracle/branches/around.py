@@ -1,4 +1,5 @@
 """Finds the Concurrences and Iterators between a container and the machine above it."""
+
 from typing import List, Tuple
 
 from ..machine.nesting import borders_below
@@ -14,14 +15,17 @@ def borders_around(node: TreeNode) -> List[Tuple[str, Border]]:
     found = []
     for below, container in borders_below(parent.machine):
         border = border_of(container)
-        if border is not None and node.below[:len(below)] == below:
+        if border is not None and node.below[: len(below)] == below:
             found.append(('/'.join((parent.key,) + below), border))
     return found
 
 
 def borders_in(node: TreeNode, label: str) -> List[Tuple[str, Border]]:
     """Return those in a state of a machine, down to the next machines, each with its path."""
-    return [('/'.join((node.key,) + below), border)
-            for below, border in ((below, border_of(container))
-                                  for below, container in borders_below(node.machine))
-            if border is not None and below[0] == label]
+    return [
+        ('/'.join((node.key,) + below), border)
+        for below, border in (
+            (below, border_of(container)) for below, container in borders_below(node.machine)
+        )
+        if border is not None and below[0] == label
+    ]

@@ -1,4 +1,5 @@
 """Concurrences and Iterators of a wrapped tree: their branches, and where an Iterator goes on."""
+
 import threading
 from typing import (
     Any,
@@ -79,15 +80,23 @@ class Border:
             self._renew(node)
             node.begin_execution()
         if nodes:
-            nodes[0].emit(EventKind.CONTAINER_START, state=', '.join(self.machines),
-                          data={BRANCHES: list(self.machines)})
+            nodes[0].emit(
+                EventKind.CONTAINER_START,
+                state=', '.join(self.machines),
+                data={BRANCHES: list(self.machines)},
+            )
         self._take_places()
         return True
 
     # -- going on after the program was stopped
 
-    def resume(self, keys: Mapping[str, Any], gone: Iterable[str], item: int,
-               tell: Callable[[Mapping[str, Any]], None]) -> None:
+    def resume(
+        self,
+        keys: Mapping[str, Any],
+        gone: Iterable[str],
+        item: int,
+        tell: Callable[[Mapping[str, Any]], None],
+    ) -> None:
         """Have this userdata at the next execution, once its inputs are copied.
 
         `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1.
@@ -140,10 +149,12 @@ class Border:
         """Tell that the container has ended, with an outcome or an error."""
         nodes = self.nodes()
         if nodes:
-            why = (error_text(error) if error is not None
-                   else NO_OUTCOME if outcome is None else '')
-            nodes[0].emit(EventKind.CONTAINER_END, text=why,
-                          outcome=outcome if isinstance(outcome, str) else '')
+            why = error_text(error) if error is not None else NO_OUTCOME if outcome is None else ''
+            nodes[0].emit(
+                EventKind.CONTAINER_END,
+                text=why,
+                outcome=outcome if isinstance(outcome, str) else '',
+            )
 
     def leave(self) -> None:
         """Give the states their places back."""
@@ -193,8 +204,11 @@ class ConcurrenceBorder(Border):
     def _take_places(self) -> None:
         own = self._own = self.container._states
         self.container._states = {
-            label: StandIn(state, self.machines[label], _forget) if label in self.machines
-            else state for label, state in own.items()}
+            label: StandIn(state, self.machines[label], _forget)
+            if label in self.machines
+            else state
+            for label, state in own.items()
+        }
 
     def _give_places_back(self) -> None:
         self.container._states, self._own = self._own, None
@@ -254,8 +268,7 @@ class IteratorBorder(Border):
         inside = tuple(border.mark() for border in self._iterators_around())
         if items is None or items.given is not iterator._items:
             items = TrackedItems(iterator._items, self._tell)
-        has_rest = (items.has_rest()
-                    and (trial_id, inside) == (self._trial_id, self._inside))
+        has_rest = items.has_rest() and (trial_id, inside) == (self._trial_id, self._inside)
         self.goes_on = items.goes_on = self._is_asked_to_go_on and has_rest
         self._is_asked_to_go_on = False
         if has_rest and self._ended_with is None and not self.goes_on:
@@ -272,8 +285,12 @@ class IteratorBorder(Border):
         iterator._items = items
         state = iterator._state
         if state is not None:
-            iterator._state = StandIn(state, self.machines.get(iterator._state_label),
-                                      self._note_outcome, self._begin_item)
+            iterator._state = StandIn(
+                state,
+                self.machines.get(iterator._state_label),
+                self._note_outcome,
+                self._begin_item,
+            )
 
     def mark(self) -> Tuple[int, int]:
         """Return what is different for each item: its number, and that of the round."""
@@ -308,14 +325,19 @@ class IteratorBorder(Border):
     def _note_outcome(self, outcome: object) -> None:
         if self._items is not None and isinstance(outcome, str):
             # one that is left for a state elsewhere, or preempted, has ended by no word of its own
-            self._items.is_finished = (loops(self.container, outcome)
-                                       and not is_preempted(outcome)
-                                       and not self.container._preempt_requested)
+            self._items.is_finished = (
+                loops(self.container, outcome)
+                and not is_preempted(outcome)
+                and not self.container._preempt_requested
+            )
 
     def _begin_item(self) -> None:
         machine = self.machines.get(self.container._state_label)
-        record = (None if machine is None
-                  else machine._oracle.records.by_label.get(self.container._state_label))
+        record = (
+            None
+            if machine is None
+            else machine._oracle.records.by_label.get(self.container._state_label)
+        )
         self._userdata.begin_item(record, self._deep_copy_keys(), self._warn_not_copied)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
@@ -334,12 +356,14 @@ class IteratorBorder(Border):
     def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
         """Return the attributes of its container for a copy, as they are while it is at rest."""
         items = attributes.get('_items')
-        return dict(attributes, _state=real(attributes.get('_state')),
-                    _items=items.given if isinstance(items, TrackedItems) else items)
+        return dict(
+            attributes,
+            _state=real(attributes.get('_state')),
+            _items=items.given if isinstance(items, TrackedItems) else items,
+        )
 
     def __getstate__(self) -> Dict[str, Any]:
-        return dict(super().__getstate__(), _items=None, _ended_with=None,
-                    _is_asked_to_go_on=False)
+        return dict(super().__getstate__(), _items=None, _ended_with=None, _is_asked_to_go_on=False)
 
     # -- userdata
 
@@ -352,8 +376,12 @@ class IteratorBorder(Border):
         if not self.goes_on:
             self._userdata.begin(userdata, deep, self._warn_not_copied)
             return {}
-        if (self._items is not None and not self._items.is_finished
-                and self.top is not None and self.top.settings.userdata == 'restore'):
+        if (
+            self._items is not None
+            and not self._items.is_finished
+            and self.top is not None
+            and self.top.settings.userdata == 'restore'
+        ):
             self._userdata.take_back(deep)
         return self._userdata.to_keep(userdata)
 
@@ -388,4 +416,3 @@ def _forget_given_up(container: smach.Container) -> None:
 
 def _forget(outcome: object) -> None:
     """Nobody needs to know with what a branch has ended."""
-

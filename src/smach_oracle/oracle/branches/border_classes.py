@@ -1,4 +1,5 @@
 """Classes of the Concurrences and Iterators of a wrapped tree, made of their own classes."""
+
 from typing import Any, Dict, Optional, Tuple
 
 import smach
@@ -59,11 +60,10 @@ class _Bordered:
         reduced = base.__reduce_ex__(max(2, protocol))
         attributes = self._oracle_border.without_places(dict(reduced[2]))
         return (rebuild_bordered, (type(self).__dict__['_bordered_of'],), attributes) + tuple(
-            reduced[3:])
+            reduced[3:]
+        )
 
-
-    def _copy_input_keys(self, parent_ud: Optional[smach.UserData],
-                         ud: smach.UserData) -> None:
+    def _copy_input_keys(self, parent_ud: Optional[smach.UserData], ud: smach.UserData) -> None:
         base: Any = super()
         base._copy_input_keys(parent_ud, ud)
         self._oracle_border.take_over_userdata()
@@ -72,8 +72,7 @@ class _Bordered:
 class _BorderedIterator(_Bordered):
     _oracle_border: IteratorBorder
 
-    def _copy_input_keys(self, parent_ud: Optional[smach.UserData],
-                         ud: smach.UserData) -> None:
+    def _copy_input_keys(self, parent_ud: Optional[smach.UserData], ud: smach.UserData) -> None:
         base: Any = super()
         kept = self._oracle_border.keys_to_keep(parent_ud)
         base._copy_input_keys(parent_ud, ud)
@@ -89,8 +88,9 @@ def put_border(container: smach.Container) -> None:
     cls = bordered_class(type(container))
     set_class(container, cls)
     is_iterator = isinstance(container, smach.Iterator)
-    own_attributes(container)[BORDER] = (
-        IteratorBorder if is_iterator else ConcurrenceBorder)(container)
+    own_attributes(container)[BORDER] = (IteratorBorder if is_iterator else ConcurrenceBorder)(
+        container
+    )
 
 
 def take_border_away(container: smach.Container) -> None:
@@ -107,9 +107,16 @@ def bordered_class(base: type) -> type:
     if made is None:
         mixin = _BorderedIterator if issubclass(base, smach.Iterator) else _Bordered
         metaclass: Any = type(base)
-        made = metaclass(base.__name__, (mixin, base), {
-            '__module__': base.__module__, '__qualname__': base.__qualname__,
-            '__doc__': base.__doc__, '_bordered_of': base})
+        made = metaclass(
+            base.__name__,
+            (mixin, base),
+            {
+                '__module__': base.__module__,
+                '__qualname__': base.__qualname__,
+                '__doc__': base.__doc__,
+                '_bordered_of': base,
+            },
+        )
         made = _MADE.setdefault(id(base), made)
     return made
 
@@ -118,4 +125,3 @@ def rebuild_bordered(base: type) -> object:
     """Return a new, empty object of a bordered class: for unpickling and copying."""
     cls: Any = bordered_class(base)
     return cls.__new__(cls)
-

@@ -1,4 +1,5 @@
 """One branch: where its outcomes lead, by its author's word."""
+
 from dataclasses import replace
 from typing import Any, Tuple
 
@@ -49,9 +50,11 @@ class ConcurrenceBranch(Branch):
 
     def foresees(self, node: TreeNode, outcome: str) -> bool:
         """Whether the outcome map names it for the branch, and leads to what is no failure."""
-        return any(not is_failure_above(node, name)
-                   for name, conditions in _entries(self.container._outcome_map)
-                   if dict(_entries(conditions)).get(self.label) == outcome)
+        return any(
+            not is_failure_above(node, name)
+            for name, conditions in _entries(self.container._outcome_map)
+            if dict(_entries(conditions)).get(self.label) == outcome
+        )
 
     def leads_to(self, outcome: str) -> str:
         """Say where an outcome leads, for people."""
@@ -73,7 +76,8 @@ class IteratorBranch(Branch):
         if loops(self.container, outcome):
             return 'the next item'
         return 'the end of the iteration, with {}'.format(
-            self.container._final_outcome_map.get(outcome, outcome))
+            self.container._final_outcome_map.get(outcome, outcome)
+        )
 
     def goes_on_after(self, outcome: str) -> bool:
         """Whether an outcome leads to the next item."""
@@ -101,9 +105,13 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     parent = node.parent
     if parent is None or len(node.below) != 1:
         return outcome in node.in_force.failing
-    label, = node.below
-    kind = failure_kind(outcome, route_of(parent.machine, label, outcome),
-                        parent.settings_of(label).failure_outcomes, parent.in_force.failing)
+    (label,) = node.below
+    kind = failure_kind(
+        outcome,
+        route_of(parent.machine, label, outcome),
+        parent.settings_of(label).failure_outcomes,
+        parent.in_force.failing,
+    )
     return kind is not FailureKind.NOT_A_FAILURE
 
 

@@ -1,4 +1,5 @@
 """The hidden machine of one branch: a plain state of a Concurrence or an Iterator, alone."""
+
 from typing import Mapping, Optional
 
 import smach
@@ -27,8 +28,9 @@ class BranchMachine(smach.StateMachine):
         self.hands_on_userdata = is_alone
         self._initial_state_label = label
 
-    def take(self, state: smach.State, userdata: smach.UserData,
-             remapping: Mapping[str, str]) -> None:
+    def take(
+        self, state: smach.State, userdata: smach.UserData, remapping: Mapping[str, str]
+    ) -> None:
         """Have this state, with the outcomes that it has now."""
         label = self._branch_label
         outcomes = state.get_registered_outcomes()
@@ -48,8 +50,9 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     """
     node = machine._oracle
     if not node.look_around():
-        smach.logwarn('{}: a branch does not begin, as {}'.format(
-            node.path, node.why_left_behind()))
+        smach.logwarn(
+            '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
+        )
         return outcome_of_early_end(node, None)
     if node.ended_before is not None:
         outcome, node.ended_before = node.ended_before, None

@@ -1,4 +1,5 @@
 """Userdata of an Iterator that goes on: as it was when the unfinished item began."""
+
 from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 
 import smach
@@ -20,8 +21,9 @@ class ItemUserdata:
         self._given: Dict[str, Any] = {}  # its io keys when it began
         self._at_item: Optional[Dict[str, Any]] = None
 
-    def begin_item(self, record: Optional[StateRecord], deep_copy_keys: Sequence[str],
-                   warn: Warn) -> None:
+    def begin_item(
+        self, record: Optional[StateRecord], deep_copy_keys: Sequence[str], warn: Warn
+    ) -> None:
         """Note that an item begins.
 
         `record`: of its state, where that has an oracle of its own. A visit that was begun before
@@ -33,8 +35,9 @@ class ItemUserdata:
             data = unfinished.snapshot
         self._at_item = take_snapshot(data, deep_copy_keys, warn)
 
-    def begin(self, userdata: Optional[smach.UserData], deep_copy_keys: Sequence[str],
-              warn: Warn) -> None:
+    def begin(
+        self, userdata: Optional[smach.UserData], deep_copy_keys: Sequence[str], warn: Warn
+    ) -> None:
         """Note what it is given as it begins with its first item. `userdata`: of what is above."""
         self._given = take_snapshot(self._inputs_and_outputs(userdata), deep_copy_keys, warn)
 
@@ -50,15 +53,18 @@ class ItemUserdata:
         `userdata`: what its inputs are copied from.
         """
         own = self._iterator.userdata._data
-        return {key: own[key] for key, value in self._inputs_and_outputs(userdata).items()
-                if key in own and key in self._given and _same(self._given[key], value)}
+        return {
+            key: own[key]
+            for key, value in self._inputs_and_outputs(userdata).items()
+            if key in own and key in self._given and _same(self._given[key], value)
+        }
 
     def _inputs_and_outputs(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
         iterator = self._iterator
         both = set(iterator.get_registered_input_keys()).intersection(
-            iterator.get_registered_output_keys())
-        return ({} if userdata is None
-                else {key: userdata[key] for key in both if key in userdata})
+            iterator.get_registered_output_keys()
+        )
+        return {} if userdata is None else {key: userdata[key] for key in both if key in userdata}
 
     def __getstate__(self) -> Dict[str, Any]:
         return dict(self.__dict__, _given={}, _at_item=None)

@@ -1,4 +1,5 @@
 """The items of an Iterator, with a memory of how far it has come."""
+
 from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
 
 from smach_oracle.foreign import repr_of
@@ -49,8 +50,11 @@ class TrackedItems:
         """Say which items are done again, as it begins with the first one after it was left."""
         done = self.number if self.is_finished else self.number - 1
         if done:
-            self._tell('begins with its first item again: {} that had ended {} repeated'.format(
-                *(('item 1', 'is') if done == 1 else ('items 1 to {}'.format(done), 'are'))))
+            self._tell(
+                'begins with its first item again: {} that had ended {} repeated'.format(
+                    *(('item 1', 'is') if done == 1 else ('items 1 to {}'.format(done), 'are'))
+                )
+            )
 
     def __iter__(self) -> 'TrackedItems':
         if self.goes_on and self.has_rest():
@@ -65,8 +69,10 @@ class TrackedItems:
         had_begun = self._items is not None
         self._items = iter(source)
         if had_begun and self._items is source:
-            self._tell('what it goes through can be iterated only once, and that was begun before; '
-                       'it goes on where that has ended')
+            self._tell(
+                'what it goes through can be iterated only once, and that was begun before; '
+                'it goes on where that has ended'
+            )
         self._count = len(source) if isinstance(source, Sized) else None
         self.number, self.is_finished, self.is_exhausted = 0, True, False
         self._is_pending, self._error = False, None
@@ -90,16 +96,22 @@ class TrackedItems:
         if self._error is not None:
             self._begin_behind_finished()
         self._is_pending = not self.is_finished
-        self._tell(('goes on behind {}' if self.is_finished
-                    else 'goes on with {}, which is repeated').format(self.in_words()))
+        self._tell(
+            (
+                'goes on behind {}' if self.is_finished else 'goes on with {}, which is repeated'
+            ).format(self.in_words())
+        )
 
     def _look_for_changes(self) -> None:
         if callable(self.given) or not isinstance(self.given, Sized):
             return
         count = len(self.given)
         if count != self._count:
-            self._tell('what it goes through has changed: it had {} items, and has {}'.format(
-                self._count, count))
+            self._tell(
+                'what it goes through has changed: it had {} items, and has {}'.format(
+                    self._count, count
+                )
+            )
             self._count = count
 
     def _begin_behind_finished(self) -> None:
@@ -128,8 +140,11 @@ class TrackedItems:
         except Exception as err:
             self._error = err
             self.is_finished = True  # the one before
-            self._tell('cannot get the item behind {}: {}'.format(
-                self.in_words() or 'the beginning', repr_of(err)))
+            self._tell(
+                'cannot get the item behind {}: {}'.format(
+                    self.in_words() or 'the beginning', repr_of(err)
+                )
+            )
             raise
         self._item, self.is_finished = item, False
         self.number += 1
@@ -164,5 +179,8 @@ def can_be_indexed(iterator: Any) -> bool:
     items = items.given if isinstance(items, TrackedItems) else items
     if callable(items):
         return True  # whoever makes them again says what they are
-    return (has_attribute(items, '__len__') and has_attribute(items, '__getitem__')
-            and not has_attribute(items, 'keys'))
+    return (
+        has_attribute(items, '__len__')
+        and has_attribute(items, '__getitem__')
+        and not has_attribute(items, 'keys')
+    )

@@ -1,4 +1,5 @@
 """Stands in for a branch's state while its Concurrence or Iterator executes."""
+
 import threading
 from typing import Any, Callable, Optional, cast
 
@@ -15,9 +16,13 @@ class StandIn:
     container for its children gets the user's states.
     """
 
-    def __init__(self, state: smach.State, machine: Optional[WrappedMachine],
-                 note_outcome: Callable[[object], None],
-                 note_begin: Optional[Callable[[], None]] = None) -> None:
+    def __init__(
+        self,
+        state: smach.State,
+        machine: Optional[WrappedMachine],
+        note_outcome: Callable[[object], None],
+        note_begin: Optional[Callable[[], None]] = None,
+    ) -> None:
         """`machine`: the branch's, None for a state that has no oracle of its own here."""
         self._state = state
         self._machine = machine
@@ -31,8 +36,11 @@ class StandIn:
         if self._note_begin is not None:
             self._note_begin()
         # at once where it can be: each of the Iterators that lie in each other takes these frames
-        outcome = (self._state.execute(userdata) if self._machine is None
-                   else self._execute(self._machine, userdata))
+        outcome = (
+            self._state.execute(userdata)
+            if self._machine is None
+            else self._execute(self._machine, userdata)
+        )
         self._note_outcome(outcome)
         return outcome
 
@@ -63,7 +71,8 @@ class StandIn:
         """Whether a request was not serviced."""
         machine = self._machine
         return self._state.preempt_requested() or (
-            machine is not None and machine._preempt_requested)
+            machine is not None and machine._preempt_requested
+        )
 
     def recall_preempt(self) -> None:
         """Take a request back."""

@@ -1,4 +1,5 @@
 """Finds what has changed in a script since its trial was stored, and its states' new names."""
+
 from typing import Collection, List, Mapping, NamedTuple, Optional
 
 import smach
@@ -25,8 +26,9 @@ class ChangedScript(NamedTuple):
     renaming: Optional[Renaming]
 
 
-def changed_script(top: TreeNode, store: StoreFile, trial: StoredTrial, tree: StoredTree,
-                   now: Structure) -> ChangedScript:
+def changed_script(
+    top: TreeNode, store: StoreFile, trial: StoredTrial, tree: StoredTree, now: Structure
+) -> ChangedScript:
     """Return how a script differs from the one of a stored trial.
 
     :raises SettingsError: where `resume_map` names a state that was not there, or is not.
@@ -44,25 +46,34 @@ def changed_script(top: TreeNode, store: StoreFile, trial: StoredTrial, tree: St
     for old, new in names.items():
         _check(old, old, known, 'a state of the machine that was stopped')
         _check(old, new, present, 'a state of the machine')
-    return ChangedScript(before, changes, names,
-                         Renaming(top.name, names, containers_of(described)))
+    return ChangedScript(
+        before, changes, names, Renaming(top.name, names, containers_of(described))
+    )
 
 
-def _name_unknown(top: TreeNode, names: Mapping[str, str], store: StoreFile, now: Structure
-                  ) -> None:
+def _name_unknown(
+    top: TreeNode, names: Mapping[str, str], store: StoreFile, now: Structure
+) -> None:
     """Warn of states of a map of no effect that neither this script has, nor one of before."""
     if not names:
         return
-    known = set(states_of(now.description)).union(*(
-        states_of(store.description(each)) for each in
-        {trial.structure for trial in store.trials(top.name)}))
+    known = set(states_of(now.description)).union(
+        *(
+            states_of(store.description(each))
+            for each in {trial.structure for trial in store.trials(top.name)}
+        )
+    )
     for path in sorted({path for pair in names.items() for path in pair}.difference(known)):
-        smach.logwarn('{}: resume_map names {!r}, which is not a state of the machine, and was '
-                      'not one before; there are {}'.format(top.path, path, ', '.join(sorted(
-                          states_of(now.description)))))
+        smach.logwarn(
+            '{}: resume_map names {!r}, which is not a state of the machine, and was '
+            'not one before; there are {}'.format(
+                top.path, path, ', '.join(sorted(states_of(now.description)))
+            )
+        )
 
 
 def _check(old: str, path: str, known: Collection[str], what: str) -> None:
     if path not in known:
-        raise SettingsError('resume_map.' + old, path, '{}: {}'.format(
-            what, ', '.join(sorted(known))))
+        raise SettingsError(
+            'resume_map.' + old, path, '{}: {}'.format(what, ', '.join(sorted(known)))
+        )

@@ -1,4 +1,5 @@
 """Stores where every container of a tree stands, before each state begins."""
+
 import time
 from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
 
@@ -22,13 +23,26 @@ from .userdata_facts import KeptOut, UserdataFacts, WeakIds, keys_of
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
-_COMMITTED = frozenset((
-    EventKind.TRIAL_START, EventKind.RESUMED, EventKind.STATE_START, EventKind.PRECONDITION_START,
-    EventKind.DECISION, EventKind.QUERY_OPENED, EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
-    EventKind.QUERY_CANCELLED, EventKind.JUMP, EventKind.SUPERSEDE, EventKind.GIVE_UP,
-    EventKind.HOLD_START, EventKind.SENT, EventKind.TRIAL_END))
-_CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED,
-                     EventKind.QUERY_CANCELLED))
+_COMMITTED = frozenset(
+    (
+        EventKind.TRIAL_START,
+        EventKind.RESUMED,
+        EventKind.STATE_START,
+        EventKind.PRECONDITION_START,
+        EventKind.DECISION,
+        EventKind.QUERY_OPENED,
+        EventKind.QUERY_ANSWERED,
+        EventKind.QUERY_EXPIRED,
+        EventKind.QUERY_CANCELLED,
+        EventKind.JUMP,
+        EventKind.SUPERSEDE,
+        EventKind.GIVE_UP,
+        EventKind.HOLD_START,
+        EventKind.SENT,
+        EventKind.TRIAL_END,
+    )
+)
+_CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
@@ -39,9 +53,15 @@ class Checkpointer:
     It is called by the thread in which the step happens, before the machine goes on.
     """
 
-    def __init__(self, top: TreeNode, writer: StoreWriter, codecs: Codecs,
-                 before: Optional[StoredTree] = None, behind: Optional[int] = None,
-                 first: Sequence[Fact] = ()) -> None:
+    def __init__(
+        self,
+        top: TreeNode,
+        writer: StoreWriter,
+        codecs: Codecs,
+        before: Optional[StoredTree] = None,
+        behind: Optional[int] = None,
+        first: Sequence[Fact] = (),
+    ) -> None:
         """`before`: what is stored of the trial, where it is resumed.
 
         `behind`: the moment that it goes on from, where that is not the last one. `first`: what
@@ -55,8 +75,11 @@ class Checkpointer:
         # by where a line of steps begins: what one of them commits, the others may not yet have
         self._pending: Dict[str, List[Fact]] = {_begins_line(top): list(first)}
         # numbers, by path of the Iterator
-        self._items = {} if before is None else {
-            path: told.item for path, told in before.containers.items() if told.item}
+        self._items = (
+            {}
+            if before is None
+            else {path: told.item for path, told in before.containers.items() if told.item}
+        )
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
@@ -65,8 +88,11 @@ class Checkpointer:
         self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
         # paths and keys of what is named. Of a trial that goes on its first part has done so
-        self._told = set() if before is None else {
-            (path, key) for path, told in before.containers.items() for key in told.missing}
+        self._told = (
+            set()
+            if before is None
+            else {(path, key) for path, told in before.containers.items() for key in told.missing}
+        )
         self._named = WeakIds()  # values that are named
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
 
@@ -77,8 +103,12 @@ class Checkpointer:
         if event.kind is EventKind.OPERATOR_COMMAND:
             spent = tuple(self._spent())  # such as that it is paused, which must not be delayed
             if spent:
-                self._writer.commit(NewMoment(event.wall_time, event.seq, event.kind.name,
-                                              self._top.key, '', spent), lambda: True)
+                self._writer.commit(
+                    NewMoment(
+                        event.wall_time, event.seq, event.kind.name, self._top.key, '', spent
+                    ),
+                    lambda: True,
+                )
             return
         node = self._node_of(event)
         if node is None:
@@ -106,9 +136,12 @@ class Checkpointer:
 
         That of a failure is stored once it is counted, as the state gives way to the oracle.
         """
-        return (event.kind in _COMMITTED or self._ends_branch(event, node)
-                or event.seq >= self._seq_stored + SEQ_RESERVE - 1
-                or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target)))
+        return (
+            event.kind in _COMMITTED
+            or self._ends_branch(event, node)
+            or event.seq >= self._seq_stored + SEQ_RESERVE - 1
+            or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
+        )
 
     def _pending_of(self, node: TreeNode) -> List[Fact]:
         """Return what a container and those around it have to commit, which run in one thread."""
@@ -122,8 +155,9 @@ class Checkpointer:
     def last_words(self, kind: str) -> None:
         """Store what has not been stored of the trial, which has ended, as a moment of a kind."""
         facts = [fact for line in self._pending.values() for fact in line]
-        facts += (fact for node in self._nodes.values()
-                  for fact in self._facts_of(node).all_states())
+        facts += (
+            fact for node in self._nodes.values() for fact in self._facts_of(node).all_states()
+        )
         facts += self._marks()
         self._pending = {}
         self._commit_by_hand(kind, (*facts, *self._ended_goals()))
@@ -140,8 +174,10 @@ class Checkpointer:
     def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
         """Commit a moment that belongs to no event."""
         top = self._top
-        self._writer.commit(NewMoment(time.time(), top.events.last_seq, kind, top.key, '', facts),
-                            lambda: must_stop(top))
+        self._writer.commit(
+            NewMoment(time.time(), top.events.last_seq, kind, top.key, '', facts),
+            lambda: must_stop(top),
+        )
 
     def _ended_goals(self) -> Iterator[Fact]:
         """Yield that goals do not run any more."""
@@ -176,8 +212,9 @@ class Checkpointer:
     def _facts_of(self, node: TreeNode) -> ContainerFacts:
         facts = self._facts.get(node.key)
         if facts is None:
-            facts = self._facts[node.key] = ContainerFacts(node, None if self._before is None else
-                                                           self._before.container(node.key))
+            facts = self._facts[node.key] = ContainerFacts(
+                node, None if self._before is None else self._before.container(node.key)
+            )
         return facts
 
     # -- what a moment has
@@ -191,17 +228,21 @@ class Checkpointer:
             below = self._below(path) if is_container else []
             sent_to = [Place(each, each.entry).path for each in below if each.entry]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
-            if is_container and not (any(_goes_on(each) for each in below) or any(
-                    border.is_resumed for _, border in borders_in(node, label))):
+            if is_container and not (
+                any(_goes_on(each) for each in below)
+                or any(border.is_resumed for _, border in borders_in(node, label))
+            ):
                 yield from self._not_begun_below(path)
         elif kind is EventKind.CONTAINER_START and node is self._top and node.resuming is None:
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
-                event.target in node.machine._states and not node.is_oracle(event.target)):
+            event.target in node.machine._states and not node.is_oracle(event.target)
+        ):
             yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
         elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
-            yield fact_of(node.key, AT, [label, FAILED, event.failure_kind, event.outcome,
-                                         event.text])
+            yield fact_of(
+                node.key, AT, [label, FAILED, event.failure_kind, event.outcome, event.text]
+            )
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind in _CLOSES and self._top.tree.early_end.why is None:
@@ -262,8 +303,17 @@ class Checkpointer:
         self._seq_stored = event.seq
         behind, self._behind = self._behind, None
         self._writer.commit(
-            NewMoment(event.wall_time, event.seq, event.kind.name, node.path, event.state,
-                      tuple(facts), behind), lambda: must_stop(node))
+            NewMoment(
+                event.wall_time,
+                event.seq,
+                event.kind.name,
+                node.path,
+                event.state,
+                tuple(facts),
+                behind,
+            ),
+            lambda: must_stop(node),
+        )
 
     def _spent(self) -> Iterator[Fact]:
         """Yield what has changed of what is spent, the time of the budget in whole seconds."""
@@ -281,16 +331,23 @@ class Checkpointer:
         yield from self._facts_of(node).changed(list(labels))
         if node.resuming is not None:
             return  # it does not have the stored userdata yet
-        reached = None if all_keys else frozenset().union(
-            *(keys_of(node.machine, label) for label in labels)) if labels else frozenset()
+        reached = (
+            None
+            if all_keys
+            else frozenset().union(*(keys_of(node.machine, label) for label in labels))
+            if labels
+            else frozenset()
+        )
         yield from self._keys(_userdata_path(node), node.machine.userdata._data, reached)
 
-    def _keys(self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
-              ) -> Iterator[Fact]:
+    def _keys(
+        self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
+    ) -> Iterator[Fact]:
         userdata = self._userdata.get(path)
         if userdata is None:
             userdata = self._userdata[path] = UserdataFacts(
-                self._codecs, path, lambda out: self._tell(path, out))
+                self._codecs, path, lambda out: self._tell(path, out)
+            )
         yield from userdata.changed(data, reached)
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
@@ -308,17 +365,23 @@ class Checkpointer:
             yield from self._keys(path, border.container.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
-        told = (path, '{}.{}'.format(out.key, '.'.join(out.attributes)) if out.attributes
-                else out.key)
+        told = (
+            path,
+            '{}.{}'.format(out.key, '.'.join(out.attributes)) if out.attributes else out.key,
+        )
         if told in self._told or not self._named.add(out.value):
             return
         self._told.add(told)
-        what = ('cannot be stored: {}. It'.format(out.why) if not out.attributes else
-                'is stored without its attributes {}, which are no fields of its class. They'
-                .format(', '.join(out.attributes)))
-        smach.logwarn('{}: userdata key {!r} ({}) of {} {} will be missing where the machine is '
-                      'resumed'.format(path, out.key, out.kind,
-                                       self._wrote.get(path, 'the script'), what))
+        what = (
+            'cannot be stored: {}. It'.format(out.why)
+            if not out.attributes
+            else 'is stored without its attributes {}, which are no fields of its '
+            'class. They'.format(', '.join(out.attributes))
+        )
+        smach.logwarn(
+            '{}: userdata key {!r} ({}) of {} {} will be missing where the machine is '
+            'resumed'.format(path, out.key, out.kind, self._wrote.get(path, 'the script'), what)
+        )
 
 
 def _userdata_path(node: TreeNode) -> str:
@@ -335,14 +398,18 @@ def _begins_line(node: TreeNode) -> str:
 
 def _enters(event: Event, node: TreeNode) -> bool:
     """Whether a container, or the state of a branch, begins at an event."""
-    return event.kind is (EventKind.CONTAINER_START if node.branch is None
-                          else EventKind.STATE_START)
+    return event.kind is (
+        EventKind.CONTAINER_START if node.branch is None else EventKind.STATE_START
+    )
 
 
 def _goes_on(node: TreeNode) -> bool:
     """Whether a container is to go on where it stood before the program was stopped."""
-    return node.resuming is not None or node.ended_before is not None or any(
-        record.unfinished is not None for record in node.records.by_label.values())
+    return (
+        node.resuming is not None
+        or node.ended_before is not None
+        or any(record.unfinished is not None for record in node.records.by_label.values())
+    )
 
 
 def must_stop(node: TreeNode) -> bool:

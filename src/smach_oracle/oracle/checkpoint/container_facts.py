@@ -1,4 +1,5 @@
 """The facts of one container that are to be stored, and those of them that are new."""
+
 import json
 from typing import Any, Dict, Iterator, List, Optional, Union
 
@@ -57,9 +58,12 @@ class ContainerFacts:
         yield from self.changed(list(self._node.records.by_label))
 
     def _of_state(self, record: StateRecord) -> Dict[str, Any]:
-        return {'learned': record.learned(), 'counts': [
-            record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
-                'longest_s': record.longest_s, 'shared': record.shared}
+        return {
+            'learned': record.learned(),
+            'counts': [record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
+            'longest_s': record.longest_s,
+            'shared': record.shared,
+        }
 
     def marks(self) -> Iterator[Fact]:
         """Yield what is new of the states that have begun: a jump changes marks of many at once."""
@@ -67,8 +71,9 @@ class ContainerFacts:
             if self._marks.get(label) != mark:
                 self._marks[label] = mark
                 if label in self._node.machine._states:
-                    yield fact_of(self._path, MARK + label,
-                                  [*mark, self._node.settings_of(label).on_retry])
+                    yield fact_of(
+                        self._path, MARK + label, [*mark, self._node.settings_of(label).on_retry]
+                    )
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits = history.visits
@@ -79,8 +84,10 @@ class ContainerFacts:
         for number in range(first, total):
             state, outcome, result = visits[number - total]
             # as many names as visits are kept, so that the store does not grow with each
-            yield from self._if_new('{}{}'.format(VISIT, number % (visits.maxlen or 1)),
-                                    [state, outcome, int(result), self._execution, number])
+            yield from self._if_new(
+                '{}{}'.format(VISIT, number % (visits.maxlen or 1)),
+                [state, outcome, int(result), self._execution, number],
+            )
         self._visits = total
         self._latest = visits[-1] if visits else None
 

@@ -1,4 +1,5 @@
 """Says of a store that it is damaged where what it holds cannot be understood."""
+
 import contextlib
 from typing import Iterator
 
@@ -22,6 +23,7 @@ def understood(path: str) -> Iterator[None]:
             raise
         raise StoreDamaged('{}: {}'.format(path, err)) from err
     except (ValueError, TypeError, LookupError, AttributeError, RecursionError) as err:
-        raise StoreDamaged('{0}: is damaged, and its trial cannot go on: {1!r}. `oracle_state {0} '
-                           'drop` ends the trial, and a new one can begin'.format(
-                               path, err)) from err
+        raise StoreDamaged(
+            '{0}: is damaged, and its trial cannot go on: {1!r}. `oracle_state {0} '
+            'drop` ends the trial, and a new one can begin'.format(path, err)
+        ) from err

@@ -1,4 +1,5 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
+
 import time
 from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Sequence
 
@@ -54,9 +55,14 @@ class Resumption(NamedTuple):
 
 def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
     """Say that a trial goes on."""
-    smach.logwarn('{}: trial {} goes on{}; its program was stopped {:.0f} s ago'.format(
-        top.path, resumption.trial.trial_id, ' from moment {}'.format(
-            resumption.moment) if resumption.is_earlier else '', resumption.age_s))
+    smach.logwarn(
+        '{}: trial {} goes on{}; its program was stopped {:.0f} s ago'.format(
+            top.path,
+            resumption.trial.trial_id,
+            ' from moment {}'.format(resumption.moment) if resumption.is_earlier else '',
+            resumption.age_s,
+        )
+    )
     for change in resumption.changes:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
     for old, new in resumption.renamed.items():
@@ -64,9 +70,15 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
     if top.tree.control.paused:
         smach.logwarn('{}: is paused, as before its program was stopped'.format(top.path))
     _end_goals(top, resumption)
-    top.emit(EventKind.RESUMED, data={
-        LAST_SEQ: resumption.seq, 'moment': resumption.moment,
-        'stopped_s': round(resumption.age_s, 3), 'changes': resumption.changes})
+    top.emit(
+        EventKind.RESUMED,
+        data={
+            LAST_SEQ: resumption.seq,
+            'moment': resumption.moment,
+            'stopped_s': round(resumption.age_s, 3),
+            'changes': resumption.changes,
+        },
+    )
 
 
 def _end_goals(top: TreeNode, resumption: Resumption) -> None:
@@ -74,8 +86,11 @@ def _end_goals(top: TreeNode, resumption: Resumption) -> None:
     goals = resumption.tree.goals
     if not goals:
         return
-    smach.logwarn('{}: the program was killed while {} ran: cancelled, and waited for'.format(
-        top.path, ', '.join('a goal of {}'.format(server) for server in sorted(goals.values()))))
+    smach.logwarn(
+        '{}: the program was killed while {} ran: cancelled, and waited for'.format(
+            top.path, ', '.join('a goal of {}'.format(server) for server in sorted(goals.values()))
+        )
+    )
     for goal_id, server in GOALS.end_goals(goals, lambda: must_stop(top)).items():
         smach.logwarn('{}: a goal of {} may still run'.format(top.path, server))
         GOALS.keep(goal_id, server)
@@ -97,8 +112,9 @@ class EntryPoint:
         """Have the visits of the execution that was stopped."""
         stored = self._stored
         if stored.history:
-            node.records.history.take_over(stored.visits, stored.visits_of_execution,
-                                           _of_states(node, stored.history))
+            node.records.history.take_over(
+                stored.visits, stored.visits_of_execution, _of_states(node, stored.history)
+            )
 
     def enter(self, node: TreeNode) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
@@ -108,9 +124,14 @@ class EntryPoint:
             data.pop(key, None)
         data.update(stored.keys)
         for key, why in sorted(stored.missing.items()):
-            node.warn('userdata key {!r} {}'.format(key, 'has the value that the script gives it, '
-                                                    'as {}'.format(why) if key in data
-                                                    else 'is missing, as ' + why))
+            node.warn(
+                'userdata key {!r} {}'.format(
+                    key,
+                    'has the value that the script gives it, as {}'.format(why)
+                    if key in data
+                    else 'is missing, as ' + why,
+                )
+            )
         stored.complete_snapshots(data)
         for label, snapshot in stored.snapshots.items():
             if label in machine._states and not node.is_oracle(label):
@@ -122,12 +143,14 @@ class EntryPoint:
 
 def _of_states(node: TreeNode, told: List[Any]) -> List[Any]:
     """Return what a history told, without the states that are gone."""
+
     def there(label: Any) -> Any:
         return label if label in node.machine._states else None
 
     return [there(each) for each in told[:3]] + [
         [there(state), successes, there(anchor), is_anchored]
-        for state, successes, anchor, is_anchored in told[3:]]
+        for state, successes, anchor, is_anchored in told[3:]
+    ]
 
 
 def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
@@ -183,7 +206,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     if way is not None:
         stood.at = [way.first, BEFORE]
     elif stood.label in top.machine._states and stood.sent is not None:
-        way = _way_named(top, stood.jumped_to[len(top.path) + 1:] or stood.label)
+        way = _way_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
     if way is not None:
         leave_unconfirmed(top, way.first)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
@@ -202,8 +225,11 @@ def _way_named(top: TreeNode, path: str) -> Way:
     place = place_named(top, path)
     way = None if place is None else way_to(top, place)
     if way is None:
-        raise SettingsError('on_resume', 'state:' + path, 'the label of a state of {}, or the path '
-                            'of one below it'.format(top.path))
+        raise SettingsError(
+            'on_resume',
+            'state:' + path,
+            'the label of a state of {}, or the path of one below it'.format(top.path),
+        )
     return way
 
 
@@ -260,8 +286,11 @@ class _Setting:
         That is the next item of an Iterator, or a state of the container or of one above it.
         """
         around = [*_up_from(node), node.top()]
-        asked = AskedOnce(_why(self._resumption), [node.record(label)] + [
-            each.parent.record(each.below[0]) for each in around if each.parent is not None])
+        asked = AskedOnce(
+            _why(self._resumption),
+            [node.record(label)]
+            + [each.parent.record(each.below[0]) for each in around if each.parent is not None],
+        )
         for each in around + inside:
             each.asked_next = asked
 
@@ -271,14 +300,16 @@ class _Setting:
         down = _down_to(node, stored.jumped_to)
         # the jump led to the first item of an Iterator
         has_begun = any(tree.container(place.node.key).phase for place in down) or any(
-            told.item > 1 for key, told in tree.containers.items() if (key + '/').startswith(state))
+            told.item > 1 for key, told in tree.containers.items() if (key + '/').startswith(state)
+        )
         return () if stored.phase == IN and has_begun else down
 
     def _has_begun(self, path: str) -> bool:
         """Whether anything has run in a Concurrence or Iterator, in its present execution."""
         tree = self._resumption.tree
         return bool(tree.container(path).item) or any(
-            told.phase for key, told in tree.containers.items() if key.startswith(path + '/'))
+            told.phase for key, told in tree.containers.items() if key.startswith(path + '/')
+        )
 
     def set_container(self, node: TreeNode) -> bool:
         """Set the machine, or a container in a state that was under way. See `activate`."""
@@ -307,8 +338,11 @@ class _Setting:
         place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
         way = None if place is None else way_to(top, place)
         # others may run next to it, which would be left
-        if place is None or way is None or any(
-                len(each.below) > 1 or each.branch is not None for each in _up_from(node)):
+        if (
+            place is None
+            or way is None
+            or any(len(each.below) > 1 or each.branch is not None for each in _up_from(node))
+        ):
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
@@ -334,8 +368,11 @@ class _Setting:
         stored.at, stored.asked = [label, BEFORE], []
         if node.branch is None:
             node.resuming = EntryPoint(stored)
-        node.record(label).resume(Unfinished(
-            FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption), keeps=True))
+        node.record(label).resume(
+            Unfinished(
+                FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption), keeps=True
+            )
+        )
 
     def ask_at(self, down: Sequence[Place]) -> None:
         """Have a person asked at states that are not to come again, or where nothing is to move."""
@@ -343,14 +380,18 @@ class _Setting:
             why = why_held_back(node, node.record(label))
             if why and node.tree.numbers_visits:
                 node.record(label).resume(
-                    Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True))
+                    Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True)
+                )
         self._ask_before(*down[-1])
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
         if self._resumption.asks and label in node.machine._states:
-            node.record(label).resume(Unfinished(
-                FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption), keeps=True))
+            node.record(label).resume(
+                Unfinished(
+                    FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption), keeps=True
+                )
+            )
 
     def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
         is_open = node.record(stored.label).open_question
@@ -362,11 +403,23 @@ class _Setting:
             if outcome and outcome not in node.machine._transitions.get(stored.label, ()):
                 kind, text = FailureKind.INTERRUPTED, GONE.format('outcome ' + outcome)
                 outcome = ''
-            return Unfinished(FailureKind(kind), outcome, text, why, snapshots.get(stored.label),
-                              self._resumption.asks)
+            return Unfinished(
+                FailureKind(kind),
+                outcome,
+                text,
+                why,
+                snapshots.get(stored.label),
+                self._resumption.asks,
+            )
         node.records.marks.of(stored.label).spent = True  # it may have been done
-        return Unfinished(FailureKind.INTERRUPTED, '', STOPPED, why, snapshots.get(stored.label),
-                          self._resumption.asks)
+        return Unfinished(
+            FailureKind.INTERRUPTED,
+            '',
+            STOPPED,
+            why,
+            snapshots.get(stored.label),
+            self._resumption.asks,
+        )
 
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
         """Return the containers directly in a state, or None where it can only go on as a whole."""
@@ -387,10 +440,14 @@ def _is_wrapped_through(state: object) -> bool:
     if isinstance(state, smach.StateMachine):
         return node_of(state) is not None
     border = border_of(state)
-    return border is not None and all(
-        label in border.machines or _is_wrapped_through(inner)
-        for label, inner in border.states()) and (
-            not isinstance(state, smach.Iterator) or can_be_indexed(state))
+    return (
+        border is not None
+        and all(
+            label in border.machines or _is_wrapped_through(inner)
+            for label, inner in border.states()
+        )
+        and (not isinstance(state, smach.Iterator) or can_be_indexed(state))
+    )
 
 
 def _why(resumption: Resumption) -> str:

@@ -1,4 +1,5 @@
 """Stores a trial while that can be done. Whatever fails in it stops no machine."""
+
 import time
 from functools import partial
 from typing import Callable
@@ -13,9 +14,11 @@ from ..machine.tree_node import TreeNode
 from ..records.events import Event
 from .checkpointer import Checkpointer, must_stop
 
-LOST = ('{0}: this trial is not stored any more, as a fault of the store kept it from being '
-        'written: {1}. The machine goes on. If its program is stopped now, the next start asks a '
-        'person before anything moves. Please report this fault')
+LOST = (
+    '{0}: this trial is not stored any more, as a fault of the store kept it from being '
+    'written: {1}. The machine goes on. If its program is stopped now, the next start asks a '
+    'person before anything moves. Please report this fault'
+)
 
 
 class StoreObserver:
@@ -56,5 +59,7 @@ class StoreObserver:
             self._is_broken = True
             smach.logerr(LOST.format(self._writer.path, error_text(err)))
             top = self._top
-            self._writer.commit(NewMoment(time.time(), top.events.last_seq, BROKEN, top.key, '',
-                                          ()), lambda: must_stop(top))
+            self._writer.commit(
+                NewMoment(time.time(), top.events.last_seq, BROKEN, top.key, '', ()),
+                lambda: must_stop(top),
+            )

@@ -1,4 +1,5 @@
 """One container at one moment, as a store has it."""
+
 from typing import Any, Dict, List, Mapping, Optional, Set
 
 from smach_oracle.store.names import BEFORE, ENDED, IN, MOVED

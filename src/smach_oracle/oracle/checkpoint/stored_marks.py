@@ -3,6 +3,7 @@
 A trial may go on from an earlier moment, or with other names of states. Neither makes undone what
 the robot has done. A guarded state (`on_retry`) that may come again for that is spent.
 """
+
 from typing import Callable, Dict, Mapping, Optional, Sequence, Tuple
 
 import smach
@@ -25,8 +26,9 @@ def same_place(path: str, label: str) -> StatePlace:
     return path, label
 
 
-def marks_now(latest: StoredTree, tree: StoredTree,
-              place_of: Callable[[str, str], StatePlace] = same_place) -> Marks:
+def marks_now(
+    latest: StoredTree, tree: StoredTree, place_of: Callable[[str, str], StatePlace] = same_place
+) -> Marks:
     """Return the marks with which a trial goes on.
 
     `latest`: what its last moment says. `tree`: what it goes on from, under the present names.
@@ -49,7 +51,8 @@ def marks_now(latest: StoredTree, tree: StoredTree,
             told = _mark_of(before, label)
             has_run_since = (mark.executed, mark.done) != (told.executed, told.done) or (
                 latest.container(path).visits_of(label) > before.visits_of(label)
-                and place_of is same_place)
+                and place_of is same_place
+            )
             mark.spent = mark.spent or (mark.done and has_run_since)
             mark.reached = told.reached
     return found
@@ -59,7 +62,8 @@ def _mark_of(container: StoredContainer, label: str) -> VisitMark:
     """Return a mark. Where no state was guarded, visits were counted, and not numbered."""
     mark = VisitMark()
     mark.reached, mark.executed, mark.done, mark.spent = container.marks.get(
-        label, (0, 0, False, False))[:4]
+        label, (0, 0, False, False)
+    )[:4]
     mark.done = bool(mark.done or container.visits_of(label) or label in container.begun)
     return mark
 
@@ -97,9 +101,15 @@ def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequenc
     for path in [*paths, *(by_command or ())]:
         place = place_named(top, path, at_rest=True)
         if place is None and path in paths:
-            raise SettingsError('resume_repeat', path, 'the label of a state of {}, or the path of '
-                                'one below it'.format(top.path))
+            raise SettingsError(
+                'resume_repeat',
+                path,
+                'the label of a state of {}, or the path of one below it'.format(top.path),
+            )
         if place is not None:
             begin_once_more(place.node, place.label)
-            smach.logwarn('{}: may be repeated once, as somebody has said (--repeat {})'.format(
-                place.path, path))
+            smach.logwarn(
+                '{}: may be repeated once, as somebody has said (--repeat {})'.format(
+                    place.path, path
+                )
+            )

@@ -1,4 +1,5 @@
 """Reads the containers of a tree at one moment from a store."""
+
 import json
 from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Tuple
 
@@ -41,16 +42,24 @@ class StoredTree(NamedTuple):
     @property
     def goals(self) -> Dict[str, str]:
         """Return the servers of the goals that ran, by goal id."""
-        return {name[len(GOAL):]: str(server) for name, server in self.whole.items()
-                if name.startswith(GOAL) and server}
+        return {
+            name[len(GOAL) :]: str(server)
+            for name, server in self.whole.items()
+            if name.startswith(GOAL) and server
+        }
 
     def container(self, key: str) -> StoredContainer:
         """Return what is stored of a container, nothing where nothing is."""
         return self.containers.get(key) or StoredContainer()
 
 
-def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int] = None,
-              renaming: Optional[Renaming] = None) -> StoredTree:
+def read_tree(
+    store: StoreFile,
+    trial: int,
+    codecs: Codecs,
+    until: Optional[int] = None,
+    renaming: Optional[Renaming] = None,
+) -> StoredTree:
     """Return what a store says at a moment of a trial, by default the last one.
 
     `renaming`: to names that states have got since.
@@ -62,8 +71,9 @@ def read_tree(store: StoreFile, trial: int, codecs: Codecs, until: Optional[int]
 
 
 # moments of a state that has failed: what is new then, its preconditions have written
-_AFTER_FAILURE = frozenset(kind.name for kind in (
-    EventKind.PRECONDITION_START, EventKind.DECISION, EventKind.QUERY_OPENED))
+_AFTER_FAILURE = frozenset(
+    kind.name for kind in (EventKind.PRECONDITION_START, EventKind.DECISION, EventKind.QUERY_OPENED)
+)
 
 
 class _Reading:
@@ -104,30 +114,31 @@ class _Reading:
             return
         container = self._tree.containers.setdefault(path, StoredContainer())
         if name.startswith(KEY):
-            self._keys.setdefault(path, {})[name[len(KEY):]] = value
+            self._keys.setdefault(path, {})[name[len(KEY) :]] = value
             # what somebody has set outlives a restore, and what a precondition has written
             if fact.kind == EDIT:
                 for values in self._at_entry.get(path, {}).values():
-                    values[name[len(KEY):]] = value
+                    values[name[len(KEY) :]] = value
             elif fact.kind in _AFTER_FAILURE and path == fact.moment_path:
-                self._at_entry.get(path, {}).get(fact.label, {})[name[len(KEY):]] = value
+                self._at_entry.get(path, {}).get(fact.label, {})[name[len(KEY) :]] = value
         elif name.startswith(KEPT_OUT):
-            container.missing.pop(name[len(KEPT_OUT):], None)
+            container.missing.pop(name[len(KEPT_OUT) :], None)
             if value.is_there:
                 kind, why = _plain(value)
-                container.missing[name[len(KEPT_OUT):]] = '{} was not stored: {}'.format(kind, why)
+                container.missing[name[len(KEPT_OUT) :]] = '{} was not stored: {}'.format(kind, why)
         elif name.startswith(VISIT):
             state, outcome, result, *when = _plain(value)
             # of an earlier version the name says when
-            execution, number = when or map(int, name[len(VISIT):].split(':'))
+            execution, number = when or map(int, name[len(VISIT) :].split(':'))
             self._visits.setdefault(path, {})[execution, number] = Visit(
-                state, outcome, VisitResult(result))
+                state, outcome, VisitResult(result)
+            )
         elif name.startswith(STATE):
-            told = container.states[name[len(STATE):]] = _plain(value)
+            told = container.states[name[len(STATE) :]] = _plain(value)
             if 'mark' in told:  # of an earlier version
-                container.marks[name[len(STATE):]] = told['mark']
+                container.marks[name[len(STATE) :]] = told['mark']
         elif name.startswith(MARK):
-            container.marks[name[len(MARK):]] = _plain(value)
+            container.marks[name[len(MARK) :]] = _plain(value)
         elif name == AT:
             container.at = _plain(value) or []
             container.sent = [*container.at[3:4], []][0] if fact.kind == EDIT else None
@@ -155,8 +166,9 @@ class _Reading:
 
     def _put_together(self, path: str, container: StoredContainer) -> None:
         visits = self._visits.get(path, {})
-        latest = max((number for execution, number in visits
-                      if execution == container.execution), default=-1)
+        latest = max(
+            (number for execution, number in visits if execution == container.execution), default=-1
+        )
         container.visits_of_execution = latest + 1
         while (container.execution, latest) in visits:
             container.visits.insert(0, visits[container.execution, latest])

@@ -1,4 +1,5 @@
 """Describes a tree of containers in words that can be compared with a later script."""
+
 import hashlib
 import json
 from typing import Any, Dict, Iterator, List, Mapping, NamedTuple, Tuple
@@ -24,11 +25,16 @@ def structure_of(top: TreeNode) -> Structure:
     It has every container with its states, their classes, outcomes and keys, and its transitions.
     Settings and the meta state are none of it.
     """
-    described = {path: _container(container, meta) for path, container, meta in _containers(
-        top.machine, '', top.settings.oracle_label if top.tree.recover else '')}
+    described = {
+        path: _container(container, meta)
+        for path, container, meta in _containers(
+            top.machine, '', top.settings.oracle_label if top.tree.recover else ''
+        )
+    }
     text = json.dumps(described, sort_keys=True, separators=(',', ':'))
-    return Structure(hashlib.blake2b(text.encode('ascii'), digest_size=DIGITS // 2).hexdigest(),
-                     text)
+    return Structure(
+        hashlib.blake2b(text.encode('ascii'), digest_size=DIGITS // 2).hexdigest(), text
+    )
 
 
 def differences(stored: str, now: str) -> List[str]:
@@ -45,8 +51,7 @@ def differences(stored: str, now: str) -> List[str]:
         elif path not in before:
             found.append('container {} is new'.format(name))
         else:
-            found += ('{}: {}'.format(name, text)
-                      for text in _between(before[path], after[path]))
+            found += ('{}: {}'.format(name, text) for text in _between(before[path], after[path]))
     return found
 
 
@@ -63,21 +68,25 @@ def _between(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[st
             yield from _state_differences(label, states[label], states_now[label])
     for what in ('outcomes', 'initial', 'input_keys', 'output_keys', 'rules'):
         if before.get(what) != after.get(what):
-            yield '{} were {}, and are {}'.format(what.replace('_', ' '), _shown(before.get(what)),
-                                                  _shown(after.get(what)))
+            yield '{} were {}, and are {}'.format(
+                what.replace('_', ' '), _shown(before.get(what)), _shown(after.get(what))
+            )
 
 
-def _state_differences(label: str, before: Mapping[str, Any], after: Mapping[str, Any]
-                       ) -> Iterator[str]:
+def _state_differences(
+    label: str, before: Mapping[str, Any], after: Mapping[str, Any]
+) -> Iterator[str]:
     for outcome in sorted(set(before['transitions']).union(after['transitions'])):
         was, now = before['transitions'].get(outcome), after['transitions'].get(outcome)
         if was != now:
             yield 'state {}: {} led to {}, and leads to {}'.format(
-                label, outcome, was or 'nothing', now or 'nothing')
+                label, outcome, was or 'nothing', now or 'nothing'
+            )
     for what in ('class', 'keys', 'remapping'):
         if before[what] != after[what]:
-            yield 'state {}: {} was {}, and is {}'.format(label, what, _shown(before[what]),
-                                                          _shown(after[what]))
+            yield 'state {}: {} was {}, and is {}'.format(
+                label, what, _shown(before[what]), _shown(after[what])
+            )
 
 
 def _shown(value: object) -> str:
@@ -92,8 +101,9 @@ def _containers(container: Any, path: str, meta: str) -> Iterator[Tuple[str, Any
 
 
 def _states(container: Any, meta: str) -> Dict[str, Any]:
-    children = (container._states if isinstance(container, smach.StateMachine)
-                else container.get_children())
+    children = (
+        container._states if isinstance(container, smach.StateMachine) else container.get_children()
+    )
     return {str(label): state for label, state in dict(children).items() if label != meta}
 
 
@@ -104,8 +114,10 @@ def _container(container: Any, meta: str) -> Dict[str, Any]:
         'input_keys': sorted(map(str, container.get_registered_input_keys())),
         'output_keys': sorted(map(str, container.get_registered_output_keys())),
         'initial': str(own_mark(container, '_initial_state_label') or ''),
-        'states': {label: _state(container, label, state)
-                   for label, state in _states(container, meta).items()},
+        'states': {
+            label: _state(container, label, state)
+            for label, state in _states(container, meta).items()
+        },
         'rules': _rules(container),
     }
 
@@ -120,8 +132,11 @@ def _kind(container: Any) -> str:
 def _rules(container: Any) -> List[str]:
     """Return what a Concurrence or an Iterator goes by, as far as it can be told in words."""
     if isinstance(container, smach.Iterator):
-        return sorted(map(str, container._loop_outcomes)) + ['->'] + sorted(
-            '{}:{}'.format(*item) for item in dict(container._final_outcome_map).items())
+        return (
+            sorted(map(str, container._loop_outcomes))
+            + ['->']
+            + sorted('{}:{}'.format(*item) for item in dict(container._final_outcome_map).items())
+        )
     if isinstance(container, smach.Concurrence):
         return sorted(map(str, container._outcome_map))
     return []
@@ -133,10 +148,13 @@ def _state(container: Any, label: str, state: Any) -> Dict[str, Any]:
     is_state = isinstance(state, smach.State)
     return {
         'class': _class_of(state),
-        'transitions': {str(outcome): str(target) for outcome, target in
-                        dict(transitions).items()},
-        'keys': [sorted(map(str, state.get_registered_input_keys())),
-                 sorted(map(str, state.get_registered_output_keys()))] if is_state else [],
+        'transitions': {str(outcome): str(target) for outcome, target in dict(transitions).items()},
+        'keys': [
+            sorted(map(str, state.get_registered_input_keys())),
+            sorted(map(str, state.get_registered_output_keys())),
+        ]
+        if is_state
+        else [],
         'remapping': {str(one): str(other) for one, other in dict(remapping).items()},
     }
 

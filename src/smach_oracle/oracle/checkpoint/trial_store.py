@@ -1,4 +1,5 @@
 """The store of one trial: opened before it begins, held while it runs."""
+
 import os
 import sqlite3
 import time
@@ -39,8 +40,10 @@ _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 _Read = TypeVar('_Read')
 BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
-NOT_STORED = ('{}: {} was not written any more after a fault of the store, so other states may '
-              'have run since then. A person is asked before anything moves')
+NOT_STORED = (
+    '{}: {} was not written any more after a fault of the store, so other states may '
+    'have run since then. A person is asked before anything moves'
+)
 RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up for a new one
 
 
@@ -76,8 +79,11 @@ class TrialStore:
         last = self._instead_of_lost(trials[-1] if trials else None)
         if last is None or last.ended is not None or not last.moments:
             self._earlier_moment(None)
-            smach.loginfo('{}: {} has no trial that was stopped: a new one begins'.format(
-                self._top.path, self._store.path))
+            smach.loginfo(
+                '{}: {} has no trial that was stopped: a new one begins'.format(
+                    self._top.path, self._store.path
+                )
+            )
             return None
         tree = read_tree(self._store, last.number, CODECS)
         top = tree.container(self._top.key)
@@ -85,15 +91,25 @@ class TrialStore:
         earlier = self._earlier_moment(last)
         moments = self._store.moments(last.number)
         # before its first state nothing had run, but nothing is to move without being asked either
-        is_over = top.phase == ENDED or word == RESTART or not (
-            top.phase or word == ASK or is_in_doubt(moments))
+        is_over = (
+            top.phase == ENDED
+            or word == RESTART
+            or not (top.phase or word == ASK or is_in_doubt(moments))
+        )
         if not earlier and is_over:
             if top.phase != ENDED:
-                smach.logwarn(BEGINS_ANEW.format(
-                    self._top.path, self._store.path, 'on_resume is restart' if word == RESTART
-                    else 'the last trial was stopped before its first state'))
-            self._store.end_trial(last.number, time.time(),
-                                  top.label if top.phase == ENDED else RESTARTED)
+                smach.logwarn(
+                    BEGINS_ANEW.format(
+                        self._top.path,
+                        self._store.path,
+                        'on_resume is restart'
+                        if word == RESTART
+                        else 'the last trial was stopped before its first state',
+                    )
+                )
+            self._store.end_trial(
+                last.number, time.time(), top.label if top.phase == ENDED else RESTARTED
+            )
             return self._to_resume() if top.phase == ENDED else None
         resumed = self._resumption(last, tree, moments, earlier)
         if resumed.renamed:
@@ -103,12 +119,16 @@ class TrialStore:
     def _instead_of_lost(self, last: Optional[StoredTrial]) -> Optional[StoredTrial]:
         """Return the last trial of the machine, a new one in doubt where it may be lost."""
         lost = self._store.lost_until()
-        if (lost is None or self._top.settings.on_resume[0] == RESTART
-                or (last is not None and (last.ended is None or last.number > lost))):
+        if (
+            lost is None
+            or self._top.settings.on_resume[0] == RESTART
+            or (last is not None and (last.ended is None or last.number > lost))
+        ):
             return last
         now = time.time()
-        number = self._store.begin_trial(NewTrial(self._top.name, new_id(), (*self._structure,),
-                                                  now))
+        number = self._store.begin_trial(
+            NewTrial(self._top.name, new_id(), (*self._structure,), now)
+        )
         self._store.add(number, [NewMoment(now, -1, BROKEN, self._top.key, '', ())])
         return self._store.trials(self._top.name)[-1]
 
@@ -127,36 +147,55 @@ class TrialStore:
         if trial is not None and trial.machine != self._top.name:
             return 0  # of another machine of the program
         if trial is None or unfinished is None or trial.number != unfinished.number:
-            raise SettingsError('resume_from', number, 'a moment of the trial of {} that was '
-                                'stopped and has not ended'.format(self._top.name))
+            raise SettingsError(
+                'resume_from',
+                number,
+                'a moment of the trial of {} that was stopped and has not ended'.format(
+                    self._top.name
+                ),
+            )
         _used.add(used)
         return number
 
-    def _resumption(self, trial: StoredTrial, tree: StoredTree, moments: List[StoredMoment],
-                    earlier: int = 0) -> Resumption:
+    def _resumption(
+        self, trial: StoredTrial, tree: StoredTree, moments: List[StoredMoment], earlier: int = 0
+    ) -> Resumption:
         """Return how a trial goes on. `tree`: what its last moment says."""
         in_doubt = is_in_doubt(moments)
         if in_doubt:
             smach.logwarn(NOT_STORED.format(self._top.path, self._store.path))
         latest = tree
         # what runs elsewhere, and what was asked, has not become undone
-        kept = {name: value for name, value in tree.whole.items()
-                if name.startswith(GOAL) or name in ('questions', 'paused')}
+        kept = {
+            name: value
+            for name, value in tree.whole.items()
+            if name.startswith(GOAL) or name in ('questions', 'paused')
+        }
         if earlier:
             tree = read_tree(self._store, trial.number, CODECS, earlier)
         changed = changed_script(self._top, self._store, trial, tree, self._structure)
         if changed.renaming is not None:
             tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
-        marks = marks_now(latest, tree, same_place if changed.renaming is None
-                          else changed.renaming.state)
+        marks = marks_now(
+            latest, tree, same_place if changed.renaming is None else changed.renaming.state
+        )
         tree.whole.update(kept)
-        return Resumption(trial, tree, earlier or moments[-1].number,
-                          max(each.seq for each in moments), moments[-1].at,
-                          self._top.settings.on_resume[0] == ASK or in_doubt or bool(
-                              changed.changes and changed.renaming is None),
-                          changed.changes, marks=marks, is_in_doubt=in_doubt,
-                          is_earlier=bool(earlier), renamed=changed.names,
-                          structure=changed.before)
+        return Resumption(
+            trial,
+            tree,
+            earlier or moments[-1].number,
+            max(each.seq for each in moments),
+            moments[-1].at,
+            self._top.settings.on_resume[0] == ASK
+            or in_doubt
+            or bool(changed.changes and changed.renaming is None),
+            changed.changes,
+            marks=marks,
+            is_in_doubt=in_doubt,
+            is_earlier=bool(earlier),
+            renamed=changed.names,
+            structure=changed.before,
+        )
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
         """Store the trial from now on, and set the tree to where it was where it is resumed.
@@ -169,12 +208,24 @@ class TrialStore:
         if resumed is not None:
             self._or_let_go(partial(go_on, top, resumed))
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
-        self._writer = StoreWriter(self._store, new if resumed is None else resumed.trial.number,
-                                   settings.checkpoint_wait_s, smach.logwarn)
-        self._observer = StoreObserver(top, self._writer, Checkpointer(
-            top, self._writer, CODECS, None if resumed is None else resumed.tree,
-            resumed.moment if resumed and resumed.is_earlier else None,
-            self._facts_of_new_names(resumed)))
+        self._writer = StoreWriter(
+            self._store,
+            new if resumed is None else resumed.trial.number,
+            settings.checkpoint_wait_s,
+            smach.logwarn,
+        )
+        self._observer = StoreObserver(
+            top,
+            self._writer,
+            Checkpointer(
+                top,
+                self._writer,
+                CODECS,
+                None if resumed is None else resumed.tree,
+                resumed.moment if resumed and resumed.is_earlier else None,
+                self._facts_of_new_names(resumed),
+            ),
+        )
         GOALS.observers.append(self._observer.goal_begins)
         top.tree.keep_marks = self._observer.keep_marks
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
@@ -183,8 +234,10 @@ class TrialStore:
         """Return what is stored of a trial that goes on with other names of states."""
         if resumed is None or not resumed.renamed:
             return []
-        return [fact_of('', STRUCTURE, self._structure.id),
-                fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)])]
+        return [
+            fact_of('', STRUCTURE, self._structure.id),
+            fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)]),
+        ]
 
     def _or_let_go(self, read: Callable[[], _Read]) -> _Read:
         """Return what is read of the store. Let go of it where that fails."""
@@ -217,9 +270,10 @@ def _tell_what_begins_anew(top: TreeNode) -> None:
     for node in nodes_of(top.machine):
         for below, container in borders_below(node.machine):
             if isinstance(container, smach.Iterator) and not can_be_indexed(container):
-                smach.logwarn('{}/{}: begins again with its first item where the machine is '
-                              'resumed, since its items are not a sequence'.format(
-                                  node.path, '/'.join(below)))
+                smach.logwarn(
+                    '{}/{}: begins again with its first item where the machine is '
+                    'resumed, since its items are not a sequence'.format(node.path, '/'.join(below))
+                )
 
 
 def open_store(top: TreeNode) -> Optional[TrialStore]:
@@ -234,5 +288,6 @@ def open_store(top: TreeNode) -> Optional[TrialStore]:
 
 
 def _refused(err: Exception, top: TreeNode) -> CheckpointError:
-    return CheckpointError('{} does not begin, as its store cannot be used: {}'.format(
-        top.path, err))
+    return CheckpointError(
+        '{} does not begin, as its store cannot be used: {}'.format(top.path, err)
+    )

@@ -1,4 +1,5 @@
 """Finds the keys of a container's userdata that are to be stored again."""
+
 import marshal
 import weakref
 from typing import (
@@ -85,14 +86,18 @@ class UserdataFacts:
         known = self._known
         for key, value in list(data.items()):
             before = known.get(key)
-            if before is not None and before.value is value and (
-                    id(type(value)) in _FIXED or (reached is not None and key not in reached)):
+            if (
+                before is not None
+                and before.value is value
+                and (id(type(value)) in _FIXED or (reached is not None and key not in reached))
+            ):
                 continue
             yield from self._look(key, value, before)
         for key in [key for key in known if key not in data]:
             stored = known.pop(key).stored
-            yield Fact(self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + _told(key),
-                       None)
+            yield Fact(
+                self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + _told(key), None
+            )
 
     def _look(self, key: str, value: object, before: Optional[_Known]) -> Iterator[Fact]:
         print_ = _print_of(value)
@@ -111,8 +116,9 @@ class UserdataFacts:
             return
         if dropped:
             self._tell(KeptOut(told, type_name(value), '', value, tuple(sorted(set(dropped)))))
-        self._known[key] = _Known(value, encoded._replace(parts={}),
-                                  print_ if _is_plain(encoded) else None)
+        self._known[key] = _Known(
+            value, encoded._replace(parts={}), print_ if _is_plain(encoded) else None
+        )
         if before is None or isinstance(before.stored, str):
             if before is not None:
                 yield Fact(self._path, KEPT_OUT + told, None)
@@ -120,8 +126,9 @@ class UserdataFacts:
             return
         yield Fact(self._path, KEY + told, encoded)
 
-    def _keep_out(self, key: str, value: object, why: str, before: Optional[_Known]
-                  ) -> Iterator[Fact]:
+    def _keep_out(
+        self, key: str, value: object, why: str, before: Optional[_Known]
+    ) -> Iterator[Fact]:
         kind, told = type_name(value), _told(key)
         self._known[key] = _Known(value, kind)
         if before is not None and before.stored == kind:
@@ -160,6 +167,7 @@ def keys_of(machine: Machine, label: str) -> FrozenSet[str]:
     if state is None:
         return frozenset()
     remapping = machine._remappings.get(label) or {}
-    return frozenset(remapping.get(key, key) for key in
-                     set(state.get_registered_input_keys()).union(
-                         state.get_registered_output_keys()))
+    return frozenset(
+        remapping.get(key, key)
+        for key in set(state.get_registered_input_keys()).union(state.get_registered_output_keys())
+    )

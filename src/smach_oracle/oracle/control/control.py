@@ -3,6 +3,7 @@
 The machines look at the requests before each state. A request wakes them by one flag of their
 engines, `attentive`, which they look at in any case. Without a request a step costs nothing more.
 """
+
 import contextlib
 import math
 import threading
@@ -109,8 +110,14 @@ class Control:
         with self._changed:
             engine.attentive = self.is_set or engine.stays_attentive
 
-    def hold_before(self, place: HeldPlace, confirms: bool, breaks: bool = True,
-                    asked: bool = False, obeyed: bool = False) -> Optional[Hold]:
+    def hold_before(
+        self,
+        place: HeldPlace,
+        confirms: bool,
+        breaks: bool = True,
+        asked: bool = False,
+        obeyed: bool = False,
+    ) -> Optional[Hold]:
         """Return the wait before a state, None where the machine may enter it.
 
         :param confirms: whether the state is entered only once somebody has confirmed it.
@@ -262,9 +269,15 @@ class Control:
                 return held
             self._settle()
             now = [each for each in self._held('') if each.key in moving]
-            return (*held, *now, *(Hold(place, HeldBy.PAUSE, False)
-                                   for key, place in moving.items()
-                                   if not any(each.key == key for each in now)))
+            return (
+                *held,
+                *now,
+                *(
+                    Hold(place, HeldBy.PAUSE, False)
+                    for key, place in moving.items()
+                    if not any(each.key == key for each in now)
+                ),
+            )
 
     def step(self, path: str = '') -> Tuple[Hold, ...]:
         """Let what waits enter one state each, also what waits for a confirmation.
@@ -298,8 +311,11 @@ class Control:
         self._changed.wait_for(lambda: not self._moving, _SETTLE_S)
 
     def _held(self, path: str) -> Tuple[Hold, ...]:
-        return tuple(each for each in self._holds
-                     if self._let_go(each) is None and path in ('', each.place.path))
+        return tuple(
+            each
+            for each in self._holds
+            if self._let_go(each) is None and path in ('', each.place.path)
+        )
 
     def holds(self) -> Tuple[Hold, ...]:
         """Return what waits now."""
@@ -366,8 +382,14 @@ class Control:
 
     def _note_change(self) -> None:
         """Wake who waits, and have machines look that execute."""
-        self.is_set = bool(self.paused or self._breakpoints or self._levels or self._jumps
-                           or self._moving or (self._stop is not None and self._stop.lifts_pause))
+        self.is_set = bool(
+            self.paused
+            or self._breakpoints
+            or self._levels
+            or self._jumps
+            or self._moving
+            or (self._stop is not None and self._stop.lifts_pause)
+        )
         if self.is_set:
             for engine in list(self._engines.values()):
                 engine.attentive = True

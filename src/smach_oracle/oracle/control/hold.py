@@ -1,4 +1,5 @@
 """A container that waits before a state, and how such a wait ends."""
+
 from enum import Enum
 from typing import NamedTuple
 
@@ -37,8 +38,17 @@ class HeldPlace(NamedTuple):
 class Hold:
     """One wait. `Control` alone writes to it."""
 
-    __slots__ = ('place', 'held_by', 'confirms', 'confirmed', 'stepped', 'may_be_sent',
-                 'asks', 'autonomy', 'key')
+    __slots__ = (
+        'place',
+        'held_by',
+        'confirms',
+        'confirmed',
+        'stepped',
+        'may_be_sent',
+        'asks',
+        'autonomy',
+        'key',
+    )
 
     def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
         self.place = place

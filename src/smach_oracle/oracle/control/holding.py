@@ -1,4 +1,5 @@
 """The wait of one container, with what the log and the observers are told of it."""
+
 import time
 from typing import Any, ContextManager, NamedTuple, Protocol
 
@@ -8,8 +9,11 @@ from ..records.events import EventKind
 from .control import Control, EndedBy
 from .hold import HeldBy, Hold, LetGo
 
-_WHY = {HeldBy.PAUSE: 'paused', HeldBy.BREAKPOINT: 'paused by a breakpoint',
-        HeldBy.CONFIRM: 'waits for a confirmation'}
+_WHY = {
+    HeldBy.PAUSE: 'paused',
+    HeldBy.BREAKPOINT: 'paused by a breakpoint',
+    HeldBy.CONFIRM: 'waits for a confirmation',
+}
 
 
 class HoldTeller(Protocol):
@@ -46,15 +50,24 @@ def wait_until_let_go(control: Control, hold: Hold, wait: Wait) -> LetGo:
 def _tell_begin(hold: Hold, paused_by: str, teller: HoldTeller) -> None:
     why, place = _WHY[hold.held_by], hold.place
     smach.logwarn('{}: {} before {}'.format(place.path, why, place.state))
-    teller.emit(EventKind.HOLD_START, state=place.state, outcome=hold.held_by.value,
-                by='' if hold.held_by is HeldBy.CONFIRM else paused_by,
-                text='{} before {}'.format(why, place.state))
+    teller.emit(
+        EventKind.HOLD_START,
+        state=place.state,
+        outcome=hold.held_by.value,
+        by='' if hold.held_by is HeldBy.CONFIRM else paused_by,
+        text='{} before {}'.format(why, place.state),
+    )
 
 
 def _tell_end(hold: Hold, outcome: str, waited_s: float, teller: HoldTeller) -> None:
     state = hold.place.state
-    smach.loginfo('{}: {} before {}, after {:.1f} s'.format(
-        hold.place.path, outcome, state, waited_s))
-    teller.emit(EventKind.HOLD_END, state=state, outcome=outcome,
-                text='{} after {:.1f} s'.format(outcome, waited_s),
-                data={'waited_s': round(waited_s, 3)})
+    smach.loginfo(
+        '{}: {} before {}, after {:.1f} s'.format(hold.place.path, outcome, state, waited_s)
+    )
+    teller.emit(
+        EventKind.HOLD_END,
+        state=state,
+        outcome=outcome,
+        text='{} after {:.1f} s'.format(outcome, waited_s),
+        data={'waited_s': round(waited_s, 3)},
+    )

@@ -1,4 +1,5 @@
 """Patterns of states: LABEL or PATH/LABEL, with * for a part of a name and ** for any path."""
+
 import fnmatch
 from typing import Sequence, Tuple
 
@@ -38,5 +39,6 @@ def _matches(parts: Sequence[str], names: Tuple[str, ...]) -> bool:
         return not names
     if parts[0] == '**':
         return any(_matches(parts[1:], names[skipped:]) for skipped in range(len(names) + 1))
-    return bool(names) and fnmatch.fnmatchcase(names[0], parts[0]) and _matches(
-        parts[1:], names[1:])
+    return (
+        bool(names) and fnmatch.fnmatchcase(names[0], parts[0]) and _matches(parts[1:], names[1:])
+    )

@@ -1,2 +1,4 @@
-"""From a situation to a decision: failure rates and policies (paper, IV). Pure, and without smach.
+"""From a situation to a decision: failure rates and policies (paper, IV).
+
+Pure, and without smach.
 """

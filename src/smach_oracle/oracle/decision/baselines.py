@@ -3,6 +3,7 @@
 Each counts what was done in the trial. None runs preconditions. doc/policies.md holds them as a
 table.
 """
+
 import random
 from typing import Mapping, Tuple
 
@@ -56,7 +57,8 @@ class Repeating(Baseline):
         if not self.times:
             return 'no {} allowed'.format(self.done[1] + ' are')
         return 'its {} spent'.format(
-            _times(self.times, self.done[0] + ' is', self.done[1] + ' are'))
+            _times(self.times, self.done[0] + ' is', self.done[1] + ' are')
+        )
 
 
 class Retry(Repeating):
@@ -141,7 +143,7 @@ class Ladder(Baseline):
         recoveries = situation.past.recoveries
         if recoveries < self.tries:
             return Action.REVISIT
-        return (Action.STEP_BACK if recoveries < self.tries + self.steps_back else Action.ASK)
+        return Action.STEP_BACK if recoveries < self.tries + self.steps_back else Action.ASK
 
     def wait_s(self, situation: Situation) -> float:
         """Wait before the state is tried again."""
@@ -153,8 +155,8 @@ class Ladder(Baseline):
             return ''
         return 'its {} and {} are spent'.format(
             _times(self.tries, 'retry', 'retries'),
-            _times(self.steps_back, 'step back', 'steps back'))
+            _times(self.steps_back, 'step back', 'steps back'),
+        )
 
 
-BASELINES: Tuple[Policy, ...] = (
-    Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())
+BASELINES: Tuple[Policy, ...] = (Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())

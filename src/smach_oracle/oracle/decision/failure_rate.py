@@ -4,6 +4,7 @@ The estimate starts as the designer's prior. Every result pushes one share of th
 once the memory is full only the latest results count. Two estimators share one face: a window and
 an exponentially weighted mean.
 """
+
 from collections import deque
 from enum import IntEnum
 from typing import Any, Callable, Deque, Dict, Mapping, Tuple, Union
@@ -121,8 +122,10 @@ class FailureRate:
             if position >= oldest:
                 window[position - oldest] = 1
         return {
-            'estimator': self.kind, 'successes': self.successes, 'failures': self.failures,
-            'window': window
+            'estimator': self.kind,
+            'successes': self.successes,
+            'failures': self.failures,
+            'window': window,
         }
 
     def restore(self, learned: Mapping[str, Any]) -> None:
@@ -136,7 +139,7 @@ class FailureRate:
         window = learned.get('window', []) if learned.get('estimator') == self.kind else []
         if not isinstance(window, list) or any(result not in (0, 1) for result in window):
             raise ValueError('window: {!r} is not a list of 0 and 1'.format(window))
-        window = window[-self.memory:]
+        window = window[-self.memory :]
         self.successes, self.failures = successes, failures
         self._results = len(window)
         self._failed = deque(position for position, failed in enumerate(window) if failed)
@@ -196,8 +199,10 @@ class ExponentialFailureRate:
     def snapshot(self) -> Dict[str, Any]:
         """Return what was learned as plain data, for `restore` and the rates file."""
         return {
-            'estimator': self.kind, 'successes': self.successes, 'failures': self.failures,
-            'rate': self._rate
+            'estimator': self.kind,
+            'successes': self.successes,
+            'failures': self.failures,
+            'rate': self._rate,
         }
 
     def restore(self, learned: Mapping[str, Any]) -> None:
@@ -206,8 +211,9 @@ class ExponentialFailureRate:
         :raises ValueError: where it is no snapshot.
         """
         successes, failures = _totals(learned)
-        rate = learned.get('rate',
-                           self.prior) if learned.get('estimator') == self.kind else self.prior
+        rate = (
+            learned.get('rate', self.prior) if learned.get('estimator') == self.kind else self.prior
+        )
         if not is_number(rate, 0, 1):
             raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
         self.successes, self.failures, self._rate = successes, failures, float(rate)
@@ -222,7 +228,9 @@ def _totals(learned: Mapping[str, Any]) -> Tuple[int, int]:
 
 Estimator = Union[FailureRate, ExponentialFailureRate]
 ESTIMATORS: Dict[str, Callable[[int, float], Estimator]] = {
-    FailureRate.kind: FailureRate, ExponentialFailureRate.kind: ExponentialFailureRate}
+    FailureRate.kind: FailureRate,
+    ExponentialFailureRate.kind: ExponentialFailureRate,
+}
 
 
 def make_estimator(kind: str, memory: int, prior: float) -> Estimator:

@@ -1,4 +1,5 @@
 """Merges what two machines have learned of one state. Pure."""
+
 from typing import Any, Dict, List, Mapping
 
 Learned = Mapping[str, Any]  # the snapshot of an estimator
@@ -6,8 +7,11 @@ Learned = Mapping[str, Any]  # the snapshot of an estimator
 
 def base_of(learned: Learned) -> Dict[str, Any]:
     """Return what `merged` has to know of a snapshot, to tell later what is new since then."""
-    return {key: learned[key] for key in ('estimator', 'successes', 'failures', 'rate')
-            if key in learned}
+    return {
+        key: learned[key]
+        for key in ('estimator', 'successes', 'failures', 'rate')
+        if key in learned
+    }
 
 
 def merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Dict[str, Any]:
@@ -28,14 +32,18 @@ def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Dict[s
     failures = own['failures'] - base.get('failures', 0)
     if base and base == base_of(theirs):
         return dict(own)
-    result = dict(own, successes=max(0, int(theirs['successes']) + successes),
-                  failures=max(0, int(theirs['failures']) + failures))
+    result = dict(
+        own,
+        successes=max(0, int(theirs['successes']) + successes),
+        failures=max(0, int(theirs['failures']) + failures),
+    )
     if theirs['estimator'] != own['estimator']:
         return result
     new = max(0, successes) + max(0, failures)
     if 'window' in own:
-        result['window'] = (_without(list(theirs['window']), -failures)
-                            + _latest(own['window'], new, failures))[-memory:]
+        result['window'] = (
+            _without(list(theirs['window']), -failures) + _latest(own['window'], new, failures)
+        )[-memory:]
     else:
         left = (1.0 - 1.0 / memory) ** new
         rate = own['rate'] + left * (theirs['rate'] - base.get('rate', own['rate']))

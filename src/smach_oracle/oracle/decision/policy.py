@@ -2,6 +2,7 @@
 
 doc/policies.md holds each policy as a table, cell by cell. The tests read those tables.
 """
+
 from typing import Dict, Mapping
 
 from ..errors import SettingsError
@@ -9,8 +10,18 @@ from .baselines import BASELINES
 from .failure_rate import FailureClass
 from .situation import Action, FailureContext, Past, Policy, Preconditions, Situation
 
-__all__ = ['Action', 'Algorithm1', 'FailureContext', 'POLICIES', 'Past', 'Policy',
-           'Preconditions', 'Prose', 'Situation', 'policy_named']
+__all__ = [
+    'Action',
+    'Algorithm1',
+    'FailureContext',
+    'POLICIES',
+    'Past',
+    'Policy',
+    'Preconditions',
+    'Prose',
+    'Situation',
+    'policy_named',
+]
 
 
 class Algorithm1(Policy):
@@ -66,7 +77,8 @@ class Prose(Policy):
 
 
 POLICIES: Dict[str, Policy] = {
-    policy.name: policy for policy in (Algorithm1(), Prose(), *BASELINES)}
+    policy.name: policy for policy in (Algorithm1(), Prose(), *BASELINES)
+}
 NO_PARAMETERS: Mapping[str, float] = {}
 
 

@@ -2,6 +2,7 @@
 
 "PICK failed (1 of its last 10): trying it again."
 """
+
 from typing import NamedTuple, Optional, Sequence, Tuple
 
 from .policy import Action
@@ -45,7 +46,8 @@ def going_would_repeat(state: str, target: str, repeated: Sequence[str]) -> str:
     if state in repeated and target == state:
         return 'it is not repeated by itself'
     return '{} would repeat {}'.format(
-        'trying it again' if target == state else 'going back to ' + target, ', '.join(repeated))
+        'trying it again' if target == state else 'going back to ' + target, ', '.join(repeated)
+    )
 
 
 def still_running_sentence(state: str, ran_s: float, longest_s: Optional[float]) -> str:
@@ -54,13 +56,17 @@ def still_running_sentence(state: str, ran_s: float, longest_s: Optional[float])
     `longest_s`: of its visits that have ended. None means not known.
     """
     return '{} still runs after {}. It has no time limit, so it is not abandoned.'.format(
-        state, ran_in_words(ran_s, longest_s))
+        state, ran_in_words(ran_s, longest_s)
+    )
 
 
 def ran_in_words(ran_s: float, longest_s: Optional[float]) -> str:
     """Return how long a state has run, and how long it took before."""
-    before = ('how long it took before is not known' if longest_s is None
-              else 'its longest so far was {}'.format(_seconds(longest_s)))
+    before = (
+        'how long it took before is not known'
+        if longest_s is None
+        else 'its longest so far was {}'.format(_seconds(longest_s))
+    )
     return '{}; {}'.format(_seconds(ran_s), before)
 
 
@@ -77,10 +83,12 @@ def _failed(facts: DecisionFacts) -> str:
         return '{} failed ({}), and no recovery of it is allowed'.format(facts.state, _rate(facts))
     if facts.spent > 0:
         return '{} failed again after {} of this trial'.format(
-            facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent))
+            facts.state, '1 recovery' if facts.spent == 1 else '{} recoveries'.format(facts.spent)
+        )
     failed = 'keeps failing' if facts.continuous else 'failed again' if facts.tried else 'failed'
     return '{} {}{} ({})'.format(
-        facts.state, failed, ' after ' + facts.tried if facts.tried else '', _rate(facts))
+        facts.state, failed, ' after ' + facts.tried if facts.tried else '', _rate(facts)
+    )
 
 
 def _rate(facts: DecisionFacts) -> str:
@@ -97,9 +105,9 @@ def _helped(facts: DecisionFacts) -> str:
         return ', and {} did not help'.format(facts.not_met)
     if facts.met:
         one = len(facts.met) == 1
-        return ', and its precondition{} {} hold{}'.format('' if one else 's',
-                                                           ' and '.join(facts.met),
-                                                           's' if one else '')
+        return ', and its precondition{} {} hold{}'.format(
+            '' if one else 's', ' and '.join(facts.met), 's' if one else ''
+        )
     return ''
 
 

@@ -3,6 +3,7 @@
 A policy is asked three things, in this order: is this a continuous failure. Must the preconditions
 be run, and, once they have run, what now. Where a step back leads is the policy's business too.
 """
+
 from enum import Enum
 from typing import Mapping, NamedTuple, Optional, Tuple
 

@@ -1,4 +1,5 @@
 """Carries out a verdict: the one place that moves a machine from the meta state."""
+
 from typing import Any, Mapping, Optional, Sequence
 
 from ..machine.repeats import leave_for, note_superseded
@@ -38,8 +39,9 @@ class Applying:
     Its methods return the container's outcome, or None where the machine goes on.
     """
 
-    def __init__(self, node: TreeNode, record: StateRecord, occasion: Occasion,
-                 meta: OracleState) -> None:
+    def __init__(
+        self, node: TreeNode, record: StateRecord, occasion: Occasion, meta: OracleState
+    ) -> None:
         self._node = node
         self._machine = node.machine
         self._record = record
@@ -100,13 +102,21 @@ class Applying:
     def _across(self, way: Way) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""
         below = self._occasion.below
-        return {**({} if below is None else {'from': below.failed}),
-                **({'to': way.down[-1].path} if len(way.down) > 1 else {})}
+        return {
+            **({} if below is None else {'from': below.failed}),
+            **({'to': way.down[-1].path} if len(way.down) > 1 else {}),
+        }
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:
         route = route_of(self._machine, self._record.label, verdict.outcome)
-        self._node.emit(EventKind.SUPERSEDE, state=self._record.label, outcome=verdict.outcome,
-                        target=route.target, by=verdict.by, text=verdict.text)
+        self._node.emit(
+            EventKind.SUPERSEDE,
+            state=self._record.label,
+            outcome=verdict.outcome,
+            target=route.target,
+            by=verdict.by,
+            text=verdict.text,
+        )
         if not route.is_state:
             return self._terminate(route.target)
         self._note_entry(route.target)
@@ -122,8 +132,14 @@ class Applying:
         ending, text, node = verdict.ending, verdict.text, self._node
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
         node.gave_up = ending.state is None
-        node.emit(EventKind.GIVE_UP, state=self._record.label, outcome=ending.outcome or '',
-                  target=ending.state or '', by=verdict.by, text=told)
+        node.emit(
+            EventKind.GIVE_UP,
+            state=self._record.label,
+            outcome=ending.outcome or '',
+            target=ending.state or '',
+            by=verdict.by,
+            text=told,
+        )
         if ending.error is not None:  # SMACH has logged it where it was made
             raise ending.error
         if ending.state is not None:
@@ -149,9 +165,15 @@ class Applying:
         self._meta.service_preempt()
         self._machine.service_preempt()
 
-    def _go_on(self, target: str, by: str = '', text: str = '', userdata: str = 'keep',
-               missing: Optional[Sequence[str]] = None,
-               across: Optional[Mapping[str, str]] = None) -> None:
+    def _go_on(
+        self,
+        target: str,
+        by: str = '',
+        text: str = '',
+        userdata: str = 'keep',
+        missing: Optional[Sequence[str]] = None,
+        across: Optional[Mapping[str, str]] = None,
+    ) -> None:
         """Leave the meta state for a state."""
         node = self._node
         if missing is None:
@@ -167,8 +189,9 @@ class Applying:
         return bool(by) or not again
 
     def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, Any]) -> None:
-        self._node.emit(EventKind.JUMP, state=self._record.label, target=target, by=by, text=text,
-                        data=data)
+        self._node.emit(
+            EventKind.JUMP, state=self._record.label, target=target, by=by, text=text, data=data
+        )
         self._node.records.count_oracle_edge(target)
 
     def _terminate(self, outcome: str) -> str:

@@ -1,4 +1,5 @@
 """The state boundary as an operator uses it: holds, announcements, jumps that were asked for."""
+
 import contextlib
 from typing import Iterator, Optional
 
@@ -56,8 +57,13 @@ def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]
     autonomy = node.record(place.state).settings.autonomy
     level = control.level_of(place, autonomy)
     # what an author does at a preempt waits for no confirmation, and at no breakpoint
-    hold = control.hold_before(place, level == CONFIRM_FIRST and not obeyed,
-                               asked or not (stops or was_preempted), asked, obeyed)
+    hold = control.hold_before(
+        place,
+        level == CONFIRM_FIRST and not obeyed,
+        asked or not (stops or was_preempted),
+        asked,
+        obeyed,
+    )
     if hold is not None:
         hold.autonomy, hold.key, hold.asks = autonomy, node.key, not obeyed
     else:
@@ -96,8 +102,9 @@ def _wait(node: TreeNode, hold: Hold) -> LetGo:
     lock = node.machine._state_transitioning_lock
     lock.release()  # who asks for a preempt takes it
     try:
-        return wait_until_let_go(node.tree.control, hold, Wait(
-            node, clocks_stand_still(node), lambda: _ended_by(node)))
+        return wait_until_let_go(
+            node.tree.control, hold, Wait(node, clocks_stand_still(node), lambda: _ended_by(node))
+        )
     finally:
         lock.acquire()
 

@@ -4,6 +4,7 @@ A recovery in one container may send the machine to a state of another. The cont
 failure up to the one that goes on are left: those on the way end at once, and what runs beside them
 is preempted, and waited for.
 """
+
 from typing import List, Optional, cast
 
 import smach
@@ -53,8 +54,9 @@ class Departure:
             return ''
         place = way.down[-1].path
         return 'cannot go to {}: {}'.format(
-            place, closed or '{} was done while the way there was made free'.format(
-                ', '.join(repeated)))
+            place,
+            closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
+        )
 
     def result_of(self, node: TreeNode) -> VisitResult:
         """Return how the visit counts that a container was in when it was left."""
@@ -85,10 +87,11 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     others = _claim(nodes, departure)
     if others:
         _preempt(_container_apart(nodes, others))
-        _leave_way(nodes[:-len(others)])
+        _leave_way(nodes[: -len(others)])
         return False
-    smach.loginfo('{}/{} is left for {}'.format(level.path, level.machine._current_label,
-                                                _in_words(verdict)))
+    smach.loginfo(
+        '{}/{} is left for {}'.format(level.path, level.machine._current_label, _in_words(verdict))
+    )
     _preempt(level.machine._current_state)
     _leave_way(left)
     return True
@@ -142,8 +145,9 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
     Those below are then left by that other one.
     """
     with departure.arrives_at.tree.departures_lock:
-        first = next((index for index, each in enumerate(nodes) if each.departure is not None),
-                     len(nodes))
+        first = next(
+            (index for index, each in enumerate(nodes) if each.departure is not None), len(nodes)
+        )
         others = nodes[first:]
         leaving = others[0].departure if others else departure
         for each in nodes[:first]:
@@ -163,7 +167,7 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
 
     :param others: the last ones of `nodes`, which the other departure leaves.
     """
-    inner = nodes[:-len(others)]
+    inner = nodes[: -len(others)]
     other = cast(Optional[Departure], others[0].departure)
     if not inner or other is None:
         return None
@@ -192,10 +196,16 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     overrun of the state is a failure of its own.
     """
     state = node.machine._states[failure.state]
-    below = [state] if isinstance(state, smach.StateMachine) else [
-        machine for _, machine in machines_below(state)]
-    nodes = [cast(WrappedMachine, machine)._oracle for machine in below
-             if isinstance(machine, node.tree.container_class)]
+    below = (
+        [state]
+        if isinstance(state, smach.StateMachine)
+        else [machine for _, machine in machines_below(state)]
+    )
+    nodes = [
+        cast(WrappedMachine, machine)._oracle
+        for machine in below
+        if isinstance(machine, node.tree.container_class)
+    ]
     settled = failure.kind is not FailureKind.TIME_LIMIT and any(each.gave_up for each in nodes)
     for each in nodes:
         each.gave_up = False

@@ -1,4 +1,5 @@
 """Prepares a place before a machine goes there, whoever sends it."""
+
 from typing import Collection, NamedTuple, Tuple
 
 from ..checkpoint.resuming import forget_resumed
@@ -34,8 +35,9 @@ def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
         ask_to_go_on(place.node, place.label)
     if missing:
         place = way.down[-1]
-        place.node.warn('{} there without its input keys {}'.format(sent, ', '.join(missing)),
-                        place.label)
+        place.node.warn(
+            '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
+        )
     node.record(target).go_down(way.down[1:])
     return Entry(missing, 'keep' if snapshot is None else 'restore')
 
@@ -49,5 +51,4 @@ def missing_for(way: Way, written: Collection[str]) -> Tuple[str, ...]:
     if node is not way.meets:
         return missing_on(way, written)  # keys of its own may have the same names
     remapping = node.machine._remappings.get(label) or {}
-    return tuple(key for key in missing_on(way, written)
-                 if remapping.get(key, key) not in written)
+    return tuple(key for key in missing_on(way, written) if remapping.get(key, key) not in written)

@@ -1,4 +1,5 @@
 """An Iterator that the oracle enters again goes on with the item that was not finished."""
+
 from ..branches.border import IteratorBorder, border_of
 from ..machine.tree_node import TreeNode
 from ..recovery.failure import Failure
@@ -20,5 +21,8 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
 def has_stopped_early(node: TreeNode, label: str, border: IteratorBorder) -> bool:
     """Whether an Iterator has failed or was left, when it was executed last."""
     outcome = border.outcome_before()
-    return (outcome is None or is_preempted(outcome)
-            or isinstance(judge(node, node.record(label), outcome, None), Failure))
+    return (
+        outcome is None
+        or is_preempted(outcome)
+        or isinstance(judge(node, node.record(label), outcome, None), Failure)
+    )

@@ -3,6 +3,7 @@
 An Iterator is under no oracle. It calls its transition callbacks between items, on both engines. A
 machine that it contains is held at its own boundaries.
 """
+
 from typing import Any, Iterator, Tuple
 
 import smach
@@ -47,7 +48,8 @@ def place_gates(node: TreeNode) -> None:
             _remove(container)
             continue
         if isinstance(container, smach.Iterator) and not any(
-                isinstance(child, smach.StateMachine) for child in children):
+            isinstance(child, smach.StateMachine) for child in children
+        ):
             if any(gate.node is node for gate in _gates_of(container)):
                 continue
             _remove(container)
@@ -61,19 +63,22 @@ def remove_gates(machine: smach.StateMachine) -> None:
 
 
 def _gates_of(container: Any) -> Iterator[ItemGate]:
-    return (callback[0] for callback in container._transition_cbs
-            if isinstance(callback[0], ItemGate))
+    return (
+        callback[0] for callback in container._transition_cbs if isinstance(callback[0], ItemGate)
+    )
 
 
 def _remove(container: Any) -> None:
-    container._transition_cbs[:] = [each for each in container._transition_cbs
-                                    if not isinstance(each[0], ItemGate)]
+    container._transition_cbs[:] = [
+        each for each in container._transition_cbs if not isinstance(each[0], ItemGate)
+    ]
 
 
 def _bare_containers(container: Any, below: Labels) -> Iterator[Tuple[Labels, Any]]:
     """Yield the containers within that are no machines, each with the labels that lead to it."""
-    children = (container._states if isinstance(container, smach.StateMachine)
-                else container.get_children())
+    children = (
+        container._states if isinstance(container, smach.StateMachine) else container.get_children()
+    )
     for label, state in list(children.items()):
         if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
             path = below + (label,)

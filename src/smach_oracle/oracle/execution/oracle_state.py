@@ -2,6 +2,7 @@
 
 Every state has an edge to it, and it has one to every state and container outcome.
 """
+
 import threading
 from typing import Any, Dict, Optional, Tuple
 

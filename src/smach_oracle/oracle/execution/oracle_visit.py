@@ -1,4 +1,5 @@
 """One visit of the meta state: entered on an occasion, left by a verdict (paper, section IV-A)."""
+
 from typing import Any, Mapping, Optional, cast
 
 import smach
@@ -43,8 +44,13 @@ def _enter(node: TreeNode, record: StateRecord, occasion: Occasion) -> OracleSta
     if occasion.is_told:
         record.left_by(occasion.what, meta_label)
         save_rates(node)
-        node.emit(EventKind.TRANSITION, state=record.label, outcome=occasion.outcome,
-                  target=meta_label, **(_NO_FACTS if occasion.below is None else LEFT))
+        node.emit(
+            EventKind.TRANSITION,
+            state=record.label,
+            outcome=occasion.outcome,
+            target=meta_label,
+            **(_NO_FACTS if occasion.below is None else LEFT),
+        )
     # _sync_oracle refuses any other state of this name
     meta = cast(OracleState, machine._states[meta_label])
     go_to(node, message_of(record.label, occasion.what, meta_label), meta_label)
@@ -62,13 +68,19 @@ def _log_failure(node: TreeNode, record: StateRecord, occasion: Occasion) -> Non
         smach.loginfo('{} failed, which is not counted: {}'.format(place, words))
         return
     # what was in doubt, or had not begun, has not failed
-    smach.logwarn(place + (' ' + failure.text if failure.is_held_back
-                           else ': ' + failure.text if failure.kind is FailureKind.INTERRUPTED
-                           else ' failed: ' + words))
+    smach.logwarn(
+        place
+        + (
+            ' ' + failure.text
+            if failure.is_held_back
+            else ': ' + failure.text
+            if failure.kind is FailureKind.INTERRUPTED
+            else ' failed: ' + words
+        )
+    )
 
 
-def _recover(node: TreeNode, record: StateRecord, occasion: Occasion,
-             meta: OracleState) -> Verdict:
+def _recover(node: TreeNode, record: StateRecord, occasion: Occasion, meta: OracleState) -> Verdict:
     machine = node.machine
     meta.begin(Recovering(node, record, occasion))
     if machine._preempt_requested:

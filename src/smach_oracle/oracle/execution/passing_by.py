@@ -4,6 +4,7 @@ Without an oracle the state would be executed under the request. One that does n
 do its work, which an operator has held. So none is executed: the machine goes on as if the state
 had obeyed at once.
 """
+
 from typing import Optional, Tuple, cast
 
 from ..checkpoint.resuming import forget_resumed
@@ -41,8 +42,9 @@ def pass_by(node: TreeNode) -> Optional[Stop]:
     if down:
         record.go_down(down)
         return Stop()  # to the next boundary, which is before the same state
-    node.emit(EventKind.TRANSITION, state=label, outcome=PREEMPTED, target=route.target,
-              **PASSED_BY)
+    node.emit(
+        EventKind.TRANSITION, state=label, outcome=PREEMPTED, target=route.target, **PASSED_BY
+    )
     go_to(node, message_of(label, PREEMPTED, route.target), route.target)
     return Stop()
 

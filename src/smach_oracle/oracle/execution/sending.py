@@ -1,4 +1,5 @@
 """Sends a machine to a place as an operator has asked, at a state boundary."""
+
 from typing import NamedTuple, Optional, Tuple
 
 from ..asking.question import names
@@ -41,8 +42,11 @@ def prospect_of(place: Place, written: Tuple[str, ...] = ()) -> Prospect:
     labels = list(node.labels())
     if label not in labels:
         closed = {each: why_closed(node, each) for each in labels}
-        return Prospect('{} has no state {!r} to go to; allowed: {}'.format(
-            node.path, label, names(each for each in labels if not closed[each])))
+        return Prospect(
+            '{} has no state {!r} to go to; allowed: {}'.format(
+                node.path, label, names(each for each in labels if not closed[each])
+            )
+        )
     return _prospect_on(way_for(place), written)
 
 
@@ -74,8 +78,11 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     if jump.container:
         data['to'] = way.down[-1].path
     node.emit(EventKind.SENT, state=label, target=way.first, by=jump.by, text=jump.text, data=data)
-    go_to(node, "State machine sent by {} to '{}' instead of '{}'".format(
-        by, jump.named(), label), way.first)
+    go_to(
+        node,
+        "State machine sent by {} to '{}' instead of '{}'".format(by, jump.named(), label),
+        way.first,
+    )
     return True
 
 

@@ -1,4 +1,5 @@
 """Checks that the settings of a wrapped machine fit its states."""
+
 from typing import Any, Iterator, List, Set, Tuple
 
 import smach
@@ -22,8 +23,12 @@ def check_names(top: TreeNode) -> None:
 
     :raises SettingsError: where one does not, if the node is strict (`Strictness`).
     """
-    for unfit in [*_unfit_states(top), *_unfit_nested(top), *_unfit_targets(top),
-                  *_unfit_outcomes(top)]:
+    for unfit in [
+        *_unfit_states(top),
+        *_unfit_nested(top),
+        *_unfit_targets(top),
+        *_unfit_outcomes(top),
+    ]:
         _complain(top, unfit)
 
 
@@ -39,20 +44,38 @@ def check_preconditions(node: TreeNode) -> None:
             for named in spec.labels():
                 why_not = why_unfit(node, label, named)
                 if why_not:
-                    _complain(node, UnfitName(SettingsError(
-                        'states.{}.preconditions'.format(label), named, allowed_for(node, label),
-                        problem='is not allowed: ' + why_not), named, UnfitKind.PRECONDITION))
+                    _complain(
+                        node,
+                        UnfitName(
+                            SettingsError(
+                                'states.{}.preconditions'.format(label),
+                                named,
+                                allowed_for(node, label),
+                                problem='is not allowed: ' + why_not,
+                            ),
+                            named,
+                            UnfitKind.PRECONDITION,
+                        ),
+                    )
 
 
 def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
     """Yield the names of states and of states of interfaces that no state has."""
     known = _known_names(top)
     settings = top.settings
-    named = [('states.' + name, name, UnfitKind.PROTECTION if any(
-        key in given for key in PROTECTIONS) else UnfitKind.NAME)
-             for name, given in settings.states.items()]
-    named += [('interfaces.{}.states'.format(offer.name), name, UnfitKind.NAME)
-              for offer, states in settings.interfaces for name in states]
+    named = [
+        (
+            'states.' + name,
+            name,
+            UnfitKind.PROTECTION if any(key in given for key in PROTECTIONS) else UnfitKind.NAME,
+        )
+        for name, given in settings.states.items()
+    ]
+    named += [
+        ('interfaces.{}.states'.format(offer.name), name, UnfitKind.NAME)
+        for offer, states in settings.interfaces
+        for name in states
+    ]
     for key, name, kind in named:
         if name not in known and not any(matches(name, each) for each in known):
             yield UnfitName(_no_state(key, name, known), name, kind)
@@ -65,10 +88,18 @@ def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
     known = sorted(set(paths_below(top.machine)))
     for name in top.nested:
         if not any(matches(name, path) for path in known):
-            yield UnfitName(SettingsError(
-                'nested', name, 'a path or a pattern of the machines in {}, and of the states of '
-                'its Concurrences and Iterators: {}'.format(top.path, ', '.join(known) or 'none'),
-                problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known))), name)
+            yield UnfitName(
+                SettingsError(
+                    'nested',
+                    name,
+                    'a path or a pattern of the machines in {}, and of the states of '
+                    'its Concurrences and Iterators: {}'.format(
+                        top.path, ', '.join(known) or 'none'
+                    ),
+                    problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known)),
+                ),
+                name,
+            )
 
 
 def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
@@ -78,8 +109,9 @@ def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
     named = [('on_no_answer', target, UnfitKind.CHECKED)] if verb == 'goto' else []
     if settings.on_resume[0] == STATE:
         named.append(('on_resume', settings.on_resume[1], UnfitKind.CHECKED))
-    named += [('resume_map.' + old, new, UnfitKind.CHECKED)
-              for old, new in settings.resume_map.items()]
+    named += [
+        ('resume_map.' + old, new, UnfitKind.CHECKED) for old, new in settings.resume_map.items()
+    ]
     for key, name, kind in named:
         if name.strip('/') not in known:
             yield UnfitName(_no_state(key, name, known), name.strip('/'), kind)
@@ -92,17 +124,28 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     named: List[Tuple[str, str, str, UnfitKind]] = []
     if verb == 'give_up':
         named.append(('on_no_answer', '**', target, UnfitKind.CHECKED))
-    named += [('failure_outcomes', '**', each, UnfitKind.GENERAL)
-              for each in settings.defaults.failure_outcomes]
-    named += [('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
-              for name, given in settings.states.items()
-              for each in given.get('failure_outcomes', ())]
+    named += [
+        ('failure_outcomes', '**', each, UnfitKind.GENERAL)
+        for each in settings.defaults.failure_outcomes
+    ]
+    named += [
+        ('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
+        for name, given in settings.states.items()
+        for each in given.get('failure_outcomes', ())
+    ]
     for key, name, outcome, kind in named:
         known = _outcomes_of(top, name)
         if known and outcome not in known:
-            yield UnfitName(SettingsError(
-                key, outcome, 'the outcomes: ' + ', '.join(sorted(known)),
-                problem='is no outcome' + did_you_mean(outcome, known)), outcome, kind)
+            yield UnfitName(
+                SettingsError(
+                    key,
+                    outcome,
+                    'the outcomes: ' + ', '.join(sorted(known)),
+                    problem='is no outcome' + did_you_mean(outcome, known),
+                ),
+                outcome,
+                kind,
+            )
 
 
 def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
@@ -118,8 +161,12 @@ def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
 
 
 def _no_state(key: str, name: str, known: Set[str]) -> SettingsError:
-    return SettingsError(key, name, 'the states of the machine: ' + ', '.join(sorted(known)),
-                         problem='is no state' + did_you_mean(name, known))
+    return SettingsError(
+        key,
+        name,
+        'the states of the machine: ' + ', '.join(sorted(known)),
+        problem='is no state' + did_you_mean(name, known),
+    )
 
 
 def _known_names(top: TreeNode) -> Set[str]:

@@ -1,4 +1,5 @@
 """Starts a script over: its userdata as it was at first, in all containers of the tree."""
+
 from ..machine.nesting import nodes_of
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
@@ -6,8 +7,9 @@ from ..machine.tree_node import TreeNode
 
 def may_start_over(node: TreeNode) -> bool:
     """Whether a policy of the tree may start its top machine over."""
-    return node.tree.recover and any(each.in_force.policy.restarts
-                                     for each in nodes_of(node.machine))
+    return node.tree.recover and any(
+        each.in_force.policy.restarts for each in nodes_of(node.machine)
+    )
 
 
 def keep_start(node: TreeNode) -> None:
@@ -16,8 +18,9 @@ def keep_start(node: TreeNode) -> None:
     References are kept, and copies of `deep_copy_keys`, as in any snapshot. Branches of
     Concurrences and Iterators have no userdata of their own.
     """
-    node.tree.restarts.keep({id(each): each.snapshot() for each in nodes_of(node.machine)
-                             if each.branch is None})
+    node.tree.restarts.keep(
+        {id(each): each.snapshot() for each in nodes_of(node.machine) if each.branch is None}
+    )
 
 
 def restore_start(node: TreeNode) -> None:

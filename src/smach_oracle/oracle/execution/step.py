@@ -1,4 +1,5 @@
 """The work around a state, off the short way of a plain success in container.py."""
+
 import time
 from typing import Any, Mapping, Optional
 
@@ -148,8 +149,8 @@ class Step:
             finally:
                 took_s = time.monotonic() - begun_s
                 if took_s > (record.longest_s or 0.0) and not (
-                        isinstance(outcome, (Overrun, TakenOut))
-                        or self._machine._preempt_requested):
+                    isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested
+                ):
                     record.longest_s = took_s
         finally:
             for place in way_down:
@@ -161,13 +162,20 @@ class Step:
 
         def on_late_write(key: str) -> None:
             if node.tree.is_new(node.path, label, 'late write', key):
-                smach.logwarn('{}/{}: a write to userdata key {!r} came after the time limit and '
-                              'is dropped'.format(node.path, label, key))
+                smach.logwarn(
+                    '{}/{}: a write to userdata key {!r} came after the time limit and '
+                    'is dropped'.format(node.path, label, key)
+                )
 
         gate = UserdataGate(self._machine, on_late_write)
         result = node.tree.workers.run(
-            state, view_behind(gate, self._machine, label, state), gate, label, limit_s,
-            self._record.settings.grace_period_s)
+            state,
+            view_behind(gate, self._machine, label, state),
+            gate,
+            label,
+            limit_s,
+            self._record.settings.grace_period_s,
+        )
         if result.error is not None:
             raise result.error
         return Overrun(result.overrun) if result.overrun else result.outcome
@@ -202,12 +210,12 @@ class Step:
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
             return self._unfinished(judged, outcome)
-        stopping = (self._machine.preempt_requested() or smach.is_shutdown()
-                    or ends_program(error))
+        stopping = self._machine.preempt_requested() or smach.is_shutdown() or ends_program(error)
         if self._machine.preempt_requested():
             node.tell_preempt()
             note_end_under_preempt(
-                node, record.label, outcome if isinstance(judged, Route) else None)
+                node, record.label, outcome if isinstance(judged, Route) else None
+            )
         if isinstance(judged, Route):
             result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
             node.records.visit_ended(record, outcome, result)
@@ -224,27 +232,39 @@ class Step:
                 return self._failed_unwell(judged, why)
         return self._failed(judged)
 
-    def _left(self, departure: Departure, outcome: Any,
-              error: Optional[Exception]) -> Optional[str]:
+    def _left(
+        self, departure: Departure, outcome: Any, error: Optional[Exception]
+    ) -> Optional[str]:
         """Go as a verdict of a container below says, which has left the present state."""
         node, record = self._node, self._record
         told = outcome if isinstance(outcome, str) else ''
         if isinstance(outcome, Overrun):
-            node.warn('was left for a state of another container, and {}'.format(outcome.text),
-                      record.label)
+            node.warn(
+                'was left for a state of another container, and {}'.format(outcome.text),
+                record.label,
+            )
         if error is not None:
-            smach.logwarn('{}/{}: raised {} when it was left'.format(
-                node.path, record.label, repr_of(error)))
+            smach.logwarn(
+                '{}/{}: raised {} when it was left'.format(node.path, record.label, repr_of(error))
+            )
         node.records.visit_ended(record, told, departure.result_of(node))
         if departure.arrives_at is not node:
             wanted = leaving_outcome(self._machine, node.in_force.failing, None)
             return self._advance(told, Route(wanted, False), facts=LEFT)
         if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
             recall_preempts(self._machine._states[record.label])
-        failure = Failure(record.label, FailureKind.TIME_LIMIT, told,
-                          'was left, as {} failed'.format(departure.failed), None)
-        return self._recover(occasions.arrived(failure, self._context(), departure.from_below(),
-                                               told, departure.is_own(node)))
+        failure = Failure(
+            record.label,
+            FailureKind.TIME_LIMIT,
+            told,
+            'was left, as {} failed'.format(departure.failed),
+            None,
+        )
+        return self._recover(
+            occasions.arrived(
+                failure, self._context(), departure.from_below(), told, departure.is_own(node)
+            )
+        )
 
     def _held_back(self, failure: Failure, stopping: bool) -> Optional[str]:
         """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""
@@ -253,8 +273,13 @@ class Step:
             recall_preempts(self._machine._states[record.label])  # it services none
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         if node.tree.is_resumed:  # nobody has said whether it was done before the program stopped
-            return self._recover(occasions.interrupted(failure, self._context(), Unfinished(
-                failure.kind, '', failure.text, failure.text)))
+            return self._recover(
+                occasions.interrupted(
+                    failure,
+                    self._context(),
+                    Unfinished(failure.kind, '', failure.text, failure.text),
+                )
+            )
         return self._recover(occasions.failed(failure, self._context()))
 
     def _unfinished(self, failure: Failure, before: Unfinished) -> Optional[str]:
@@ -269,9 +294,14 @@ class Step:
         if self._machine.preempt_requested() or smach.is_shutdown():
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         if failure.kind is FailureKind.INTERRUPTED:
-            node.emit(EventKind.FAILURE, state=failure.state, failure_kind=int(failure.kind),
-                      failure_class=int(record.failure_class), rate=record.rate,
-                      text=failure.text)
+            node.emit(
+                EventKind.FAILURE,
+                state=failure.state,
+                failure_kind=int(failure.kind),
+                failure_class=int(record.failure_class),
+                rate=record.rate,
+                text=failure.text,
+            )
         return self._recover(occasions.interrupted(failure, self._context(), before))
 
     def _failed_unwell(self, failure: Failure, why: str) -> Optional[str]:
@@ -283,8 +313,9 @@ class Step:
         if self._author_recovers(failure):
             if not why:
                 node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
-            return self._end_unrecovered(self._natural_ending(failure), failure,
-                                         UNCOUNTED if why else NO_FACTS)
+            return self._end_unrecovered(
+                self._natural_ending(failure), failure, UNCOUNTED if why else NO_FACTS
+            )
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
         state = self._machine._states[record.label]
@@ -300,17 +331,27 @@ class Step:
         """Count the failure and recover from it. `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         state = self._machine._states[record.label]
-        if (node.tree.recover and failure.kind is not FailureKind.TIME_LIMIT
-                and isinstance(state, smach.Container)):
+        if (
+            node.tree.recover
+            and failure.kind is not FailureKind.TIME_LIMIT
+            and isinstance(state, smach.Container)
+        ):
             # a Concurrence that has failed has preempted its branches. One that overran still runs
             recall_preempts(state)
         context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)
         # rate and class are those before this failure is counted
-        node.emit(EventKind.FAILURE, state=failure.state, outcome=failure.outcome,
-                  failure_kind=int(failure.kind), failure_class=int(record.failure_class),
-                  rate=record.rate, continuous=continuous, text=failure.text)
+        node.emit(
+            EventKind.FAILURE,
+            state=failure.state,
+            outcome=failure.outcome,
+            failure_kind=int(failure.kind),
+            failure_class=int(record.failure_class),
+            rate=record.rate,
+            continuous=continuous,
+            text=failure.text,
+        )
         record.learn(True)
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
@@ -339,26 +380,42 @@ class Step:
         node, record, answer = self._node, self._record, taken.answer
         recall_preempts(self._machine._states[record.label])
         if taken.error is not None:
-            smach.logwarn('{}/{}: raised {} when it was preempted'.format(
-                node.path, record.label, repr_of(taken.error)))
+            smach.logwarn(
+                '{}/{}: raised {} when it was preempted'.format(
+                    node.path, record.label, repr_of(taken.error)
+                )
+            )
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
-        node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED if answer.kind is
-                                 AnswerKind.SUPERSEDE else VisitResult.PREEMPTED)
+        node.records.visit_ended(
+            record,
+            outcome,
+            VisitResult.SUPERSEDED
+            if answer.kind is AnswerKind.SUPERSEDE
+            else VisitResult.PREEMPTED,
+        )
         return self._recover(occasions.taken_out(taken.failure, self._context(), answer, outcome))
 
     def _author_recovers(self, failure: Failure) -> bool:
         settings = self._record.settings
         branch = self._node.branch
         if branch is not None:
-            return (failure.route is not None and settings.author_recoveries != 'override'
-                    and branch.foresees(self._node, failure.outcome))
+            return (
+                failure.route is not None
+                and settings.author_recoveries != 'override'
+                and branch.foresees(self._node, failure.outcome)
+            )
         return failure.route is not None and author_recovers(
-            failure.outcome, failure.route, failure.kind, settings.failure_outcomes,
-            settings.author_recoveries)
+            failure.outcome,
+            failure.route,
+            failure.kind,
+            settings.failure_outcomes,
+            settings.author_recoveries,
+        )
 
     def _natural_ending(self, failure: Failure) -> ContainerEnding:
-        return natural_ending(failure, self._machine.get_registered_outcomes(),
-                              self._node.in_force.failing)
+        return natural_ending(
+            failure, self._machine.get_registered_outcomes(), self._node.in_force.failing
+        )
 
     def _preempted_ending(self, failure: Failure) -> ContainerEnding:
         """Return how a failure ends the container while a preempt or a shutdown is under way.
@@ -372,18 +429,23 @@ class Step:
             obey_preempt(self._node, self._machine._states[failure.state])
         return ending
 
-    def _end_unrecovered(self, ending: ContainerEnding, failure: Failure,
-                         facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:
+    def _end_unrecovered(
+        self, ending: ContainerEnding, failure: Failure, facts: Mapping[str, Any] = NO_FACTS
+    ) -> Optional[str]:
         if ending.error is not None:
             if isinstance(ending.error, smach.InvalidUserCodeError):
                 smach.logerr("State '{}' ended in an error.".format(self._record.label))
             raise ending.error
-        route = (Route(ending.state, True) if ending.state is not None
-                 else Route(str(ending.outcome), False))
+        route = (
+            Route(ending.state, True)
+            if ending.state is not None
+            else Route(str(ending.outcome), False)
+        )
         return self._advance(failure.outcome, route, facts=facts)
 
-    def _advance(self, outcome: str, route: Route, learn: bool = False,
-                 facts: Mapping[str, Any] = NO_FACTS) -> Optional[str]:
+    def _advance(
+        self, outcome: str, route: Route, learn: bool = False, facts: Mapping[str, Any] = NO_FACTS
+    ) -> Optional[str]:
         """Make the transition that the author drew. `learn`: take the short way next time.
 
         `facts`: further fields of the event.

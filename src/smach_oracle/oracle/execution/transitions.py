@@ -1,4 +1,5 @@
 """Moves a machine on: to a state, or to its end."""
+
 from typing import NamedTuple, Optional
 
 import smach
@@ -59,12 +60,17 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
     """End the container. A preempt that its last state has serviced is serviced."""
     machine = node.machine
     last = machine._current_state
-    if machine._preempt_requested and last is not None and not last.preempt_requested() and (
-            machine._preempted_state is not None or container_outcome == PREEMPTED):
+    if (
+        machine._preempt_requested
+        and last is not None
+        and not last.preempt_requested()
+        and (machine._preempted_state is not None or container_outcome == PREEMPTED)
+    ):
         machine.service_preempt()
     machine._set_current_state(None)
     if node.branch is None:  # else its container tells
-        smach.loginfo("State machine terminating '{}':'{}':'{}'".format(
-            label, outcome, container_outcome))
+        smach.loginfo(
+            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
+        )
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome

@@ -2,6 +2,7 @@
 
 Also what one execution of any container begins and ends.
 """
+
 import functools
 import time
 from types import TracebackType
@@ -30,8 +31,12 @@ from .wrapping import adopt, bring_up_to_date
 _running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
-def run_container(machine: WrappedMachine, execute: Callable[..., Optional[str]],
-                  args: Tuple[Any, ...], kwargs: Dict[str, Any]) -> Optional[str]:
+def run_container(
+    machine: WrappedMachine,
+    execute: Callable[..., Optional[str]],
+    args: Tuple[Any, ...],
+    kwargs: Dict[str, Any],
+) -> Optional[str]:
     """Execute a container. Where no container above it runs, this is a trial.
 
     Containers that lie in each other take the frames of this function many times on the stack.
@@ -77,12 +82,21 @@ def _begin_trial(machine: WrappedMachine, execute: Callable[[], Optional[str]]) 
     return _run_trial(node, execute, store, resumed)
 
 
-def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
-               store: Optional[TrialStore], resumed: Optional[Resumption]) -> Optional[str]:
+def _run_trial(
+    node: TreeNode,
+    execute: Callable[[], Optional[str]],
+    store: Optional[TrialStore],
+    resumed: Optional[Resumption],
+) -> Optional[str]:
     if resumed is None:
-        node.emit(EventKind.TRIAL_START, data={
-            'initial': [node.machine._initial_state_label or ''], 'recovers': node.tree.recover,
-            'settings': _settings(node)})
+        node.emit(
+            EventKind.TRIAL_START,
+            data={
+                'initial': [node.machine._initial_state_label or ''],
+                'recovers': node.tree.recover,
+                'settings': _settings(node),
+            },
+        )
     else:
         tell_resumed(node, resumed)
     node.tree.control.begin_trial()
@@ -104,16 +118,24 @@ def _run_trial(node: TreeNode, execute: Callable[[], Optional[str]],
             _end_trial(node, outcome, error, store)
 
 
-def _end_trial(node: TreeNode, outcome: Optional[str], error: Optional[BaseException],
-               store: Optional[TrialStore]) -> None:
+def _end_trial(
+    node: TreeNode,
+    outcome: Optional[str],
+    error: Optional[BaseException],
+    store: Optional[TrialStore],
+) -> None:
     node.tree.control.end_trial()
     why = _trial_end(node, outcome, error)
     if why is TrialEnd.KEPT:
         node.machine.service_preempt()
         for state in node.machine._states.values():
             recall_preempts(state)
-    node.emit(EventKind.TRIAL_END, outcome=outcome or '', text=_why(outcome, error),
-              data={ENDED_BY: why.value, **_learned(node)})
+    node.emit(
+        EventKind.TRIAL_END,
+        outcome=outcome or '',
+        text=_why(outcome, error),
+        data={ENDED_BY: why.value, **_learned(node)},
+    )
     save_rates(node)
     if store is not None:
         store.end(why, outcome or '', time.time())
@@ -123,11 +145,16 @@ def _settings(node: TreeNode) -> Dict[str, Any]:
     """Return the settings by which the top oracle decides, without those of single states."""
     settings, defaults = node.settings, node.settings.defaults
     parameters = sorted(settings.policy_parameters.items())
-    return {'policy': settings.policy,
-            **{'policy.' + name: value for name, value in parameters},
-            'memory': defaults.memory, 'estimator': defaults.estimator,
-            'prior': defaults.prior, 'moderate_from': defaults.moderate_from,
-            'high_from': defaults.high_from, 'max_recoveries': defaults.max_recoveries}
+    return {
+        'policy': settings.policy,
+        **{'policy.' + name: value for name, value in parameters},
+        'memory': defaults.memory,
+        'estimator': defaults.estimator,
+        'prior': defaults.prior,
+        'moderate_from': defaults.moderate_from,
+        'high_from': defaults.high_from,
+        'max_recoveries': defaults.max_recoveries,
+    }
 
 
 def _learned(node: TreeNode) -> Dict[str, Any]:
@@ -164,13 +191,18 @@ class _Execution:
     def __enter__(self) -> '_Execution':
         node = self._node
         node.begin_execution()
-        begins_in = (node.entry if node.resuming is None else node.resuming.label)
-        node.emit(EventKind.CONTAINER_START,
-                  state=begins_in or node.machine._initial_state_label or '')
+        begins_in = node.entry if node.resuming is None else node.resuming.label
+        node.emit(
+            EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
+        )
         return self
 
-    def __exit__(self, kind: Optional[Type[BaseException]], error: Optional[BaseException],
-                 trace: Optional[TracebackType]) -> None:
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
         node = self._node
         if error is not None:
             # also after what no engine cleans up after, such as Ctrl-C
@@ -180,8 +212,9 @@ class _Execution:
         dropped = node.tree.control.leave(node.engine, node.key)
         if dropped is not None:
             tell_dropped(node, dropped)
-        node.emit(EventKind.CONTAINER_END, outcome=self.outcome or '',
-                  text=_why(self.outcome, error))
+        node.emit(
+            EventKind.CONTAINER_END, outcome=self.outcome or '', text=_why(self.outcome, error)
+        )
         node.runs_around = ()
         node.records.drop_snapshots()
 

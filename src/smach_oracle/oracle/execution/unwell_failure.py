@@ -3,6 +3,7 @@
 Such a visit is no visit: it is in no history, no rate and no count, and the observers are told of
 no failure, transition or jump. They are told that the machine waits.
 """
+
 import time
 from typing import Optional
 

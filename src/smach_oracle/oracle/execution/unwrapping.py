@@ -1,4 +1,5 @@
 """Takes a machine out of its oracle again: the opposite of wrapping."""
+
 from typing import Optional, cast
 
 import smach
@@ -73,8 +74,11 @@ def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -
     All that is kept of the machine belongs to the program, and its threads are not in the child.
     """
     wrapped = cast(WrappedMachine, machine)
-    smach.logwarn('{}: runs in a child process of the program, and without an oracle there'.format(
-        wrapped._oracle.path))
+    smach.logwarn(
+        '{}: runs in a child process of the program, and without an oracle there'.format(
+            wrapped._oracle.path
+        )
+    )
     _make_bare(wrapped)
     outcome: Optional[str] = machine.execute(*args, **kwargs)
     return outcome
@@ -91,5 +95,6 @@ def _make_bare(machine: WrappedMachine) -> None:
             _make_bare(cast(WrappedMachine, child))
     _strip_alone(machine)
     if isinstance(machine, tree.container_class):
-        machine._oracle = TreeNode(machine, Tree(tree.container_class, recover=False), Settings(),
-                                   name)
+        machine._oracle = TreeNode(
+            machine, Tree(tree.container_class, recover=False), Settings(), name
+        )

@@ -1,4 +1,5 @@
 """Classes of wrapped machines: each made of an OracleContainer and the machine's own class."""
+
 from typing import Any, Dict, Optional, Tuple
 
 import smach
@@ -17,8 +18,10 @@ def wrapped_class(oracle_class: type, base: type) -> type:
     made = _MADE.get(key)
     if made is None:
         namespace: Dict[str, Any] = {
-            '__module__': base.__module__, '__qualname__': base.__qualname__,
-            '__doc__': base.__doc__, '_wrapped_of': (oracle_class, base)
+            '__module__': base.__module__,
+            '__qualname__': base.__qualname__,
+            '__doc__': base.__doc__,
+            '_wrapped_of': (oracle_class, base),
         }
         for name in _STATIC + _new_names(oracle_class):
             own = _static(base, name)
@@ -32,8 +35,11 @@ def wrapped_class(oracle_class: type, base: type) -> type:
 
 def _new_names(oracle_class: type) -> Tuple[str, ...]:
     """Return the public names that no StateMachine has: a user's class that uses one keeps it."""
-    return tuple(name for name in dir(oracle_class)
-                 if not name.startswith('_') and not hasattr(smach.StateMachine, name))
+    return tuple(
+        name
+        for name in dir(oracle_class)
+        if not name.startswith('_') and not hasattr(smach.StateMachine, name)
+    )
 
 
 def _static(cls: type, name: str) -> object:
@@ -63,8 +69,9 @@ def change_class(machine: smach.StateMachine, oracle_class: type) -> None:
     try:
         set_class(machine, wrapped_class(oracle_class, type(machine)))
     except TypeError as err:
-        raise SettingsError('machine', machine, 'a machine whose class can be extended ({})'.format(
-            err)) from err
+        raise SettingsError(
+            'machine', machine, 'a machine whose class can be extended ({})'.format(err)
+        ) from err
     renew_attributes(machine)
 
 

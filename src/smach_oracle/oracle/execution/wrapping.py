@@ -1,4 +1,5 @@
 """Whole trees: puts a machine, and the machines nested in it, under one oracle each."""
+
 from typing import cast
 
 import smach
@@ -19,8 +20,15 @@ from .settings_check import check_names, check_preconditions
 from .wrapped_classes import change_class, two_classes
 
 
-def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settings, nested: Nested,
-                 name: str, strict: Strictness) -> WrappedMachine:
+def wrap_machine(
+    oracle_class: type,
+    given: object,
+    tree: Tree,
+    settings: Settings,
+    nested: Nested,
+    name: str,
+    strict: Strictness,
+) -> WrappedMachine:
     """Wrap a machine and what is nested in it. See OracleContainer.wrap.
 
     A machine that is wrapped already keeps its tree, and takes over from `tree` what is new.
@@ -41,16 +49,18 @@ def wrap_machine(oracle_class: type, given: object, tree: Tree, settings: Settin
     return machine
 
 
-def _put_under(machine: smach.StateMachine, oracle_class: type, tree: Tree, settings: Settings,
-               name: str) -> WrappedMachine:
+def _put_under(
+    machine: smach.StateMachine, oracle_class: type, tree: Tree, settings: Settings, name: str
+) -> WrappedMachine:
     change_class(machine, oracle_class)
     wrapped = cast(WrappedMachine, machine)
     node = own_attributes(machine)['_oracle'] = TreeNode(wrapped, tree, settings, name)
     return node.machine
 
 
-def _put_in_order(machine: WrappedMachine, settings: Settings, nested: Nested,
-                  strict: Strictness) -> None:
+def _put_in_order(
+    machine: WrappedMachine, settings: Settings, nested: Nested, strict: Strictness
+) -> None:
     top = machine._oracle
     top.strict = strict
     top.nested = nested
@@ -84,8 +94,14 @@ def _configure(machine: WrappedMachine, settings: Settings) -> None:
             node.configure(settings)
 
 
-def _wrap_again(machine: WrappedMachine, tree: Tree, settings: Settings, nested: Nested, name: str,
-                strict: Strictness) -> WrappedMachine:
+def _wrap_again(
+    machine: WrappedMachine,
+    tree: Tree,
+    settings: Settings,
+    nested: Nested,
+    name: str,
+    strict: Strictness,
+) -> WrappedMachine:
     top = machine._oracle
     before = top.settings
     try:

@@ -1,4 +1,5 @@
 """Calls functions when they are due, in one daemon thread that lives while one of them waits."""
+
 import threading
 from time import monotonic
 from typing import Any, Callable, Dict, Optional, Tuple
@@ -25,8 +26,9 @@ class AlarmClock:
         with self._changed:
             self._due_s[ring] = monotonic() + seconds
             if self._thread is None:
-                self._thread = threading.Thread(target=self._run, name='smach_oracle alarm clock',
-                                                daemon=True)
+                self._thread = threading.Thread(
+                    target=self._run, name='smach_oracle alarm clock', daemon=True
+                )
                 self._thread.start()
             else:
                 self._changed.notify()

@@ -1,4 +1,5 @@
 """The memory of one container: its states' records, its history, the ways out of its oracle."""
+
 import copy
 from typing import Any, Dict, Mapping, Optional, Tuple
 
@@ -41,8 +42,9 @@ class ContainerRecords:
         """Return what was learned of each state that is there, as plain data."""
         return {label: record.learned() for label, record in list(self.by_label.items())}
 
-    def take_over(self, label: str, settings: StateSettings, learned: Mapping[str, Any],
-                  is_shared: bool) -> None:
+    def take_over(
+        self, label: str, settings: StateSettings, learned: Mapping[str, Any], is_shared: bool
+    ) -> None:
         """Take over what was learned of a state, which may not be there yet.
 
         `is_shared`: whether the rates file has it.
@@ -86,10 +88,11 @@ class ContainerRecords:
         state, but where it is a machine that is entered for the clean-up within it.
         """
         if not self.winds_down():
-            self._work = tuple((record, record.snapshot)
-                               for record in list(self.by_label.values())
-                               if (not cleans_within if record.label == label
-                                   else record.snapshot is not None))
+            self._work = tuple(
+                (record, record.snapshot)
+                for record in list(self.by_label.values())
+                if (not cleans_within if record.label == label else record.snapshot is not None)
+            )
 
     @property
     def has_obeyed(self) -> bool:
@@ -102,7 +105,8 @@ class ContainerRecords:
         Each entry takes a snapshot of its own.
         """
         return self._work is not None and all(
-            record.snapshot is snapshot for record, snapshot in self._work)
+            record.snapshot is snapshot for record, snapshot in self._work
+        )
 
     def note_drawn(self) -> None:
         """Note that the next state is what the author drew after `preempted`."""
@@ -134,8 +138,9 @@ class ContainerRecords:
         """Let the next success of this kind take the short way through the records."""
         if outcome in record.fast:
             record.retire_edge(outcome)
-        record.fast[outcome] = FastEdge(target, message,
-                                    Visit(record.label, outcome, VisitResult.SUCCESS))
+        record.fast[outcome] = FastEdge(
+            target, message, Visit(record.label, outcome, VisitResult.SUCCESS)
+        )
 
     def count_oracle_edge(self, target: str) -> None:
         """Count a way out of the meta state."""

@@ -1,4 +1,5 @@
 """The settings in force in one container."""
+
 from typing import Any, Dict
 
 from ..decision.policy import Policy, policy_named
@@ -34,7 +35,8 @@ class ContainerSettings:
     def _sets(self, key: str, usual: str) -> bool:
         given = list(self.of_machine.states.values()) + list(self.given_with_add.values())
         return getattr(self.of_machine.defaults, key) != usual or any(
-            each.get(key, usual) != usual for each in given)
+            each.get(key, usual) != usual for each in given
+        )
 
     def of_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state of the container at `path`, relative to the top machine.
@@ -45,5 +47,6 @@ class ContainerSettings:
         settings = self.of_machine
         if own:
             settings = settings.with_states(
-                {label: {**own, **dict(settings.states.get(label, {}))}})
+                {label: {**own, **dict(settings.states.get(label, {}))}}
+            )
         return settings.for_state(path, label)

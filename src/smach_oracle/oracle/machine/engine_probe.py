@@ -1,4 +1,5 @@
 """Finds out how the engine works that executes a machine."""
+
 import smach
 
 from ..identity import WeakIdentityMap
@@ -17,8 +18,14 @@ class EngineProbe:
     step, and no class of a user's. `stepped`: whether this execution has come to a state.
     """
 
-    __slots__ = ('stepped', 'lock_is_held', 'attentive', 'stays_attentive', 'tells_transitions',
-                 'has_own_loop')
+    __slots__ = (
+        'stepped',
+        'lock_is_held',
+        'attentive',
+        'stays_attentive',
+        'tells_transitions',
+        'has_own_loop',
+    )
 
     def __init__(self) -> None:
         self.stepped = False
@@ -53,14 +60,17 @@ class EngineProbe:
 def _has_own_loop(machine: Machine) -> bool:
     """Whether nobody but SMACH and this package has a say in how a machine steps."""
     step = getattr(machine, '_update_once', None)
-    return (getattr(step, '__func__', None) is getattr(type(machine), '_update_once', None)
-            and _steps_as_drawn(type(machine)))
+    return getattr(step, '__func__', None) is getattr(
+        type(machine), '_update_once', None
+    ) and _steps_as_drawn(type(machine))
 
 
 def _steps_as_drawn(cls: type) -> bool:
     known = _STEP_AS_DRAWN.get(cls)
     if known is None:
         known = _STEP_AS_DRAWN[cls] = all(
-            each.__module__.partition('.')[0] in ('smach', 'smach_oracle') for each in cls.__mro__
-            if 'execute' in vars(each) or '_update_once' in vars(each))
+            each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+            for each in cls.__mro__
+            if 'execute' in vars(each) or '_update_once' in vars(each)
+        )
     return known

@@ -1,4 +1,5 @@
 """Sources of the robot's health: ports, and functions of the user's own."""
+
 import time
 from typing import Callable, Optional, Protocol
 
@@ -57,4 +58,4 @@ class HealthFunctionPort:
             return '{}: {}'.format(self._name, result) if result else ''
         if isinstance(result, bool) or type(result).__name__ == 'bool_':  # numpy's, too
             return '' if result else self._name
-        return '{} returned {}; True and \'\' are well'.format(self._name, repr_of(result))
+        return "{} returned {}; True and '' are well".format(self._name, repr_of(result))

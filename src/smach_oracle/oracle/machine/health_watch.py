@@ -1,4 +1,5 @@
 """Watches the robot's health for a whole tree of machines, and gives the one notice about it."""
+
 import random
 import threading
 import time
@@ -88,8 +89,11 @@ class HealthWatch:
         if is_same(made_of, self._made_of):
             return
         self._made_of = made_of
-        functions = [HealthFunctionPort(each.name, each.function) for each in conditions
-                     if each.function is not None]
+        functions = [
+            HealthFunctionPort(each.name, each.function)
+            for each in conditions
+            if each.function is not None
+        ]
         if self.given is not None:
             functions.append(HealthFunctionPort(name_of(self.given), self.given))
         self._functions = functions
@@ -98,8 +102,10 @@ class HealthWatch:
     def _listen_to(self, conditions: Tuple[HealthCondition, ...]) -> Optional[HealthPort]:
         heard = [each for each in conditions if each.kind is not HealthKind.FUNCTION]
         if heard and self.listen is None:
-            smach.logwarn('healthy: this process is not a ROS node, so {} is not listened to, and '
-                          'its condition holds'.format(', '.join(sources_of(conditions))))
+            smach.logwarn(
+                'healthy: this process is not a ROS node, so {} is not listened to, and '
+                'its condition holds'.format(', '.join(sources_of(conditions)))
+            )
         return self.listen(heard) if heard and self.listen is not None else None
 
     def why_unwell(self, stopped: Stopped, since_s: Optional[float] = None) -> str:
@@ -134,8 +140,9 @@ class HealthWatch:
                 return why
             pause(max(0.0, min(self._until_next_look_s(), until_s - time.monotonic())))
 
-    def wait_until_well(self, teller: Teller, state: str, what: str, why: str, stopped: Stopped,
-                        pause: Pause) -> bool:
+    def wait_until_well(
+        self, teller: Teller, state: str, what: str, why: str, stopped: Stopped, pause: Pause
+    ) -> bool:
         """Wait until the robot has been well for the settle time.
 
         The first who waits gives the notice, for the whole tree. It is ended once.
@@ -151,8 +158,9 @@ class HealthWatch:
                 since_s, looked_s = looked_s, time.monotonic()
                 if self._has_settled(phase, stopped, since_s):
                     return True
-                pause(self._until_next_look_s() if phase.well_since_s is not None
-                      else LOOK_PERIOD_S)
+                pause(
+                    self._until_next_look_s() if phase.well_since_s is not None else LOOK_PERIOD_S
+                )
             return False
         finally:
             self._leave(phase)
@@ -174,8 +182,11 @@ class HealthWatch:
             phase.waiting += 1
             phase.states.add(place)
             if is_first:
-                smach.logwarn('{} {} while the robot is not well ({}): waiting{}'.format(
-                    place, what, why, '; no failure is counted' if what == FAILED else ''))
+                smach.logwarn(
+                    '{} {} while the robot is not well ({}): waiting{}'.format(
+                        place, what, why, '; no failure is counted' if what == FAILED else ''
+                    )
+                )
                 teller.emit(EventKind.HEALTH_WAIT_START, state=state, text=why)
             else:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))
@@ -208,11 +219,19 @@ class HealthWatch:
         phase.over = True
         self._phase = None
         waited_s = time.monotonic() - phase.since_s
-        text = ('the robot is well again after {:.1f} s' if outcome == 'well' else
-                'the wait for the robot to be well was ended after {:.1f} s').format(waited_s)
+        text = (
+            'the robot is well again after {:.1f} s'
+            if outcome == 'well'
+            else 'the wait for the robot to be well was ended after {:.1f} s'
+        ).format(waited_s)
         smach.loginfo('{}/{}: {}'.format(phase.teller.path, phase.state, text))
-        phase.teller.emit(EventKind.HEALTH_WAIT_END, state=phase.state, outcome=outcome, text=text,
-                          data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)})
+        phase.teller.emit(
+            EventKind.HEALTH_WAIT_END,
+            state=phase.state,
+            outcome=outcome,
+            text=text,
+            data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)},
+        )
 
     def __reduce__(self) -> Tuple[Any, ...]:
         """Neither who is asked nor a wait travels with a copied or pickled machine."""

@@ -1,4 +1,5 @@
 """The rates file of a tree: written and read where the settings name one."""
+
 from ..records.name_claims import claim
 from ..records.rates_file import read_rates, share_rates, write_rates
 from .nesting import nodes_of

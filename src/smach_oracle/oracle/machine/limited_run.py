@@ -1,4 +1,5 @@
 """Executions of states whose time is watched, as the machines see them that run inside."""
+
 import contextlib
 import contextvars
 import threading
@@ -78,7 +79,8 @@ class WatchedRun(LimitedRun):
 
 
 _AROUND: 'contextvars.ContextVar[Tuple[LimitedRun, ...]]' = contextvars.ContextVar(
-    'smach_oracle_limited_runs', default=())
+    'smach_oracle_limited_runs', default=()
+)
 
 
 def runs_of_thread() -> Tuple[LimitedRun, ...]:

@@ -1,4 +1,5 @@
 """Finds the machines nested in others, and those of them that are under an oracle."""
+
 from typing import Any, Iterator, List, Mapping, Tuple, cast
 
 import smach
@@ -11,7 +12,8 @@ BORDER = '_oracle_border'  # the mark of a Concurrence or an Iterator of a wrapp
 
 
 def machines_below(
-    container: object, below: Labels = ()) -> Iterator[Tuple[Labels, smach.StateMachine]]:
+    container: object, below: Labels = ()
+) -> Iterator[Tuple[Labels, smach.StateMachine]]:
     """Yield the state machines nested in a container, each with the labels that lead to it.
 
     It looks through Concurrences and Iterators, but not into the machines that it finds. Of a
@@ -30,7 +32,8 @@ def machines_below(
 
 
 def borders_below(
-    container: object, below: Labels = ()) -> Iterator[Tuple[Labels, smach.Container]]:
+    container: object, below: Labels = ()
+) -> Iterator[Tuple[Labels, smach.Container]]:
     """Yield the Concurrences and Iterators in a container, each with the labels that lead to it.
 
     It looks through them, but not into machines.
@@ -57,8 +60,11 @@ def paths_below(container: object, above: Labels = ()) -> Iterator[str]:
     """
     for label, state in list(children_of(container).items()):
         path = above + (label,)
-        is_branch = not isinstance(container, smach.StateMachine) and isinstance(
-            state, smach.State) and not isinstance(state, smach.Container)
+        is_branch = (
+            not isinstance(container, smach.StateMachine)
+            and isinstance(state, smach.State)
+            and not isinstance(state, smach.Container)
+        )
         if is_branch or isinstance(state, smach.StateMachine):
             yield '/'.join(map(str, path))
         yield from paths_below(state, path)
@@ -90,8 +96,11 @@ def containers_in(machine: WrappedMachine) -> List[WrappedMachine]:
         container = waiting.pop(0)
         if not any(container is each for each in found):
             found.append(container)
-            waiting.extend(cast(WrappedMachine, child) for _, child in machines_below(container)
-                           if isinstance(child, wrapped))
+            waiting.extend(
+                cast(WrappedMachine, child)
+                for _, child in machines_below(container)
+                if isinstance(child, wrapped)
+            )
     return found
 
 

@@ -1,4 +1,5 @@
 """The oracle of one container, for adapters that publish, record or print what it does."""
+
 from typing import Callable, List, Optional
 
 import smach
@@ -24,8 +25,17 @@ def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:
             record = node.record(label)
             successes, failures = record.totals
             rows.append(
-                StateRateRow(path, label, record.rate, int(record.failure_class), successes,
-                             failures, record.recoveries, record.has_preconditions))
+                StateRateRow(
+                    path,
+                    label,
+                    record.rate,
+                    int(record.failure_class),
+                    successes,
+                    failures,
+                    record.recoveries,
+                    record.has_preconditions,
+                )
+            )
     return rows
 
 
@@ -35,10 +45,14 @@ def transition_rows(machine: WrappedMachine) -> List[TransitionRow]:
     for node in nodes_of(machine):
         path = node.path
         for label, record in list(node.records.by_label.items()):
-            rows += [TransitionRow(path, label, outcome, target, count)
-                     for (outcome, target), count in record.transitions().items()]
-        rows += [TransitionRow(path, node.settings.oracle_label, target, target, count)
-                 for target, count in list(node.records.oracle_edges.items())]
+            rows += [
+                TransitionRow(path, label, outcome, target, count)
+                for (outcome, target), count in record.transitions().items()
+            ]
+        rows += [
+            TransitionRow(path, node.settings.oracle_label, target, target, count)
+            for target, count in list(node.records.oracle_edges.items())
+        ]
     return rows
 
 
@@ -167,6 +181,7 @@ def oracle_of(machine: object) -> Oracle:
     """
     node = node_of(machine)
     if node is None:
-        raise TrialError('{!r} is not under an oracle; OracleContainer.wrap puts it there'.format(
-            machine))
+        raise TrialError(
+            '{!r} is not under an oracle; OracleContainer.wrap puts it there'.format(machine)
+        )
     return Oracle(node)

@@ -3,6 +3,7 @@
 Both engines have these members, upstream's and our own. The private ones are those that public
 scripts and tools use too.
 """
+
 from types import TracebackType
 from typing import Any, Dict, List, Mapping, Optional, Protocol, Tuple, Type
 
@@ -24,8 +25,12 @@ class StepLock(Protocol):
     def __enter__(self) -> bool:
         """Acquire it."""
 
-    def __exit__(self, kind: Optional[Type[BaseException]], err: Optional[BaseException],
-                 trace: Optional[TracebackType]) -> None:
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        err: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
         """Release it."""
 
 

@@ -4,6 +4,7 @@ A repeat is a state that was executed in this trial and that the oracle leads th
 at once or by the author's transitions from where it has jumped to. The author's own loops
 are not repeats.
 """
+
 from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 
 from ..records.state_record import StateRecord
@@ -24,7 +25,8 @@ def begin_watching(node: TreeNode) -> None:
     """Begin a trial: number the visits where a state of the tree is guarded."""
     nodes = list(nodes_of(node.machine))
     node.tree.numbers_visits = node.tree.recover and any(
-        each.in_force.guards_states() for each in nodes)
+        each.in_force.guards_states() for each in nodes
+    )
     for each in nodes:
         for record in each.records.by_label.values():
             record.be_special(each.is_special())
@@ -47,7 +49,8 @@ def why_held_back(node: TreeNode, record: StateRecord) -> str:
     if on_retry == ALLOW or not node.records.marks.of(record.label).spent:
         return ''
     return 'was done in this trial and {}'.format(
-        'must not be repeated' if on_retry == NEVER else 'is not repeated by itself')
+        'must not be repeated' if on_retry == NEVER else 'is not repeated by itself'
+    )
 
 
 def has_visited(node: TreeNode, label: str) -> bool:
@@ -68,10 +71,15 @@ def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
     since = node.records.marks.of(target).reached
     done = list(_done_below(node))
     reached = _reached_from(node, target) if done else set()
-    return tuple(each.name for each in done
-                 if (since and each.mark.executed >= since)
-                 or ((each.mark.spent and each.mark.reached or not since)
-                     and any(_is_at_or_below(each.name, label) for label in reached)))
+    return tuple(
+        each.name
+        for each in done
+        if (since and each.mark.executed >= since)
+        or (
+            (each.mark.spent and each.mark.reached or not since)
+            and any(_is_at_or_below(each.name, label) for label in reached)
+        )
+    )
 
 
 def _reached_from(node: TreeNode, target: str) -> Set[str]:
@@ -82,8 +90,14 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
         label = waiting.pop()
         reached.add(label)
         following = (node.machine._transitions.get(label) or {}).values()
-        waiting.update(each for each in following if each is not None and each not in reached
-                       and each in node.machine._states and not node.is_oracle(each))
+        waiting.update(
+            each
+            for each in following
+            if each is not None
+            and each not in reached
+            and each in node.machine._states
+            and not node.is_oracle(each)
+        )
     return reached
 
 
@@ -189,7 +203,7 @@ def _is_at_or_below(name: str, label: str) -> bool:
 
 def _done_in(node: TreeNode, each: TreeNode) -> Iterator[_Done]:
     """Yield the guarded states of a container at or below `node` that were executed."""
-    path = each.path[len(node.path) + 1:]
+    path = each.path[len(node.path) + 1 :]
     for label, record in list(each.records.by_label.items()):
         mark = each.records.marks.of(label)
         if mark.done and record.settings.on_retry != ALLOW:

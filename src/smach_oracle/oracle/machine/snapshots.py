@@ -1,4 +1,5 @@
 """Userdata as it was: snapshots, and their restore."""
+
 import copy
 import pickle
 from typing import Any, Callable, Dict, Iterable, Mapping, Optional
@@ -8,8 +9,9 @@ from smach_oracle.foreign import ends_program, error_text
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
 
-def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
-                  warn: Callable[[str, str], None]) -> Dict[str, Any]:
+def take_snapshot(
+    data: Mapping[str, Any], deep_copy_keys: Iterable[str], warn: Callable[[str, str], None]
+) -> Dict[str, Any]:
     """Return the userdata as it is now.
 
     It holds references. `deep_copy_keys` are copied through and through. `warn` takes each key that
@@ -28,8 +30,12 @@ def take_snapshot(data: Mapping[str, Any], deep_copy_keys: Iterable[str],
     return snapshot
 
 
-def restore(data: Dict[str, Any], snapshot: Mapping[str, Any], keep: Iterable[str],
-            deep_copy_keys: Iterable[str]) -> None:
+def restore(
+    data: Dict[str, Any],
+    snapshot: Mapping[str, Any],
+    keep: Iterable[str],
+    deep_copy_keys: Iterable[str],
+) -> None:
     """Make `data` in place what it was at `snapshot`, except the keys in `keep`.
 
     In place, because scripts hold on to the dictionary. Deep copies are handed out as copies, so

@@ -2,6 +2,7 @@
 
 These are the trial, its events, the expert and the threads that were left behind.
 """
+
 import itertools
 import os
 import threading
@@ -46,9 +47,13 @@ def new_id() -> str:
 class Tree:
     """Shared by the top machine and all wrapped containers below it."""
 
-    def __init__(self, container_class: type, recover: bool = True,
-                 expert: Optional[Expert] = None,
-                 health: Optional[HealthFunction] = None) -> None:
+    def __init__(
+        self,
+        container_class: type,
+        recover: bool = True,
+        expert: Optional[Expert] = None,
+        health: Optional[HealthFunction] = None,
+    ) -> None:
         # that of wrapped machines, and what nested ones become
         self.container_class = container_class
         self.recover = recover
@@ -122,8 +127,11 @@ class Tree:
 
     def spent(self) -> Dict[str, Any]:
         """Return what a trial that goes on needs of what is spent or asked, as plain data."""
-        return {'questions': self._questions, 'budget': self.budget.spent(),
-                'paused': [self.control.paused, self.control.paused_by]}
+        return {
+            'questions': self._questions,
+            'budget': self.budget.spent(),
+            'paused': [self.control.paused, self.control.paused_by],
+        }
 
     def next_visit(self) -> int:
         """Return the number of the next visit of a state, in whichever container."""

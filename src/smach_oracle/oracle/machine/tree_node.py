@@ -1,4 +1,5 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
+
 import copy
 from dataclasses import replace
 from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, Tuple
@@ -204,13 +205,15 @@ class TreeNode:
 
         It executes inside a state that was abandoned, or its trial has ended early.
         """
-        return self.tree.early_end.why is not None or any(
-            run.abandoned for run in self.runs_around)
+        return self.tree.early_end.why is not None or any(run.abandoned for run in self.runs_around)
 
     def why_left_behind(self) -> str:
         """Say why, where it is left behind."""
-        return ('its trial ends early, and can go on later' if self.tree.early_end.why is not None
-                else 'the state around it was abandoned')
+        return (
+            'its trial ends early, and can go on later'
+            if self.tree.early_end.why is not None
+            else 'the state around it was abandoned'
+        )
 
     def runs_beside_others(self) -> bool:
         """Whether a Concurrence or an Iterator is around it."""
@@ -261,8 +264,7 @@ class TreeNode:
 
     def configure(self, settings: Settings) -> None:
         """Go on under these settings with what was learned."""
-        self.in_force.use(settings if self.branch is None
-                          else self.branch.settings_here(settings))
+        self.in_force.use(settings if self.branch is None else self.branch.settings_here(settings))
         self.records.history.resize(settings.history_length)
         self.checked_states = -1
         for label, record in self.records.by_label.items():
@@ -274,9 +276,14 @@ class TreeNode:
         if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
             return settings
         # beside a branch is no state that could be run for it. A path names one elsewhere
-        return replace(settings, preconditions=tuple(
-            spec for spec in settings.preconditions
-            if all('/' in label for label in spec.labels())))
+        return replace(
+            settings,
+            preconditions=tuple(
+                spec
+                for spec in settings.preconditions
+                if all('/' in label for label in spec.labels())
+            ),
+        )
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""
@@ -317,8 +324,9 @@ class TreeNode:
     def end_precondition(self, state: smach.State) -> None:
         """Note that it has ended."""
         with self.tree.departures_lock:
-            self.as_preconditions = tuple(each for each in self.as_preconditions
-                                          if each is not state)
+            self.as_preconditions = tuple(
+                each for each in self.as_preconditions if each is not state
+            )
 
     def emit(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""
@@ -372,8 +380,9 @@ class TreeNode:
 
     def snapshot(self) -> Dict[str, Any]:
         """Return the userdata as it is now."""
-        return take_snapshot(self.machine.userdata._data, self.in_force.deep_copy_keys,
-                             self.warn_not_copied)
+        return take_snapshot(
+            self.machine.userdata._data, self.in_force.deep_copy_keys, self.warn_not_copied
+        )
 
     # -- learned rates, for a rates file (rates_file.Learner)
 

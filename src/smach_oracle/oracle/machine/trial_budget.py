@@ -1,4 +1,5 @@
 """Counts what is left of a trial's budget, for all containers of a tree."""
+
 import contextlib
 import threading
 from time import monotonic
@@ -32,8 +33,7 @@ class TrialBudget:
         """Return the recoveries, the questions and the seconds spent."""
         with self._lock:
             self._note()
-            return [self._recoveries, self._questions,
-                    monotonic() - self._begun_s - self._stood_s]
+            return [self._recoveries, self._questions, monotonic() - self._begun_s - self._stood_s]
 
     def go_on(self, spent: Optional[Sequence[float]]) -> None:
         """Go on after `begin` with what was spent before. None means nothing."""
@@ -68,7 +68,8 @@ class TrialBudget:
             return ''
         minutes = '{:g}'.format(self._limits.minutes or 0.0)
         return "the trial's {} over".format(
-            '1 minute is' if minutes == '1' else minutes + ' minutes are')
+            '1 minute is' if minutes == '1' else minutes + ' minutes are'
+        )
 
     def left_s(self) -> Optional[float]:
         """Return how many seconds are left, 0.0 where none are. None means they are not limited."""
@@ -122,4 +123,5 @@ def _spent(limit: Optional[int], used: int, one: str, many: str) -> str:
     if limit == 0:
         return 'this trial is allowed no {}'.format(many)
     return "the trial's {} spent".format(
-        '1 {} is'.format(one) if limit == 1 else '{} {} are'.format(limit, many))
+        '1 {} is'.format(one) if limit == 1 else '{} {} are'.format(limit, many)
+    )

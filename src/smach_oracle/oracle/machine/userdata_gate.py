@@ -4,6 +4,7 @@ The gate sits where a `smach.UserData` keeps its dictionary (`_data`), so that e
 passes it: by attribute, by item, by `update`, through a Remapper, from the output keys of a nested
 container.
 """
+
 import threading
 from collections.abc import MutableMapping
 from typing import Any, Callable, Iterator, Optional, Set
@@ -22,8 +23,9 @@ class UserdataGate(MutableMapping):
     threads.
     """
 
-    def __init__(self, machine: Machine, on_late_write: Optional[Callable[[str],
-                                                                          None]] = None) -> None:
+    def __init__(
+        self, machine: Machine, on_late_write: Optional[Callable[[str], None]] = None
+    ) -> None:
         self._machine = machine
         self._on_late_write = on_late_write
         self._lock = threading.Lock()

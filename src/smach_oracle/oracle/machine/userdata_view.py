@@ -1,4 +1,5 @@
 """The userdata of a state: the container's userdata by the state's own key names."""
+
 from typing import Any, Collection, Iterable, Mapping, Tuple, cast
 
 import smach
@@ -23,8 +24,9 @@ def write_constants(userdata: smach.UserData, constants: Mapping[str, Any]) -> N
         userdata[key] = value
 
 
-def view_of(machine: Machine, label: str, state: smach.State,
-            userdata: smach.UserData) -> smach.Remapper:
+def view_of(
+    machine: Machine, label: str, state: smach.State, userdata: smach.UserData
+) -> smach.Remapper:
     """Return what a state reads and writes, by its own key names.
 
     `label` is '' for a state that is not in the machine.
@@ -32,12 +34,14 @@ def view_of(machine: Machine, label: str, state: smach.State,
     if label and own_mark(machine, 'hands_on_userdata'):
         return cast(smach.Remapper, userdata)  # as an Iterator does
     remapping = machine._remappings.get(label) or {} if label else {}
-    return smach.Remapper(userdata, state.get_registered_input_keys(),
-                          state.get_registered_output_keys(), remapping)
+    return smach.Remapper(
+        userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping
+    )
 
 
-def view_behind(gate: UserdataGate, machine: Machine, label: str,
-                state: smach.State) -> smach.Remapper:
+def view_behind(
+    gate: UserdataGate, machine: Machine, label: str, state: smach.State
+) -> smach.Remapper:
     """Return what `view_of` does for the container's userdata, behind a gate."""
     return view_of(machine, label, state, behind(gate))
 
@@ -69,12 +73,16 @@ class StateView:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
         self.state = None  # what no state is: made for one visit
-        if (_KEEPS_KEY_SETS and _has_plain_keys(state)
-                and not own_mark(machine, 'hands_on_userdata')):
+        if (
+            _KEEPS_KEY_SETS
+            and _has_plain_keys(state)
+            and not own_mark(machine, 'hands_on_userdata')
+        ):
             self.state = state
             self.input_keys, self.output_keys = state._input_keys, state._output_keys
-            self.remapper = smach.Remapper(machine.userdata, self.input_keys, self.output_keys,
-                                           self.remapping)
+            self.remapper = smach.Remapper(
+                machine.userdata, self.input_keys, self.output_keys, self.remapping
+            )
         else:
             self.remapper = view_of(machine, label, state, machine.userdata)
 
@@ -84,7 +92,8 @@ def _has_plain_keys(state: smach.State) -> bool:
     methods = ('get_registered_input_keys', 'get_registered_output_keys')
     return isinstance(state, smach.State) and all(
         getattr(getattr(state, name), '__func__', None) is getattr(smach.State, name)
-        for name in methods)
+        for name in methods
+    )
 
 
 def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tuple[str, ...]:
@@ -95,9 +104,7 @@ def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tupl
     present = set(available).union(constants_of(machine, label))
     remapping = machine._remappings.get(label) or {}
     inputs = machine._states[label].get_registered_input_keys()
-    return tuple(
-        sorted(key for key in inputs
-               if remapping.get(key, key) not in present))
+    return tuple(sorted(key for key in inputs if remapping.get(key, key) not in present))
 
 
 def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:

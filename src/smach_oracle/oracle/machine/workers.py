@@ -4,6 +4,7 @@ A state with a time limit: on overrun the gate on its userdata is shut and the s
 After a grace period it is abandoned. A function: it cannot be preempted, and is abandoned at once.
 While an abandoned thread lives, what it runs is blocked: nobody enters it again.
 """
+
 import functools
 import math
 import threading
@@ -61,8 +62,15 @@ class Workers:
             del self.abandoned[id(target)]
             return ''
 
-    def run(self, state: smach.State, userdata: smach.Remapper, gate: UserdataGate, label: str,
-            limit_s: float, grace_s: float) -> LimitedResult:
+    def run(
+        self,
+        state: smach.State,
+        userdata: smach.Remapper,
+        gate: UserdataGate,
+        label: str,
+        limit_s: float,
+        grace_s: float,
+    ) -> LimitedResult:
         """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
 
         The limit stands still while a person is asked about something inside the state.
@@ -70,9 +78,11 @@ class Workers:
         raised.
         """
         run = LimitedRun()
-        call = BackgroundCall(functools.partial(_execute_inside, run, state, userdata),
-                              'smach_oracle worker of {}'.format(label),
-                              functools.partial(self._ended_late, state))
+        call = BackgroundCall(
+            functools.partial(_execute_inside, run, state, userdata),
+            'smach_oracle worker of {}'.format(label),
+            functools.partial(self._ended_late, state),
+        )
         self.under_way[id(state)] = run
         try:
             call.start()
@@ -81,8 +91,15 @@ class Workers:
             if not call.left:
                 self.under_way.pop(id(state), None)
 
-    def _run_within(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
-                    gate: UserdataGate, limit_s: float, grace_s: float) -> LimitedResult:
+    def _run_within(
+        self,
+        run: LimitedRun,
+        state: smach.State,
+        call: BackgroundCall,
+        gate: UserdataGate,
+        limit_s: float,
+        grace_s: float,
+    ) -> LimitedResult:
         try:
             left_s = limit_s
             while left_s:
@@ -97,16 +114,23 @@ class Workers:
         what = 'overran its time limit of {:g} s and '.format(limit_s)
         if ended:
             return LimitedResult(overrun=what + 'ended when it was preempted')
-        return LimitedResult(overrun=what +
-                             'was abandoned {:g} s after it was preempted'.format(grace_s))
+        return LimitedResult(
+            overrun=what + 'was abandoned {:g} s after it was preempted'.format(grace_s)
+        )
 
     def _ended_late(self, state: smach.State) -> None:
         self.under_way.pop(id(state), None)
         recall_preempts(state)
 
-    def call(self, function: Callable[[smach.UserData], object], userdata: smach.UserData,
-             gate: UserdataGate, limit_s: Optional[float], grace_s: float,
-             stopped: Callable[[], bool]) -> LimitedResult:
+    def call(
+        self,
+        function: Callable[[smach.UserData], object],
+        userdata: smach.UserData,
+        gate: UserdataGate,
+        limit_s: Optional[float],
+        grace_s: float,
+        stopped: Callable[[], bool],
+    ) -> LimitedResult:
         """Call `function` until its time limit (s, monotonic, None: no limit) or until `stopped()`.
 
         It has `grace_s` more to end by itself, in which it writes nothing any more, and is left
@@ -119,7 +143,8 @@ class Workers:
         why = ''
         try:
             while not why and not call.done.wait(
-                    min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))):
+                min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))
+            ):
                 if time.monotonic() >= end:
                     why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
                 elif stopped():
@@ -134,8 +159,14 @@ class Workers:
         late = self._abandon(function, call, gate, _STOPPED if stopped() else _LATE)
         return LimitedResult(overrun=why + (' and was left behind' if late else ''))
 
-    def _leave_state(self, run: LimitedRun, state: smach.State, call: BackgroundCall,
-                     gate: UserdataGate, grace_s: float) -> bool:
+    def _leave_state(
+        self,
+        run: LimitedRun,
+        state: smach.State,
+        call: BackgroundCall,
+        gate: UserdataGate,
+        grace_s: float,
+    ) -> bool:
         """Preempt a state and abandon it after its grace period.
 
         Return False where that was needed.
@@ -210,5 +241,6 @@ def recall_preempts(state: smach.State) -> None:
         for child in _children(state):
             recall_preempts(child)
     except Exception as err:  # a user's container may be of any make
-        smach.logwarn('Could not take a preempt request back from {}: {}'.format(
-            repr_of(state), repr_of(err)))
+        smach.logwarn(
+            'Could not take a preempt request back from {}: {}'.format(repr_of(state), repr_of(err))
+        )

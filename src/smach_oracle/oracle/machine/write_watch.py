@@ -1,4 +1,5 @@
 """Finds the keys of a container's userdata that were written, and takes writes back."""
+
 from typing import Any, Dict, Iterable, NamedTuple, Optional, Set
 
 from ..identity import own_mark
@@ -35,8 +36,7 @@ class WriteWatch:
         self._kept: Set[str] = set()  # written through the gate before `begin`
         self._before = dict(machine.userdata._data)
         self._prints = {
-            key: fingerprint(self._before[key])
-            for key in self._deep if key in self._before
+            key: fingerprint(self._before[key]) for key in self._deep if key in self._before
         }
 
     def begin(self) -> UserdataMark:
@@ -84,9 +84,13 @@ class WriteWatch:
         """Return the keys set, deleted or changed so far."""
         now = dict(self._machine.userdata._data)
         keys = self._kept.union(self.gate.written)
-        keys.update(key for key in now
-                    if key not in self._before or now[key] is not self._before[key])
+        keys.update(
+            key for key in now if key not in self._before or now[key] is not self._before[key]
+        )
         keys.update(key for key in self._before if key not in now)
-        keys.update(key for key, seen in self._prints.items()
-                    if key in now and fingerprint(now[key]) != seen)
+        keys.update(
+            key
+            for key, seen in self._prints.items()
+            if key in now and fingerprint(now[key]) != seen
+        )
         return keys

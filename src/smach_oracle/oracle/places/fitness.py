@@ -1,4 +1,5 @@
 """Checks which places may be named as preconditions of a state, whatever runs."""
+
 from typing import List
 
 import smach
@@ -37,12 +38,16 @@ def allowed_for(node: TreeNode, label: str) -> str:
     if node.branch is not None:
         return elsewhere
     return 'the labels of the other states of {}: {}; or {}'.format(
-        node.path, ', '.join(sorted(other for other in node.labels() if other != label)), elsewhere)
+        node.path, ', '.join(sorted(other for other in node.labels() if other != label)), elsewhere
+    )
 
 
 def _unknown(node: TreeNode, label: str, name: str) -> str:
-    names = {'{}/{}'.format(each.relative_path, state)
-             for each in nodes_of(node.top().machine) for state in each.labels()}
+    names = {
+        '{}/{}'.format(each.relative_path, state)
+        for each in nodes_of(node.top().machine)
+        for state in each.labels()
+    }
     if node.branch is None:
         names.update(node.labels())
     own = {label, '{}/{}'.format(node.relative_path, label)}
@@ -50,8 +55,11 @@ def _unknown(node: TreeNode, label: str, name: str) -> str:
 
 
 def _where_it_is(node: TreeNode, name: str) -> str:
-    paths = ['{}/{}'.format(each.relative_path, name) for each in nodes_of(node.top().machine)
-             if each is not node and name in each.labels()]
+    paths = [
+        '{}/{}'.format(each.relative_path, name)
+        for each in nodes_of(node.top().machine)
+        if each is not node and name in each.labels()
+    ]
     return 'in other containers there is ' + ', '.join(sorted(paths)) if paths else ''
 
 
@@ -64,8 +72,7 @@ def _around(node: TreeNode) -> List[TreeNode]:
 
 
 def _is_around(place: Place, node: TreeNode) -> bool:
-    return any(each.parent is place.node and each.below[0] == place.label
-               for each in _around(node))
+    return any(each.parent is place.node and each.below[0] == place.label for each in _around(node))
 
 
 def _is_in_iterator(place: Place, node: TreeNode) -> bool:

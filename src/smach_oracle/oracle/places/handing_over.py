@@ -1,4 +1,5 @@
 """Userdata on its way between containers, through the input and output keys of its author."""
+
 from typing import Any, Iterator, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import smach
@@ -79,10 +80,10 @@ def hand_on(link: Link, written: Set[str], into: Any) -> Set[str]:
 
 
 def _inputs(link: Link) -> Sequence[Tuple[str, str]]:
-    return [(key, link.remapping.get(key, key))
-            for key in link.below.get_registered_input_keys()]
+    return [(key, link.remapping.get(key, key)) for key in link.below.get_registered_input_keys()]
 
 
 def _constants(link: Link) -> Mapping[str, Any]:
-    return (constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine)
-            else {})
+    return (
+        constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine) else {}
+    )

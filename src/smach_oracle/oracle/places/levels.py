@@ -3,6 +3,7 @@
 The first level of a failure is its own container, then comes the one above it, and so on to the
 top.
 """
+
 from typing import Iterator
 
 from ..machine.nesting import nodes_of

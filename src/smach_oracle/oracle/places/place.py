@@ -1,4 +1,5 @@
 """Places: the states of all containers of a tree."""
+
 from typing import Iterator, NamedTuple, Optional
 
 from ..machine.nesting import nodes_of
@@ -48,6 +49,6 @@ def place_named(node: TreeNode, name: str, at_rest: bool = False) -> Optional[Pl
     path = name[1:] if name.startswith('/') else name
     for each in nodes_of(node.top().machine) if at_rest else nodes_of_tree(node):
         above = each.relative_path + '/' if each.relative_path else ''
-        if path.startswith(above) and path[len(above):] in each.labels():
-            return Place(each, path[len(above):])
+        if path.startswith(above) and path[len(above) :] in each.labels():
+            return Place(each, path[len(above) :])
     return None

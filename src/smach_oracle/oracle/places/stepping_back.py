@@ -1,4 +1,5 @@
 """Tells what the visits say about a failure, and what ran before it in the levels above."""
+
 from ..decision.policy import FailureContext
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord

@@ -1,4 +1,5 @@
 """The way from a failure to a place, and what is told of it before the machine goes there."""
+
 from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 from ..identity import own_mark
@@ -96,8 +97,8 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
     for link in links_to(below):
         child = link.below
         keys = set(child.userdata._data).union(
-            key for key in child.get_registered_input_keys()
-            if link.remapping.get(key, key) in keys)
+            key for key in child.get_registered_input_keys() if link.remapping.get(key, key) in keys
+        )
         item = own_mark(child, '_items_label')
         if item is not None:  # an Iterator: its state works on its own userdata
             keys.add(item)

@@ -1,4 +1,5 @@
 """A question that comes before the next state of some containers. Pure, and without smach."""
+
 from typing import List, Optional, Sequence
 
 from .events import FailureKind

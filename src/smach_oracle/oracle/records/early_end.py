@@ -2,6 +2,7 @@
 
 Pure, and without smach.
 """
+
 import contextlib
 import threading
 from typing import Callable, Iterator, Optional

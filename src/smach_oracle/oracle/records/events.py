@@ -5,6 +5,7 @@ happened, in the order of the sequence numbers, before the machine goes on: an o
 holds the machine back, which is how a recorder loses nothing. An observer that raises does not stop
 the machine. The log names it once. It gets the events that follow.
 """
+
 import threading
 import time
 from enum import IntEnum
@@ -134,8 +135,9 @@ class EventSource:
         with self._lock:
             self._seq = seq + 1
 
-    def emit(self, kind: EventKind, path: str, of_trial: Optional[str] = None,
-             **fields: Any) -> None:
+    def emit(
+        self, kind: EventKind, path: str, of_trial: Optional[str] = None, **fields: Any
+    ) -> None:
         """Tell every observer. It costs nothing to speak of where there is none.
 
         What comes after the end of its trial (`of_trial`, None means the present one) is not told.
@@ -160,13 +162,20 @@ class EventSource:
         """Log that an observer has failed, the first time that it does."""
         if any(each is observer for each in self._told):
             return
-        self._told = [each for each in self._told
-                      if any(each is other for other in self.observers)] + [observer]
+        self._told = [
+            each for each in self._told if any(each is other for other in self.observers)
+        ] + [observer]
         name, without_it = _in_words(observer)
-        self._log_error('{}: {} failed at {} of {}: {}. So {}. The machine goes on. This is said '
-                        'once'.format(self.trial_id, name, event.kind.name,
-                                      '/'.join(filter(None, (event.path, event.state))),
-                                      error_text(err), without_it))
+        self._log_error(
+            '{}: {} failed at {} of {}: {}. So {}. The machine goes on. This is said once'.format(
+                self.trial_id,
+                name,
+                event.kind.name,
+                '/'.join(filter(None, (event.path, event.state))),
+                error_text(err),
+                without_it,
+            )
+        )
 
     def __getstate__(self) -> Dict[str, Any]:
         """Without the lock and the observers: neither can travel with a pickled machine."""

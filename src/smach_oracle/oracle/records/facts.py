@@ -3,6 +3,7 @@
 Bags that were recorded before events carried them tell the same by the words of a text. Those words
 are known here and nowhere else. Pure, and without smach.
 """
+
 from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Tuple
 
@@ -17,12 +18,16 @@ LAST_SEQ = 'last_seq'  # key in the data of RESUMED: number of the last event th
 # key in the data of TRANSITION: true where it says nothing of how good the state is
 NOT_COUNTED = 'not_counted'
 # fields of such a TRANSITION: the author's own, from a failure while the robot was not well
-UNCOUNTED: Mapping[str, Any] = {'text': 'not counted, as the robot is not well',
-                                'data': {NOT_COUNTED: True}}
+UNCOUNTED: Mapping[str, Any] = {
+    'text': 'not counted, as the robot is not well',
+    'data': {NOT_COUNTED: True},
+}
 
 # fields of the TRANSITION of a state that was left for a state of another container
-LEFT: Mapping[str, Any] = {'text': 'left for a state of another container',
-                           'data': {NOT_COUNTED: True}}
+LEFT: Mapping[str, Any] = {
+    'text': 'left for a state of another container',
+    'data': {NOT_COUNTED: True},
+}
 
 # fields of the TRANSITION from a state that was held, and that a preempt has ended before it began
 PASSED_BY: Mapping[str, Any] = {'text': 'preempted before it began', 'data': {NOT_COUNTED: True}}

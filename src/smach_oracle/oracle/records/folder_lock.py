@@ -1,4 +1,5 @@
 """A lock on a folder, which leaves no file behind and ends with its process."""
+
 import contextlib
 import errno
 import fcntl
@@ -40,6 +41,7 @@ def _lock(descriptor: int, folder: str, until_s: float) -> None:
             if err.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EINTR):
                 raise
             if time.monotonic() > until_s:
-                raise OSError(errno.EAGAIN, 'another program holds the lock of the folder',
-                              folder) from None
+                raise OSError(
+                    errno.EAGAIN, 'another program holds the lock of the folder', folder
+                ) from None
         time.sleep(0.005)

@@ -7,6 +7,7 @@ the present visit (`unconditioned`, the listing's Rs), and which other state suc
 the present state began to fail (`succeeded_before`, the prose). Both are kept up to date as visits
 come in, so no walk over the chain is ever needed.
 """
+
 from collections import deque
 from typing import Any, Deque, List, NamedTuple, Optional, Tuple
 
@@ -91,8 +92,7 @@ class History:
     @property
     def visits_of_execution(self) -> int:
         """Return the number of visits of this execution, where counted, else of those kept."""
-        return (self.visits.added if isinstance(self.visits, _CountedVisits)
-                else len(self.visits))
+        return self.visits.added if isinstance(self.visits, _CountedVisits) else len(self.visits)
 
     def visited(self, visit: Visit, has_preconditions: bool) -> None:
         """Add a visit that has ended."""
@@ -109,9 +109,14 @@ class History:
         :param initial: the container's initial state.
         :param successes: number of successes of `state` in all.
         """
-        return FailureContext(state, initial, self.failed_last(state),
-                              self.failing_since(state, successes), self.unconditioned,
-                              self.succeeded_before(state, successes))
+        return FailureContext(
+            state,
+            initial,
+            self.failed_last(state),
+            self.failing_since(state, successes),
+            self.unconditioned,
+            self.succeeded_before(state, successes),
+        )
 
     def failed_last(self, state: str) -> bool:
         """Whether this container's most recent failure of the trial was of `state`."""
@@ -166,8 +171,13 @@ class History:
 
     def told(self) -> List[Any]:
         """Return all but the visits as plain data, for `take_over`."""
-        return [self.unconditioned, self.succeeded, self.succeeded_other, list(self._streak),
-                list(self._before)]
+        return [
+            self.unconditioned,
+            self.succeeded,
+            self.succeeded_other,
+            list(self._streak),
+            list(self._before),
+        ]
 
     def take_over(self, visits: List[Visit], number: int, told: List[Any]) -> None:
         """Go on from another history: its latest visits, their number in all, and what it told.

@@ -4,6 +4,7 @@ A machine claims its name by a lock on one byte of the file's folder. It leaves 
 ends with the machine or its process. Programs on other computers do not see it: a network file
 system keeps the locks of folders to each computer.
 """
+
 import contextlib
 import fcntl
 import hashlib

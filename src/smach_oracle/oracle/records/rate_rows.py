@@ -1,4 +1,5 @@
 """Learned rates and counts, as rows for those who publish them."""
+
 from typing import NamedTuple
 
 

@@ -11,6 +11,7 @@ machines then, for programs that do not know "machines". A machine without a nam
 "states": {NAME: {PATH: [STATE]}} has the states of each, also those without a result. "renamed":
 {NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
 """
+
 import gc
 import json
 import os
@@ -36,10 +37,14 @@ from .name_claims import is_claimed
 FORMAT = 'smach_oracle rates'
 VERSION = 1
 DAMAGED = '.damaged'
-INHERITS = ('Rates file {}: {!r} is new there, and begins with what {} has learned. It has the '
-            'same states, and no running program uses that name')
-FROM_NAMELESS = ('Rates file {}: {!r} is new there, and begins with what machines without a name '
-                 'have learned of its states')
+INHERITS = (
+    'Rates file {}: {!r} is new there, and begins with what {} has learned. It has the '
+    'same states, and no running program uses that name'
+)
+FROM_NAMELESS = (
+    'Rates file {}: {!r} is new there, and begins with what machines without a name '
+    'have learned of its states'
+)
 States = Dict[str, Any]  # what was learned, by label
 Containers = Dict[str, States]  # by path below the top machine
 Labels = Dict[str, List[str]]  # by path, too
@@ -48,8 +53,9 @@ Labels = Dict[str, List[str]]  # by path, too
 class Machines(Dict[str, Containers]):
     """What a file has, by the names of machines, '' for one that has none."""
 
-    def __init__(self, content: Mapping[str, Containers], states: Any = None,
-                 renamed: Any = None) -> None:
+    def __init__(
+        self, content: Mapping[str, Containers], states: Any = None, renamed: Any = None
+    ) -> None:
         """`states`: of each. `renamed`: new names, by those whose rates have gone there, too."""
         super().__init__(content)
         self.states: Dict[str, Labels] = states if isinstance(states, dict) else {}
@@ -179,8 +185,9 @@ def _write(path: str, machines: Machines, name: str) -> None:
         content['renamed'] = machines.renamed
     text = json.dumps(content, indent=1, sort_keys=True)
     folder = os.path.dirname(path)
-    descriptor, temporary = tempfile.mkstemp(prefix=os.path.basename(path) + '.', suffix='.tmp',
-                                             dir=folder)
+    descriptor, temporary = tempfile.mkstemp(
+        prefix=os.path.basename(path) + '.', suffix='.tmp', dir=folder
+    )
     try:
         with os.fdopen(descriptor, 'w', encoding='utf-8') as stream:
             stream.write(text + '\n')
@@ -230,8 +237,11 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
     machines = _machines(path)
     if machines is None:
         return
-    containers = (machines[name] if name in machines
-                  else _inherited(os.path.realpath(path), name, learners, is_shared))
+    containers = (
+        machines[name]
+        if name in machines
+        else _inherited(os.path.realpath(path), name, learners, is_shared)
+    )
     for learner in learners:
         for label, learned in containers.get(learner.relative_path, {}).items():
             try:
@@ -265,8 +275,9 @@ def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: boo
                 machines.renamed[before] = name
                 _write(path, machines, name)
     except OSError as err:
-        smach.logwarn('Rates file {}: that {!r} is new cannot be noted there: {}'.format(
-            path, name, err))
+        smach.logwarn(
+            'Rates file {}: that {!r} is new cannot be noted there: {}'.format(path, name, err)
+        )
     return containers
 
 
@@ -276,8 +287,11 @@ def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> 
     Else '' for machines without a name, where they have learned of any of its states.
     """
     own = _labels(learners)
-    found = [name for name in machines
-             if name and name not in machines.renamed and machines.states.get(name) == own]
+    found = [
+        name
+        for name in machines
+        if name and name not in machines.renamed and machines.states.get(name) == own
+    ]
     if any(label in machines.get('', {}).get(place, {}) for place in own for label in own[place]):
         found.append('')
     if any(is_claimed(path, name) for name in found):
@@ -300,8 +314,9 @@ def _size(containers: Containers) -> int:
 
 
 def _tell_unusable(path: str, label: str, learner: Learner, err: Exception) -> None:
-    smach.logwarn('Rates file {}: {!r} of {} cannot be used: {}'.format(
-        path, label, learner.path, err))
+    smach.logwarn(
+        'Rates file {}: {!r} of {} cannot be used: {}'.format(path, label, learner.path, err)
+    )
 
 
 def _machines_or_none(path: str) -> Machines:
@@ -315,8 +330,11 @@ def _machines_or_none(path: str) -> Machines:
     except FileNotFoundError:
         return Machines({})
     except (ValueError, RecursionError) as err:
-        smach.logwarn('Rates file {} is damaged ({}), {}; a new one is written'.format(
-            path, err, _set_aside(path)))
+        smach.logwarn(
+            'Rates file {} is damaged ({}), {}; a new one is written'.format(
+                path, err, _set_aside(path)
+            )
+        )
         return Machines({})
 
 
@@ -328,12 +346,16 @@ def _machines(path: str) -> Any:
     except FileNotFoundError:
         return None
     except OSError as err:
-        smach.logwarn('Rates file {} cannot be read, starting from the priors: {}'.format(
-            path, err))
+        smach.logwarn(
+            'Rates file {} cannot be read, starting from the priors: {}'.format(path, err)
+        )
         return None
     except (ValueError, RecursionError) as err:
-        smach.logwarn('Rates file {} is damaged ({}), {}; starting from the priors'.format(
-            path, err, _set_aside(path)))
+        smach.logwarn(
+            'Rates file {} is damaged ({}), {}; starting from the priors'.format(
+                path, err, _set_aside(path)
+            )
+        )
         return None
 
 
@@ -344,9 +366,10 @@ def _checked(content: Any) -> Machines:
         raise ValueError('it has version {!r}, known is {}'.format(content.get('version'), VERSION))
     machines = content.get('machines', {'': content.get('containers')})
     if not isinstance(machines, dict) or not all(
-            isinstance(containers, dict) and all(
-                isinstance(states, dict) for states in containers.values())
-            for containers in machines.values()):
+        isinstance(containers, dict)
+        and all(isinstance(states, dict) for states in containers.values())
+        for containers in machines.values()
+    ):
         raise ValueError('it has no states')
     return Machines(machines, content.get('states'), content.get('renamed'))
 

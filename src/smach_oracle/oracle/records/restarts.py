@@ -1,4 +1,5 @@
 """Counts how often a trial was started over, and keeps the userdata of its start."""
+
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 

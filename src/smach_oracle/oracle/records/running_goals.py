@@ -1,4 +1,5 @@
 """Goals that this program has sent to others, and that run on where it is killed. Pure."""
+
 import threading
 from collections import OrderedDict
 from typing import Callable, Dict, List, Mapping

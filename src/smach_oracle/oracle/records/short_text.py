@@ -12,4 +12,4 @@ def shortened(text: str, longest: int) -> str:
         return text
     kept = max(0, longest - len(LEFT_OUT))
     tail = kept // 2
-    return text[:kept - tail] + LEFT_OUT + text[len(text) - tail:]
+    return text[: kept - tail] + LEFT_OUT + text[len(text) - tail :]

@@ -1,4 +1,5 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
+
 import threading
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
@@ -78,13 +79,33 @@ class StateRecord:
     them.
     """
 
-    __slots__ = ('label', 'settings', 'fast', 'snapshot', 'recoveries', 'fallbacks',
-                 'unwell_repeats', '_tried',
-                 'has_preconditions', 'special', 'view', 'longest_s', 'entered_by_oracle',
-                 'way_down', 'unfinished', 'open_question', '_is_special', '_estimator', '_lock',
-                 '_learned', 'shared',
-                 '_retired',
-                 '_edges', '_visits', '_visits_before')
+    __slots__ = (
+        'label',
+        'settings',
+        'fast',
+        'snapshot',
+        'recoveries',
+        'fallbacks',
+        'unwell_repeats',
+        '_tried',
+        'has_preconditions',
+        'special',
+        'view',
+        'longest_s',
+        'entered_by_oracle',
+        'way_down',
+        'unfinished',
+        'open_question',
+        '_is_special',
+        '_estimator',
+        '_lock',
+        '_learned',
+        'shared',
+        '_retired',
+        '_edges',
+        '_visits',
+        '_visits_before',
+    )
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
@@ -133,8 +154,12 @@ class StateRecord:
     def be_special(self, special: bool) -> None:
         """Have more done than to execute the state, which a time limit wants in any case."""
         self._is_special = special or self.settings.time_limit_s is not None
-        self.special = (self._is_special or self.entered_by_oracle or bool(self.way_down)
-                        or self.unfinished is not None)
+        self.special = (
+            self._is_special
+            or self.entered_by_oracle
+            or bool(self.way_down)
+            or self.unfinished is not None
+        )
 
     def enter_by_oracle(self) -> None:
         """Note that the oracle leads to the state, which is visited next."""
@@ -214,16 +239,16 @@ class StateRecord:
         :raises ValueError: where theirs cannot be read.
         """
         with self._lock:
-            return merged(self._up_to_date().snapshot(), self.shared, theirs,
-                          self.settings.memory)
+            return merged(self._up_to_date().snapshot(), self.shared, theirs, self.settings.memory)
 
     def share(self, before: Mapping[str, Any], written: Mapping[str, Any]) -> None:
         """Have what is shared now. `before`: what was learned here when it was merged."""
         with self._lock:
             estimator = self._up_to_date()
             if before != written:
-                estimator.restore(merged(estimator.snapshot(), base_of(before), written,
-                                         self.settings.memory))
+                estimator.restore(
+                    merged(estimator.snapshot(), base_of(before), written, self.settings.memory)
+                )
             self.shared = base_of(written)
 
     @property
@@ -327,5 +352,6 @@ class StateRecord:
             edge = self.fast.pop(outcome)
             self._retired += edge.count
         if edge.count:
-            self._edges[outcome, edge.target] = self._edges.get(
-                (outcome, edge.target), 0) + edge.count
+            self._edges[outcome, edge.target] = (
+                self._edges.get((outcome, edge.target), 0) + edge.count
+            )

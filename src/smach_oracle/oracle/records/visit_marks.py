@@ -2,6 +2,7 @@
 
 Pure, and without smach.
 """
+
 from typing import Dict, List, Tuple
 
 
@@ -46,5 +47,7 @@ class VisitMarks:
 
     def told(self) -> List[Tuple[str, List[object]]]:
         """Return labels and marks as plain data."""
-        return [(label, [mark.reached, mark.executed, mark.done, mark.spent])
-                for label, mark in list(self._by_label.items())]
+        return [
+            (label, [mark.reached, mark.executed, mark.done, mark.spent])
+            for label, mark in list(self._by_label.items())
+        ]

@@ -1,4 +1,5 @@
 """Visits of states, and how each counts. Pure, and without smach."""
+
 from enum import IntEnum
 from typing import NamedTuple
 

@@ -1,4 +1,5 @@
 """Describes Concurrences and Iterators in a question: where outcomes lead, what runs again."""
+
 from typing import Any, Iterator, Tuple
 
 import smach
@@ -16,10 +17,11 @@ def outcomes_of_branch(node: TreeNode, state: smach.State) -> Tuple[OutcomeChoic
     branch = node.branch
     if branch is None:
         return ()
-    last = [(not branch.goes_on_after(outcome), str(outcome), outcome)
-            for outcome in state.get_registered_outcomes()]
-    return tuple(OutcomeChoice(outcome, branch.leads_to(outcome))
-                 for _, _, outcome in sorted(last))
+    last = [
+        (not branch.goes_on_after(outcome), str(outcome), outcome)
+        for outcome in state.get_registered_outcomes()
+    ]
+    return tuple(OutcomeChoice(outcome, branch.leads_to(outcome)) for _, _, outcome in sorted(last))
 
 
 def running_again(way: Way) -> Tuple[str, ...]:

@@ -1,4 +1,5 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
+
 from typing import Any, Callable, List, Optional, Tuple
 
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
@@ -33,8 +34,15 @@ class Deciding:
     `decide` is called in the machine's thread, `cancel` from any thread.
     """
 
-    def __init__(self, node: TreeNode, record: StateRecord, failure: Failure,
-                 context: FailureContext, continuous: bool, stop: RecoveryStop) -> None:
+    def __init__(
+        self,
+        node: TreeNode,
+        record: StateRecord,
+        failure: Failure,
+        context: FailureContext,
+        continuous: bool,
+        stop: RecoveryStop,
+    ) -> None:
         self._node = node
         self._record = record
         self.failure = failure
@@ -88,7 +96,8 @@ class Deciding:
         way = way_to(self._node, place) if place is not None else None
         if way is None:
             return Decider.POLICY, self.facts_of(
-                Action.ASK, blocked='there is no state {!r} to go back to'.format(name))
+                Action.ASK, blocked='there is no state {!r} to go back to'.format(name)
+            )
         why_not = why_not_above() if action is Action.RESTART else ''
         decider, why_not = (Decider.AUTHOR, why_not) if why_not else self._what_prevents(way)
         if why_not:
@@ -100,9 +109,12 @@ class Deciding:
 
     def _past(self) -> Past:
         record, tree = self._record, self._node.tree
-        return Past(record.recoveries, tree.restarts.count,
-                    '{}/{} {}'.format(self._node.path, record.label, record.visits),
-                    tree.trials - 1)
+        return Past(
+            record.recoveries,
+            tree.restarts.count,
+            '{}/{} {}'.format(self._node.path, record.label, record.visits),
+            tree.trials - 1,
+        )
 
     def _place_of(self, action: Action) -> Tuple[str, Optional[Place]]:
         """Return where a decision leads, by name and as a place.
@@ -114,8 +126,11 @@ class Deciding:
             top = [node, *levels_above(node)][-1]
             label = top.machine._initial_state_label or ''
             return label, Place(top, label)
-        name = (self._record.label if action is Action.REVISIT
-                else node.in_force.policy.step_back_target(self._context))
+        name = (
+            self._record.label
+            if action is Action.REVISIT
+            else node.in_force.policy.step_back_target(self._context)
+        )
         return name, place_named(node, name)
 
     def _named(self, way: Way) -> str:
@@ -125,8 +140,10 @@ class Deciding:
 
     def _what_prevents(self, way: Way) -> Tuple[Decider, str]:
         """Spend a recovery on going to a place, or return what prevents it, and why."""
-        for decider, why_not in ((Decider.ON_RETRY, self.why_repeats_on),
-                                 (Decider.POLICY, self._why_not)):
+        for decider, why_not in (
+            (Decider.ON_RETRY, self.why_repeats_on),
+            (Decider.POLICY, self._why_not),
+        ):
             reason = why_not(way)
             if reason:
                 return decider, reason
@@ -145,7 +162,8 @@ class Deciding:
         target = self._named(way)
         if not has_visited(place.node, place.label):
             return 'this trial has not been in {}, and going there may repeat {}'.format(
-                target, ', '.join(repeated))
+                target, ', '.join(repeated)
+            )
         return going_would_repeat(self._record.label, target, repeated)
 
     def _why_not(self, way: Way) -> str:
@@ -164,10 +182,18 @@ class Deciding:
     def facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""
         record = self._record
-        return DecisionFacts(record.label, record.recent, record.rate, self._continuous, action,
-                             met=self._met, not_met=self._not_met, tried=record.tried,
-                             not_failed=self.failure.why_none,
-                             **fields)
+        return DecisionFacts(
+            record.label,
+            record.recent,
+            record.rate,
+            self._continuous,
+            action,
+            met=self._met,
+            not_met=self._not_met,
+            tried=record.tried,
+            not_failed=self.failure.why_none,
+            **fields,
+        )
 
     # -- preconditions
 
@@ -187,8 +213,9 @@ class Deciding:
         self._emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
         for _ in range(self._record.most_repeats):
-            if not why_not or not self._stop.has_waited_after('did not get its precondition '
-                                                              + spec.name):
+            if not why_not or not self._stop.has_waited_after(
+                'did not get its precondition ' + spec.name
+            ):
                 break
             why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
@@ -197,8 +224,11 @@ class Deciding:
             self._not_met = spec.name
         else:
             self._met.append(spec.name)
-        self.tried.append('precondition {}: {}'.format(
-            spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome))
+        self.tried.append(
+            'precondition {}: {}'.format(
+                spec.name, '{} ({})'.format(outcome, why_not) if why_not else outcome
+            )
+        )
         return not why_not
 
     def _emit(self, kind: EventKind, **fields: Any) -> None:

@@ -3,6 +3,7 @@
 Without an oracle an unsuccessful outcome leads to a state of the author's or ends the machine
 (paper, section VI-A).
 """
+
 import traceback
 from typing import Any, Callable, NamedTuple, Optional, Tuple
 
@@ -89,8 +90,9 @@ def route_of(machine: Machine, label: str, outcome: str) -> Route:
     return Route('', False)
 
 
-def failure_kind(outcome: str, route: Route, listed: Tuple[str, ...],
-                 failing: FailingNames) -> FailureKind:
+def failure_kind(
+    outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames
+) -> FailureKind:
     """Classify a registered outcome, without regard to who recovers from it."""
     if outcome in listed:
         return FailureKind.FAILING_OUTCOME
@@ -103,8 +105,9 @@ def failure_kind(outcome: str, route: Route, listed: Tuple[str, ...],
     return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
 
 
-def author_recovers(outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...],
-                    author_recoveries: str) -> bool:
+def author_recovers(
+    outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...], author_recoveries: str
+) -> bool:
     """Whether the author's own transition from this failing outcome stays.
 
     It does where it leads to another state, or, for an outcome that only sounds like a failure, to
@@ -125,8 +128,9 @@ def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult
     return VisitResult.SUCCESS if kind is FailureKind.NOT_A_FAILURE else VisitResult.FAILURE
 
 
-def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
-                   failing: FailingNames) -> ContainerEnding:
+def natural_ending(
+    failure: Failure, container_outcomes: Tuple[str, ...], failing: FailingNames
+) -> ContainerEnding:
     """Return how the failure would have ended the container without an oracle.
 
     An overrun has no such ending, since the state would still run: the container's own failing
@@ -134,8 +138,11 @@ def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
     """
     if failure.route is not None and failure.route.target:
         route = failure.route
-        return ContainerEnding(state=route.target) if route.is_state else ContainerEnding(
-            outcome=route.target)
+        return (
+            ContainerEnding(state=route.target)
+            if route.is_state
+            else ContainerEnding(outcome=route.target)
+        )
     if failure.error is not None:
         return ContainerEnding(error=failure.error())
     for word in failing.words:
@@ -145,7 +152,8 @@ def natural_ending(failure: Failure, container_outcomes: Tuple[str, ...],
         if outcome in failing:
             return ContainerEnding(outcome=outcome)
     return ContainerEnding(
-        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text)))
+        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text))
+    )
 
 
 def route_at_preempt(machine: Machine, label: str) -> Route:
@@ -170,11 +178,15 @@ def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     registered = machine.get_registered_outcomes()
     state = machine._states[failure.state]
     if machine.preempt_requested() and not (
-            smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)):
+        smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)
+    ):
         route = route_at_preempt(machine, failure.state)
         if route.target:
-            return ContainerEnding(state=route.target, obeys=True) if route.is_state else (
-                ContainerEnding(outcome=route.target))
+            return (
+                ContainerEnding(state=route.target, obeys=True)
+                if route.is_state
+                else (ContainerEnding(outcome=route.target))
+            )
     if PREEMPTED in registered:
         return ContainerEnding(outcome=PREEMPTED)
     return natural_ending(failure, registered, node.in_force.failing)
@@ -197,8 +209,11 @@ def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str
 
     It wants one, and nobody goes by it.
     """
-    if (outcome is not None or node.tree.early_end.why is None
-            or not (node.branch is not None or len(node.below) > 1)):
+    if (
+        outcome is not None
+        or node.tree.early_end.why is None
+        or not (node.branch is not None or len(node.below) > 1)
+    ):
         return outcome
     return leaving_outcome(node.machine, node.in_force.failing, None)
 
@@ -222,7 +237,9 @@ def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
         return err
     wrapped: Exception = smach.InvalidUserCodeError(
         'Could not execute state {!r} of type {}: {}'.format(
-            label, repr_of(state), traceback_of(err)))
+            label, repr_of(state), traceback_of(err)
+        )
+    )
     wrapped.__cause__ = err
     return wrapped
 
@@ -235,10 +252,13 @@ def traceback_of(err: Exception) -> str:
 def unregistered_text(label: str, state: smach.State, outcome: Any) -> str:
     """Say that the state has not registered the outcome."""
     return 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
-        label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes()))
+        label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes())
+    )
 
 
 def unbound_text(label: str, outcome: str, container_outcomes: Tuple[str, ...]) -> str:
     """Say that the outcome leads nowhere."""
-    return ('Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
-            'the container has {}'.format(outcome, label, names(container_outcomes)))
+    return (
+        'Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
+        'the container has {}'.format(outcome, label, names(container_outcomes))
+    )

@@ -1,4 +1,5 @@
 """What is done where nobody answers a question (`on_no_answer`)."""
+
 from typing import TYPE_CHECKING, Optional
 
 from ..asking.question import names
@@ -27,7 +28,8 @@ def fall_back(recovering: 'Recovering') -> Verdict:
         if target in node.machine.get_registered_outcomes():
             return recovering.give_up(why, target)
         recovering.warn(
-            'on_no_answer: {!r} is no outcome of this container; stopping'.format(target))
+            'on_no_answer: {!r} is no outcome of this container; stopping'.format(target)
+        )
     return recovering.give_up(why)
 
 
@@ -44,8 +46,11 @@ def fallback_in_words(recovering: 'Recovering') -> str:
     ending = recovering.natural_ending()
     if ending.error is not None:
         return 'stop with the error {}'.format(type(ending.error).__name__)
-    return ('go on to {}'.format(ending.state) if ending.state
-            else 'stop with {}'.format(ending.outcome))
+    return (
+        'go on to {}'.format(ending.state)
+        if ending.state
+        else 'stop with {}'.format(ending.outcome)
+    )
 
 
 def fallback_in_short(recovering: 'Recovering') -> str:
@@ -70,9 +75,14 @@ def _why_not(recovering: 'Recovering', way: Optional[Way]) -> str:
     record, budget = recovering.record, recovering.budget
     if record.fallbacks >= max(1, record.settings.max_recoveries):
         return 'this trial has gone there {} times for {} already'.format(
-            record.fallbacks, record.label)
+            record.fallbacks, record.label
+        )
     if way is None:
         return 'no such state; there are ' + names(recovering.node.labels())
     over = 'the trial is over then' if recovering.ends_budget else budget.why_over()
-    return (why_closed_on(way) or recovering.deciding.why_repeats_on(way) or over
-            or budget.why_no_recovery())
+    return (
+        why_closed_on(way)
+        or recovering.deciding.why_repeats_on(way)
+        or over
+        or budget.why_no_recovery()
+    )

@@ -1,4 +1,5 @@
 """Judges how a state has ended: where its outcome leads, or what kind of failure it is."""
+
 from functools import lru_cache, partial
 from typing import Any, Callable, NamedTuple, Optional, Union
 
@@ -34,8 +35,9 @@ class HeldBack(NamedTuple):
     text: str
 
 
-def judge(node: TreeNode, record: StateRecord, outcome: Any,
-          error: Optional[Exception]) -> Union[Route, Failure]:
+def judge(
+    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
     judged = _judge(node, record, outcome, error)
     if isinstance(judged, Route):
@@ -44,14 +46,21 @@ def judge(node: TreeNode, record: StateRecord, outcome: Any,
     return judged._replace(text='; '.join(filter(None, (judged.text, items)))) if items else judged
 
 
-def _judge(node: TreeNode, record: StateRecord, outcome: Any,
-           error: Optional[Exception]) -> Union[Route, Failure]:
+def _judge(
+    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+) -> Union[Route, Failure]:
     machine = node.machine
     label, state = record.label, machine._states[record.label]
     if error is not None:
-        return Failure(label, FailureKind.EXCEPTION, '',
-                       error_text(error), None,
-                       _once(partial(raised_error, label, state, error)), traceback_of(error))
+        return Failure(
+            label,
+            FailureKind.EXCEPTION,
+            '',
+            error_text(error),
+            None,
+            _once(partial(raised_error, label, state, error)),
+            traceback_of(error),
+        )
     if isinstance(outcome, Overrun):
         return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
     if isinstance(outcome, Unfinished):
@@ -62,11 +71,17 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
         text = unregistered_text(label, state, outcome)
         if node.branch is not None and isinstance(outcome, str):
             # Concurrences and Iterators go on with such an outcome
-            return Failure(label, FailureKind.UNREGISTERED_OUTCOME, outcome, text,
-                           Route(outcome, False))
-        return Failure(label, FailureKind.UNREGISTERED_OUTCOME,
-                       outcome if isinstance(outcome, str) else '', text, None,
-                       _once(partial(smach.InvalidTransitionError, text)))
+            return Failure(
+                label, FailureKind.UNREGISTERED_OUTCOME, outcome, text, Route(outcome, False)
+            )
+        return Failure(
+            label,
+            FailureKind.UNREGISTERED_OUTCOME,
+            outcome if isinstance(outcome, str) else '',
+            text,
+            None,
+            _once(partial(smach.InvalidTransitionError, text)),
+        )
     route = route_of(machine, label, outcome)
     kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:
@@ -74,8 +89,9 @@ def _judge(node: TreeNode, record: StateRecord, outcome: Any,
     if route.target:
         return Failure(label, kind, outcome, _description(node, label, state), route)
     text = unbound_text(label, outcome, machine.get_registered_outcomes())
-    return Failure(label, kind, outcome, text, route,
-                   _once(partial(smach.InvalidTransitionError, text)))
+    return Failure(
+        label, kind, outcome, text, route, _once(partial(smach.InvalidTransitionError, text))
+    )
 
 
 def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
@@ -89,8 +105,11 @@ def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     error = None
     if route is None or not route.target:
         route = None
-        if before.kind not in (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT,
-                               FailureKind.HELD_BACK):
+        if before.kind not in (
+            FailureKind.INTERRUPTED,
+            FailureKind.TIME_LIMIT,
+            FailureKind.HELD_BACK,
+        ):
             error = partial(smach.InvalidUserCodeError, '{}: {}'.format(label, before.text))
     return Failure(label, before.kind, before.outcome, before.text, route, error)
 
@@ -99,8 +118,9 @@ def _description(node: TreeNode, label: str, state: smach.State) -> str:
     try:
         return node.tree.describe_failure(state)
     except Exception as err:  # it looks into states of any make
-        smach.logwarn('{}/{}: cannot say more of its failure: {}'.format(
-            node.path, label, repr_of(err)))
+        smach.logwarn(
+            '{}/{}: cannot say more of its failure: {}'.format(node.path, label, repr_of(err))
+        )
         return ''
 
 

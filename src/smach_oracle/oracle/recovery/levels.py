@@ -1,4 +1,5 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
+
 from typing import Any, FrozenSet, List, NamedTuple, Optional, Tuple
 
 import smach
@@ -48,8 +49,12 @@ def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     for label in node.below[1:-1]:
         around = around.get_children()[label]
     # what only the settings call a failure its author has not foreseen
-    return (isinstance(around, smach.Iterator) and outcome in around._loop_outcomes
-            and not _is_overridden(above, node.below) and outcome in node.in_force.failing)
+    return (
+        isinstance(around, smach.Iterator)
+        and outcome in around._loop_outcomes
+        and not _is_overridden(above, node.below)
+        and outcome in node.in_force.failing
+    )
 
 
 def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen]:
@@ -64,15 +69,19 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
         if above is not next(levels_above(node), None):
             return None
         if not is_direct(node):
-            return (Foreseen('{} {} -> the next item'.format(node.path, outcome), outcome)
-                    if _is_passed_over(node, above, outcome) else None)
+            return (
+                Foreseen('{} {} -> the next item'.format(node.path, outcome), outcome)
+                if _is_passed_over(node, above, outcome)
+                else None
+            )
         label = node.below[0]
         route, kind = _judged_above(above, label, outcome)
         if kind is FailureKind.NOT_A_FAILURE or not route.target:
             return None
         settings = above.settings_of(label)
-        if author_recovers(outcome, route, kind, settings.failure_outcomes,
-                           settings.author_recoveries):
+        if author_recovers(
+            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
+        ):
             return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
         if route.is_state:  # `author_recoveries: override`
             return None
@@ -83,12 +92,14 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
 def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, FailureKind]:
     """Return where the end of a container leads on the level above, and what it is there."""
     route = route_of(above.machine, label, outcome)
-    return route, failure_kind(outcome, route, above.settings_of(label).failure_outcomes,
-                               above.in_force.failing)
+    return route, failure_kind(
+        outcome, route, above.settings_of(label).failure_outcomes, above.in_force.failing
+    )
 
 
-def failure_above(above: TreeNode, label: str, ending: ContainerEnding,
-                  text: str) -> Optional[Failure]:
+def failure_above(
+    above: TreeNode, label: str, ending: ContainerEnding, text: str
+) -> Optional[Failure]:
     """Return the failure that the end of a container is on the level above, else None.
 
     :param label: of the state there that holds the container.
@@ -152,8 +163,9 @@ class OuterLevel:
     That is a failure of the state only where the oracle does not ask.
     """
 
-    def __init__(self, node: TreeNode, below: TreeNode, failure: Failure,
-                 stop: RecoveryStop) -> None:
+    def __init__(
+        self, node: TreeNode, below: TreeNode, failure: Failure, stop: RecoveryStop
+    ) -> None:
         """`below`: the level below, which asks. `failure`: as its end would be judged here."""
         self._node = node
         self._record: StateRecord = node.record(failure.state)
@@ -161,8 +173,9 @@ class OuterLevel:
         self._below = below
         self._context = failure_context(node, self._record)
         self._continuous = node.in_force.policy.is_continuous(self._context)
-        self._deciding = Deciding(node, self._record, failure, self._context, self._continuous,
-                                  stop)
+        self._deciding = Deciding(
+            node, self._record, failure, self._context, self._continuous, stop
+        )
         self.tried: List[str] = []
 
     def cancel(self) -> None:
@@ -187,20 +200,43 @@ class OuterLevel:
         self._node.records.note_failure(record)
         sentence = decision_sentence(facts)
         smach.loginfo('{}/{}'.format(self._node.path, sentence))
-        self._emit(EventKind.FAILURE, outcome=self._failure.outcome,
-                   failure_kind=int(self._failure.kind), failure_class=int(failure_class),
-                   rate=rate, continuous=self._continuous, text=self._failure.text)
-        self._emit(EventKind.DECISION, outcome=facts.action.value, target=facts.target,
-                   failure_class=int(record.failure_class), rate=record.rate,
-                   continuous=self._continuous, text=sentence, data={DECIDED_BY: decider.value})
+        self._emit(
+            EventKind.FAILURE,
+            outcome=self._failure.outcome,
+            failure_kind=int(self._failure.kind),
+            failure_class=int(failure_class),
+            rate=rate,
+            continuous=self._continuous,
+            text=self._failure.text,
+        )
+        self._emit(
+            EventKind.DECISION,
+            outcome=facts.action.value,
+            target=facts.target,
+            failure_class=int(record.failure_class),
+            rate=record.rate,
+            continuous=self._continuous,
+            text=sentence,
+            data={DECIDED_BY: decider.value},
+        )
         record.recoveries += 1
-        return OuterDecision(self._node, way, sentence, decided.kept(self._deciding.watch),
-                             facts.wait_s, facts.action is Action.RESTART)
+        return OuterDecision(
+            self._node,
+            way,
+            sentence,
+            decided.kept(self._deciding.watch),
+            facts.wait_s,
+            facts.action is Action.RESTART,
+        )
 
     def _foreseen(self) -> str:
         node = self._node
-        foreseen = foreseen_above(node, natural_ending(
-            self._failure, node.machine.get_registered_outcomes(), node.in_force.failing))
+        foreseen = foreseen_above(
+            node,
+            natural_ending(
+                self._failure, node.machine.get_registered_outcomes(), node.in_force.failing
+            ),
+        )
         return foreseen.text if foreseen is not None else ''
 
     def _emit(self, kind: EventKind, **fields: object) -> None:

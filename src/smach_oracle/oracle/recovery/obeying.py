@@ -1,4 +1,5 @@
 """Makes a verdict of an expert's answer."""
+
 from typing import Callable, Optional
 
 import smach
@@ -13,8 +14,13 @@ from .failure import ContainerEnding
 from .verdict import GiveUp, JumpTo, Supersede, Verdict
 
 
-def verdict_of(answer: Answer, node: TreeNode, label: str, watch: WriteWatch,
-               natural_ending: Callable[[], ContainerEnding]) -> Verdict:
+def verdict_of(
+    answer: Answer,
+    node: TreeNode,
+    label: str,
+    watch: WriteWatch,
+    natural_ending: Callable[[], ContainerEnding],
+) -> Verdict:
     """Write the outputs of an answer about a state, and return the way out of the meta state.
 
     `natural_ending`: how the container ends where the answer gives up without an outcome.
@@ -39,8 +45,9 @@ def way_of(answer: Answer, node: TreeNode) -> Way:
     place = place_at(node, answer.container, answer.state)
     way = way_to(node, place) if place is not None else None
     if way is None:
-        raise smach.InvalidStateError('there is no way to {}/{}'.format(
-            answer.container or node.path, answer.state))
+        raise smach.InvalidStateError(
+            'there is no way to {}/{}'.format(answer.container or node.path, answer.state)
+        )
     return way
 
 

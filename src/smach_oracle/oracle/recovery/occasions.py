@@ -2,6 +2,7 @@
 
 Which phases of a recovery do anything, what is counted and what is told follows from it alone.
 """
+
 import enum
 from typing import Callable, NamedTuple, Optional
 
@@ -59,38 +60,60 @@ class Occasion(NamedTuple):
 def failed(failure: Failure, context: FailureContext, continuous: bool = False) -> Occasion:
     """A state has failed, or overran, or was held back since it is not to be repeated."""
     return Occasion(
-        failure, context, failure.outcome, failure.outcome or failure.kind.name.lower(),
+        failure,
+        context,
+        failure.outcome,
+        failure.outcome or failure.kind.name.lower(),
         superseding=Superseding.TAKES_BACK if failure.is_counted else Superseding.COUNTS,
-        continuous=continuous)
+        continuous=continuous,
+    )
 
 
-def interrupted(failure: Failure, context: FailureContext, before: Unfinished,
-                continuous: bool = False) -> Occasion:
+def interrupted(
+    failure: Failure, context: FailureContext, before: Unfinished, continuous: bool = False
+) -> Occasion:
     """A visit was begun before the program was stopped. `before`: how it stood."""
     occasion = failed(failure, context, continuous)
     if not before.asks:
         return occasion
     if failure.is_held_back:
         return occasion._replace(keeps=True)
-    return occasion._replace(first=FirstStep.ASK, why=before.asks, keeps=before.keeps,
-                             continuous=False)
+    return occasion._replace(
+        first=FirstStep.ASK, why=before.asks, keeps=before.keeps, continuous=False
+    )
 
 
 def taken_out(failure: Failure, context: FailureContext, answer: Answer, outcome: str) -> Occasion:
     """A state was ended by an answer while it still ran. `failure`: as if it had failed."""
-    return Occasion(failure, context, outcome, outcome or 'taken_out', FirstStep.OBEY,
-                    Superseding.RECORDS, is_logged=False, answer=answer)
+    return Occasion(
+        failure,
+        context,
+        outcome,
+        outcome or 'taken_out',
+        FirstStep.OBEY,
+        Superseding.RECORDS,
+        is_logged=False,
+        answer=answer,
+    )
 
 
-def arrived(failure: Failure, context: FailureContext, below: FromBelow, outcome: str,
-            is_own: bool) -> Occasion:
+def arrived(
+    failure: Failure, context: FailureContext, below: FromBelow, outcome: str, is_own: bool
+) -> Occasion:
     """A state was left for this level. `failure`: if it has to be asked about.
 
     `is_own`: the decision was made on this level, as if the state had failed.
     """
-    return Occasion(failure, context, outcome, outcome or 'left', FirstStep.OBEY,
-                    Superseding.TAKES_BACK if is_own else Superseding.RECORDS, is_logged=False,
-                    below=below)
+    return Occasion(
+        failure,
+        context,
+        outcome,
+        outcome or 'left',
+        FirstStep.OBEY,
+        Superseding.TAKES_BACK if is_own else Superseding.RECORDS,
+        is_logged=False,
+        below=below,
+    )
 
 
 def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
@@ -99,10 +122,10 @@ def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
     `why`: the robot is not well, or '' where a preempt or a shutdown is under way.
     """
     return failed(failure, context)._replace(
-        first=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why)
+        first=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why
+    )
 
 
-def often_unwell(failure: Failure, context: FailureContext, continuous: bool,
-                 why: str) -> Occasion:
+def often_unwell(failure: Failure, context: FailureContext, continuous: bool, why: str) -> Occasion:
     """A state has failed while the robot was not well, too often not to be counted."""
     return failed(failure, context, continuous)._replace(first=FirstStep.WAIT_AND_DECIDE, why=why)

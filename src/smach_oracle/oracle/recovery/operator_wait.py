@@ -1,4 +1,5 @@
 """Waits for an operator where no machine's lock is held: before a precondition, between items."""
+
 import contextlib
 from typing import Callable, Iterator, Optional
 
@@ -34,8 +35,9 @@ def wait_for_operator(node: TreeNode, place: HeldPlace, autonomy: str, stopped: 
     if hold is None:
         return
     hold.may_be_sent, hold.autonomy = False, autonomy
-    wait_until_let_go(control, hold, Wait(node, clocks_stand_still(node),
-                                          lambda: _ended_by(node, stopped)))
+    wait_until_let_go(
+        control, hold, Wait(node, clocks_stand_still(node), lambda: _ended_by(node, stopped))
+    )
 
 
 def _ended_by(node: TreeNode, stopped: Stopped) -> Optional[LetGo]:

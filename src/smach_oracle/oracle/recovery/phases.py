@@ -4,6 +4,7 @@ Each phase is a function of the recovery. It returns a verdict, or None to leave
 new way to recover is one more function, and its place in `recover`. Which phases do anything on
 which occasion is in a table of doc/executive_inside.md.
 """
+
 from typing import FrozenSet, List, Optional
 
 import smach
@@ -42,9 +43,15 @@ from .verdict import JumpTo, Verdict
 
 def recover(recovering: Recovering) -> Verdict:
     """Go through the phases, and return the verdict of the first that comes to one."""
-    return (obey_given(recovering) or wait_until_well(recovering) or ask_first(recovering)
-            or decide(recovering) or escalate(recovering) or ask_expert(recovering)
-            or fall_back(recovering))  # every verdict counts as true, and the last phase has one
+    return (
+        obey_given(recovering)
+        or wait_until_well(recovering)
+        or ask_first(recovering)
+        or decide(recovering)
+        or escalate(recovering)
+        or ask_expert(recovering)
+        or fall_back(recovering)
+    )  # every verdict counts as true, and the last phase has one
 
 
 # -- what comes before a decision
@@ -68,11 +75,15 @@ def _obey_answer(recovering: Recovering, answer: Answer) -> Optional[Verdict]:
         closed = why_closed_on(verdict.way)
     if not closed:
         return verdict
-    recovering.ask_at_once('cannot go to {}, as was answered: {} {}'.format(
-        answer.state, answer.state, closed))
+    recovering.ask_at_once(
+        'cannot go to {}, as was answered: {} {}'.format(answer.state, answer.state, closed)
+    )
     # it does not run any more
-    recovering.judge_anew(recovering.failure._replace(
-        kind=FailureKind.TIME_LIMIT, text='was taken out while it still ran'))
+    recovering.judge_anew(
+        recovering.failure._replace(
+            kind=FailureKind.TIME_LIMIT, text='was taken out while it still ran'
+        )
+    )
     return recovering.end_unaided() if recovering.budget.why_over() else None
 
 
@@ -97,7 +108,8 @@ def wait_until_well(recovering: Recovering) -> Optional[Verdict]:
         return recovering.preempted()
     again = first is FirstStep.ENTER_AGAIN
     if recovering.stop.is_over() or not recovering.stop.wait_until_well(
-            FAILED if again else 'failed again', why):
+        FAILED if again else 'failed again', why
+    ):
         return recovering.end_early()
     return _enter_again(recovering) if again else None
 
@@ -108,9 +120,12 @@ def _enter_again(recovering: Recovering) -> Optional[Verdict]:
     if not repeated_by_going_to(node, label):
         recovering.record.unwell_repeats += 1
         return recovering.jump(Way((), node, (Place(node, label),)))
-    recovering.judge_anew(recovering.failure._replace(
-        kind=FailureKind.HELD_BACK,
-        text='failed while the robot was not well, and is not repeated by itself'))
+    recovering.judge_anew(
+        recovering.failure._replace(
+            kind=FailureKind.HELD_BACK,
+            text='failed while the robot was not well, and is not repeated by itself',
+        )
+    )
     return None
 
 
@@ -145,8 +160,9 @@ def _follow_policy(recovering: Recovering, facts: DecisionFacts) -> Verdict:
     """Carry out a decision that asks nobody."""
     way = recovering.deciding.way
     if way is None:
-        return _give_way(recovering, _why_nobody_is_asked(recovering)
-                         or Foreseen('the policy asks nobody'))
+        return _give_way(
+            recovering, _why_nobody_is_asked(recovering) or Foreseen('the policy asks nobody')
+        )
     recovering.record.recoveries += 1
     restarts = facts.action is Action.RESTART
     written: FrozenSet[str] = frozenset() if restarts else way.kept(recovering.deciding.watch)
@@ -163,10 +179,16 @@ def _tell_decision(recovering: Recovering, decided: Decided) -> None:
     decider, facts = decided
     record, sentence = recovering.record, decision_sentence(facts)
     smach.loginfo('{}/{}'.format(recovering.node.path, sentence))
-    recovering.emit(EventKind.DECISION, outcome=facts.action.value, target=facts.target,
-                    failure_class=int(record.failure_class), rate=record.rate,
-                    continuous=recovering.occasion.continuous, text=sentence,
-                    data={DECIDED_BY: decider.value})
+    recovering.emit(
+        EventKind.DECISION,
+        outcome=facts.action.value,
+        target=facts.target,
+        failure_class=int(record.failure_class),
+        rate=record.rate,
+        continuous=recovering.occasion.continuous,
+        text=sentence,
+        data={DECIDED_BY: decider.value},
+    )
 
 
 # -- the levels above
@@ -179,17 +201,30 @@ def escalate(recovering: Recovering) -> Optional[Verdict]:
     decider, facts = recovering.decided
     nobody = _why_nobody_is_asked(recovering)
     levels = [] if nobody else _levels_that_may_decide(recovering, decider)
-    asked = ('the oracle above' if levels
-             else 'nobody, since ' + nobody.text if nobody else _asked_in_words(recovering))
+    asked = (
+        'the oracle above'
+        if levels
+        else 'nobody, since ' + nobody.text
+        if nobody
+        else _asked_in_words(recovering)
+    )
     _tell_decision(recovering, (decider, facts._replace(asked=asked)))
     outer = _decided_above(recovering, levels)
     if recovering.stop.is_over():
         return recovering.end_early()
     if outer is not None:
         recovering.record.recoveries += 1
-        return _wait_and_jump(recovering, outer.wait_s, JumpTo(
-            outer.way, text=outer.text, written=outer.written, decided_by=outer.decided_by,
-            restarts=outer.restarts))
+        return _wait_and_jump(
+            recovering,
+            outer.wait_s,
+            JumpTo(
+                outer.way,
+                text=outer.text,
+                written=outer.written,
+                decided_by=outer.decided_by,
+                restarts=outer.restarts,
+            ),
+        )
     return _give_way(recovering, nobody) if nobody else None
 
 
@@ -202,7 +237,8 @@ def _why_nobody_is_asked(recovering: Recovering) -> Optional[Foreseen]:
         return None
     foreseen = foreseen_above(node, recovering.natural_ending())
     return foreseen and foreseen._replace(
-        text='its author goes on from there ({})'.format(foreseen.text))
+        text='its author goes on from there ({})'.format(foreseen.text)
+    )
 
 
 def _why_left_to_others(recovering: Recovering) -> str:
@@ -219,8 +255,7 @@ def _give_way(recovering: Recovering, why: Foreseen) -> Verdict:
 
 def _levels_that_may_decide(recovering: Recovering, decider: Decider) -> List[TreeNode]:
     """Return them, innermost first. None where the failure is to be asked about at once."""
-    if decider is not Decider.POLICY or (
-            recovering.record.failure_class is FailureClass.HIGH):
+    if decider is not Decider.POLICY or (recovering.record.failure_class is FailureClass.HIGH):
         return []
     return levels_that_may_decide(recovering.node)
 
@@ -229,8 +264,9 @@ def _decided_above(recovering: Recovering, levels: List[TreeNode]) -> Optional[O
     """Return what the innermost level decides that does not ask, or None where all ask."""
     below, ending = recovering.node, recovering.natural_ending()
     for level in levels:
-        failure = failure_above(level, below.below[0], ending,
-                                '{}: {}'.format(below.path, recovering.cause))
+        failure = failure_above(
+            level, below.below[0], ending, '{}: {}'.format(below.path, recovering.cause)
+        )
         if failure is None or recovering.stop.is_over():
             return None
         recovering.outer = OuterLevel(level, recovering.node, failure, recovering.stop)
@@ -240,8 +276,9 @@ def _decided_above(recovering: Recovering, levels: List[TreeNode]) -> Optional[O
         if decision is not None:
             return decision
         below = level
-        ending = natural_ending(failure, level.machine.get_registered_outcomes(),
-                                level.in_force.failing)
+        ending = natural_ending(
+            failure, level.machine.get_registered_outcomes(), level.in_force.failing
+        )
     return None
 
 
@@ -271,14 +308,18 @@ def _ask(recovering: Recovering, expert: Expert) -> Optional[Verdict]:
         if early_end.end_at_shutdown(bool(smach.is_shutdown())):
             preempt_beside(node)
         if reply.question_id:
-            recovering.emit(EventKind.QUERY_CANCELLED, query_id=reply.question_id,
-                            text=recovering.stop.why())
+            recovering.emit(
+                EventKind.QUERY_CANCELLED, query_id=reply.question_id, text=recovering.stop.why()
+            )
         return recovering.preempted()
     if reply.answer is not None:
         return _obey(recovering, reply.answer)
     why = '; '.join(filter(None, (reply.why_none, budget.why_over())))
-    recovering.emit(EventKind.QUERY_EXPIRED, query_id=reply.question_id,
-                    text='{}; fallback: {}'.format(why, fallback_in_words(recovering)))
+    recovering.emit(
+        EventKind.QUERY_EXPIRED,
+        query_id=reply.question_id,
+        text='{}; fallback: {}'.format(why, fallback_in_words(recovering)),
+    )
     recovering.why_no_answer = why
     return None
 
@@ -297,6 +338,12 @@ def _asked_in_words(recovering: Recovering) -> str:
 
 
 def _obey(recovering: Recovering, answer: Answer) -> Verdict:
-    return recovering.when_well(verdict_of(
-        answer, recovering.node, recovering.record.label, recovering.deciding.watch,
-        recovering.natural_ending))
+    return recovering.when_well(
+        verdict_of(
+            answer,
+            recovering.node,
+            recovering.record.label,
+            recovering.deciding.watch,
+            recovering.natural_ending,
+        )
+    )

@@ -4,6 +4,7 @@ It runs on the userdata of its own container. The containers on the way down to 
 keys, as if they began. Once it has ended well, what it wrote goes up through their output keys, and
 down through the input keys of the containers around the failed state.
 """
+
 from typing import Any, Dict, List, Tuple
 
 from ..machine.tree_node import TreeNode
@@ -39,8 +40,8 @@ class RunElsewhere:
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
         self._before: List[Tuple[Dict[str, Any], Dict[str, Any]]] = [
-            (link.below.userdata._data, dict(link.below.userdata._data))
-            for link in self._down[:-1]]
+            (link.below.userdata._data, dict(link.below.userdata._data)) for link in self._down[:-1]
+        ]
         self.gate = self._watch.gate
         for link in self._down:
             hand_down(link)
@@ -74,6 +75,6 @@ def _check(way: Way) -> None:
     for place in way.down[:-1]:
         guarded = place.node.settings_of(place.label).on_retry != ALLOW
         if guarded and place.node.records.marks.of(place.label).done:
-            raise NotMet('{} was done in this trial and is not repeated by itself'.format(
-                place.path))
-
+            raise NotMet(
+                '{} was done in this trial and is not repeated by itself'.format(place.path)
+            )

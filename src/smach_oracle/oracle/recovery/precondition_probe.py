@@ -4,6 +4,7 @@ Only a callable, and the check of a pair where it is one, can be asked without b
 about. A state is never run for it. A user's callable may take forever, so it is called in threads
 that nobody waits for.
 """
+
 from typing import List, NamedTuple, Optional
 
 from smach_oracle.foreign import repr_of
@@ -18,8 +19,10 @@ from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 
 _LAST = {
-    VisitResult.SUCCESS: 'succeeded', VisitResult.FAILURE: 'failed',
-    VisitResult.SUPERSEDED: 'was superseded', VisitResult.PREEMPTED: 'was preempted'
+    VisitResult.SUCCESS: 'succeeded',
+    VisitResult.FAILURE: 'failed',
+    VisitResult.SUPERSEDED: 'was superseded',
+    VisitResult.PREEMPTED: 'was preempted',
 }
 
 
@@ -41,7 +44,8 @@ class LivePreconditionProbe(PreconditionProbe):
         self._gate = UserdataGate(node.machine)
         self._gate.shut()
         self._items: List[_StatePrecondition] = [
-            _StatePrecondition(label, spec) for label in node.labels()
+            _StatePrecondition(label, spec)
+            for label in node.labels()
             for spec in node.record(label).settings.preconditions
         ]
         self.names = tuple((item.state, item.spec.name) for item in self._items)
@@ -57,14 +61,18 @@ class LivePreconditionProbe(PreconditionProbe):
         if spec.kind is PreconditionKind.PAIR:
             check, achieve = spec.target
             found = self._of(check)
-            return found._replace(text='{}; {} would bring it about'.format(
-                found.text, achieve.name)) if found.holds is False else found
+            return (
+                found._replace(text='{}; {} would bring it about'.format(found.text, achieve.name))
+                if found.holds is False
+                else found
+            )
         return self._of(spec)
 
     def _of(self, spec: PreconditionSpec) -> PreconditionStatus:
         if spec.kind is PreconditionKind.LABEL:
             return PreconditionStatus(
-                None, 'only running {} would tell{}'.format(spec.target, self._last(spec.target)))
+                None, 'only running {} would tell{}'.format(spec.target, self._last(spec.target))
+            )
         if spec.kind is not PreconditionKind.CALLABLE:
             return PreconditionStatus(None, 'only running {} would tell'.format(spec.name))
         try:
@@ -73,13 +81,19 @@ class LivePreconditionProbe(PreconditionProbe):
             return PreconditionStatus(None, '{} raised {}'.format(spec.name, repr_of(err)))
         if result is None:
             return PreconditionStatus(None, '{} returned None; True is met'.format(spec.name))
-        return PreconditionStatus(truth_of(result), shortened(
-            '{} returned {}'.format(spec.name, repr_of(result)), 300))
+        return PreconditionStatus(
+            truth_of(result), shortened('{} returned {}'.format(spec.name, repr_of(result)), 300)
+        )
 
     def _last(self, name: str) -> str:
         place = place_named(self._node, name)
         visits = place.node.records.history.latest() if place is not None else ()
         last: Optional[VisitResult] = next(
-            (visit.result for visit in reversed(visits)
-             if place is not None and visit.state == place.label), None)
+            (
+                visit.result
+                for visit in reversed(visits)
+                if place is not None and visit.state == place.label
+            ),
+            None,
+        )
         return '; its last visit ' + _LAST[last] if last is not None else ''

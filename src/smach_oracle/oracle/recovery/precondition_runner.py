@@ -2,6 +2,7 @@
 
 Runs of preconditions do not count as visits.
 """
+
 import contextlib
 import threading
 from typing import Any, Iterator, List, NamedTuple, Optional
@@ -104,9 +105,14 @@ class PreconditionRunner:
         self._wait_for_operator(self._node, spec.name)
         self._check_free(spec.target)
         gate = self._gate.branch()
-        ended = self._node.tree.workers.call(spec.target, behind(gate), gate,
-                                             self._settings.time_limit_s,
-                                             self._settings.grace_period_s, self._stopped)
+        ended = self._node.tree.workers.call(
+            spec.target,
+            behind(gate),
+            gate,
+            self._settings.time_limit_s,
+            self._settings.grace_period_s,
+            self._stopped,
+        )
         if isinstance(ended.error, Exception):
             raise NotMet('{} raised {}'.format(spec.name, repr_of(ended.error))) from ended.error
         if ended.error is not None:
@@ -153,8 +159,10 @@ class PreconditionRunner:
 
     def _label_of(self, state: smach.State) -> str:
         """Return the label of a state that was given itself, '' where the container has it not."""
-        return next((label for label in self._node.labels()
-                     if self._node.machine._states[label] is state), '')
+        return next(
+            (label for label in self._node.labels() if self._node.machine._states[label] is state),
+            '',
+        )
 
     @contextlib.contextmanager
     def _noted(self, site: _Site, label: str) -> Iterator[None]:
@@ -164,8 +172,11 @@ class PreconditionRunner:
         """
         repeated = repeated_by_running(site.node, label) if label else ()
         if repeated:
-            raise NotMet('{} was done in this trial and is not repeated by itself'.format(
-                ', '.join(repeated)))
+            raise NotMet(
+                '{} was done in this trial and is not repeated by itself'.format(
+                    ', '.join(repeated)
+                )
+            )
         if label:
             self._check_free(site.node.machine._states[label])
             note_precondition(site.node, label)
@@ -205,8 +216,13 @@ class PreconditionRunner:
             return state.execute(view_behind(site.gate, machine, label, state))
         gate = site.gate.branch()
         result = self._node.tree.workers.run(
-            state, view_behind(gate, machine, label, state), gate, label,
-            settings.time_limit_s, settings.grace_period_s)
+            state,
+            view_behind(gate, machine, label, state),
+            gate,
+            label,
+            settings.time_limit_s,
+            settings.grace_period_s,
+        )
         if result.error is not None:
             raise result.error
         if result.overrun:
@@ -230,7 +246,9 @@ class PreconditionRunner:
             listed = site.node.settings_of(label).failure_outcomes
             route = route_of(site.node.machine, label, outcome)
             failed = failure_kind(outcome, route, listed, failing) not in (
-                FailureKind.NOT_A_FAILURE, FailureKind.UNREGISTERED_OUTCOME)
+                FailureKind.NOT_A_FAILURE,
+                FailureKind.UNREGISTERED_OUTCOME,
+            )
         else:
             listed = self._node.settings.defaults.failure_outcomes
             failed = outcome in failing or outcome in listed

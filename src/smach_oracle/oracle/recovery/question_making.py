@@ -1,4 +1,5 @@
 """Makes a question of a failure, with everything that an expert needs (paper, section V)."""
+
 from typing import Any, Collection, Dict, Iterator, Mapping, NamedTuple, Tuple
 
 import smach
@@ -26,28 +27,42 @@ class Account(NamedTuple):
     fallback: str  # what happens without an answer, in words
 
 
-def make_question(node: TreeNode, record: StateRecord, failure: Failure, account: Account,
-                  deadline_s: float) -> Question:
+def make_question(
+    node: TreeNode, record: StateRecord, failure: Failure, account: Account, deadline_s: float
+) -> Question:
     """Return a question about a failure. `deadline_s`: seconds left. 0 waits without end."""
     machine = node.machine
     state = machine._states[record.label]
     return Question(
         question_id=record.take_question() or node.tree.next_question_id(),
-        trial_id=node.tree.trial_id, container_path=node.path, failed_state=record.label,
+        trial_id=node.tree.trial_id,
+        container_path=node.path,
+        failed_state=record.label,
         failure_kind=failure.kind,
-        outcome=failure.outcome, text=failure.text, failure_class=int(record.failure_class),
-        rate=record.rate, continuous=account.continuous, recoveries=record.recoveries,
-        reason=account.reason, tried=account.tried, history=node.records.history.latest(),
+        outcome=failure.outcome,
+        text=failure.text,
+        failure_class=int(record.failure_class),
+        rate=record.rate,
+        continuous=account.continuous,
+        recoveries=record.recoveries,
+        reason=account.reason,
+        tried=account.tried,
+        history=node.records.history.latest(),
         choices=tuple(_state_choices(node, account.written)),
-        supersede_outcomes=(outcomes_of_branch(node, state)
-                            or tuple(_supersede_outcomes(machine, record.label, state))),
+        supersede_outcomes=(
+            outcomes_of_branch(node, state)
+            or tuple(_supersede_outcomes(machine, record.label, state))
+        ),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
         give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
         interfaces=node.settings.offers_for(node.relative_path, record.label),
         userdata=dict(machine.userdata._data),
-        input_userdata=_inputs(machine, record.label, state), deadline_s=deadline_s,
-        fallback=account.fallback, preconditions=LivePreconditionProbe(node),
-        give_up_above=tuple(_give_up_above(node)))
+        input_userdata=_inputs(machine, record.label, state),
+        deadline_s=deadline_s,
+        fallback=account.fallback,
+        preconditions=LivePreconditionProbe(node),
+        give_up_above=tuple(_give_up_above(node)),
+    )
 
 
 def targets_of(node: TreeNode) -> Mapping[Target, str]:
@@ -73,10 +88,17 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
         container, label = _target(node, way)
         record = way.down[-1].node.record(label)
         yield StateChoice(
-            label, 1.0 - record.rate, int(record.failure_class), record.visits,
+            label,
+            1.0 - record.rate,
+            int(record.failure_class),
+            record.visits,
             missing_on(way, () if way.left else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed_on(way), repeated_on(way), container, running_again(way))
+            why_closed_on(way),
+            repeated_on(way),
+            container,
+            running_again(way),
+        )
 
 
 def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
@@ -85,8 +107,9 @@ def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
             yield LevelOutcome(level.path, outcome)
 
 
-def _supersede_outcomes(machine: Machine, label: str,
-                        state: smach.State) -> Iterator[OutcomeChoice]:
+def _supersede_outcomes(
+    machine: Machine, label: str, state: smach.State
+) -> Iterator[OutcomeChoice]:
     for outcome in sorted(state.get_registered_outcomes(), key=str):
         route = route_of(machine, label, outcome)
         if route.target:
@@ -96,5 +119,8 @@ def _supersede_outcomes(machine: Machine, label: str,
 def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, Any]:
     data = dict(machine.userdata._data)
     remapping = machine._remappings.get(label) or {}
-    return {key: data[remapping.get(key, key)] for key in state.get_registered_input_keys()
-            if remapping.get(key, key) in data}
+    return {
+        key: data[remapping.get(key, key)]
+        for key in state.get_registered_input_keys()
+        if remapping.get(key, key) in data
+    }

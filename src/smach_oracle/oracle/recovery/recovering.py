@@ -1,4 +1,5 @@
 """One recovery under way: what its phases share, and how it ends early."""
+
 import threading
 from typing import Any, List, Mapping, Optional
 
@@ -21,10 +22,12 @@ from .question_making import Account, make_question, targets_of
 from .stop import RecoveryStop, preempt_beside
 from .verdict import GiveUp, JumpTo, Preempted, Verdict
 
-KEPT = ('nobody has said how the trial goes on ({}). The machine stops where it stands, and the '
-        'trial is kept. The next start asks again. `oracle_run --resume` asks only before a state '
-        'that on_retry protects, if the script has changed (unless --resume-map says how), and if '
-        'the store may have lost something. `oracle_state {} drop` ends the trial')
+KEPT = (
+    'nobody has said how the trial goes on ({}). The machine stops where it stands, and the '
+    'trial is kept. The next start asks again. `oracle_run --resume` asks only before a state '
+    'that on_retry protects, if the script has changed (unless --resume-map says how), and if '
+    'the store may have lost something. `oracle_state {} drop` ends the trial'
+)
 
 
 class Recovering:
@@ -40,8 +43,9 @@ class Recovering:
         self.occasion = occasion
         self.failure = occasion.failure
         self.stop = RecoveryStop(node, record)
-        self.deciding = Deciding(node, record, occasion.failure, occasion.context,
-                                 occasion.continuous, self.stop)
+        self.deciding = Deciding(
+            node, record, occasion.failure, occasion.context, occasion.continuous, self.stop
+        )
         self.budget = node.tree.budget
         self.ends_budget = False  # whether the question's deadline is that of the trial
         self.cause = ''  # of the decision
@@ -79,8 +83,13 @@ class Recovering:
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure. `deadline_s`: seconds left, 0 without end."""
-        account = Account(self.occasion.continuous, self.cause, tuple(self.tried),
-                          self.deciding.watch.written(), fallback_in_words(self))
+        account = Account(
+            self.occasion.continuous,
+            self.cause,
+            tuple(self.tried),
+            self.deciding.watch.written(),
+            fallback_in_words(self),
+        )
         return make_question(self.node, self.record, self.failure, account, deadline_s)
 
     def say_that_it_waits(self, question: Question) -> None:
@@ -88,8 +97,11 @@ class Recovering:
         limit = 'it waits on'
         if question.deadline_s:
             limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback_in_short(self))
-        smach.logwarn('{}/{}: the expert is asked (question {}); without an answer {}'.format(
-            self.node.path, self.record.label, question.question_id, limit))
+        smach.logwarn(
+            '{}/{}: the expert is asked (question {}); without an answer {}'.format(
+                self.node.path, self.record.label, question.question_id, limit
+            )
+        )
 
     def states_now(self) -> Mapping[Target, str]:
         """Return where the machine could go, and why it cannot go there now, '' where it can."""
@@ -115,15 +127,15 @@ class Recovering:
         if not (isinstance(verdict, JumpTo) and health.is_set):
             return verdict
         why = health.why_unwell(self.stopped)
-        if why and not self.stop.wait_until_well(
-                'is left for ' + verdict.way.down[-1].label, why):
+        if why and not self.stop.wait_until_well('is left for ' + verdict.way.down[-1].label, why):
             return self.end_early()
         return verdict
 
     def natural_ending(self) -> ContainerEnding:
         """Return how the failure would have ended the container."""
-        return natural_ending(self.failure, self.node.machine.get_registered_outcomes(),
-                              self.node.in_force.failing)
+        return natural_ending(
+            self.failure, self.node.machine.get_registered_outcomes(), self.node.in_force.failing
+        )
 
     def give_up(self, text: str, outcome: str = '') -> Verdict:
         """End the container with an outcome, or ('') as the failure would have ended it."""

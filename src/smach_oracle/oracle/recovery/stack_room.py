@@ -4,6 +4,7 @@ Each container takes a few frames while it executes. Where none are left, Python
 RecursionError in the innermost one. That is no failure of any state: no oracle around it could do
 better, and each of them would try.
 """
+
 import sys
 from typing import Iterator, Optional
 
@@ -57,7 +58,9 @@ def _too_deep(node: TreeNode) -> TooDeepError:
     return TooDeepError(
         '{}: {} containers lie in each other, and the stack of Python, which has {} frames, is '
         'full. Call sys.setrecursionlimit({}) before the machine runs'.format(
-            top.path, depth, limit, -(-wanted // 1000) * 1000))
+            top.path, depth, limit, -(-wanted // 1000) * 1000
+        )
+    )
 
 
 def _depth_of(container: object) -> int:
@@ -65,6 +68,10 @@ def _depth_of(container: object) -> int:
     depth, level = 0, [container]
     while level:
         depth += 1
-        level = [state for each in level for state in children_of(each).values()
-                 if isinstance(state, smach.Container)]
+        level = [
+            state
+            for each in level
+            for state in children_of(each).values()
+            if isinstance(state, smach.Container)
+        ]
     return depth

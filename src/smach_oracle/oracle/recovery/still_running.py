@@ -3,6 +3,7 @@
 Without an oracle the machine might have ended before it came to this state. A state without a time
 limit is never abandoned, so a person is asked, while it runs, whether to wait on.
 """
+
 import threading
 import time
 from typing import Any, List, Mapping, NamedTuple, Optional
@@ -102,8 +103,9 @@ class WatchedVisit:
         if left_s:
             self._node.tree.clock.ring_in(left_s, self._ring)
         else:
-            threading.Thread(target=self._ask, name='smach_oracle still running',
-                             daemon=True).start()
+            threading.Thread(
+                target=self._ask, name='smach_oracle still running', daemon=True
+            ).start()
 
     def _ask(self) -> None:
         expert = self._node.tree.expert if self._node.in_force.policy.asks else None
@@ -111,8 +113,11 @@ class WatchedVisit:
             return
         spent = self._why_nobody_is_asked()
         if expert is None or spent:
-            self.warn('{} Nobody is asked: {}'.format(self._sentence(), spent)
-                      if spent else self._sentence())
+            self.warn(
+                '{} Nobody is asked: {}'.format(self._sentence(), spent)
+                if spent
+                else self._sentence()
+            )
             return
         reply = self._inquire(expert)
         if self.stopped():
@@ -150,8 +155,11 @@ class WatchedVisit:
                 self._node.tree.clock.ring_in(self._ran_s(), self._ring)
 
     def _is_wait_on(self, answer: Answer) -> bool:
-        return (answer.kind is AnswerKind.GOTO and answer.state == self._record.label
-                and answer.container in ('', self._node.path))
+        return (
+            answer.kind is AnswerKind.GOTO
+            and answer.state == self._record.label
+            and answer.container in ('', self._node.path)
+        )
 
     def _take_out(self, answer: Answer) -> None:
         """Preempt the state. Once it has ended, the machine goes as answered."""
@@ -159,39 +167,57 @@ class WatchedVisit:
             if self._ended.is_set():
                 return
             self._answer = answer
-            smach.logwarn('{}: is preempted, as {} answered {} {}'.format(
-                self._place(), answer.by or 'the expert', answer.kind.name.lower(),
-                answer.named()).rstrip())
+            smach.logwarn(
+                '{}: is preempted, as {} answered {} {}'.format(
+                    self._place(),
+                    answer.by or 'the expert',
+                    answer.kind.name.lower(),
+                    answer.named(),
+                ).rstrip()
+            )
             try:
                 self._state.request_preempt()
             except Exception as err:  # it is the user's
-                smach.logerr('request_preempt of {} failed: {}'.format(
-                    repr_of(self._state), repr_of(err)))
+                smach.logerr(
+                    'request_preempt of {} failed: {}'.format(repr_of(self._state), repr_of(err))
+                )
         if not self._ended.wait(self._record.settings.grace_period_s):
-            self.warn('does not heed its preempt and still runs; the machine waits for its end, '
-                      'and then goes as answered')
+            self.warn(
+                'does not heed its preempt and still runs; the machine waits for its end, '
+                'and then goes as answered'
+            )
 
     # -- its question
 
     def stopped(self) -> bool:
         """Whether the state has ended, or a preempt or a shutdown ends the visit."""
-        return (self._ended.is_set() or self._machine.preempt_requested() or smach.is_shutdown()
-                or self._node.is_left_behind())
+        return (
+            self._ended.is_set()
+            or self._machine.preempt_requested()
+            or smach.is_shutdown()
+            or self._node.is_left_behind()
+        )
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the state. `deadline_s`: seconds left, 0 without end."""
         ran = ran_in_words(self._ran_s(), self._record.longest_s)
         question = make_question(
-            self._node, self._record, self._failure(),
-            Account(False, 'it still runs after ' + ran, (), (), 'it runs on'), deadline_s)
+            self._node,
+            self._record,
+            self._failure(),
+            Account(False, 'it still runs after ' + ran, (), (), 'it runs on'),
+            deadline_s,
+        )
         with self._lock:
             self._open_id = question.question_id
         # no interface can do the work of a state that runs, and no function of a user's is called
         # meanwhile
-        choices = tuple(choice._replace(blocked='', repeats=())
-                        if (choice.container, choice.state) == ('', self._record.label)
-                        else choice
-                        for choice in question.choices)  # its own name means to wait on
+        choices = tuple(
+            choice._replace(blocked='', repeats=())
+            if (choice.container, choice.state) == ('', self._record.label)
+            else choice
+            for choice in question.choices
+        )  # its own name means to wait on
         return question._replace(choices=choices, interfaces=(), preconditions=None)
 
     def _failure(self) -> Failure:
@@ -202,8 +228,11 @@ class WatchedVisit:
 
     def say_that_it_waits(self, question: Question) -> None:
         """Log that somebody is asked, while the state runs on."""
-        smach.logwarn('{}: {} The expert is asked (question {})'.format(
-            self._place(), self._sentence(), question.question_id))
+        smach.logwarn(
+            '{}: {} The expert is asked (question {})'.format(
+                self._place(), self._sentence(), question.question_id
+            )
+        )
 
     def states_now(self) -> Mapping[Target, str]:
         """Return where the machine could go, and why it cannot go there now, '' where it can."""
@@ -235,7 +264,9 @@ class WatchedVisit:
     def _note_answer(self, fields: Mapping[str, Any]) -> bool:
         """Close the question, as it is answered. Return False where it was taken back before."""
         waits_on = (fields.get('outcome'), fields.get('target')) == (
-            AnswerKind.GOTO.name.lower(), self._record.label)
+            AnswerKind.GOTO.name.lower(),
+            self._record.label,
+        )
         with self._lock:
             is_open, self._open_id = bool(self._open_id), ''
             self._answered = is_open and not waits_on

@@ -1,4 +1,5 @@
 """Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
+
 import threading
 from typing import Optional
 
@@ -127,5 +128,6 @@ class RecoveryStop:
         """Wait until the robot is well. Return False where something has ended the recovery."""
         with standing_still(self._node.runs_around):
             is_well = self._node.tree.health.wait_until_well(
-                self._node, self._record.label, what, why, self.is_over, self.cancelled.wait)
+                self._node, self._record.label, what, why, self.is_over, self.cancelled.wait
+            )
         return is_well and not self.is_over()

@@ -2,6 +2,7 @@
 
 There are four kinds, and no other way out. `execution.applying` carries them out.
 """
+
 from typing import FrozenSet, NamedTuple, Optional, Union
 
 from ..machine.tree_node import TreeNode

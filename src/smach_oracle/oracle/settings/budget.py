@@ -1,4 +1,5 @@
 """The budget of a whole trial: what the oracle may spend, over all containers. Pure."""
+
 import math
 from typing import Any, Dict, NamedTuple, Optional
 
@@ -39,7 +40,8 @@ def checked_budget(key: str, given: object) -> Budget:
     limits: Dict[str, Any] = {}
     for name, value in values.mapping(key, given).items():
         if name not in _CHECKS:
-            raise SettingsError('{}.{}'.format(key, name), value,
-                                'one of the keys ' + ', '.join(_CHECKS))
+            raise SettingsError(
+                '{}.{}'.format(key, name), value, 'one of the keys ' + ', '.join(_CHECKS)
+            )
         limits[name] = values.optional(_CHECKS[name])('{}.{}'.format(key, name), value)
     return Budget(**limits)

@@ -2,6 +2,7 @@
 
 Each takes the dotted key and the value, and returns the value or raises SettingsError.
 """
+
 import math
 from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
 
@@ -29,19 +30,23 @@ def is_state(value: object) -> bool:
 
 def number(low: float, high: float, allowed: str) -> Check:
     """Check for a number from `low` to `high`. Its SettingsError says `allowed`."""
+
     def check(key: str, value: Any) -> float:
         if not is_number(value, low, high):
             raise SettingsError(key, value, allowed)
         return float(value)
+
     return check
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check:
     """Check for a whole number from `low` to `high`. Its SettingsError says `allowed`."""
+
     def check(key: str, value: Any) -> int:
         if not is_whole(value, low, high):
             raise SettingsError(key, value, allowed)
         return int(value)
+
     return check
 
 
@@ -63,11 +68,13 @@ def no_name(key: str, value: object, allowed: str) -> SettingsError:
 
 def choice(options: Sequence[str]) -> Check:
     """Check for one of some words. Its SettingsError names them all."""
+
     def check(key: str, value: object) -> str:
         word = as_text(value)
         if not isinstance(word, str) or word not in options:
             raise no_name(key, value, ', '.join(options))
         return word
+
     return check
 
 
@@ -116,8 +123,10 @@ def words(key: str, value: object) -> Tuple[str, ...]:
 
 def optional(check: Check) -> Check:
     """Check that admits None (nothing set) beside what `check` admits."""
+
     def checked(key: str, value: object) -> object:
         return None if as_value(value) is None else check(key, value)
+
     return checked
 
 
@@ -149,7 +158,7 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     verb: object
     target: object
     if isinstance(value, Mapping) and len(value) == 1:
-        (verb, target), = value.items()
+        ((verb, target),) = value.items()
         target = as_text(target)
     elif isinstance(value, str):
         verb, _, target = value.partition(':')
@@ -161,8 +170,12 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     if (verb == 'stop' and not target) or (verb in ('goto', 'give_up') and named):
         return str(verb), str(target or '')
     how_read = read_otherwise(target) if verb in ('goto', 'give_up') else ''
-    raise SettingsError(key, value, "'stop', {'goto': LABEL} or {'give_up': OUTCOME}",
-                        problem='is not allowed' + how_read)
+    raise SettingsError(
+        key,
+        value,
+        "'stop', {'goto': LABEL} or {'give_up': OUTCOME}",
+        problem='is not allowed' + how_read,
+    )
 
 
 def deadline(key: str, value: object) -> float:

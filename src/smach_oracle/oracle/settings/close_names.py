@@ -1,4 +1,5 @@
 """Suggests the name that a mistyped one may stand for. Pure."""
+
 from difflib import get_close_matches
 from typing import Iterable
 

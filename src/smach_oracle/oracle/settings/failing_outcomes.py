@@ -1,4 +1,5 @@
 """Decides which outcomes sound like a failure. Pure, and without smach."""
+
 import re
 from typing import Iterable, Pattern
 
@@ -21,8 +22,9 @@ class FailingNames:
     def __init__(self, words: Iterable[str] = DEFAULT_FAILING_OUTCOMES) -> None:
         self.words = tuple(words)
         self._whole = _pattern(r'(?:^|.*[_\-])(?:{})$', self.words, re.IGNORECASE | re.DOTALL)
-        capitalised = tuple(word[:1].upper() + word[1:] for word in self.words
-                            if word[:1].isalpha())
+        capitalised = tuple(
+            word[:1].upper() + word[1:] for word in self.words if word[:1].isalpha()
+        )
         self._camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
 
     def __contains__(self, outcome: object) -> bool:

@@ -3,6 +3,7 @@
 A topic, a status of the diagnostics, or a function. In YAML a list of them, or one alone:
 {topic: /motors_on}, {diagnostics: Power System}, {function: 'python:module:attribute'}.
 """
+
 import math
 import re
 from enum import Enum
@@ -55,8 +56,9 @@ _KEYS = {
 }
 
 
-def checked_health(given: object,
-                   resolver: Optional[Resolver] = None) -> Tuple[HealthCondition, ...]:
+def checked_health(
+    given: object, resolver: Optional[Resolver] = None
+) -> Tuple[HealthCondition, ...]:
     """Check the conditions. `resolver` turns 'python:module:attribute' into that object.
 
     :raises SettingsError: naming key, value and what is allowed.
@@ -67,8 +69,10 @@ def checked_health(given: object,
         return (_condition('healthy', given, resolver),)
     if not isinstance(given, (list, tuple)):
         raise SettingsError('healthy', given, 'a list of conditions, or one')
-    return tuple(_condition('healthy[{}]'.format(index), entry, resolver)
-                 for index, entry in enumerate(given))
+    return tuple(
+        _condition('healthy[{}]'.format(index), entry, resolver)
+        for index, entry in enumerate(given)
+    )
 
 
 def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthCondition:
@@ -83,8 +87,9 @@ def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthC
     kind = kinds[0]
     for name in entry:
         if name not in _KEYS[kind]:
-            raise SettingsError('{}.{}'.format(key, name), entry[name],
-                                'one of the keys ' + ', '.join(_KEYS[kind]))
+            raise SettingsError(
+                '{}.{}'.format(key, name), entry[name], 'one of the keys ' + ', '.join(_KEYS[kind])
+            )
     prefix = key + '.'
     make = {HealthKind.TOPIC: _topic, HealthKind.DIAGNOSTICS: _diagnostics}.get(kind)
     made = make(prefix, entry) if make else _function(prefix, entry, resolver)
@@ -101,10 +106,12 @@ def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
         raise SettingsError(prefix + 'topic', topic, 'the name of a topic, such as /motors_on')
     field = as_text(entry.get('field', 'data'))
     if not isinstance(field, str) or not _FIELD.fullmatch(field):
-        raise SettingsError(prefix + 'field', field, 'a field of the message, such as data or '
-                            'status.level')
-    return HealthCondition(HealthKind.TOPIC, topic.strip('/') or topic, topic, field,
-                           **_wanted(prefix, entry))
+        raise SettingsError(
+            prefix + 'field', field, 'a field of the message, such as data or status.level'
+        )
+    return HealthCondition(
+        HealthKind.TOPIC, topic.strip('/') or topic, topic, field, **_wanted(prefix, entry)
+    )
 
 
 def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
@@ -113,12 +120,16 @@ def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
     if not limits:
         return {'equals': _plain(prefix + 'equals', entry.get('equals', True))}
     if 'equals' in entry:
-        raise SettingsError(prefix + 'equals', entry['equals'],
-                            'equals, or at_least and at_most, not both')
+        raise SettingsError(
+            prefix + 'equals', entry['equals'], 'equals, or at_least and at_most, not both'
+        )
     wanted = {name: _NUMBER(prefix + name, entry[name]) for name in limits}
     if wanted.get('at_least', -math.inf) > wanted.get('at_most', math.inf):
-        raise SettingsError(prefix + 'at_least', wanted['at_least'],
-                            'at most at_most, which is {:g}'.format(wanted['at_most']))
+        raise SettingsError(
+            prefix + 'at_least',
+            wanted['at_least'],
+            'at most at_most, which is {:g}'.format(wanted['at_most']),
+        )
     return wanted
 
 
@@ -138,16 +149,19 @@ def _diagnostics(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
     return HealthCondition(HealthKind.DIAGNOSTICS, source.strip('/') or source, source, worst=worst)
 
 
-def _function(prefix: str, entry: Mapping[str, Any],
-              resolver: Optional[Resolver]) -> HealthCondition:
+def _function(
+    prefix: str, entry: Mapping[str, Any], resolver: Optional[Resolver]
+) -> HealthCondition:
     given = entry['function']
     name, found = '', given
     if isinstance(given, str):
         name, found = _resolved(prefix + 'function', given, resolver)
     if not callable(found) or isinstance(found, type) or values.is_state(found):
-        raise SettingsError(prefix + 'function', given,
-                            "'python:module:attribute' of a function without arguments, "
-                            'or such a function')
+        raise SettingsError(
+            prefix + 'function',
+            given,
+            "'python:module:attribute' of a function without arguments, or such a function",
+        )
     name = name or name_of(found)
     return HealthCondition(HealthKind.FUNCTION, name, function=found)
 
@@ -163,5 +177,8 @@ def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, 
 
 def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:
     """Return what must be listened to, in words. Functions are called instead."""
-    return ['{} {}'.format(condition.kind.value, condition.source) for condition in conditions
-            if condition.kind is not HealthKind.FUNCTION]
+    return [
+        '{} {}'.format(condition.kind.value, condition.source)
+        for condition in conditions
+        if condition.kind is not HealthKind.FUNCTION
+    ]

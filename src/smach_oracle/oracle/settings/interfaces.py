@@ -2,6 +2,7 @@
 
 They say what is offered, for which states, and how it is started.
 """
+
 import re
 from typing import Any, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -16,7 +17,6 @@ _NODE = re.compile(r'({0}) +({0})'.format(_NAME))
 _ARGUMENT = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 START_LIMIT_S = 60.0
 _LIMIT = values.number(0.1, 3600.0, 'seconds from 0.1 to 3600')
-
 
 
 class InterfaceStart(NamedTuple):
@@ -55,9 +55,12 @@ def checked_interfaces(given: object) -> Offers:
                 raise SettingsError(prefix + key, entry[key], 'one of the keys ' + ', '.join(_KEYS))
         if 'action' not in entry:
             raise SettingsError(prefix + 'action', None, 'the name of a SharedAutonomy action')
-        offer = InterfaceOffer(name, values.label(prefix + 'action', entry['action']),
-                               values.text(prefix + 'description', entry.get('description', '')),
-                               _start(prefix, entry))
+        offer = InterfaceOffer(
+            name,
+            values.label(prefix + 'action', entry['action']),
+            values.text(prefix + 'description', entry.get('description', '')),
+            _start(prefix, entry),
+        )
         offers.append((offer, values.words(prefix + 'states', entry.get('states', ()))))
     return tuple(offers)
 
@@ -74,15 +77,20 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
         raise SettingsError(prefix + 'node', entry['node'], 'one of launch and node, not both')
     kind = kinds[0]
     pattern, allowed = {
-        'launch': (_LAUNCH, 'PACKAGE/FILE.launch'), 'node': (_NODE, 'PACKAGE TYPE')
+        'launch': (_LAUNCH, 'PACKAGE/FILE.launch'),
+        'node': (_NODE, 'PACKAGE TYPE'),
     }[kind]
     found = pattern.fullmatch(values.text(prefix + kind, entry[kind]))
     if found is None or '..' in entry[kind]:
         raise SettingsError(prefix + kind, entry[kind], allowed)
     args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
     return InterfaceStart(
-        kind, found.group(1), found.group(2), tuple(args),
-        _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', START_LIMIT_S)))
+        kind,
+        found.group(1),
+        found.group(2),
+        tuple(args),
+        _LIMIT(prefix + 'start_limit_s', entry.get('start_limit_s', START_LIMIT_S)),
+    )
 
 
 def _launch_args(key: str, given: object) -> List[str]:
@@ -90,8 +98,11 @@ def _launch_args(key: str, given: object) -> List[str]:
     for name, value in values.mapping(key, given).items():
         read = as_value(value)
         if not _ARGUMENT.fullmatch(name) or not isinstance(read, (str, int, float)):
-            raise SettingsError('{}.{}'.format(key, name), value,
-                              'the name of a launch argument, and text, a number or true or false')
+            raise SettingsError(
+                '{}.{}'.format(key, name),
+                value,
+                'the name of a launch argument, and text, a number or true or false',
+            )
         args.append('{}:={}'.format(name, str(read).lower() if isinstance(read, bool) else read))
     return args
 

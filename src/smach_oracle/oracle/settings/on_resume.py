@@ -1,4 +1,5 @@
 """The settings on_resume and resume_map: how a stored trial goes on that was not finished. Pure."""
+
 from typing import Dict, Iterator, Mapping, Tuple
 
 from ..errors import SettingsError

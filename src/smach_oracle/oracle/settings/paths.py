@@ -1,4 +1,5 @@
 """Files and folders as people name them in settings, parameters and command lines. Pure."""
+
 import os
 
 from ..errors import SettingsError

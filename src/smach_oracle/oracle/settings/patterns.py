@@ -3,6 +3,7 @@
 A name without '/' is a label, in any container. One with '/' is a path below the top machine. In
 both `*` stands for any part of one label. In a path `**` stands for any number of labels.
 """
+
 import functools
 import re
 from typing import List, Tuple, Union
@@ -26,8 +27,12 @@ def check_name(key: str, name: str) -> str:
     :raises SettingsError: for a pattern that says nothing clear.
     """
     if any(ANY_LABELS in part and part != ANY_LABELS for part in name.split('/')):
-        raise SettingsError(key, name, "a name in which '**' stands alone between two '/', for "
-                            "whole labels; '*' is a part of one")
+        raise SettingsError(
+            key,
+            name,
+            "a name in which '**' stands alone between two '/', for "
+            "whole labels; '*' is a part of one",
+        )
     return name
 
 
@@ -65,8 +70,12 @@ def exactness(name: str) -> Tuple[bool, bool, int, int]:
     A name without `*` is more exact than a pattern, and a path is more exact than a label. Of two
     patterns the one with more letters is, then the one with fewer `**`.
     """
-    return (not is_pattern(name), _is_path(name), len(name.replace('*', '').replace('/', '')),
-            -name.split('/').count(ANY_LABELS))
+    return (
+        not is_pattern(name),
+        _is_path(name),
+        len(name.replace('*', '').replace('/', '')),
+        -name.split('/').count(ANY_LABELS),
+    )
 
 
 def _is_path(name: str) -> bool:

@@ -1,4 +1,5 @@
 """The choice of a policy, with its parameters. Pure."""
+
 from typing import Any, Dict, Mapping, NamedTuple
 
 from ..decision.policy import POLICIES

@@ -6,6 +6,7 @@ a state of another one below the top machine. The others are a `smach.State`, a 
 hold. In YAML: a label, a path (KITCHEN/LOOK, or /LOOK for a state of the top machine),
 'python:module:attribute', or {check: ..., achieve: ...}.
 """
+
 from enum import Enum
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -53,11 +54,13 @@ class PreconditionSpec(NamedTuple):
 _ALLOWED = (
     'the label of a state, PATH/LABEL of one elsewhere, a smach.State, '
     'a callable f(userdata) -> bool, a pair (check, achieve) of these, '
-    "'python:module:attribute' or {check: ..., achieve: ...}")
+    "'python:module:attribute' or {check: ..., achieve: ...}"
+)
 
 
-def parse_preconditions(key: str, given: object,
-                        resolver: Optional[Resolver] = None) -> Tuple[PreconditionSpec, ...]:
+def parse_preconditions(
+    key: str, given: object, resolver: Optional[Resolver] = None
+) -> Tuple[PreconditionSpec, ...]:
     """Check a list of preconditions of one state.
 
     :raises SettingsError: naming `key` and the position.
@@ -68,11 +71,13 @@ def parse_preconditions(key: str, given: object,
         raise SettingsError(key, given, 'a list of preconditions')
     return tuple(
         parse_precondition('{}[{}]'.format(key, index), spec, resolver)
-        for index, spec in enumerate(given))
+        for index, spec in enumerate(given)
+    )
 
 
-def parse_precondition(key: str, given: object,
-                       resolver: Optional[Resolver] = None) -> PreconditionSpec:
+def parse_precondition(
+    key: str, given: object, resolver: Optional[Resolver] = None
+) -> PreconditionSpec:
     """Check one precondition.
 
     :raises SettingsError: naming `key`.
@@ -102,9 +107,13 @@ def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> Precondit
         raise SettingsError(key, given, 'an object, since names cannot be imported here')
     found = named_object(key, given, 'function or state', resolver)
     if not callable(found) and not is_state(found):
-        raise SettingsError(key, given, 'the name of a callable or a smach.State',
-                            problem='names a value of type {}'.format(type(found).__name__))
-    return parse_precondition(key, found)._replace(name=given[len(PYTHON):].rpartition(':')[2])
+        raise SettingsError(
+            key,
+            given,
+            'the name of a callable or a smach.State',
+            problem='names a value of type {}'.format(type(found).__name__),
+        )
+    return parse_precondition(key, found)._replace(name=given[len(PYTHON) :].rpartition(':')[2])
 
 
 def _halves(key: str, given: Mapping[str, Any]) -> List[Any]:
@@ -118,5 +127,6 @@ def _parse_pair(key: str, halves: List[Any], resolver: Optional[Resolver]) -> Pr
     achieve = parse_precondition(key + '.achieve', halves[1], resolver)
     if PreconditionKind.PAIR in (check.kind, achieve.kind):
         raise SettingsError(key, halves, 'a pair of a check and an achieve, neither of them a pair')
-    return PreconditionSpec(PreconditionKind.PAIR, '{} or {}'.format(check.name, achieve.name),
-                            (check, achieve))
+    return PreconditionSpec(
+        PreconditionKind.PAIR, '{} or {}'.format(check.name, achieve.name), (check, achieve)
+    )

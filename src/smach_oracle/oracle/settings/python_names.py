@@ -1,4 +1,5 @@
 """Objects that settings name by 'python:module:attribute', and what is wrong with such a name."""
+
 from typing import Any, Callable
 
 from smach_oracle.foreign import error_text
@@ -26,5 +27,6 @@ def named_object(key: str, given: str, wanted: str, resolver: Resolver) -> Any:
         why = str(err)
     except Exception as err:
         why = 'importing it raised {}'.format(error_text(err))
-    raise SettingsError(key, given, _ALLOWED.format(wanted),
-                        problem='cannot be found: {}'.format(why))
+    raise SettingsError(
+        key, given, _ALLOWED.format(wanted), problem='cannot be found: {}'.format(why)
+    )

@@ -3,6 +3,7 @@
 `Settings.from_dict` reads nested plain dictionaries, as YAML and rosparam give them. Every error is
 a SettingsError that names the dotted key, the value and what is allowed.
 """
+
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
@@ -76,8 +77,9 @@ _MACHINE_CHECKS: Dict[str, values.Check] = {
     'still_running_s': values.number(0, math.inf, 'seconds from 0'),
     'still_running_factor': values.number(1, math.inf, 'a number from 1'),
     'watch_preconditions': values.flag,
-    'history_length': values.whole(1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY),
-                                   _MAX_HISTORY),
+    'history_length': values.whole(
+        1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY
+    ),
     'rates_file': values.file,
     'checkpoint': values.file,
     'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
@@ -144,8 +146,9 @@ class Settings:
     resume_repeat: Tuple[str, ...] = ()
 
     @classmethod
-    def from_dict(cls, given: Optional[Mapping[str, Any]],
-                  resolver: Optional[Resolver] = None) -> 'Settings':
+    def from_dict(
+        cls, given: Optional[Mapping[str, Any]], resolver: Optional[Resolver] = None
+    ) -> 'Settings':
         """Check a dictionary of settings.
 
         `resolver` turns 'python:module:attribute' of a precondition or of a condition of health
@@ -158,15 +161,21 @@ class Settings:
         _refuse_unknown('', given, allowed)
         defaults = _checked_defaults(given)
         machine = {
-            key: check(key, given[key])
-            for key, check in _MACHINE_CHECKS.items() if key in given
+            key: check(key, given[key]) for key, check in _MACHINE_CHECKS.items() if key in given
         }
         if 'policy' in machine:
             machine['policy'], machine['policy_parameters'] = machine['policy']
-        states = {name: _checked_state(name, overrides, defaults, resolver)
-                  for name, overrides in values.mapping('states', given.get('states')).items()}
-        return cls(defaults=defaults, interfaces=checked_interfaces(given.get('interfaces')),
-                   states=states, healthy=checked_health(given.get('healthy'), resolver), **machine)
+        states = {
+            name: _checked_state(name, overrides, defaults, resolver)
+            for name, overrides in values.mapping('states', given.get('states')).items()
+        }
+        return cls(
+            defaults=defaults,
+            interfaces=checked_interfaces(given.get('interfaces')),
+            states=states,
+            healthy=checked_health(given.get('healthy'), resolver),
+            **machine,
+        )
 
     def for_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state.
@@ -180,31 +189,42 @@ class Settings:
             merged.update(self.states[name])
         return replace(self.defaults, **merged) if merged else self.defaults
 
-    def with_states(self, states: Mapping[str, Mapping[str, Any]],
-                    resolver: Optional[Resolver] = None) -> 'Settings':
+    def with_states(
+        self, states: Mapping[str, Mapping[str, Any]], resolver: Optional[Resolver] = None
+    ) -> 'Settings':
         """Return these settings with further settings of single states, which win.
 
         :raises SettingsError: naming key, value and what is allowed.
         """
         merged = {name: dict(overrides) for name, overrides in self.states.items()}
         for name, overrides in states.items():
-            merged.setdefault(name,
-                              {}).update(_checked_state(name, overrides, self.defaults, resolver))
+            merged.setdefault(name, {}).update(
+                _checked_state(name, overrides, self.defaults, resolver)
+            )
         return replace(self, states=merged)
 
     def offers_for(self, path: str, label: str) -> Tuple[InterfaceOffer, ...]:
         """Return the shared-autonomy interfaces on offer for a state."""
         full = '{}/{}'.format(path, label) if path else label
-        return tuple(offer for offer, states in self.interfaces
-                     if not states or any(matches(name, full) for name in states))
+        return tuple(
+            offer
+            for offer, states in self.interfaces
+            if not states or any(matches(name, full) for name in states)
+        )
 
 
 def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
     for key in given:
         if key not in allowed:
             keys = 'one of the keys ' + ', '.join(allowed)
-            raise SettingsError(prefix + key, given[key], keys, '{}: no such setting{}; allowed: {}'
-                                .format(prefix + key, _hint(prefix, key, allowed), keys))
+            raise SettingsError(
+                prefix + key,
+                given[key],
+                keys,
+                '{}: no such setting{}; allowed: {}'.format(
+                    prefix + key, _hint(prefix, key, allowed), keys
+                ),
+            )
 
 
 def _hint(prefix: str, key: str, allowed: List[str]) -> str:
@@ -218,24 +238,27 @@ def _hint(prefix: str, key: str, allowed: List[str]) -> str:
 
 def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:
     defaults = StateSettings(
-        **{key: check(key, given[key])
-           for key, check in _STATE_CHECKS.items() if key in given})
+        **{key: check(key, given[key]) for key, check in _STATE_CHECKS.items() if key in given}
+    )
     _check_thresholds('', defaults, given)
     return defaults
 
 
-def _checked_state(name: str, overrides: object, defaults: StateSettings,
-                   resolver: Optional[Resolver]) -> Dict[str, Any]:
+def _checked_state(
+    name: str, overrides: object, defaults: StateSettings, resolver: Optional[Resolver]
+) -> Dict[str, Any]:
     prefix = 'states.{}.'.format(check_name('states', name))
     overrides = values.mapping(prefix[:-1], overrides)
     _refuse_unknown(prefix, overrides, sorted(list(_STATE_CHECKS) + ['preconditions']))
     checked = {
         key: check(prefix + key, overrides[key])
-        for key, check in _STATE_CHECKS.items() if key in overrides
+        for key, check in _STATE_CHECKS.items()
+        if key in overrides
     }
     if 'preconditions' in overrides:
-        checked['preconditions'] = parse_preconditions(prefix + 'preconditions',
-                                                       overrides['preconditions'], resolver)
+        checked['preconditions'] = parse_preconditions(
+            prefix + 'preconditions', overrides['preconditions'], resolver
+        )
     _check_thresholds(prefix, replace(defaults, **checked), checked)
     return checked
 
@@ -244,10 +267,16 @@ def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, 
     """Blame the threshold that was given, not the default of the other."""
     if settings.moderate_from > settings.high_from:
         if 'moderate_from' not in given:
-            raise SettingsError(prefix + 'high_from', settings.high_from,
-                              'at least moderate_from, which is {}'.format(settings.moderate_from))
-        raise SettingsError(prefix + 'moderate_from', settings.moderate_from,
-                          'at most high_from, which is {}'.format(settings.high_from))
+            raise SettingsError(
+                prefix + 'high_from',
+                settings.high_from,
+                'at least moderate_from, which is {}'.format(settings.moderate_from),
+            )
+        raise SettingsError(
+            prefix + 'moderate_from',
+            settings.moderate_from,
+            'at most high_from, which is {}'.format(settings.high_from),
+        )
 
 
 SettingsLike = Union[Settings, Mapping[str, Any], None]
@@ -265,5 +294,5 @@ def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Set
     if not isinstance(preconditions, Mapping):
         raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
     return checked.with_states(
-        {label: {'preconditions': given}
-         for label, given in preconditions.items()})
+        {label: {'preconditions': given} for label, given in preconditions.items()}
+    )

@@ -1,4 +1,5 @@
 """Names in the settings that stand for nothing in a machine, and who decides about them. Pure."""
+
 from enum import Enum
 from typing import Callable, NamedTuple, Union
 

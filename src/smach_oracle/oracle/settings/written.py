@@ -4,6 +4,7 @@ YAML reads ON as true, 2 as a number and ~ as nothing. Whether a label or a valu
 on the setting. So a value from a file keeps its text: `as_text` gives what stands there, and
 `as_value` what YAML reads.
 """
+
 from typing import Any, Mapping, Optional
 
 
@@ -60,8 +61,9 @@ def plain(value: Any) -> Any:
 def read_otherwise(value: object) -> str:
     """Say how YAML has read a name that is no text any more, or '' where it has not."""
     if isinstance(value, bool):
-        return '. YAML reads {0} as {1}: write "{0}"'.format(*(
-            ('ON', 'true') if value else ('OFF', 'false')))
+        return '. YAML reads {0} as {1}: write "{0}"'.format(
+            *(('ON', 'true') if value else ('OFF', 'false'))
+        )
     if isinstance(value, (int, float)):
         return '. YAML reads {0} as a number: write "{0}"'.format(value)
     return ''

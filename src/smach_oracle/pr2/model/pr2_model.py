@@ -6,6 +6,7 @@ four-bar fingers become jaws that slide. Their joints read the travel (m) of one
 closed place, so that the gap between the tips is their sum. Parts in signal colours get those of a
 PR2.
 """
+
 import os
 import shutil
 import tempfile
@@ -26,8 +27,14 @@ JAW_OPEN = 0.045  # m, each finger from its closed place
 JAW_SHIFT = 0.00187
 LIGHT = 1e-3  # kg, of a link that has no mass
 LEAST_INERTIA = 1e-6  # kg m2
-COLOURS = {'White': '0.93 0.93 0.92 1', 'Grey2': '0.84 0.85 0.86 1', 'Grey': '0.60 0.61 0.63 1',
-           'Blue': '0.42 0.47 0.55 1', 'Green': '0.88 0.89 0.90 1', 'Red': '0.25 0.26 0.28 1'}
+COLOURS = {
+    'White': '0.93 0.93 0.92 1',
+    'Grey2': '0.84 0.85 0.86 1',
+    'Grey': '0.60 0.61 0.63 1',
+    'Blue': '0.42 0.47 0.55 1',
+    'Green': '0.88 0.89 0.90 1',
+    'Red': '0.25 0.26 0.28 1',
+}
 TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
 
 
@@ -64,8 +71,10 @@ def pr2_urdf() -> Path:
 def srdf_pairs() -> FrozenSet[FrozenSet[str]]:
     """The pairs of links that may touch: neighbours, and those that never meet or always do."""
     root = ElementTree.parse(str(pr2_files().srdf)).getroot()
-    return frozenset(frozenset((pair.get('link1', ''), pair.get('link2', '')))
-                     for pair in root.iter('disable_collisions'))
+    return frozenset(
+        frozenset((pair.get('link1', ''), pair.get('link2', '')))
+        for pair in root.iter('disable_collisions')
+    )
 
 
 def _installed() -> Path:
@@ -76,11 +85,14 @@ def _installed() -> Path:
     except metadata.PackageNotFoundError as err:
         raise ModelError(
             'the Python package {} is not installed; it has the PR2. Run scripts/setup'.format(
-                err.args[0])) from err  # Python 3.8 has no name in it
+                err.args[0]
+            )
+        ) from err  # Python 3.8 has no name in it
     share = Path(str(package.locate_file('cmeel.prefix'))) / 'share'
     if not (share / 'example-robot-data' / 'robots' / 'pr2_description').is_dir():
         raise ModelError(
-            'there is no PR2 in {}: example-robot-data lies elsewhere or is broken'.format(share))
+            'there is no PR2 in {}: example-robot-data lies elsewhere or is broken'.format(share)
+        )
     return share
 
 
@@ -100,7 +112,8 @@ def _derive(share: Path, folder: Path) -> None:
     except OSError as err:
         raise ModelError(
             'the PR2 model cannot be kept in {}: {}; set XDG_CACHE_HOME to a folder that can be '
-            'written'.format(folder.parent, err)) from err
+            'written'.format(folder.parent, err)
+        ) from err
     try:
         _write(share, draft, folder)
         os.chmod(draft, 0o755)
@@ -188,8 +201,9 @@ def _mend_joint(joint: ElementTree.Element) -> None:
         x, y, z = (float(value) for value in _child(joint, 'origin').get('xyz', '0 0 0').split())
         _child(joint, 'origin').set('xyz', '{} {} {}'.format(x, y + side * JAW_SHIFT, z))
         _child(joint, 'axis').set('xyz', '0 {} 0'.format(side))
-        _child(joint, 'limit').attrib.update(lower='0', upper=str(JAW_OPEN), effort='200',
-                                             velocity='0.1')
+        _child(joint, 'limit').attrib.update(
+            lower='0', upper=str(JAW_OPEN), effort='200', velocity='0.1'
+        )
         _child(joint, 'dynamics').set('damping', '10')
     elif name.endswith(('finger_tip_joint', 'parallel_root_joint')):
         joint.set('type', 'fixed')
@@ -209,10 +223,14 @@ def _put_on_wheels(robot: ElementTree.Element) -> None:
     """Joints in front of the root that take it over the floor."""
     children = {_child(joint, 'child').get('link') for joint in robot.findall('joint')}
     root = next(
-        str(link.get('name')) for link in robot.findall('link') if link.get('name') not in children)
+        str(link.get('name')) for link in robot.findall('link') if link.get('name') not in children
+    )
     links: List[str] = ['world', 'base_x_link', 'base_y_link', root]
-    kinds: Tuple[Tuple[str, str],
-                 ...] = (('prismatic', '1 0 0'), ('prismatic', '0 1 0'), ('continuous', '0 0 1'))
+    kinds: Tuple[Tuple[str, str], ...] = (
+        ('prismatic', '1 0 0'),
+        ('prismatic', '0 1 0'),
+        ('continuous', '0 0 1'),
+    )
     for name in links[:3]:
         _inertial(ElementTree.SubElement(robot, 'link', name=name), 1.0, 0.1)
     for name, (kind, axis), parent, child in zip(BASE_JOINTS, kinds, links, links[1:]):
@@ -220,5 +238,6 @@ def _put_on_wheels(robot: ElementTree.Element) -> None:
         ElementTree.SubElement(joint, 'parent', link=parent)
         ElementTree.SubElement(joint, 'child', link=child)
         ElementTree.SubElement(joint, 'axis', xyz=axis)
-        ElementTree.SubElement(joint, 'limit', lower='-20', upper='20', effort='20000',
-                               velocity='1')
+        ElementTree.SubElement(
+            joint, 'limit', lower='-20', upper='20', effort='20000', velocity='1'
+        )

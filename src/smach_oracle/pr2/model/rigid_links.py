@@ -3,6 +3,7 @@
 Lengths are m. An element without a part that is needed, or with text that is not a number, raises
 a ValueError.
 """
+
 import xml.etree.ElementTree as ElementTree
 from typing import Dict, Tuple
 
@@ -50,15 +51,25 @@ def fixed_frames(robot: Element) -> Dict[str, Tuple[str, np.ndarray]]:
 def inertia_of(inertial: Element) -> np.ndarray:
     """(3, 3) kg m2, in the axes of its own origin."""
     value = {axes: float(text) for axes, text in _part(inertial, 'inertia').attrib.items()}
-    return np.array([[value['ixx'], value['ixy'], value['ixz']],
-                     [value['ixy'], value['iyy'], value['iyz']],
-                     [value['ixz'], value['iyz'], value['izz']]])
+    return np.array(
+        [
+            [value['ixx'], value['ixy'], value['ixz']],
+            [value['ixy'], value['iyy'], value['iyz']],
+            [value['ixz'], value['iyz'], value['izz']],
+        ]
+    )
 
 
 def set_inertia(inertial: Element, inertia: np.ndarray) -> None:
     """Write a (3, 3) inertia, kg m2."""
-    for name, row, column in (('ixx', 0, 0), ('ixy', 0, 1), ('ixz', 0, 2), ('iyy', 1, 1),
-                              ('iyz', 1, 2), ('izz', 2, 2)):
+    for name, row, column in (
+        ('ixx', 0, 0),
+        ('ixy', 0, 1),
+        ('ixz', 0, 2),
+        ('iyy', 1, 1),
+        ('iyz', 1, 2),
+        ('izz', 2, 2),
+    ):
         _part(inertial, 'inertia').set(name, repr(float(inertia[row, column])))
 
 
@@ -76,13 +87,17 @@ def _move_into(holder: Element, link: Element, holder_from_link: np.ndarray) -> 
     _set_origin(ours, transform(centre.tolist()))
 
 
-def _mass_properties(inertial: Element,
-                     holder_from_link: np.ndarray) -> Tuple[float, np.ndarray, np.ndarray]:
+def _mass_properties(
+    inertial: Element, holder_from_link: np.ndarray
+) -> Tuple[float, np.ndarray, np.ndarray]:
     """Mass, centre (3,) and inertia (3, 3) about that centre, in the axes of the holder."""
     pose = holder_from_link @ origin_of(inertial)
     turn = pose[:3, :3]
-    return float(_part(inertial, 'mass').get('value',
-                                             0)), pose[:3, 3], turn @ inertia_of(inertial) @ turn.T
+    return (
+        float(_part(inertial, 'mass').get('value', 0)),
+        pose[:3, 3],
+        turn @ inertia_of(inertial) @ turn.T,
+    )
 
 
 def _about(point: np.ndarray, mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.ndarray:
@@ -105,13 +120,17 @@ def _rpy(pose: np.ndarray) -> Tuple[float, float, float]:
     pitch = float(np.arctan2(-pose[2, 0], np.hypot(pose[0, 0], pose[1, 0])))
     if np.hypot(pose[0, 0], pose[1, 0]) < 1e-9:
         return 0.0, pitch, float(np.arctan2(-pose[0, 1], pose[1, 1]))
-    return float(np.arctan2(pose[2, 1], pose[2,
-                                             2])), pitch, float(np.arctan2(pose[1, 0], pose[0, 0]))
+    return (
+        float(np.arctan2(pose[2, 1], pose[2, 2])),
+        pitch,
+        float(np.arctan2(pose[1, 0], pose[0, 0])),
+    )
 
 
 def _part(element: Element, tag: str) -> Element:
     found = element.find(tag)
     if found is None:
-        raise ValueError('<{} name="{}"> has no <{}>'.format(element.tag, element.get('name', ''),
-                                                             tag))
+        raise ValueError(
+            '<{} name="{}"> has no <{}>'.format(element.tag, element.get('name', ''), tag)
+        )
     return found

@@ -1,4 +1,5 @@
 """Poses of messages in the frame that subsystems think in, and back."""
+
 from typing import Optional, Tuple
 
 import numpy as np
@@ -45,8 +46,9 @@ def pose_in_base(message: PoseStamped, robot: Robot, what: str) -> np.ndarray:
     """
     position, turn = message.pose.position, message.pose.orientation
     try:
-        pose = from_quaternion((position.x, position.y, position.z),
-                               (turn.x, turn.y, turn.z, turn.w))
+        pose = from_quaternion(
+            (position.x, position.y, position.z), (turn.x, turn.y, turn.z, turn.w)
+        )
     except ValueError as err:
         raise SkillError('{}: {}'.format(what, err)) from err
     return _near(base_from(message.header.frame_id, robot, what) @ pose, what)
@@ -60,32 +62,40 @@ def point_in_base(message: PointStamped, robot: Robot, what: str) -> np.ndarray:
     point = np.array([message.point.x, message.point.y, message.point.z])
     if not np.isfinite(point).all():
         raise SkillError('{}: the point is not finite: {}'.format(what, list(point)))
-    return _near(transform(apply(base_from(message.header.frame_id, robot, what), point)), what)[:3,
-                                                                                                 3]
+    return _near(transform(apply(base_from(message.header.frame_id, robot, what), point)), what)[
+        :3, 3
+    ]
 
 
-def box_in_base(message: PoseStamped, size: Vector3, robot: Robot, what: str,
-                flat: bool = False) -> UprightBox:
+def box_in_base(
+    message: PoseStamped, size: Vector3, robot: Robot, what: str, flat: bool = False
+) -> UprightBox:
     """An upright box in base_footprint.
 
     :param flat: its height may be 0, as a table's is.
     :raises SkillError: as pose_in_base does, and for a size that no object has.
     """
     extent = np.array([size.x, size.y, size.z])
-    if not np.isfinite(extent).all() or extent[:2].min() <= 0 or extent[2] < 0 or (extent[2] == 0
-                                                                                   and not flat):
+    if (
+        not np.isfinite(extent).all()
+        or extent[:2].min() <= 0
+        or extent[2] < 0
+        or (extent[2] == 0 and not flat)
+    ):
         raise SkillError('{}: its size is {} m; each must be above 0'.format(what, list(extent)))
     if not flat and extent.max() > LARGEST:
-        raise SkillError('{}: its size is {} m; at most {} is allowed'.format(
-            what, list(extent), LARGEST))
+        raise SkillError(
+            '{}: its size is {} m; at most {} is allowed'.format(what, list(extent), LARGEST)
+        )
     pose = pose_in_base(message, robot, what)
     return UprightBox(pose[:3, 3], extent, yaw_of(pose))
 
 
 def pose_message(pose: np.ndarray, stamp: Optional[object] = None) -> PoseStamped:
     """A 4x4 in base_footprint as a message."""
-    header = Header(
-        frame_id=BASE_FRAME) if stamp is None else Header(frame_id=BASE_FRAME, stamp=stamp)
+    header = (
+        Header(frame_id=BASE_FRAME) if stamp is None else Header(frame_id=BASE_FRAME, stamp=stamp)
+    )
     return PoseStamped(header, Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
 
 
@@ -96,6 +106,9 @@ def box_messages(box: UprightBox, stamp: Optional[object] = None) -> Tuple[PoseS
 
 def _near(pose: np.ndarray, what: str) -> np.ndarray:
     if np.abs(pose[:3, 3]).max() > FARTHEST:
-        raise SkillError('{}: ({}) m is more than {} m away'.format(
-            what, ', '.join('{:.6g}'.format(each) for each in pose[:3, 3]), FARTHEST))
+        raise SkillError(
+            '{}: ({}) m is more than {} m away'.format(
+                what, ', '.join('{:.6g}'.format(each) for each in pose[:3, 3]), FARTHEST
+            )
+        )
     return pose

@@ -1,4 +1,5 @@
 """The skills of the second use case over messages: the door, picking inside it, handing over."""
+
 from functools import partial
 from typing import Optional
 
@@ -57,8 +58,9 @@ class KitchenSkills(Manipulation):
         super().__init__(context)
         self.kitchen = kitchen
 
-    def localise_at_fridge(self, goal: LocaliseAtFridgeGoal,
-                           report: ReportStatus) -> LocaliseAtFridgeResult:
+    def localise_at_fridge(
+        self, goal: LocaliseAtFridgeGoal, report: ReportStatus
+    ) -> LocaliseAtFridgeResult:
         """Look at the refrigerator, and set right where the robot believes to stand."""
         self.hands.feel(self.context.robot)
         report('looking where the refrigerator stands')
@@ -98,12 +100,19 @@ class KitchenSkills(Manipulation):
             held = self._pick_from_somewhere(goal, arm, target, report)
         return PickResult(grasp=pose_message(held.grasp))
 
-    def _pick_from_somewhere(self, goal: PickGoal, arm: str, target: UprightBox,
-                             report: ReportStatus) -> HeldObject:
+    def _pick_from_somewhere(
+        self, goal: PickGoal, arm: str, target: UprightBox, report: ReportStatus
+    ) -> HeldObject:
         """Pick a drink from the first place of the base from which there is a grasp."""
         for stance in STANCES:
-            there = come_near(self.context, self.kitchen, target, arm, goal.attempt + stance.place,
-                              stance is not STANCES[0])
+            there = come_near(
+                self.context,
+                self.kitchen,
+                target,
+                arm,
+                goal.attempt + stance.place,
+                stance is not STANCES[0],
+            )
             try:
                 return self._pick_inside(goal, arm, there, there is not target, stance, report)
             except NoGrasp:
@@ -133,8 +142,15 @@ class KitchenSkills(Manipulation):
         finally:
             self.hands.feel(self.context.robot)
 
-    def _pick_inside(self, goal: PickGoal, arm: str, target: UprightBox, driven: bool,
-                     stance: Stance, report: ReportStatus) -> HeldObject:
+    def _pick_inside(
+        self,
+        goal: PickGoal,
+        arm: str,
+        target: UprightBox,
+        driven: bool,
+        stance: Stance,
+        report: ReportStatus,
+    ) -> HeldObject:
         """Pick a drink from where the base stands.
 
         :param driven: whether the base has driven since the drink was seen.
@@ -149,9 +165,18 @@ class KitchenSkills(Manipulation):
         target = seen_again(target, others) if driven else target
         try:
             with self.firmer_after_slip(goal.attempt) as effort:
-                held = pick_from_fridge(self.context, self.kitchen, fridge, arm, target, others,
-                                        effort, elsewhere_of(goal.attempt),
-                                        partial(self.hands.keep, arm), stance)
+                held = pick_from_fridge(
+                    self.context,
+                    self.kitchen,
+                    fridge,
+                    arm,
+                    target,
+                    others,
+                    effort,
+                    elsewhere_of(goal.attempt),
+                    partial(self.hands.keep, arm),
+                    stance,
+                )
         except SkillError:
             self.hands.feel(robot)
             raise

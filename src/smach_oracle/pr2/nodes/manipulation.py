@@ -1,4 +1,5 @@
 """The manipulation skills over messages: goals in, results out. The node gives them servers."""
+
 import contextlib
 from functools import partial
 from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Type
@@ -131,8 +132,9 @@ class Manipulation:
         self.context.robot.look_at(point)
         return PointHeadResult()
 
-    def build_collision_map(self, goal: BuildCollisionMapGoal,
-                            report: ReportStatus) -> BuildCollisionMapResult:
+    def build_collision_map(
+        self, goal: BuildCollisionMapGoal, report: ReportStatus
+    ) -> BuildCollisionMapResult:
         """Boxes of the table and the objects, under an id.
 
         :raises SkillError: for a pose or size that is not allowed, where there are more objects
@@ -142,10 +144,13 @@ class Manipulation:
         if len(goal.objects) != len(goal.sizes):
             raise SkillError('{} objects but {} sizes'.format(len(goal.objects), len(goal.sizes)))
         if len(goal.objects) > MOST_BOXES:
-            raise SkillError('{} objects; allowed: at most {}'.format(len(goal.objects),
-                                                                     MOST_BOXES))
-        objects = [box_in_base(pose, size, robot, 'objects[{}]'.format(k))
-                   for k, (pose, size) in enumerate(zip(goal.objects, goal.sizes))]
+            raise SkillError(
+                '{} objects; allowed: at most {}'.format(len(goal.objects), MOST_BOXES)
+            )
+        objects = [
+            box_in_base(pose, size, robot, 'objects[{}]'.format(k))
+            for k, (pose, size) in enumerate(zip(goal.objects, goal.sizes))
+        ]
         centre = pose_in_base(goal.table, robot, 'table')
         made = map_of(UprightBox(centre[:3, 3], TABLE_SIZE, yaw_of(centre)), objects)
         return BuildCollisionMapResult(map_id=self.maps.keep(made), boxes=len(made.boxes))
@@ -167,8 +172,15 @@ class Manipulation:
             self._begins = False
             # only after a slip: what does not slip may tilt where it is pressed hard
             with self.firmer_after_slip() as effort:
-                held = pick(self.context, arm, target, boxes, effort, elsewhere_of(goal.attempt),
-                            partial(self.hands.keep, arm))
+                held = pick(
+                    self.context,
+                    arm,
+                    target,
+                    boxes,
+                    effort,
+                    elsewhere_of(goal.attempt),
+                    partial(self.hands.keep, arm),
+                )
         return PickResult(grasp=pose_message(held.grasp))
 
     def place(self, goal: PlaceGoal, report: ReportStatus) -> PlaceResult:
@@ -189,7 +201,8 @@ class Manipulation:
         held, boxes = self._held_object(arm, grasp, made)
         report('looking at the place')
         if stands_open(encoder_readings(robot), arm) and self._is_placed(
-                arm, centre, goal.tolerance, held, made):
+            arm, centre, goal.tolerance, held, made
+        ):
             return PlaceResult()
         boxes.update(self._standing_at(arm, centre, goal.tolerance, held, boxes))
         report('choosing a way')
@@ -207,8 +220,9 @@ class Manipulation:
             raise SkillError('the object was let go, but nothing stands at its place')
         return PlaceResult()
 
-    def _is_placed(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
-                   made: CollisionMap) -> bool:
+    def _is_placed(
+        self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject, made: CollisionMap
+    ) -> bool:
         """Take an empty hand away from a place, and look whether it has put its object down there.
 
         :param made: a map of what stood there before.
@@ -224,10 +238,17 @@ class Manipulation:
             np.hypot(*(box.centre - centre)[:2]) < (tolerance or USUAL_SPOT) + KNOWN
             and np.abs(box.size - 2 * held.half).max() < SAME_SIZE
             and nearest_object(made, box.centre) is None
-            for box in things_on_table(robot.see(), limbs))
+            for box in things_on_table(robot.see(), limbs)
+        )
 
-    def _standing_at(self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject,
-                     boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:
+    def _standing_at(
+        self,
+        arm: str,
+        centre: np.ndarray,
+        tolerance: float,
+        held: HeldObject,
+        boxes: Mapping[str, MapBox],
+    ) -> Dict[str, MapBox]:
         """Return the things about a place by now that are not on the map: boxes by name.
 
         :param boxes: the map.
@@ -241,9 +262,12 @@ class Manipulation:
             'thing {}'.format(k): MapBox(box.centre, box.size / 2 + PADDING, box.yaw)
             for k, box in enumerate(seen)
             if np.hypot(*(box.centre - centre)[:2]) < tolerance + ABOUT
-            and np.hypot(*(box.centre - hand[:3, 3])[:2]) > ABOUT / 2 and all(
+            and np.hypot(*(box.centre - hand[:3, 3])[:2]) > ABOUT / 2
+            and all(
                 np.hypot(*(box.centre - other.centre)[:2]) > KNOWN
-                for name, other in boxes.items() if name.startswith('object'))
+                for name, other in boxes.items()
+                if name.startswith('object')
+            )
         }
 
     def forget_slips(self) -> None:
@@ -263,8 +287,9 @@ class Manipulation:
             raise
 
     @contextlib.contextmanager
-    def _withdrawing(self, arm: str, boxes: Dict[str, MapBox],
-                     errors: Type[Exception] = SkillError) -> Iterator[None]:
+    def _withdrawing(
+        self, arm: str, boxes: Dict[str, MapBox], errors: Type[Exception] = SkillError
+    ) -> Iterator[None]:
         """After a failure, take the empty hand out of the camera's view."""
         try:
             yield
@@ -294,8 +319,9 @@ class Manipulation:
         if held is not None:
             put_back(self.context, arm, held, boxes)
 
-    def _held_object(self, arm: str, grasp: np.ndarray,
-                     made: CollisionMap) -> Tuple[HeldObject, Dict[str, MapBox]]:
+    def _held_object(
+        self, arm: str, grasp: np.ndarray, made: CollisionMap
+    ) -> Tuple[HeldObject, Dict[str, MapBox]]:
         """The held object, and the boxes without it.
 
         It is the one that the map has there, or the remembered one, or something of the usual size.
@@ -308,9 +334,9 @@ class Manipulation:
         if index is not None:
             box = made.objects[index]
             boxes.pop('object {}'.format(index))
-            return HeldObject(grasp,
-                              inverse(grasp) @ box.matrix, box.size / 2,
-                              known.effort if known else FIRM), boxes
+            return HeldObject(
+                grasp, inverse(grasp) @ box.matrix, box.size / 2, known.effort if known else FIRM
+            ), boxes
         if known is not None:
             return known, boxes
         upright = UprightBox(grasp[:3, 3], 2 * USUAL, 0.0)

@@ -1,4 +1,5 @@
 """Node: what the PR2's arms, hands and head can do, as actions."""
+
 import rospy
 
 from smach_oracle.msg import (
@@ -35,8 +36,11 @@ def serve(skills: KitchenSkills, server: SkillServer) -> None:
     """Offer all skills."""
     server.offer('move_arms_aside', MoveArmsAsideAction, skills.move_arms_aside)
     server.offer('point_head', PointHeadAction, skills.point_head)
-    server.offer('build_collision_map', BuildCollisionMapAction,
-                 CollisionMapPublisher(skills.build_collision_map, skills.maps))
+    server.offer(
+        'build_collision_map',
+        BuildCollisionMapAction,
+        CollisionMapPublisher(skills.build_collision_map, skills.maps),
+    )
     server.offer('pick', PickAction, skills.pick)
     server.offer('place', PlaceAction, skills.place)
     server.offer('localise_at_fridge', LocaliseAtFridgeAction, skills.localise_at_fridge)
@@ -50,7 +54,8 @@ def main() -> None:
     parameters_only(
         'Node: move_arms_aside, point_head, build_collision_map, pick, place, localise_at_fridge, '
         'open_door, close_door and hand_over as actions. Parameters: ~snapshot, ~pass_time, '
-        '~kitchen; see doc/simulation.md.')
+        '~kitchen; see doc/simulation.md.'
+    )
     rospy.init_node('pr2_manipulation')
     try:
         kitchen = kitchen_at('~kitchen')

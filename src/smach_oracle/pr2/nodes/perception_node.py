@@ -1,4 +1,5 @@
 """The node of the PR2's perception: objects on the table, a drink in the open refrigerator."""
+
 import contextlib
 from typing import Dict, Iterator, List, Optional
 
@@ -66,8 +67,9 @@ class Perception:
         self._links = links
         self._kitchen = kitchen
 
-    def detect_tabletop(self, goal: DetectTabletopGoal,
-                        report: ReportStatus) -> DetectTabletopResult:
+    def detect_tabletop(
+        self, goal: DetectTabletopGoal, report: ReportStatus
+    ) -> DetectTabletopResult:
         """The table and the objects on it.
 
         :raises NotSeen: where they cannot be made out.
@@ -85,10 +87,12 @@ class Perception:
                 self._look_beside(image, found, near)
         report('{} objects'.format(len(found.objects)))
         objects = [box_messages(box, _stamp(image)) for box in found.objects]
-        return DetectTabletopResult(table=box_messages(found.table, _stamp(image))[0],
-                                    objects=[pose for pose, _ in objects],
-                                    sizes=[size for _, size in objects],
-                                    colours=[_message_of(each) for each in found.colours])
+        return DetectTabletopResult(
+            table=box_messages(found.table, _stamp(image))[0],
+            objects=[pose for pose, _ in objects],
+            sizes=[size for _, size in objects],
+            colours=[_message_of(each) for each in found.colours],
+        )
 
     def detect_drink(self, goal: DetectDrinkGoal, report: ReportStatus) -> DetectDrinkResult:
         """The foremost drink on the shelf, or the foremost one of the colour asked for.
@@ -105,7 +109,8 @@ class Perception:
         limbs = self._limbs()
         self._robot.spend('perception', DETECTION)
         pose, size = box_messages(
-            find_drink(image, self._kitchen, fridge, lowest, limbs, goal.colour), _stamp(image))
+            find_drink(image, self._kitchen, fridge, lowest, limbs, goal.colour), _stamp(image)
+        )
         return DetectDrinkResult(drink=pose, size=size)
 
     def _near(self, point: PointStamped) -> np.ndarray:
@@ -134,8 +139,9 @@ class Perception:
             self._robot.spend('perception', DETECTION)
             for box in things_on_table(glance, limbs):
                 if distance_from(near, box.centre) < distance_from(near, first) - NEARER:
-                    raise NotSeen('something nearer stands beside what the image showed',
-                                  box.centre)
+                    raise NotSeen(
+                        'something nearer stands beside what the image showed', box.centre
+                    )
         if found.beyond:
             ahead = np.linalg.norm(first - image.base_from_camera[:3, 3])
             self._robot.look_at(apply(image.base_from_camera, np.array([0.0, 0.0, ahead])))
@@ -249,8 +255,11 @@ def robot_links(limit_s: float = MODEL_WAIT_S) -> Dict[str, Joint]:
         rospy.rostime.wallsleep(period_s)
         text = rospy.get_param('robot_description', None)
     if text is None:
-        raise ValueError('no parameter {} within {:.0f} s'.format(
-            rospy.resolve_name('robot_description'), limit_s))
+        raise ValueError(
+            'no parameter {} within {:.0f} s'.format(
+                rospy.resolve_name('robot_description'), limit_s
+            )
+        )
     return read_joints(text)
 
 
@@ -265,7 +274,8 @@ def main() -> None:
     """Entry point of the node."""
     parameters_only(
         'Node: detects the table and the objects on it, and drinks in the refrigerator. '
-        'Parameters: ~snapshot, ~pass_time, ~kitchen; see doc/perception.md.')
+        'Parameters: ~snapshot, ~pass_time, ~kitchen; see doc/perception.md.'
+    )
     rospy.init_node('pr2_perception')
     try:
         snapshot, pass_time = snapshot_service(), pass_time_service()

@@ -1,4 +1,5 @@
 """Skills as actions: one at a time, each failure an aborted action with its reason."""
+
 import threading
 import traceback
 from typing import Callable, List, Mapping, Tuple, Type
@@ -37,8 +38,9 @@ class SkillServer:
         self._running = ''
         self._servers: List[actionlib.SimpleActionServer] = []
 
-    def offer(self, name: str, spec: type, handler: Handler, errors: Tuple[Type[Exception],
-                                                                           ...] = ()) -> None:
+    def offer(
+        self, name: str, spec: type, handler: Handler, errors: Tuple[Type[Exception], ...] = ()
+    ) -> None:
         """Serve an action.
 
         :param spec: the Action type. Its feedback has a field `status`, its result a field
@@ -49,8 +51,11 @@ class SkillServer:
         """
         expected = (SkillError, RobotError, PlanningError) + errors
         server: actionlib.SimpleActionServer = actionlib.SimpleActionServer(
-            name, spec, lambda goal: self._serve(name, spec, server, handler, goal, expected),
-            auto_start=False)
+            name,
+            spec,
+            lambda goal: self._serve(name, spec, server, handler, goal, expected),
+            auto_start=False,
+        )
         server.register_preempt_callback(lambda: self._abort() if self._running == name else None)
         server.start()
         self._servers.append(server)
@@ -59,8 +64,15 @@ class SkillServer:
         """Return how many actions are served."""
         return len(self._servers)
 
-    def _serve(self, name: str, spec: type, server: actionlib.SimpleActionServer, handler: Handler,
-               goal: genpy.Message, expected: Tuple[Type[Exception], ...]) -> None:
+    def _serve(
+        self,
+        name: str,
+        spec: type,
+        server: actionlib.SimpleActionServer,
+        handler: Handler,
+        goal: genpy.Message,
+        expected: Tuple[Type[Exception], ...],
+    ) -> None:
         action = spec()
         feedback, result = action.action_feedback.feedback, action.action_result.result
 

@@ -1,4 +1,5 @@
 """Whether a thing that was seen before is gone: the camera sees past where it stood."""
+
 import numpy as np
 
 from smach_oracle.geometry.box import UprightBox
@@ -22,13 +23,17 @@ def sees_past(image: CameraImage, box: UprightBox) -> bool:
     """
     across = np.cross(box.centre - image.base_from_camera[:3, 3], (0.0, 0.0, 1.0))
     across /= max(float(np.linalg.norm(across)), 1e-9)
-    points = np.array([box.centre + [0.0, 0.0, (height - 0.5) * box.size[2]] +
-                       aside * box.narrow * across for height in HEIGHTS for aside in ASIDE])
+    points = np.array(
+        [
+            box.centre + [0.0, 0.0, (height - 0.5) * box.size[2]] + aside * box.narrow * across
+            for height in HEIGHTS
+            for aside in ASIDE
+        ]
+    )
     pixels = pixels_of(points, image.intrinsics, image.base_from_camera)
     columns, rows = np.round(pixels[:, :2]).astype(int).T
     height, width = image.depth.shape
-    inside = ((pixels[:, 2] > 0) & (columns >= 0) & (columns < width) & (rows >= 0)
-              & (rows < height))
+    inside = (pixels[:, 2] > 0) & (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
     depth = image.depth[rows[inside], columns[inside]]
     measured = np.isfinite(depth) & (depth > 0)
     if measured.sum() < LEAST:

@@ -1,4 +1,5 @@
 """Patches where the camera measured no depth, as glare makes them, in which things may stand."""
+
 from typing import Optional
 
 import numpy as np
@@ -40,8 +41,9 @@ def dazzled(image: CameraImage) -> bool:
     return int((white & blind_patches(image)).sum()) >= LEAST_PATCH
 
 
-def blind_distance(image: CameraImage, blind: np.ndarray, plane: Plane,
-                   patch: np.ndarray, near: np.ndarray = HERE) -> Optional[float]:
+def blind_distance(
+    image: CameraImage, blind: np.ndarray, plane: Plane, patch: np.ndarray, near: np.ndarray = HERE
+) -> Optional[float]:
     """m from a point to the nearest place on a surface that is behind a blind patch.
 
     :param blind: as from blind_patches().
@@ -53,9 +55,16 @@ def blind_distance(image: CameraImage, blind: np.ndarray, plane: Plane,
     if not len(rows):
         return None
     stride = image.stride(COLUMNS)
-    rays = np.column_stack([(stride * columns - image.intrinsics[0, 2]) / image.intrinsics[0, 0],
-                            (stride * rows - image.intrinsics[1, 2]) / image.intrinsics[1, 1],
-                            np.ones(len(rows))]) @ image.base_from_camera[:3, :3].T
+    rays = (
+        np.column_stack(
+            [
+                (stride * columns - image.intrinsics[0, 2]) / image.intrinsics[0, 0],
+                (stride * rows - image.intrinsics[1, 2]) / image.intrinsics[1, 1],
+                np.ones(len(rows)),
+            ]
+        )
+        @ image.base_from_camera[:3, :3].T
+    )
     eye = image.base_from_camera[:3, 3]
     down = rays @ plane.normal
     meets = down < -1e-6

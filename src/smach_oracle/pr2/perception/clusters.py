@@ -1,4 +1,5 @@
 """Things on a level surface in a camera image: clusters of points above the surface."""
+
 import zlib
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
@@ -56,8 +57,9 @@ class Cluster(NamedTuple):
     box: UprightBox  # down to the surface
 
 
-def cloud_of(image: CameraImage, limbs: Sequence[Capsule] = (),
-             reach: float = 2.5) -> OrganizedCloud:
+def cloud_of(
+    image: CameraImage, limbs: Sequence[Capsule] = (), reach: float = 2.5
+) -> OrganizedCloud:
     """The points of an image within `reach` m of depth, without those of the robot's own limbs."""
     stride = image.stride(COLUMNS)
     depth = image.depth[::stride, ::stride]
@@ -68,8 +70,13 @@ def cloud_of(image: CameraImage, limbs: Sequence[Capsule] = (),
     for index, limb in enumerate(limbs):
         hidden[_distance(points, limb) < limb.radius] = index
     points[hidden >= 0] = np.nan
-    return OrganizedCloud(points, image.colour[::stride, ::stride], hidden,
-                          tuple(limb.name for limb in limbs), float(measured.mean()))
+    return OrganizedCloud(
+        points,
+        image.colour[::stride, ::stride],
+        hidden,
+        tuple(limb.name for limb in limbs),
+        float(measured.mean()),
+    )
 
 
 def generator_of(image: CameraImage) -> np.random.Generator:
@@ -77,8 +84,14 @@ def generator_of(image: CameraImage) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(np.ascontiguousarray(image.depth).tobytes()))
 
 
-def clusters_on(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, lowest: float,
-                highest: float, margin: float = MARGIN) -> List[Cluster]:
+def clusters_on(
+    cloud: OrganizedCloud,
+    plane: Plane,
+    patch: np.ndarray,
+    lowest: float,
+    highest: float,
+    margin: float = MARGIN,
+) -> List[Cluster]:
     """The clusters above a surface, in no order. A small one is taken for noise.
 
     :param patch: (n, 3) points of the surface. Clusters stand within its convex hull.
@@ -90,7 +103,8 @@ def clusters_on(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, lowest: 
     for chosen in standing_on(points, plane, patch, lowest, highest, margin):
         own = points[chosen]
         found.append(
-            Cluster(own, pixels[chosen], upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))))
+            Cluster(own, pixels[chosen], upright_box(own, plane.z_at(*own[:, :2].mean(axis=0))))
+        )
     return found
 
 
@@ -107,14 +121,18 @@ def cut_off(cloud: OrganizedCloud, cluster: Cluster) -> bool:
     """Whether the edge of the image cuts a cluster off."""
     height, width = cloud.hidden.shape
     rows, columns = cluster.pixels.T
-    return bool(rows.min() < 2 or columns.min() < 2 or rows.max() > height - 3
-                or columns.max() > width - 3)
+    return bool(
+        rows.min() < 2 or columns.min() < 2 or rows.max() > height - 3 or columns.max() > width - 3
+    )
 
 
 def _distance(points: np.ndarray, limb: Capsule) -> np.ndarray:
     axis = limb.end - limb.start
     length = float(axis @ axis)
-    along = np.clip((points - limb.start) @ axis /
-                    length, 0.0, 1.0) if length > 1e-9 else np.zeros(points.shape[:-1])
+    along = (
+        np.clip((points - limb.start) @ axis / length, 0.0, 1.0)
+        if length > 1e-9
+        else np.zeros(points.shape[:-1])
+    )
     distance = np.linalg.norm(points - limb.start - along[..., None] * axis, axis=-1)
     return np.where(np.isfinite(distance), distance, np.inf)

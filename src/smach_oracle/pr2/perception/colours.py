@@ -1,12 +1,20 @@
 """The colours of things, by their hue and by their shares of red, green and blue."""
+
 from typing import List, Tuple
 
 import numpy as np
 
 # degrees of hue from which each name counts, up to the next one's. Red passes 360
-HUES: List[Tuple[float, str]] = [(0.0, 'red'), (18.0, 'orange'), (43.0, 'yellow'), (68.0, 'green'),
-                                 (165.0, 'turquoise'), (205.0, 'blue'), (262.0, 'purple'),
-                                 (335.0, 'red')]
+HUES: List[Tuple[float, str]] = [
+    (0.0, 'red'),
+    (18.0, 'orange'),
+    (43.0, 'yellow'),
+    (68.0, 'green'),
+    (165.0, 'turquoise'),
+    (205.0, 'blue'),
+    (262.0, 'purple'),
+    (335.0, 'red'),
+]
 GREY = 'grey'
 NAMES = tuple(sorted({name for _, name in HUES} | {GREY}))
 LEAST_SATURATION = 0.25  # less is grey
@@ -26,9 +34,14 @@ def names_of(colours: np.ndarray) -> np.ndarray:
     highest, lowest = values.max(axis=-1), values.min(axis=-1)
     spread = np.maximum(highest - lowest, 1e-9)
     red, green, blue = np.moveaxis(values, -1, 0)
-    hue = np.where(highest == red, (green - blue) / spread % 6.0,
-                   np.where(highest == green, (blue - red) / spread + 2.0,
-                            (red - green) / spread + 4.0)) * 60.0
+    hue = (
+        np.where(
+            highest == red,
+            (green - blue) / spread % 6.0,
+            np.where(highest == green, (blue - red) / spread + 2.0, (red - green) / spread + 4.0),
+        )
+        * 60.0
+    )
     starts = np.array([start for start, _ in HUES])
     named = np.array([name for _, name in HUES])[np.searchsorted(starts, hue, side='right') - 1]
     named = np.where(highest - lowest < LEAST_SATURATION * highest, GREY, named)

@@ -1,4 +1,5 @@
 """The refrigerator's door in a camera image: its angle, and its handle where it is in view."""
+
 from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -47,12 +48,17 @@ def find_door(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray
     return DoorView(angle, base_from_fridge @ from_rpy(shift))
 
 
-def _points_of_door(image: CameraImage, kitchen: Kitchen,
-                    base_from_fridge: np.ndarray) -> np.ndarray:
+def _points_of_door(
+    image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray
+) -> np.ndarray:
     """(n, 3) points at the handle's height, within the door's swing, in the fridge's frame."""
     stride = image.stride(COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics, inverse(base_from_fridge)
-                       @ image.base_from_camera, stride=stride).reshape(-1, 3)
+    points = points_of(
+        image.depth[::stride, ::stride],
+        image.intrinsics,
+        inverse(base_from_fridge) @ image.base_from_camera,
+        stride=stride,
+    ).reshape(-1, 3)
     points = points[np.isfinite(points[:, 2])]
     low, high = kitchen.handle_span
     level = (points[:, 2] > low + 0.02) & (points[:, 2] < high - 0.02)
@@ -81,8 +87,9 @@ def _best_angle(points: np.ndarray, kitchen: Kitchen, eye: np.ndarray) -> Tuple[
         pairs = counts[:-1] + counts[1:]
         peak = int(np.argmax(pairs))
         inside = offsets[(offsets >= edges[peak]) & (offsets < edges[peak + 2])]
-        if pairs[peak] > best[2] and not (face and _handle_shift(local, kitchen,
-                                                                 float(np.median(inside))) is None):
+        if pairs[peak] > best[2] and not (
+            face and _handle_shift(local, kitchen, float(np.median(inside))) is None
+        ):
             best = (float(angle), float(np.median(inside)), int(pairs[peak]))
     return best
 

@@ -1,4 +1,5 @@
 """A drink in the open refrigerator as the head camera sees it: the shelf, and what is on it."""
+
 from typing import List, Sequence, Tuple
 
 import numpy as np
@@ -41,9 +42,14 @@ BLIND = ': depth is missing in a patch of the image, before the shelf'
 HIDDEN = 0.5  # share of the shelf from which its being hidden is the reason
 
 
-def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
-               min_height: float = 0.03, limbs: Sequence[Capsule] = (),
-               colour: str = '') -> UprightBox:
+def find_drink(
+    image: CameraImage,
+    kitchen: Kitchen,
+    base_from_fridge: np.ndarray,
+    min_height: float = 0.03,
+    limbs: Sequence[Capsule] = (),
+    colour: str = '',
+) -> UprightBox:
     """The foremost thing on the drinks' shelf that can be a drink, in the frame of the base.
 
     :param base_from_fridge: 4x4, where the map has the fridge, right to some 0.1 m.
@@ -58,28 +64,42 @@ def find_drink(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarra
     cloud = cloud_of(image, limbs)
     points = _about_shelf(cloud, kitchen, base_from_fridge)
     plane = find_plane(points, generator_of(image), tolerance=OFF_SHELF, least=LEAST_SHELF)
-    patch = largest_patch(
-        points[np.abs(plane.height(points)) < OFF_SHELF]) if plane is not None else points[:0]
+    patch = (
+        largest_patch(points[np.abs(plane.height(points)) < OFF_SHELF])
+        if plane is not None
+        else points[:0]
+    )
     if plane is None or len(patch) < LEAST_SHELF:
         raise NotSeen(_no_shelf(image, kitchen, base_from_fridge, cloud))
     seen = _in_front(cloud, plane, patch, kitchen, base_from_fridge, min_height)
     clusters = _of_colour(cloud, seen, plane, colour) if colour else seen
     blind = blind_patches(image)
-    reasons = [_why_no_drink(cloud, each, 'the {} thing'.format(colour)
-                             if colour else 'what is foremost', blind) for each in clusters]
+    reasons = [
+        _why_no_drink(
+            cloud, each, 'the {} thing'.format(colour) if colour else 'what is foremost', blind
+        )
+        for each in clusters
+    ]
     drinks = [each.box for each, reason in zip(clusters, reasons) if not reason]
     if drinks:
         return drinks[0]
     hidden = _share_hidden(image, kitchen, base_from_fridge)[1]
     if hidden > HIDDEN:
         raise NotSeen('no drink in view: the door hides {:.0f}% of the shelf'.format(100 * hidden))
-    raise NotSeen('no {}drink: {}'.format(
-        colour and colour + ' ', reasons[0] if reasons else _on_shelf(cloud, seen) +
-        ('' if blind_distance(image, blind, plane, patch) is None else BLIND)))
+    raise NotSeen(
+        'no {}drink: {}'.format(
+            colour and colour + ' ',
+            reasons[0]
+            if reasons
+            else _on_shelf(cloud, seen)
+            + ('' if blind_distance(image, blind, plane, patch) is None else BLIND),
+        )
+    )
 
 
-def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
-               colour: str) -> List[Cluster]:
+def _of_colour(
+    cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane, colour: str
+) -> List[Cluster]:
     """Return the things of a colour: whole, or parts of things that touch, foremost first."""
     found = []
     for cluster in clusters:
@@ -93,15 +113,20 @@ def _of_colour(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane,
 
 def _on_shelf(cloud: OrganizedCloud, clusters: Sequence[Cluster]) -> str:
     """Say what is on the shelf, for people."""
-    names = [name_of(cloud.colour[tuple(each.pixels.T)].mean(axis=0)) or 'dark'
-             for each in clusters]
+    names = [
+        name_of(cloud.colour[tuple(each.pixels.T)].mean(axis=0)) or 'dark' for each in clusters
+    ]
     if not names:
         return 'there is nothing on the shelf'
     return 'there are {} things on the shelf: {}'.format(len(names), ', '.join(names))
 
 
-def things_on_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
-                    limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
+def things_on_shelf(
+    image: CameraImage,
+    kitchen: Kitchen,
+    base_from_fridge: np.ndarray,
+    limbs: Sequence[Capsule] = (),
+) -> List[UprightBox]:
     """Everything seen on the drinks' shelf, foremost first, or [] where the shelf is not seen.
 
     Parameters and boxes are as in find_drink().
@@ -115,8 +140,9 @@ def things_on_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.n
     return [each.box for each in _in_front(cloud, plane, patch, kitchen, base_from_fridge, 0.0)]
 
 
-def _about_shelf(cloud: OrganizedCloud, kitchen: Kitchen,
-                 base_from_fridge: np.ndarray) -> np.ndarray:
+def _about_shelf(
+    cloud: OrganizedCloud, kitchen: Kitchen, base_from_fridge: np.ndarray
+) -> np.ndarray:
     """(n, 3): the points that may be of the shelf, in the frame of the base."""
     points = cloud.points[np.isfinite(cloud.points[..., 2])]
     local = apply(inverse(base_from_fridge), points)
@@ -126,8 +152,14 @@ def _about_shelf(cloud: OrganizedCloud, kitchen: Kitchen,
     return points[near & (np.abs(local[:, 2] - low[2]) < SHELF_SLACK)]
 
 
-def _in_front(cloud: OrganizedCloud, plane: Plane, patch: np.ndarray, kitchen: Kitchen,
-              base_from_fridge: np.ndarray, min_height: float) -> List[Cluster]:
+def _in_front(
+    cloud: OrganizedCloud,
+    plane: Plane,
+    patch: np.ndarray,
+    kitchen: Kitchen,
+    base_from_fridge: np.ndarray,
+    min_height: float,
+) -> List[Cluster]:
     """Return the things that stand on the shelf, foremost first."""
     low, high = shelf_region(kitchen)
     lowest = max(OFF_SHELF, min_height if min_height > 0 else 0.03)
@@ -156,33 +188,43 @@ def _why_no_drink(cloud: OrganizedCloud, cluster: Cluster, what: str, blind: np.
         return '{} on the shelf, {}, has not the size of a drink'.format(what, extent)
     if box.narrow > NARROW[1] or box.wide > WIDEST:
         return '{} on the shelf is too large, {}: one thing, or several that touch'.format(
-            what, extent)
+            what, extent
+        )
     several = why_several(cloud, cluster)
-    return '{} on the shelf, {}, seems to be several things that touch: {}'.format(
-        what, extent, several) if several else ''
+    return (
+        '{} on the shelf, {}, seems to be several things that touch: {}'.format(
+            what, extent, several
+        )
+        if several
+        else ''
+    )
 
 
-def _no_shelf(image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray,
-              cloud: OrganizedCloud) -> str:
+def _no_shelf(
+    image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray, cloud: OrganizedCloud
+) -> str:
     in_image, hidden = _share_hidden(image, kitchen, base_from_fridge)
     if in_image < 0.3:
         return 'no shelf in view: the camera does not look into the refrigerator'
     if hidden > HIDDEN:
-        return 'the door hides the shelf: {:.0f}% of it is behind something nearer'.format(100 *
-                                                                                           hidden)
+        return 'the door hides the shelf: {:.0f}% of it is behind something nearer'.format(
+            100 * hidden
+        )
     if cloud.known < 0.3:
         return 'no shelf in view: depth is missing for {:.0f}% of the image'.format(
-            100 * (1 - cloud.known))
+            100 * (1 - cloud.known)
+        )
     return 'no shelf in view where the map has it'
 
 
-def _share_hidden(image: CameraImage, kitchen: Kitchen,
-                  base_from_fridge: np.ndarray) -> Tuple[float, float]:
+def _share_hidden(
+    image: CameraImage, kitchen: Kitchen, base_from_fridge: np.ndarray
+) -> Tuple[float, float]:
     """Share of the shelf's front half that is in the image, and share of that which is hidden."""
     low, high = shelf_region(kitchen)
     across, inwards = np.meshgrid(
-        np.linspace(low[1], high[1], 24)[2:-2],
-        np.linspace(low[0], high[0] / 2, 10)[1:])
+        np.linspace(low[1], high[1], 24)[2:-2], np.linspace(low[0], high[0] / 2, 10)[1:]
+    )
     # a drink on the shelf hides some of that as well: so look a drink's height above the shelf
     grid = np.column_stack([inwards.ravel(), across.ravel(), np.full(inwards.size, low[2] + 0.15)])
     seen = pixels_of(apply(base_from_fridge, grid), image.intrinsics, image.base_from_camera)

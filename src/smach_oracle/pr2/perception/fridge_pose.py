@@ -1,4 +1,5 @@
 """The pose of the refrigerator, by all of its faces that a camera image shows."""
+
 from typing import NamedTuple
 
 import numpy as np
@@ -43,14 +44,16 @@ def find_fridge(image: CameraImage, kitchen: Kitchen, expected: np.ndarray) -> F
     door = find_door(image, kitchen, expected)
     points = _points_about(image, kitchen, door)
     if len(points) < LEAST_POINTS:
-        raise DoorNotSeen('too little of the refrigerator is in view: {} points'.format(
-            len(points)))
+        raise DoorNotSeen(
+            'too little of the refrigerator is in view: {} points'.format(len(points))
+        )
     found = _fitted(kitchen, points, door, expected, bool(door.angle > SHUT))
     if abs(found.turned) > LIKELY and door.angle <= SHUT:
         found = _fitted(kitchen, points, door, expected, True)  # it stands ajar after all
     if found.median > MOST_OFF:
-        raise DoorNotSeen('what is seen of the refrigerator is {:.0f} mm off its map'.format(
-            1000 * found.median))
+        raise DoorNotSeen(
+            'what is seen of the refrigerator is {:.0f} mm off its map'.format(1000 * found.median)
+        )
     return found.view
 
 
@@ -60,13 +63,15 @@ class _Fit(NamedTuple):
     turned: float  # rad, against what was expected
 
 
-def _fitted(kitchen: Kitchen, points: np.ndarray, door: DoorView, expected: np.ndarray,
-            moves: bool) -> _Fit:
+def _fitted(
+    kitchen: Kitchen, points: np.ndarray, door: DoorView, expected: np.ndarray, moves: bool
+) -> _Fit:
     """Fit the map to points.
 
     :param points: (n, 3) m, in the fridge's frame as the door has it.
     :param moves: whether the door's angle is fitted, too, else it is shut.
     """
+
     def off(values: np.ndarray) -> np.ndarray:
         angle = values[3] if moves else 0.0
         there = apply(inverse(_moved(values)), points)
@@ -84,11 +89,21 @@ def _fitted(kitchen: Kitchen, points: np.ndarray, door: DoorView, expected: np.n
     starts = [[x, 0.0, 0.0] for x in (STARTS if moves else (0.0,))]
     starts += [believed.tolist()] * moves
     scale = [0.01, 0.01, 0.01] + [0.02] * moves
-    found = min((least_squares(unlikely, start + [door.angle] * moves, loss='soft_l1',
-                               f_scale=LOOSE, max_nfev=25, x_scale=scale) for start in starts),
-                key=lambda fit: float(fit.cost))
-    view = FridgeView(door.base_from_fridge @ _moved(found.x),
-                      float(found.x[3]) if moves else 0.0)
+    found = min(
+        (
+            least_squares(
+                unlikely,
+                start + [door.angle] * moves,
+                loss='soft_l1',
+                f_scale=LOOSE,
+                max_nfev=25,
+                x_scale=scale,
+            )
+            for start in starts
+        ),
+        key=lambda fit: float(fit.cost),
+    )
+    view = FridgeView(door.base_from_fridge @ _moved(found.x), float(found.x[3]) if moves else 0.0)
     return _Fit(view, float(np.median(off(found.x))), float(found.x[2] - believed[2]))
 
 
@@ -99,21 +114,29 @@ def _moved(values: np.ndarray) -> np.ndarray:
 def _points_about(image: CameraImage, kitchen: Kitchen, door: DoorView) -> np.ndarray:
     """(n, 3) points near the faces of the refrigerator, in its frame as the door has it."""
     stride = image.stride(COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics,
-                       inverse(door.base_from_fridge) @ image.base_from_camera,
-                       stride=stride).reshape(-1, 3)
+    points = points_of(
+        image.depth[::stride, ::stride],
+        image.intrinsics,
+        inverse(door.base_from_fridge) @ image.base_from_camera,
+        stride=stride,
+    ).reshape(-1, 3)
     with np.errstate(invalid='ignore'):
         points = points[np.all((points > REGION[0]) & (points < REGION[1]), axis=1)]
     boxes = fridge_boxes(kitchen, np.eye(4), door.angle if door.angle > SHUT else 0.0)
     points = points[np.min([np.abs(_distance(points, box)) for box in boxes], axis=0) < NEAR]
-    return points[::max(1, len(points) // MOST_POINTS)]
+    return points[:: max(1, len(points) // MOST_POINTS)]
 
 
 def _distance(points: np.ndarray, box: MapBox) -> np.ndarray:
     """(n,) m from points (n, 3) to the faces of a box, below 0 inside."""
     away = points - box.centre
-    turn = np.array([[np.cos(box.yaw), np.sin(box.yaw), 0.0],
-                     [-np.sin(box.yaw), np.cos(box.yaw), 0.0], [0.0, 0.0, 1.0]])
+    turn = np.array(
+        [
+            [np.cos(box.yaw), np.sin(box.yaw), 0.0],
+            [-np.sin(box.yaw), np.cos(box.yaw), 0.0],
+            [0.0, 0.0, 1.0],
+        ]
+    )
     beyond = np.abs(away @ turn.T) - box.half
     outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
     return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0))

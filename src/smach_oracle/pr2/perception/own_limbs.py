@@ -1,4 +1,5 @@
 """The robot's own arms, by its encoders: what the camera sees there is left out."""
+
 from typing import Dict, List, Mapping
 
 import numpy as np
@@ -29,7 +30,9 @@ def limbs_of(links: Dict[str, Joint], positions: Mapping[str, float]) -> List[Ca
     limbs = []
     for arm in ARMS:
         for first, last, radius in _PARTS:
-            start, end = (link_pose(links, BASE_FRAME, arm[0] + name, positions)[:3, 3]
-                          for name in (first, last))
+            start, end = (
+                link_pose(links, BASE_FRAME, arm[0] + name, positions)[:3, 3]
+                for name in (first, last)
+            )
             limbs.append(Capsule('{} arm'.format(arm), np.asarray(start), np.asarray(end), radius))
     return limbs

@@ -1,4 +1,5 @@
 """The table and the objects on it in what the head camera sees: a plane, and clusters above it."""
+
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -56,9 +57,13 @@ class Tabletop(NamedTuple):
     beyond: Sequence[np.ndarray] = ()
 
 
-def find_tabletop(image: CameraImage, min_height: float = 0.02,
-                  limbs: Sequence[Capsule] = (), like: Optional[Look] = None,
-                  near: np.ndarray = HERE) -> Tabletop:
+def find_tabletop(
+    image: CameraImage,
+    min_height: float = 0.02,
+    limbs: Sequence[Capsule] = (),
+    like: Optional[Look] = None,
+    near: np.ndarray = HERE,
+) -> Tabletop:
     """The table and what stands on it.
 
     :param min_height: m above the table. Lower clusters are no objects. 0 or less: 0.02.
@@ -79,28 +84,40 @@ def find_tabletop(image: CameraImage, min_height: float = 0.02,
     if len(patch) < LEAST_TABLE:
         raise NotSeen(_no_table(cloud))
     lowest = max(OFF_TABLE, min_height if min_height > 0 else 0.02)
-    clusters = sorted((part for each in clusters_on(cloud, plane, patch, lowest, TALLEST)
-                       for part in parts_by_colour(cloud, each, plane)),
-                      key=lambda each: distance_from(near, each.box.centre))
+    clusters = sorted(
+        (
+            part
+            for each in clusters_on(cloud, plane, patch, lowest, TALLEST)
+            for part in parts_by_colour(cloud, each, plane)
+        ),
+        key=lambda each: distance_from(near, each.box.centre),
+    )
     blind = blind_patches(image)
     hidden = blind_distance(image, blind, plane, patch, near)
     if not clusters:
-        raise NotSeen('there is nothing on the table that stands higher than {:.0f} cm{}{}'.format(
-            100 * lowest, _hidden_by(cloud), '' if hidden is None else BLIND))
+        raise NotSeen(
+            'there is nothing on the table that stands higher than {:.0f} cm{}{}'.format(
+                100 * lowest, _hidden_by(cloud), '' if hidden is None else BLIND
+            )
+        )
     if like is None:
         target, what = clusters[0], 'the nearest object'
     else:
         target, what = _like(cloud, clusters, plane, like, hidden is not None), 'the object'
     _check(cloud, target, what)
     away = distance_from(near, target.box.centre)
-    if blind_beside(blind, target) or (like is None and hidden is not None
-                                       and hidden < away + target.box.wide):
+    if blind_beside(blind, target) or (
+        like is None and hidden is not None and hidden < away + target.box.wide
+    ):
         raise NotSeen('{} may be hidden in part, or something nearer{}'.format(what, BLIND))
     order = [target] + [each for each in clusters if not _overlap(each, target)]
     objects = [each for each in order if max(each.box.wide, each.box.size[2]) <= LARGEST]
-    return Tabletop(_top(patch, plane), [each.box for each in objects],
-                    [_colour(cloud, each) for each in objects],
-                    _beyond(cloud, plane, away, near))
+    return Tabletop(
+        _top(patch, plane),
+        [each.box for each in objects],
+        [_colour(cloud, each) for each in objects],
+        _beyond(cloud, plane, away, near),
+    )
 
 
 def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[UprightBox]:
@@ -115,12 +132,16 @@ def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[U
     if plane is None:
         return []
     patch = largest_patch(at_table[np.abs(plane.height(at_table)) < OFF_TABLE])
-    return [each.box for each in clusters_on(cloud, plane, patch, 0.02, TALLEST)
-            if max(each.box.wide, each.box.size[2]) <= LARGEST]
+    return [
+        each.box
+        for each in clusters_on(cloud, plane, patch, 0.02, TALLEST)
+        if max(each.box.wide, each.box.size[2]) <= LARGEST
+    ]
 
 
-def _beyond(cloud: OrganizedCloud, plane: Plane, distance: float,
-            near: np.ndarray) -> List[np.ndarray]:
+def _beyond(
+    cloud: OrganizedCloud, plane: Plane, distance: float, near: np.ndarray
+) -> List[np.ndarray]:
     """Return where to look, (3,) each, for things nearer than `distance` m next to the image."""
     found = []
     for edge in (cloud.points[:, :EDGE], cloud.points[:, -EDGE:]):
@@ -138,8 +159,9 @@ def _top(patch: np.ndarray, plane: Plane) -> UprightBox:
     """The table's top, without thickness."""
     box = upright_box(patch, float(patch[:, 2].min()))
     z = plane.z_at(box.centre[0], box.centre[1])
-    return box._replace(centre=np.array([box.centre[0], box.centre[1], z]),
-                        size=box.size * [1, 1, 0])
+    return box._replace(
+        centre=np.array([box.centre[0], box.centre[1], z]), size=box.size * [1, 1, 0]
+    )
 
 
 def distance_from(near: np.ndarray, point: np.ndarray) -> float:
@@ -157,8 +179,9 @@ def _overlap(one: Cluster, other: Cluster) -> bool:
     return one is other or away < min(one.box.narrow, other.box.narrow) / 2
 
 
-def _like(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane, like: Look,
-          blind: bool) -> Cluster:
+def _like(
+    cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane, like: Look, blind: bool
+) -> Cluster:
     """The cluster, or part of one, that looks as the object did.
 
     :param blind: whether part of the table cannot be seen.
@@ -178,9 +201,14 @@ def _like(cloud: OrganizedCloud, clusters: Sequence[Cluster], plane: Plane, like
         raise NotSeen(
             'what was seen first, {} and {}, is not among the {} things on the table: '
             '{}{}{}'.format(
-                name_of(like.colour) or 'dark', _in_cm(like.size), len(clusters), ', '.join(
-                    name_of(_colour(cloud, each)) or 'dark' for each in clusters),
-                _hidden_by(cloud), BLIND if blind else ''))
+                name_of(like.colour) or 'dark',
+                _in_cm(like.size),
+                len(clusters),
+                ', '.join(name_of(_colour(cloud, each)) or 'dark' for each in clusters),
+                _hidden_by(cloud),
+                BLIND if blind else '',
+            )
+        )
     return min(alike)[2]
 
 
@@ -207,27 +235,33 @@ def _check(cloud: OrganizedCloud, cluster: Cluster, what: str) -> None:
     if max(box.wide, box.size[2]) > LARGEST:
         raise NotSeen(
             'what is nearest is no object: it is too large, {}; is an arm in the view?'.format(
-                extent))
+                extent
+            )
+        )
     if box.narrow > GRASPABLE:
         raise NotSeen(
-            'what is nearest is too large for the gripper, {}: one thing, or several that touch'.
-            format(extent))
+            'what is nearest is too large for the gripper, {}: one thing, or several that '
+            'touch'.format(extent)
+        )
     several = why_several(cloud, cluster)
     if several:
-        raise NotSeen('what is nearest, {}, seems to be several things that touch: {}'.format(
-            extent, several))
+        raise NotSeen(
+            'what is nearest, {}, seems to be several things that touch: {}'.format(extent, several)
+        )
 
 
 def _no_table(cloud: OrganizedCloud) -> str:
     if cloud.known < 0.3:
         return 'no table in view: depth is missing for {:.0f}% of the image'.format(
-            100 * (1 - cloud.known))
+            100 * (1 - cloud.known)
+        )
     return 'no table in view{}'.format(_hidden_by(cloud))
 
 
 def _hidden_by(cloud: OrganizedCloud) -> str:
     """Return which limb covers much of the image, as the end of a sentence."""
-    shares = [(float((cloud.hidden == index).mean()), name)
-              for index, name in enumerate(cloud.limbs)]
+    shares = [
+        (float((cloud.hidden == index).mean()), name) for index, name in enumerate(cloud.limbs)
+    ]
     share, name = max(shares, default=(0.0, ''))
     return '; the {} covers {:.0f}% of the view'.format(name, 100 * share) if share > 0.03 else ''

@@ -1,4 +1,5 @@
 """Whether a cluster of points is one thing or several that touch: by a waist, or by colours."""
+
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -38,8 +39,9 @@ def parts_by_colour(cloud: OrganizedCloud, cluster: Cluster, plane: Plane) -> Li
     return found if len(found) > 1 else [cluster]
 
 
-def _with_those_between(points: np.ndarray, colours: np.ndarray,
-                        ends: Sequence[np.ndarray]) -> List[np.ndarray]:
+def _with_those_between(
+    points: np.ndarray, colours: np.ndarray, ends: Sequence[np.ndarray]
+) -> List[np.ndarray]:
     """The colours of a cluster's two ends, and of what is unlike both, (3,) each.
 
     :param points: (n, 3) m.
@@ -52,8 +54,10 @@ def _with_those_between(points: np.ndarray, colours: np.ndarray,
             break
         piece = colours[unlike][largest_piece(points[unlike], CELL)]
         between = np.median(piece / np.maximum(piece.sum(axis=1, keepdims=True), 1.0), axis=0)
-        if len(piece) < LEAST_POINTS or min(
-                float(unlikeness(between, each)) for each in found) <= CHROMA:
+        if (
+            len(piece) < LEAST_POINTS
+            or min(float(unlikeness(between, each)) for each in found) <= CHROMA
+        ):
             break  # the noise of one colour
         found.append(between)
     return found
@@ -99,8 +103,10 @@ def _has_waist(flat: np.ndarray) -> bool:
     slices = np.floor((flat[:, 0] - flat[:, 0].min()) / SLICE).astype(int)
     widths = np.array([_width(flat[slices == index, 1]) for index in range(slices.max() + 1)])
     quarter = len(widths) // 4
-    return any(widths[at] < WAIST * min(widths[:at].max(), widths[at + 1:].max())
-               for at in range(max(1, quarter), len(widths) - max(1, quarter)))
+    return any(
+        widths[at] < WAIST * min(widths[:at].max(), widths[at + 1 :].max())
+        for at in range(max(1, quarter), len(widths) - max(1, quarter))
+    )
 
 
 def _width(values: np.ndarray) -> float:

@@ -1,4 +1,5 @@
 """One arm for the time of one skill: its position, its reach, paths for it, and its motions."""
+
 import contextlib
 import zlib
 from typing import Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional
@@ -18,7 +19,7 @@ FAST, SLOW = 0.45, 0.2  # of the joints' velocity limits
 FEEL_EFFORT = 40.0  # N with which the gripper closes
 READY = {
     'right': np.array([-0.4, 0.3, -1.2, -1.4, 0.0, -0.8, 0.0]),
-    'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0])
+    'left': np.array([0.4, 0.3, 1.2, -1.4, 0.0, -0.8, 0.0]),
 }  # rad, a posture for work in front of the robot
 TILT = 0.35  # rad, of what is held, on its way
 LEVEL_BUDGET = 3000  # collision checks for such a way
@@ -56,8 +57,9 @@ class Arm:
     Joint positions are (7,), rad. Poses are 4x4, base_footprint from tool.
     """
 
-    def __init__(self, context: SkillContext, arm: str, boxes: Mapping[str, MapBox],
-                 seed: int) -> None:
+    def __init__(
+        self, context: SkillContext, arm: str, boxes: Mapping[str, MapBox], seed: int
+    ) -> None:
         """Build the arm's collision world.
 
         :param arm: 'left' or 'right'.
@@ -102,8 +104,9 @@ class Arm:
         """4x4, base_footprint from tool, by the encoders."""
         return self.chain.forward(self.now())
 
-    def reach(self, pose: np.ndarray, near: Optional[np.ndarray] = None,
-              restarts: int = 12) -> List[np.ndarray]:
+    def reach(
+        self, pose: np.ndarray, near: Optional[np.ndarray] = None, restarts: int = 12
+    ) -> List[np.ndarray]:
         """Joint positions free of collision that take the tool to `pose`, nearest to `near` first.
 
         :param near: where None, the arm's usual posture.
@@ -119,19 +122,24 @@ class Arm:
         for q in found:
             if all(np.abs(q - other).max() > 0.2 for other in distinct):
                 distinct.append(q)
-        return [q for q in distinct[:2 * ENOUGH] if self.space.is_free(q)][:ENOUGH]
+        return [q for q in distinct[: 2 * ENOUGH] if self.space.is_free(q)][:ENOUGH]
 
-    def path(self, goal: np.ndarray, start: Optional[np.ndarray] = None,
-             budget: int = BUDGET) -> np.ndarray:
+    def path(
+        self, goal: np.ndarray, start: Optional[np.ndarray] = None, budget: int = BUDGET
+    ) -> np.ndarray:
         """A path (m, 7) around the obstacles.
 
         :param start: (7,). Where None, where the arm is now.
         :param budget: collision checks at most.
         :raises PlanningError: where none is found.
         """
-        return plan(self.space,
-                    self.now() if start is None else start, goal,
-                    int(self.generator.integers(1, 2**31)), budget)
+        return plan(
+            self.space,
+            self.now() if start is None else start,
+            goal,
+            int(self.generator.integers(1, 2**31)),
+            budget,
+        )
 
     def level_path(self, goal: np.ndarray, start: Optional[np.ndarray] = None) -> np.ndarray:
         """A path (m, 7) on which the hand tilts by at most TILT, where one is found.
@@ -170,8 +178,9 @@ class Arm:
         try:
             self._robot.follow(ARM_JOINTS[self.name], positions, times)
         except RobotError as err:
-            raise SkillError('the {} arm did not follow its way: {}'.format(self.name,
-                                                                            err)) from err
+            raise SkillError(
+                'the {} arm did not follow its way: {}'.format(self.name, err)
+            ) from err
 
     def go(self, goal: np.ndarray, speed: float = FAST, level: bool = False) -> None:
         """Plan and move to joint positions, as `follow` does.
@@ -195,8 +204,11 @@ class Arm:
         if state.position < gap - 0.015:
             state = self._gripper(gap)
         if state.position < gap - 0.015:
-            raise SkillError('the {} gripper opened only {:.1f} of {:.1f} cm'.format(
-                self.name, 100 * state.position, 100 * gap))
+            raise SkillError(
+                'the {} gripper opened only {:.1f} of {:.1f} cm'.format(
+                    self.name, 100 * state.position, 100 * gap
+                )
+            )
         self._set_fingers()
 
     def close(self, effort: float = FEEL_EFFORT) -> float:
@@ -236,8 +248,8 @@ class Arm:
         """Take the collision world's fingers to the encoders' readings."""
         joints = encoder_readings(self._robot)
         self.space.place_rest(
-            {name: value
-             for name, value in joints.items() if '_finger_joint' in name})
+            {name: value for name, value in joints.items() if '_finger_joint' in name}
+        )
 
 
 def known_arm(arm: str) -> str:
@@ -295,4 +307,5 @@ def summary(reasons: Iterable[str]) -> str:
         counted[reason] = counted.get(reason, 0) + 1
     return ', '.join(
         '{} times {}'.format(number, reason)
-        for reason, number in sorted(counted.items(), key=lambda item: (-item[1], item[0])))
+        for reason, number in sorted(counted.items(), key=lambda item: (-item[1], item[0]))
+    )

@@ -4,6 +4,7 @@ The client is apart from the world's: it knows what the robot has measured. It i
 each skill, so that no answer depends on what was asked before. Lengths in m, angles in rad, frame:
 base_footprint.
 """
+
 import contextlib
 from typing import Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
@@ -36,8 +37,9 @@ class CollisionWorld:
         if arm not in ARMS:
             raise ValueError('arm {!r}; allowed: {}'.format(arm, ', '.join(ARMS)))
         lift = 'torso_lift_joint'
-        self.chain = JointChain.from_urdf(model.urdf, BASE_FRAME, TOOL_FRAME[arm],
-                                          fixed={lift: joints.get(lift, 0.0)})
+        self.chain = JointChain.from_urdf(
+            model.urdf, BASE_FRAME, TOOL_FRAME[arm], fixed={lift: joints.get(lift, 0.0)}
+        )
         self.checks = 0  # how often a configuration was looked at, the measure of planning effort
         self._boxes: Dict[str, int] = {}
         self._held: Optional[Tuple[int, np.ndarray]] = None
@@ -77,9 +79,13 @@ class CollisionWorld:
     def add_box(self, name: str, box: MapBox) -> None:
         """An obstacle. A box of the same name is replaced."""
         self.remove(name)
-        self._boxes[name] = self._body(box.half, 0.0, box.centre,
-                                       (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)),
-                                       box.upright_cylinder)
+        self._boxes[name] = self._body(
+            box.half,
+            0.0,
+            box.centre,
+            (0.0, 0.0, np.sin(box.yaw / 2), np.cos(box.yaw / 2)),
+            box.upright_cylinder,
+        )
 
     def remove(self, name: str) -> None:
         """Drop an obstacle, if it is there."""
@@ -146,10 +152,14 @@ class CollisionWorld:
         bodies = {body: name for name, body in self._boxes.items()}
         found = set()
         for one, other in self._collisions(q):
-            found.add(' touches '.join(
-                names.get(link, BASE_FRAME) if body ==
-                self._robot else bodies.get(body, 'the held object')
-                for body, link in (one, other)))
+            found.add(
+                ' touches '.join(
+                    names.get(link, BASE_FRAME)
+                    if body == self._robot
+                    else bodies.get(body, 'the held object')
+                    for body, link in (one, other)
+                )
+            )
         return '; '.join(sorted(found))
 
     def distance(self, q: np.ndarray, reach: float = 0.1) -> float:
@@ -165,8 +175,9 @@ class CollisionWorld:
                 if self._held is not None:
                     least = self._nearest(self._held[0], body, least)
         for one, other in self._pairs:
-            points = pybullet.getClosestPoints(self._robot, self._robot, least, one, other,
-                                               physicsClientId=self._client)
+            points = pybullet.getClosestPoints(
+                self._robot, self._robot, least, one, other, physicsClientId=self._client
+            )
             least = min([least] + [point[8] for point in points])
         return least
 
@@ -199,27 +210,44 @@ class CollisionWorld:
                     yield (held, -1), (bodies.pop(), -1)
 
     def _pose(self, q: np.ndarray) -> None:
-        pybullet.resetJointStatesMultiDof(self._robot, self._arm, [[float(value)] for value in q],
-                                          physicsClientId=self._client)
+        pybullet.resetJointStatesMultiDof(
+            self._robot, self._arm, [[float(value)] for value in q], physicsClientId=self._client
+        )
         if self._held is not None:
             body, tool_from_object = self._held
             pose = self.chain.forward(q) @ tool_from_object
-            pybullet.resetBasePositionAndOrientation(body, pose[:3, 3].tolist(),
-                                                     quaternion(pose).tolist(),
-                                                     physicsClientId=self._client)
+            pybullet.resetBasePositionAndOrientation(
+                body, pose[:3, 3].tolist(), quaternion(pose).tolist(), physicsClientId=self._client
+            )
 
-    def _body(self, half: VectorLike, mass: float, position: VectorLike,
-              xyzw: Sequence[float], upright_cylinder: bool = False) -> int:
+    def _body(
+        self,
+        half: VectorLike,
+        mass: float,
+        position: VectorLike,
+        xyzw: Sequence[float],
+        upright_cylinder: bool = False,
+    ) -> int:
         if upright_cylinder:
-            shape = pybullet.createCollisionShape(pybullet.GEOM_CYLINDER,
-                                                  radius=float(max(half[0], half[1])),
-                                                  height=2 * float(half[2]),
-                                                  physicsClientId=self._client)
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_CYLINDER,
+                radius=float(max(half[0], half[1])),
+                height=2 * float(half[2]),
+                physicsClientId=self._client,
+            )
         else:
-            shape = pybullet.createCollisionShape(pybullet.GEOM_BOX,
-                                                  halfExtents=[float(each) for each in half],
-                                                  physicsClientId=self._client)
+            shape = pybullet.createCollisionShape(
+                pybullet.GEOM_BOX,
+                halfExtents=[float(each) for each in half],
+                physicsClientId=self._client,
+            )
         return int(
-            pybullet.createMultiBody(mass, shape, -1, [float(each) for each in position],
-                                     [float(each) for each in xyzw], physicsClientId=self._client))
-
+            pybullet.createMultiBody(
+                mass,
+                shape,
+                -1,
+                [float(each) for each in position],
+                [float(each) for each in xyzw],
+                physicsClientId=self._client,
+            )
+        )

@@ -4,6 +4,7 @@ To load the robot takes as long as some hundred checks. So a client that a skill
 cleaned and lent again. A cleaned one answers as a new one does: it stands at zero, and no contact
 of before is left in it.
 """
+
 import os
 import tempfile
 import threading
@@ -49,8 +50,8 @@ def model_from(urdf: str, srdf: str) -> CollisionModel:
     except ElementTree.ParseError as err:
         raise ValueError('robot_description_semantic: {}'.format(err)) from err
     return CollisionModel(
-        urdf,
-        frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs))
+        urdf, frozenset(frozenset((pair.get('link1', ''), pair.get('link2', ''))) for pair in pairs)
+    )
 
 
 class CollisionBody:
@@ -65,17 +66,21 @@ class CollisionBody:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         try:
             self.robot = self._load(model.urdf)
-            infos = [pybullet.getJointInfo(self.robot, k, physicsClientId=self.client)
-                     for k in range(pybullet.getNumJoints(self.robot, physicsClientId=self.client))]
+            infos = [
+                pybullet.getJointInfo(self.robot, k, physicsClientId=self.client)
+                for k in range(pybullet.getNumJoints(self.robot, physicsClientId=self.client))
+            ]
             self.links = {info[12].decode(): k for k, info in enumerate(infos)}
             self.joints = {info[1].decode(): k for k, info in enumerate(infos)}
             self.arm = [self.joints[name] for name in ARM_JOINTS[arm]]
             names = _below(model.urdf, arm[0] + '_shoulder_pan_link')
             self.moving = {self.links[name] for name in names}
             self.hand = {self.links[name] for name in names if '_gripper_' in name}
-            self._solid = [(name, index) for name, index in self.links.items()
-                           if pybullet.getCollisionShapeData(self.robot, index,
-                                                             physicsClientId=self.client)]
+            self._solid = [
+                (name, index)
+                for name, index in self.links.items()
+                if pybullet.getCollisionShapeData(self.robot, index, physicsClientId=self.client)
+            ]
             # of links that must not touch, one of which moves
             self.pairs = self._filter(model.allowed)
             self.clean()
@@ -85,11 +90,17 @@ class CollisionBody:
 
     def place(self, joints: Mapping[str, float]) -> None:
         """Set joints to positions (rad or m). Names that it does not have are left out."""
-        known = [(self.joints[name], value) for name, value in sorted(joints.items())
-                 if name in self.joints]
-        pybullet.resetJointStatesMultiDof(self.robot, [index for index, _ in known],
-                                          [[value] for _, value in known],
-                                          physicsClientId=self.client)
+        known = [
+            (self.joints[name], value)
+            for name, value in sorted(joints.items())
+            if name in self.joints
+        ]
+        pybullet.resetJointStatesMultiDof(
+            self.robot,
+            [index for index, _ in known],
+            [[value] for _, value in known],
+            physicsClientId=self.client,
+        )
 
     def clean(self) -> None:
         """Put every joint to zero, and drop what the client remembers of earlier contacts.
@@ -102,8 +113,9 @@ class CollisionBody:
             for _, index in self._solid:
                 if (index not in self.moving) == resting:
                     group, mask = (_RESTING, _MOVING) if resting else (_MOVING, _ALL)
-                    pybullet.setCollisionFilterGroupMask(self.robot, index, group, mask,
-                                                         physicsClientId=self.client)
+                    pybullet.setCollisionFilterGroupMask(
+                        self.robot, index, group, mask, physicsClientId=self.client
+                    )
 
     def close(self) -> None:
         """Drop the client. The object cannot be used afterwards."""
@@ -118,8 +130,10 @@ class CollisionBody:
             with os.fdopen(handle, 'w') as stream:
                 stream.write(urdf)
             return int(
-                pybullet.loadURDF(path, useFixedBase=True, flags=_FLAGS,
-                                  physicsClientId=self.client))
+                pybullet.loadURDF(
+                    path, useFixedBase=True, flags=_FLAGS, physicsClientId=self.client
+                )
+            )
         except pybullet.error as err:
             raise ValueError('robot description: {}'.format(err)) from err
         finally:
@@ -131,12 +145,13 @@ class CollisionBody:
         resting = [each for each in self._solid if each[1] not in self.moving]
         pairs = []
         for k, (one, first) in enumerate(moving):
-            for other, second in moving[k + 1:] + resting:
+            for other, second in moving[k + 1 :] + resting:
                 if frozenset((one, other)) not in allowed:
                     pairs.append((first, second))
                 else:
-                    pybullet.setCollisionFilterPair(self.robot, self.robot, first, second, 0,
-                                                    physicsClientId=self.client)
+                    pybullet.setCollisionFilterPair(
+                        self.robot, self.robot, first, second, 0, physicsClientId=self.client
+                    )
         return pairs
 
 

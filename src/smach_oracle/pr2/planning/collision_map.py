@@ -1,4 +1,5 @@
 """Maps to plan in: boxes made of what was detected, or of all that an image shows."""
+
 import collections
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -39,11 +40,19 @@ class CollisionMapStore:
     def keep(self, made: CollisionMap) -> str:
         """Its id, which depends on its content alone."""
         name = 'map_{:08x}'.format(
-            seed_of(*[
-                part for key in sorted(made.boxes)
-                for part in (key, np.asarray(made.boxes[key].centre),
-                             np.asarray(made.boxes[key].half), made.boxes[key].yaw)
-            ]))
+            seed_of(
+                *[
+                    part
+                    for key in sorted(made.boxes)
+                    for part in (
+                        key,
+                        np.asarray(made.boxes[key].centre),
+                        np.asarray(made.boxes[key].half),
+                        made.boxes[key].yaw,
+                    )
+                ]
+            )
+        )
         self._maps.pop(name, None)
         self._maps[name] = made
         while len(self._maps) > KEPT:
@@ -56,8 +65,9 @@ class CollisionMapStore:
         :raises SkillError: where there is none.
         """
         if name not in self._maps:
-            raise SkillError('no collision map {!r}; known: {}'.format(
-                name, ', '.join(self._maps) or 'none'))
+            raise SkillError(
+                'no collision map {!r}; known: {}'.format(name, ', '.join(self._maps) or 'none')
+            )
         return self._maps[name]
 
 
@@ -66,17 +76,23 @@ def map_of(table: UprightBox, objects: Sequence[UprightBox]) -> CollisionMap:
 
     :raises SkillError: for a table or object without extent.
     """
-    for name, box in [('the table', table)] + [('object {}'.format(k), box)
-                                               for k, box in enumerate(objects)]:
+    for name, box in [('the table', table)] + [
+        ('object {}'.format(k), box) for k, box in enumerate(objects)
+    ]:
         flat = box.size[:2] if box is table else box.size
         if not np.all(np.asarray(flat) > 0.002) or np.max(box.size) > 3.0:
-            raise SkillError('{} has the size {} m; 0.2 cm to 3 m are allowed'.format(
-                name, ' x '.join('{:.3f}'.format(each) for each in box.size)))
+            raise SkillError(
+                '{} has the size {} m; 0.2 cm to 3 m are allowed'.format(
+                    name, ' x '.join('{:.3f}'.format(each) for each in box.size)
+                )
+            )
     top = table.centre[2] + table.size[2] / 2
     boxes = {
-        TABLE: MapBox(np.array([table.centre[0], table.centre[1], top - THICK / 2]),
-                      np.array([table.size[0] / 2 + EDGE, table.size[1] / 2 + EDGE, THICK / 2]),
-                      table.yaw)
+        TABLE: MapBox(
+            np.array([table.centre[0], table.centre[1], top - THICK / 2]),
+            np.array([table.size[0] / 2 + EDGE, table.size[1] / 2 + EDGE, THICK / 2]),
+            table.yaw,
+        )
     }
     for k, box in enumerate(objects):
         boxes['object {}'.format(k)] = MapBox(box.centre, box.size / 2 + PADDING, box.yaw)
@@ -91,8 +107,10 @@ def with_margin(boxes: Mapping[str, MapBox]) -> Dict[str, MapBox]:
     higher = dict(boxes)
     if TABLE in higher:
         table = higher[TABLE]
-        higher[TABLE] = table._replace(centre=table.centre + [0.0, 0.0, TABLE_ERROR / 2],
-                                       half=table.half + [0.0, 0.0, TABLE_ERROR / 2])
+        higher[TABLE] = table._replace(
+            centre=table.centre + [0.0, 0.0, TABLE_ERROR / 2],
+            half=table.half + [0.0, 0.0, TABLE_ERROR / 2],
+        )
     return higher
 
 
@@ -101,7 +119,8 @@ def around(made: CollisionMap, target: UprightBox) -> Dict[str, MapBox]:
     near = nearest_object(made, target.centre)
     return {
         name: box
-        for name, box in made.boxes.items() if near is None or name != 'object {}'.format(near)
+        for name, box in made.boxes.items()
+        if near is None or name != 'object {}'.format(near)
     }
 
 
@@ -117,8 +136,9 @@ def nearest_object(made: CollisionMap, point: np.ndarray, within: float = 0.05) 
     return int(np.argmin(distances))
 
 
-def map_of_image(image: CameraImage, limbs: Sequence[Capsule],
-                 target: Optional[UprightBox] = None) -> CollisionMap:
+def map_of_image(
+    image: CameraImage, limbs: Sequence[Capsule], target: Optional[UprightBox] = None
+) -> CollisionMap:
     """The map of all that an image shows within REGION.
 
     :param limbs: of the robot. They are left out.
@@ -129,16 +149,19 @@ def map_of_image(image: CameraImage, limbs: Sequence[Capsule],
     if target is not None:
         points = points[~_inside(points, target)]
     return CollisionMap(
-        {'seen {}'.format(k): box
-         for k, box in enumerate(_columns(points)[:MOST_BOXES])}, ())
+        {'seen {}'.format(k): box for k, box in enumerate(_columns(points)[:MOST_BOXES])}, ()
+    )
 
 
 def _inside(points: np.ndarray, box: UprightBox, margin: float = 0.012) -> np.ndarray:
     away = points - box.centre
     along = away[:, 0] * np.cos(box.yaw) + away[:, 1] * np.sin(box.yaw)
     across = away[:, 1] * np.cos(box.yaw) - away[:, 0] * np.sin(box.yaw)
-    return ((np.abs(along) < box.size[0] / 2 + margin) & (np.abs(across) < box.size[1] / 2 + margin)
-            & (np.abs(away[:, 2]) < box.size[2] / 2 + margin))
+    return (
+        (np.abs(along) < box.size[0] / 2 + margin)
+        & (np.abs(across) < box.size[1] / 2 + margin)
+        & (np.abs(away[:, 2]) < box.size[2] / 2 + margin)
+    )
 
 
 def _columns(points: np.ndarray, least: int = 3) -> List[MapBox]:

@@ -1,4 +1,5 @@
 """Joint paths of a hand that goes with a door, and may turn about the vertical axis."""
+
 from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -24,10 +25,17 @@ class DoorSwing(NamedTuple):
     share: float  # of the angle that was asked for
 
 
-def best_swing(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, turns: Tuple[float, float],
-               seed: np.ndarray, generator: np.random.Generator, is_free: IsFree,
-               may_begin: Callable[[np.ndarray],
-                                   bool] = lambda q: True, tries: int = 45) -> Optional[DoorSwing]:
+def best_swing(
+    chain: JointChain,
+    tool_at: ToolAt,
+    angles: np.ndarray,
+    turns: Tuple[float, float],
+    seed: np.ndarray,
+    generator: np.random.Generator,
+    is_free: IsFree,
+    may_begin: Callable[[np.ndarray], bool] = lambda q: True,
+    tries: int = 45,
+) -> Optional[DoorSwing]:
     """The longest path found along `angles` (rad, in order, evenly spaced).
 
     :param turns: rad, the least and most that the hand may be turned against the door.
@@ -50,8 +58,15 @@ def best_swing(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, turns: Tu
     return best
 
 
-def _follow(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, limits: Tuple[float, float],
-            start: np.ndarray, turn: float, is_free: IsFree) -> DoorSwing:
+def _follow(
+    chain: JointChain,
+    tool_at: ToolAt,
+    angles: np.ndarray,
+    limits: Tuple[float, float],
+    start: np.ndarray,
+    turn: float,
+    is_free: IsFree,
+) -> DoorSwing:
     path, turns = [start], [turn]
     for before, angle in zip(angles[:-1], angles[1:]):
         options = [turns[-1] + step * abs(angle - before) for step in TURNS]
@@ -61,11 +76,17 @@ def _follow(chain: JointChain, tool_at: ToolAt, angles: np.ndarray, limits: Tupl
             break
         path.append(step[0])
         turns.append(step[1])
-    return DoorSwing(np.array(path), np.array(angles[:len(path)]), len(path) / len(angles))
+    return DoorSwing(np.array(path), np.array(angles[: len(path)]), len(path) / len(angles))
 
 
-def _next(chain: JointChain, tool_at: ToolAt, angle: float, turns: Sequence[float], q: np.ndarray,
-          is_free: IsFree) -> Optional[Tuple[np.ndarray, float]]:
+def _next(
+    chain: JointChain,
+    tool_at: ToolAt,
+    angle: float,
+    turns: Sequence[float],
+    q: np.ndarray,
+    is_free: IsFree,
+) -> Optional[Tuple[np.ndarray, float]]:
     """The next point of a path, and the hand's turn there.
 
     Of the points in reach, it is the one with most room for the joints.
@@ -77,7 +98,8 @@ def _next(chain: JointChain, tool_at: ToolAt, angle: float, turns: Sequence[floa
     for turn, reached in zip(turns, found):
         if np.abs(reached - q).max() < MAX_JOINT_STEP:  # not where there is no solution
             options.append(
-                (_room(chain, reached) - 0.5 * float(np.abs(reached - q).max()), turn, reached))
+                (_room(chain, reached) - 0.5 * float(np.abs(reached - q).max()), turn, reached)
+            )
     for _, turn, reached in sorted(options, key=lambda option: -option[0]):
         if is_free(reached, angle):
             return reached, turn

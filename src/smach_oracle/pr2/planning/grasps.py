@@ -1,4 +1,5 @@
 """Grasps of an upright thing: headings all round, with the hand level, inclined or from above."""
+
 from typing import Iterator, List
 
 import numpy as np
@@ -39,8 +40,12 @@ def grasps(box: UprightBox, arm: str, fine: bool = False) -> List[np.ndarray]:
     :returns: poses of the tool (4x4, in base_footprint) when the gripper closes.
     """
     straight = float(np.arctan2(*(box.centre[:2] - SHOULDER[arm])[::-1]))
-    found = [(cost, order, grasp) for order, (cost, grasp) in enumerate(
-        _all(box, straight, FINE_HEADINGS if fine else HEADINGS))]
+    found = [
+        (cost, order, grasp)
+        for order, (cost, grasp) in enumerate(
+            _all(box, straight, FINE_HEADINGS if fine else HEADINGS)
+        )
+    ]
     return [grasp for _, _, grasp in sorted(found, key=lambda item: item[:2])]
 
 
@@ -55,8 +60,10 @@ def others_first(found: List[np.ndarray], failed: int) -> List[np.ndarray]:
     if not failed or not found:
         return list(found)
     natural = _inclination(found[0])
-    kinds = sorted({_inclination(grasp) for grasp in found},
-                   key=lambda kind: (kind != natural, -abs(kind - natural)))
+    kinds = sorted(
+        {_inclination(grasp) for grasp in found},
+        key=lambda kind: (kind != natural, -abs(kind - natural)),
+    )
     last = failed % len(kinds)
     rank = {kind: number for number, kind in enumerate(kinds[last:] + kinds[:last])}
     return sorted(found, key=lambda grasp: rank[_inclination(grasp)])
@@ -123,4 +130,5 @@ def _middle(box: UprightBox, heading: float, pitch: float) -> np.ndarray:
     height = min(max(box.centre[2], bottom + LOWEST + 0.03 * np.sin(pitch)), top - BELOW_TOP)
     ahead = min(DEPTH, box.narrow / 3)
     return np.array(
-        [box.centre[0] + ahead * np.cos(heading), box.centre[1] + ahead * np.sin(heading), height])
+        [box.centre[0] + ahead * np.cos(heading), box.centre[1] + ahead * np.sin(heading), height]
+    )

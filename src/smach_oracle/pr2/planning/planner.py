@@ -4,6 +4,7 @@ Effort is counted in collision checks, never in seconds, and every random draw c
 the same question has the same answer on any day and under any load. One question at a time in a
 process: OMPL's seed is global.
 """
+
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -32,8 +33,9 @@ class PlanningError(Exception):
     """No path was found. The text gives the reason."""
 
 
-def plan(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
-         budget: int = BUDGET) -> np.ndarray:
+def plan(
+    space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, budget: int = BUDGET
+) -> np.ndarray:
     """A path free of collision.
 
     :param start: (7,), where the arm is. Where it touches something by a little, it first steps out
@@ -84,8 +86,9 @@ def straight(space: CollisionWorld, start: np.ndarray, goal: np.ndarray) -> Opti
     chain = space.chain
     here = chain.forward(start)
     turn = rotation_vector(goal @ inverse(here))
-    length = max(float(np.linalg.norm(goal[:3, 3] - here[:3, 3])),
-                 0.2 * float(np.linalg.norm(turn)))
+    length = max(
+        float(np.linalg.norm(goal[:3, 3] - here[:3, 3])), 0.2 * float(np.linalg.norm(turn))
+    )
     steps = max(2, int(np.ceil(length / STRAIGHT_STEP)))
     path = [np.asarray(start, dtype=float)]
     for k in range(1, steps + 1):
@@ -114,8 +117,9 @@ def timed(chain: JointChain, path: np.ndarray, speed: float = 0.4) -> Tuple[np.n
     fastest = np.min(limits / np.maximum(np.abs(directions), 1e-9), axis=1)  # along each piece
     bend = np.abs(np.diff(directions, axis=0)).max(axis=1)
     speeds = np.zeros(len(points))
-    speeds[1:-1] = np.minimum(np.minimum(fastest[:-1], fastest[1:]),
-                              CORNER / np.maximum(bend, 1e-9))
+    speeds[1:-1] = np.minimum(
+        np.minimum(fastest[:-1], fastest[1:]), CORNER / np.maximum(bend, 1e-9)
+    )
     push = np.min(ACCELERATION / np.maximum(np.abs(directions), 1e-9), axis=1)
     for k in range(len(lengths)):
         speeds[k + 1] = min(speeds[k + 1], np.sqrt(speeds[k] ** 2 + 2 * push[k] * lengths[k]))
@@ -145,15 +149,17 @@ def _between(here: np.ndarray, goal: np.ndarray, turn: np.ndarray, share: float)
     return transform(here[:3, 3] + share * (goal[:3, 3] - here[:3, 3]), rotation)
 
 
-def _straight_in_joints(space: CollisionWorld, start: np.ndarray,
-                        goal: np.ndarray) -> Optional[List[np.ndarray]]:
+def _straight_in_joints(
+    space: CollisionWorld, start: np.ndarray, goal: np.ndarray
+) -> Optional[List[np.ndarray]]:
     steps = max(2, int(np.ceil(np.linalg.norm(goal - start) / RESOLUTION)))
     free = all(space.is_free(q) for q in np.linspace(start, goal, steps + 1)[1:-1])
     return [start, goal] if free else None
 
 
-def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
-         budget: int) -> List[np.ndarray]:
+def _rrt(
+    space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int, budget: int
+) -> List[np.ndarray]:
     chain = space.chain
     states = ompl_base.RealVectorStateSpace(len(start))
     bounds = ompl_base.RealVectorBounds(len(start))
@@ -165,9 +171,11 @@ def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
     ompl_util.RNG.setSeed(max(1, int(seed)))
     setup = ompl_geometric.SimpleSetup(states)
     setup.setStateValidityChecker(
-        lambda state: space.is_free(np.array([state[k] for k in range(len(start))])))
-    setup.getSpaceInformation().setStateValidityCheckingResolution(RESOLUTION /
-                                                                   states.getMaximumExtent())
+        lambda state: space.is_free(np.array([state[k] for k in range(len(start))]))
+    )
+    setup.getSpaceInformation().setStateValidityCheckingResolution(
+        RESOLUTION / states.getMaximumExtent()
+    )
     ends = [states.allocState(), states.allocState()]
     for state, q in zip(ends, (start, chain.clip(goal))):
         for k in range(len(start)):
@@ -180,7 +188,8 @@ def _rrt(space: CollisionWorld, start: np.ndarray, goal: np.ndarray, seed: int,
     setup.solve(ompl_base.PlannerTerminationCondition(lambda: space.checks >= last))
     if not setup.haveExactSolutionPath():
         raise PlanningError(
-            'no way around the obstacles was found within {} collision checks'.format(budget))
+            'no way around the obstacles was found within {} collision checks'.format(budget)
+        )
     path = setup.getSolutionPath()
     setup.getPathSimplifier().reduceVertices(path, 60, 30)
     return [np.array([state[k] for k in range(len(start))]) for state in path.getStates()]

@@ -1,4 +1,5 @@
 """The arms while the base drives: compact, clear of doors and of the camera's view."""
+
 from typing import Iterable, Mapping
 
 import numpy as np
@@ -10,8 +11,10 @@ from ..robot import RobotError
 from .arm import Arm, SkillContext, SkillError, Unreachable, encoder_readings, seed_of
 
 # rad, the left hand folded before the chest, the right arm at the robot's side
-TRAVEL = {'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
-          'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0])}
+TRAVEL = {
+    'left': np.array([0.24, 1.24, 1.42, -1.89, -0.07, -1.98, 0.35]),
+    'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]),
+}
 NEAR_ENOUGH = 0.06  # rad
 # m, m, rad: where the right hand carries
 CARRIES = ((0.45, -0.38, -0.2), (0.45, -0.38, 0.2), (0.45, -0.32, -0.2), (0.48, -0.42, -0.5))
@@ -46,13 +49,17 @@ def carry(limb: Arm, level: bool = True) -> None:
     """
     now = limb.pose()
     height = min(max(now[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
-    tilt = np.eye(4) if level else transform(
-        rotation=from_rpy((0, 0, 0), yaw=-yaw_of(now))[:3, :3] @ now[:3, :3])
+    tilt = (
+        np.eye(4)
+        if level
+        else transform(rotation=from_rpy((0, 0, 0), yaw=-yaw_of(now))[:3, :3] @ now[:3, :3])
+    )
     for x, y, yaw in CARRIES:
         side = 1.0 if limb.name == 'right' else -1.0
         try:
             found = limb.reach(
-                from_rpy((x, side * y, height), yaw=side * yaw) @ tilt, near=TRAVEL[limb.name])
+                from_rpy((x, side * y, height), yaw=side * yaw) @ tilt, near=TRAVEL[limb.name]
+            )
         except Unreachable:
             continue
         if found:

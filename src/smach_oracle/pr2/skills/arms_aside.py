@@ -1,4 +1,5 @@
 """Move the arms to the robot's sides, out of the camera's view."""
+
 from typing import Mapping, Sequence
 
 import numpy as np
@@ -15,8 +16,10 @@ from ..planning.arm import (
 )
 from ..robot import ARMS
 
-ASIDE = {'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]),
-         'left': np.array([1.6, 0.2, 1.5, -1.5, -0.5, -0.6, 0.0])}  # rad
+ASIDE = {
+    'right': np.array([-1.6, 0.2, -1.5, -1.5, 0.5, -0.6, 0.0]),
+    'left': np.array([1.6, 0.2, 1.5, -1.5, -0.5, -0.6, 0.0]),
+}  # rad
 NEAR_ENOUGH = 0.06  # rad
 
 
@@ -35,8 +38,9 @@ def arms_aside(context: SkillContext, arms: Sequence[str], boxes: Mapping[str, M
     """
     unknown = sorted(set(arms) - set(ARMS))
     if unknown:
-        raise SkillError('arm {}; allowed: {}'.format(', '.join(map(repr, unknown)),
-                                                      ', '.join(ARMS)))
+        raise SkillError(
+            'arm {}; allowed: {}'.format(', '.join(map(repr, unknown)), ', '.join(ARMS))
+        )
     wanted = [arm for arm in ARMS if arm in arms or not arms]
     away = [arm for arm in wanted if not is_aside(encoder_readings(context.robot), arm)]
     for arm in away:
@@ -45,7 +49,8 @@ def arms_aside(context: SkillContext, arms: Sequence[str], boxes: Mapping[str, M
     for arm in wanted:
         if not is_aside(encoder_readings(context.robot), arm):
             raise SkillError(
-                'the {} arm is not at the side: something moved it, or holds it'.format(arm))
+                'the {} arm is not at the side: something moved it, or holds it'.format(arm)
+            )
 
 
 def _turned(q: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -1,4 +1,5 @@
 """An arm at the refrigerator's door: the door in its map, and ways of the hand along it."""
+
 from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
@@ -35,10 +36,17 @@ def look(robot: Robot, kitchen: Kitchen, point: np.ndarray, tries: int = 3) -> D
     raise SkillError('the door was not looked for: tries is {}'.format(tries))
 
 
-def swing_along(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt, first: float,
-                last: float, turns: Tuple[float, float], touching: Tuple[str, ...],
-                may_begin: Callable[[np.ndarray],
-                                    bool] = lambda q: True) -> Optional[DoorSwing]:
+def swing_along(
+    limb: Arm,
+    kitchen: Kitchen,
+    fridge: np.ndarray,
+    tool_at: ToolAt,
+    first: float,
+    last: float,
+    turns: Tuple[float, float],
+    touching: Tuple[str, ...],
+    may_begin: Callable[[np.ndarray], bool] = lambda q: True,
+) -> Optional[DoorSwing]:
     """The best path of the hand along the door between two angles (rad)."""
     count = int(np.ceil(abs(last - first) / STEP)) + 1
 
@@ -47,8 +55,16 @@ def swing_along(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, tool_at: ToolAt
         with limb.space.touchable(touching):
             return limb.space.is_free(q)
 
-    return best_swing(limb.chain, tool_at, np.linspace(first, last, count), turns, READY[limb.name],
-                      limb.generator, is_free, may_begin)
+    return best_swing(
+        limb.chain,
+        tool_at,
+        np.linspace(first, last, count),
+        turns,
+        READY[limb.name],
+        limb.generator,
+        is_free,
+        may_begin,
+    )
 
 
 def strain(limb: Arm, swing: DoorSwing, speed: float) -> None:
@@ -76,8 +92,12 @@ def relax(limb: Arm) -> None:
 def arm_at(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> Arm:
     """The arm among the parts of the fridge where they were seen."""
     boxes = named_boxes(kitchen, view.base_from_fridge, view.angle)
-    return Arm(context, arm, boxes,
-               seed_of(arm, view.angle, view.base_from_fridge, encoder_readings(context.robot)))
+    return Arm(
+        context,
+        arm,
+        boxes,
+        seed_of(arm, view.angle, view.base_from_fridge, encoder_readings(context.robot)),
+    )
 
 
 def is_beside(limb: Arm, kitchen: Kitchen, view: DoorView, q: np.ndarray) -> bool:
@@ -97,8 +117,15 @@ def approach_to(limb: Arm, grasp: np.ndarray) -> Optional[np.ndarray]:
     return None if path is None or not limb.space.is_free(path[-1]) else path[::-1]
 
 
-def against(kitchen: Kitchen, fridge: np.ndarray, angle: float, turn: float, reach: float,
-            height: float, inside: bool) -> np.ndarray:
+def against(
+    kitchen: Kitchen,
+    fridge: np.ndarray,
+    angle: float,
+    turn: float,
+    reach: float,
+    height: float,
+    inside: bool,
+) -> np.ndarray:
     """4x4, base from tool: the closed hand beside the door's inner or outer face.
 
     :param turn: rad, of the hand against the face. At 0 it points straight at it. The more it lies
@@ -121,8 +148,9 @@ def named_boxes(kitchen: Kitchen, fridge: np.ndarray, angle: float) -> Dict[str,
     return named
 
 
-def place_door(limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float,
-               berth: float = 0.0) -> None:
+def place_door(
+    limb: Arm, kitchen: Kitchen, fridge: np.ndarray, angle: float, berth: float = 0.0
+) -> None:
     """Have the door at an angle in the arm's map, with `berth` m around it."""
     boxes = named_boxes(kitchen, fridge, angle)
     for name in ('door', 'handle'):

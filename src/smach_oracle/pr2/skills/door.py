@@ -4,6 +4,7 @@ Many a door falls shut unless it is open past a stop. So the hand holds the hand
 wide open: where the arm gets no farther, the base takes it along. In the end the camera looks
 whether the door stays open.
 """
+
 from contextlib import contextmanager
 from typing import Iterator
 
@@ -103,17 +104,20 @@ def _open(context: SkillContext, kitchen: Kitchen, arm: str) -> float:
                 take_hands_off(context, kitchen)  # it may stand open far enough to be pushed
             view = _look_from_before(context, kitchen)
     if view.angle < AJAR:
-        raise SkillError('the door fell shut again, to {:.0f} degrees, when the hand let go '
-                         'of its handle at {:.0f}'.format(*np.degrees([view.angle, angle])))
+        raise SkillError(
+            'the door fell shut again, to {:.0f} degrees, when the hand let go '
+            'of its handle at {:.0f}'.format(*np.degrees([view.angle, angle]))
+        )
     if view.angle < WIDE - STEP:
         angle = _push_open(context, kitchen, arm, view)
         _stow_beside(context, kitchen, angle)
         drive(context, odom_from_pose(kitchen, *CLEAR))
         view = look(context.robot, kitchen, OPEN_LOOK)
         if view.angle < LEAST_OPEN:
-            raise SkillError('the door stands open by {:.0f} degrees only, and not by {:.0f}: '
-                             'something is in its way, or it fell back'.format(
-                                 *np.degrees([view.angle, angle])))
+            raise SkillError(
+                'the door stands open by {:.0f} degrees only, and not by {:.0f}: '
+                'something is in its way, or it fell back'.format(*np.degrees([view.angle, angle]))
+            )
     else:
         drive(context, odom_from_pose(kitchen, *CLEAR))
     return view.angle
@@ -146,8 +150,9 @@ def _close(context: SkillContext, kitchen: Kitchen, arm: str) -> None:
                     raise
             view = look(context.robot, kitchen, np.array([-0.2, 0.10, GRASP_HEIGHT]))
     if view.angle >= 2 * STEP:
-        raise SkillError('the door still stands open by {:.0f} degrees'.format(
-            np.degrees(view.angle)))
+        raise SkillError(
+            'the door still stands open by {:.0f} degrees'.format(np.degrees(view.angle))
+        )
 
 
 @contextmanager
@@ -212,12 +217,23 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
         return from_rpy(bar, yaw=turn - angle + yaw_of(fridge)) @ from_rpy((BEYOND, 0.0, 0.0))
 
     with arm_at(context, kitchen, arm, view) as limb:
-        swing = swing_along(limb, kitchen, fridge, grasp_at, view.angle, PULLED, (-1.05, 1.45),
-                            ('handle',), lambda q: approach_to(limb, q) is not None)
+        swing = swing_along(
+            limb,
+            kitchen,
+            fridge,
+            grasp_at,
+            view.angle,
+            PULLED,
+            (-1.05, 1.45),
+            ('handle',),
+            lambda q: approach_to(limb, q) is not None,
+        )
         if swing is None or swing.angles[-1] < LEAST_PULL:
             raise SkillError(
                 'the handle is out of reach of the {} arm, or cannot be pulled from here'.format(
-                    arm))
+                    arm
+                )
+            )
         context.robot.gripper(arm, GRIPPER_OPEN)
         place_door(limb, kitchen, fridge, view.angle)
         approach = approach_to(limb, swing.path[0])
@@ -235,8 +251,9 @@ def _pull(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView) -> 
             raise HandleLost('the handle slipped out of the {} hand'.format(arm))
         # an arm that pulls against a hinge does not get as far as it was sent
         bar = apply(limb.pose(), np.array([-BEYOND, 0.0, 0.0]))
-        reached = _draw_along(context, kitchen, fridge,
-                              door_angle_at(kitchen, apply(inverse(fridge), bar)))
+        reached = _draw_along(
+            context, kitchen, fridge, door_angle_at(kitchen, apply(inverse(fridge), bar))
+        )
         relax(limb)
         context.robot.gripper(arm, RELEASE)
     return reached
@@ -285,8 +302,17 @@ def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
         return against(kitchen, fridge, angle, turn, PUSH_REACH, PUSH_HEIGHT, inside=True)
 
     with arm_at(context, kitchen, arm, view) as limb:
-        swing = swing_along(limb, kitchen, fridge, push_at, view.angle - 2 * STEP, WIDE,
-                            (-1.75, 0.6), ('door',), lambda q: is_beside(limb, kitchen, view, q))
+        swing = swing_along(
+            limb,
+            kitchen,
+            fridge,
+            push_at,
+            view.angle - 2 * STEP,
+            WIDE,
+            (-1.75, 0.6),
+            ('door',),
+            lambda q: is_beside(limb, kitchen, view, q),
+        )
         if swing is None or swing.angles[-1] < view.angle + STEP:
             if view.angle >= LEAST_OPEN:
                 return view.angle  # wide enough, as it stands
@@ -309,8 +335,17 @@ def _push_shut(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
 
     with arm_at(context, kitchen, arm, view) as limb:
         context.robot.gripper(arm, 0.0)
-        swing = swing_along(limb, kitchen, fridge, push_at, view.angle + 2 * STEP, 0.0, (-1.2, 2.4),
-                            ('door',), lambda q: is_beside(limb, kitchen, view, q))
+        swing = swing_along(
+            limb,
+            kitchen,
+            fridge,
+            push_at,
+            view.angle + 2 * STEP,
+            0.0,
+            (-1.2, 2.4),
+            ('door',),
+            lambda q: is_beside(limb, kitchen, view, q),
+        )
         if swing is None or swing.angles[-1] > view.angle - STEP:
             raise SkillError('the {} arm cannot push the door shut from here'.format(arm))
         place_door(limb, kitchen, fridge, view.angle, BERTH)
@@ -319,8 +354,11 @@ def _push_shut(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
     _press(context)
     # a hand that is lifted away from there may hook the door, or its handle
     step_back(context, OFF_DOOR)
-    stow(context, (arm,), named_boxes(
-        kitchen, base_from_fridge(kitchen, context.robot.odom_from_base()), 2 * STEP))
+    stow(
+        context,
+        (arm,),
+        named_boxes(kitchen, base_from_fridge(kitchen, context.robot.odom_from_base()), 2 * STEP),
+    )
 
 
 def _press(context: SkillContext) -> None:

@@ -3,6 +3,7 @@
 Where the program that asked for it was stopped, the drink may be in the hand, in the refrigerator
 or before it. The skill goes on from there.
 """
+
 from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -59,14 +60,29 @@ class Stance(NamedTuple):
 
 
 # in this order, until there is a grasp
-STANCES = (Stance(0), Stance(1), Stance(2), Stance(3), Stance(0, from_above=True),
-           Stance(1, pushes=1), Stance(2, pushes=1))
+STANCES = (
+    Stance(0),
+    Stance(1),
+    Stance(2),
+    Stance(3),
+    Stance(0, from_above=True),
+    Stance(1, pushes=1),
+    Stance(2, pushes=1),
+)
 
 
-def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray,
-                     arm: str, target: UprightBox, others: Sequence[UprightBox],
-                     effort: float = FEEL_EFFORT, elsewhere: int = 0,
-                     grasped: Grasped = nobody_told, stance: Stance = STANCES[0]) -> HeldObject:
+def pick_from_fridge(
+    context: SkillContext,
+    kitchen: Kitchen,
+    fridge: np.ndarray,
+    arm: str,
+    target: UprightBox,
+    others: Sequence[UprightBox],
+    effort: float = FEEL_EFFORT,
+    elsewhere: int = 0,
+    grasped: Grasped = nobody_told,
+    stance: Stance = STANCES[0],
+) -> HeldObject:
     """Pick a drink and take it out, upright. Where that fails, the hand leaves the fridge empty.
 
     :param fridge: 4x4, where it is, in base_footprint.
@@ -78,17 +94,25 @@ def pick_from_fridge(context: SkillContext, kitchen: Kitchen, fridge: np.ndarray
     :raises SkillError: with the reason. ObjectSlipped where the drink did not come along, NoGrasp
         where the hand has not begun.
     """
-    boxes = {
-        name: _padded(box)
-        for name, box in named_boxes(kitchen, fridge, WIDE).items()
-    }
-    boxes.update({
-        'thing {}'.format(k): _kept_off(box, max(elsewhere, stance.pushes))
-        for k, box in enumerate(others) if np.hypot(*(box.centre - target.centre)[:2]) > SAME
-    })
+    boxes = {name: _padded(box) for name, box in named_boxes(kitchen, fridge, WIDE).items()}
+    boxes.update(
+        {
+            'thing {}'.format(k): _kept_off(box, max(elsewhere, stance.pushes))
+            for k, box in enumerate(others)
+            if np.hypot(*(box.centre - target.centre)[:2]) > SAME
+        }
+    )
     try:
-        held = pick(context, arm, target, boxes, effort, elsewhere, grasped,
-                    stance.from_above or elsewhere > 0)
+        held = pick(
+            context,
+            arm,
+            target,
+            boxes,
+            effort,
+            elsewhere,
+            grasped,
+            stance.from_above or elsewhere > 0,
+        )
         held = held._replace(effort=max(effort, CARRIED))
         grasped(held)
         with Arm(context, arm, {}, seed_of(arm, held.grasp)) as hand:
@@ -157,8 +181,14 @@ def _carry(hand: Arm, held: HeldObject) -> None:
         raise ObjectSlipped('the drink was lost on the way out of the refrigerator')
 
 
-def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: str,
-              attempt: int, exactly: bool = False) -> UprightBox:
+def come_near(
+    context: SkillContext,
+    kitchen: Kitchen,
+    target: UprightBox,
+    arm: str,
+    attempt: int,
+    exactly: bool = False,
+) -> UprightBox:
     """Drive to where drinks are picked from, where the base stands beside that. Look at a drink.
 
     Each time that a drink is picked again, the base stands otherwise. What is out of reach from one
@@ -185,8 +215,9 @@ def come_near(context: SkillContext, kitchen: Kitchen, target: UprightBox, arm: 
     return there
 
 
-def _picking_pose(kitchen: Kitchen, odom_from_base: np.ndarray, target: UprightBox, arm: str,
-                  attempt: int) -> Tuple[float, float, float]:
+def _picking_pose(
+    kitchen: Kitchen, odom_from_base: np.ndarray, target: UprightBox, arm: str, attempt: int
+) -> Tuple[float, float, float]:
     """x, y in m and yaw in rad of the base, in the fridge's frame, for a try at picking a drink."""
     if not attempt:
         return PICKING
@@ -211,9 +242,11 @@ def seen_again(target: UprightBox, things: Sequence[UprightBox]) -> UprightBox:
 
     :param things: what is seen on the shelf.
     """
-    beside = [(float(np.hypot(*(box.centre - target.centre)[:2])), number)
-              for number, box in enumerate(things)
-              if np.abs(box.size - target.size).max() < SAME_SIZE]
+    beside = [
+        (float(np.hypot(*(box.centre - target.centre)[:2])), number)
+        for number, box in enumerate(things)
+        if np.abs(box.size - target.size).max() < SAME_SIZE
+    ]
     distance, number = min(beside, default=(np.inf, -1))
     return things[number] if distance < MOVED else target
 

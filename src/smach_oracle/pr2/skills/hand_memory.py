@@ -3,6 +3,7 @@
 A hand that has opened, or has closed on nothing, holds nothing. So what a hand held once does not
 count for good, as in the next trial.
 """
+
 from typing import Dict, Optional, Sequence
 
 import numpy as np

@@ -4,6 +4,7 @@ A robot that is told to stop does nothing more. So a hand may still hold the han
 it, or stand behind the door. An arm that is stowed from there is held up by the door, or pulls at
 it.
 """
+
 import numpy as np
 
 from smach_oracle.geometry.transforms import apply, from_rpy, inverse, yaw_of
@@ -76,8 +77,12 @@ def go_away(context: SkillContext, kitchen: Kitchen) -> None:
     before = context.robot.odom_from_base()
     here = inverse(base_from_fridge(kitchen, before))
     length = min(AWAY_FOR_GOOD, max(OFF, float(here[0, 3]) - FARTHEST_BACK))
-    drive(context, odom_from_pose(kitchen, float(here[0, 3]) - length,
-                                  min(float(here[1, 3]), FARTHEST_LEFT), yaw_of(here)))
+    drive(
+        context,
+        odom_from_pose(
+            kitchen, float(here[0, 3]) - length, min(float(here[1, 3]), FARTHEST_LEFT), yaw_of(here)
+        ),
+    )
 
 
 def _let_go(context: SkillContext, arm: str) -> None:
@@ -96,5 +101,8 @@ def _is_about_door(context: SkillContext, kitchen: Kitchen, tool: np.ndarray) ->
     fridge = base_from_fridge(kitchen, context.robot.odom_from_base())
     hand = apply(inverse(fridge), tool[:3, 3])
     from_hinge = float(np.hypot(hand[0], hand[1] - kitchen.width / 2))
-    return bool(hand[0] < 0.0 and hand[2] < kitchen.height
-                and from_hinge < kitchen.width + kitchen.handle_stand_off + ABOUT_DOOR)
+    return bool(
+        hand[0] < 0.0
+        and hand[2] < kitchen.height
+        and from_hinge < kitchen.width + kitchen.handle_stand_off + ABOUT_DOOR
+    )

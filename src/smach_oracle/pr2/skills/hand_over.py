@@ -3,6 +3,7 @@
 Where the program that asked for it was stopped, the hand may be on its way, or may have let go.
 The skill looks for what an empty hand has set down.
 """
+
 from typing import Dict, Optional
 
 import numpy as np
@@ -56,8 +57,7 @@ def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldO
     boxes = {PALM: palm}
     top = palm.centre + [0.0, 0.0, palm.half[2]]
     try:
-        stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM,
-                      gently=True)
+        stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM, gently=True)
     except ObjectLost:
         if _is_given(context, arm, expected, held):
             return
@@ -101,8 +101,13 @@ def _beside(hand: Arm, expected: np.ndarray) -> bool:
 
 def _about_palm(expected: np.ndarray) -> Dict[str, MapBox]:
     """A palm that has not been seen, as low as it may be."""
-    return {PALM: MapBox(expected - [0.0, 0.0, LEVEL + THICK / 2],
-                         np.array([LEAST_HALF, LEAST_HALF, THICK / 2]), 0.0)}
+    return {
+        PALM: MapBox(
+            expected - [0.0, 0.0, LEVEL + THICK / 2],
+            np.array([LEAST_HALF, LEAST_HALF, THICK / 2]),
+            0.0,
+        )
+    }
 
 
 def middle_of_top(image: CameraImage, expected: np.ndarray, height: float) -> Optional[np.ndarray]:
@@ -127,8 +132,11 @@ def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
     """
     points = _near(image, expected)
     if len(points) < LEAST_POINTS:
-        raise SkillError('no hand waits where it should: {} points within {:.0f} cm of it'.format(
-            len(points), 100 * NEAR))
+        raise SkillError(
+            'no hand waits where it should: {} points within {:.0f} cm of it'.format(
+                len(points), 100 * NEAR
+            )
+        )
     # a palm that is held out lies higher than the arm behind it
     height = float(np.percentile(points[:, 2], 90))
     level = points[np.abs(points[:, 2] - height) < 0.015]
@@ -136,19 +144,26 @@ def find_palm(image: CameraImage, expected: np.ndarray) -> MapBox:
     if np.min(high - low) < LEAST_EXTENT:
         raise SkillError(
             'what is where the hand should wait is too small for one: {:.0f} x {:.0f} cm'.format(
-                *(100 * (high - low))))
+                *(100 * (high - low))
+            )
+        )
     centre = (low + high) / 2
-    return MapBox(np.array([centre[0], centre[1], height - THICK / 2]),
-                  np.array([*np.maximum((high - low) / 2, LEAST_HALF), THICK / 2]), 0.0)
+    return MapBox(
+        np.array([centre[0], centre[1], height - THICK / 2]),
+        np.array([*np.maximum((high - low) / 2, LEAST_HALF), THICK / 2]),
+        0.0,
+    )
 
 
 def _near(image: CameraImage, expected: np.ndarray) -> np.ndarray:
     """(n, 3): what an image shows about a point, in base_footprint."""
     stride = image.stride(COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
-                       stride=stride)
+    points = points_of(
+        image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera, stride=stride
+    )
     points = points.reshape(-1, 3)
     with np.errstate(invalid='ignore'):
-        near = ((np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) &
-                (np.abs(points[:, 2] - expected[2]) < LEVEL))
+        near = (np.hypot(*(points[:, :2] - expected[:2]).T) < NEAR) & (
+            np.abs(points[:, 2] - expected[2]) < LEVEL
+        )
     return points[near]

@@ -1,4 +1,5 @@
 """Set right where the robot believes to stand: look at the refrigerator, whose place it knows."""
+
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +44,8 @@ def localise_at_fridge(context: SkillContext, kitchen: Kitchen) -> Correction:
     if np.hypot(*correction[:2]) > FARTHEST or abs(correction.yaw) > MOST_TURNED:
         raise SkillError(
             'the refrigerator is seen {:.0f} cm and {:.0f} degrees from where it should be: that '
-            'cannot be'.format(100 * np.hypot(*correction[:2]), np.degrees(correction.yaw)))
+            'cannot be'.format(100 * np.hypot(*correction[:2]), np.degrees(correction.yaw))
+        )
     try:
         robot.localise(found)
     except RobotError as err:

@@ -1,4 +1,5 @@
 """Pick an object: choose a grasp, go there, close, feel, lift, feel again."""
+
 from typing import Callable, List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
@@ -71,9 +72,16 @@ class _GraspPath(NamedTuple):
     approach: np.ndarray  # (k, 7) from there
 
 
-def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str, MapBox],
-         effort: float = FEEL_EFFORT, elsewhere: int = 0,
-         grasped: Grasped = nobody_told, from_above: bool = True) -> HeldObject:
+def pick(
+    context: SkillContext,
+    arm: str,
+    target: UprightBox,
+    boxes: Mapping[str, MapBox],
+    effort: float = FEEL_EFFORT,
+    elsewhere: int = 0,
+    grasped: Grasped = nobody_told,
+    from_above: bool = True,
+) -> HeldObject:
     """Grasp an object and lift it.
 
     :param arm: 'left' or 'right'.
@@ -89,12 +97,15 @@ def pick(context: SkillContext, arm: str, target: UprightBox, boxes: Mapping[str
     candidates = others_first(grasps(target, arm), elsewhere) if arm in ('left', 'right') else []
     obstacles = with_margin(boxes)
     obstacles[TARGET] = MapBox(target.centre, target.size / 2, target.yaw)
-    with Arm(context, arm, obstacles,
-             seed_of(arm, target.centre, target.size, context.robot.joints())) as hand:
+    with Arm(
+        context, arm, obstacles, seed_of(arm, target.centre, target.size, context.robot.joints())
+    ) as hand:
         if not candidates:
             raise SkillError(
                 'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
-                    100 * target.size[0], 100 * target.size[1]))
+                    100 * target.size[0], 100 * target.size[1]
+                )
+            )
         hand.open()
         try:
             return _pick(hand, target, _allowed(candidates, from_above), effort, grasped)
@@ -115,8 +126,9 @@ def _allowed(candidates: List[np.ndarray], from_above: bool) -> List[np.ndarray]
     return [each for each in candidates if from_above or not comes_from_above(each)]
 
 
-def _pick(hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float,
-          grasped: Grasped) -> HeldObject:
+def _pick(
+    hand: Arm, target: UprightBox, candidates: List[np.ndarray], effort: float, grasped: Grasped
+) -> HeldObject:
     reasons: List[str] = []
     missed = 0
     for grasp in candidates:
@@ -150,8 +162,10 @@ def _check_width(hand: Arm, target: UprightBox, gap: float) -> None:
     hand.open()
     raise SkillError(
         'the gripper closed on something {:.1f} cm wide, and the object is {:.1f} x {:.1f} cm: it '
-        'holds another thing, or a corner'.format(100 * gap, 100 * target.size[0],
-                                                 100 * target.size[1]))
+        'holds another thing, or a corner'.format(
+            100 * gap, 100 * target.size[0], 100 * target.size[1]
+        )
+    )
 
 
 def _path_to(hand: Arm, grasp: np.ndarray, reasons: List[str]) -> Optional[_GraspPath]:
@@ -196,8 +210,9 @@ def _lift(hand: Arm, target: UprightBox, effort: float, grasped: Grasped) -> Hel
     return held
 
 
-def way_up(hand: Arm, start: np.ndarray, grasp: np.ndarray,
-            heights: Sequence[float]) -> Optional[np.ndarray]:
+def way_up(
+    hand: Arm, start: np.ndarray, grasp: np.ndarray, heights: Sequence[float]
+) -> Optional[np.ndarray]:
     """A straight path (m, 7) upwards, by the first of these heights (m) that the arm can do.
 
     :param start: (7,), of a hand at its grasp (4x4).

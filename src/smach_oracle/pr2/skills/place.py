@@ -1,4 +1,5 @@
 """Put down what a hand holds: go above the place, lower, let go, back off, and look."""
+
 from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -69,9 +70,16 @@ class ObjectLost(SkillError):
     """The hand turned out to be empty."""
 
 
-def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
-          boxes: Mapping[str, MapBox], support: str = 'table',
-          tolerance: float = 0.0, gently: bool = False) -> np.ndarray:
+def place(
+    context: SkillContext,
+    arm: str,
+    centre: np.ndarray,
+    held: HeldObject,
+    boxes: Mapping[str, MapBox],
+    support: str = 'table',
+    tolerance: float = 0.0,
+    gently: bool = False,
+) -> np.ndarray:
     """Put the held object down upright, at the free spot nearest to its place.
 
     :param centre: (3,) m, where its centre should be, in base_footprint.
@@ -83,20 +91,24 @@ def place(context: SkillContext, arm: str, centre: np.ndarray, held: HeldObject,
     :returns: (3,) where its centre should be now.
     :raises SkillError: where nothing is held, no path is found, or the object is lost.
     """
-    with Arm(context, arm, with_margin(boxes),
-             seed_of(arm, centre, held.grasp, context.robot.joints())) as hand:
+    with Arm(
+        context, arm, with_margin(boxes), seed_of(arm, centre, held.grasp, context.robot.joints())
+    ) as hand:
         if support not in boxes:
             raise SkillError(
-                'there is nothing to stand on: the collision map has no {}'.format(support))
+                'there is nothing to stand on: the collision map has no {}'.format(support)
+            )
         if hand.close(held.effort) == 0:
             raise ObjectLost('the {} hand holds nothing'.format(arm))
         centre = _on_support(centre, held, boxes[support], HOVER if gently else DROP)
         hand.space.attach(held.half - 0.004, held.tool_from_object)
         spots, taken = free_spots(centre, tolerance, held.half, boxes, support)
         if not spots:
-            raise SkillError('no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} '
-                             'there'.format(100 * max(tolerance, USUAL), centre[0], centre[1],
-                                            _who_stands(taken)))
+            raise SkillError(
+                'no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} there'.format(
+                    100 * max(tolerance, USUAL), centre[0], centre[1], _who_stands(taken)
+                )
+            )
         centre, path = _find_path(hand, spots, held, support, gently)
         hand.follow(path.there, FAST if held.effort < FIRM else CAREFUL)
         if hand.close(held.effort) == 0:
@@ -147,8 +159,9 @@ def _back_from(hand: Arm, planned: np.ndarray) -> np.ndarray:
     return planned if path is None else path
 
 
-def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[str,
-                                                                               MapBox]) -> None:
+def put_back(
+    context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[str, MapBox]
+) -> None:
     """Let go of an object where it was taken, if the arm is above that, elsewhere, where it is.
 
     :raises SkillError: where the hand does not open, or the arm does not follow its path.
@@ -158,8 +171,9 @@ def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[s
         if np.hypot(*(now - held.grasp)[:2, 3]) < NEAR:
             with hand.space.touchable(hand.space.names()):
                 down = hand.line(hand.now(), held.grasp)
-                back = None if down is None else hand.line(down[-1], backed_off(
-                    held.grasp, RETREAT))
+                back = (
+                    None if down is None else hand.line(down[-1], backed_off(held.grasp, RETREAT))
+                )
             if down is not None and back is not None:
                 hand.follow(down, SLOW)
                 hand.open()
@@ -168,24 +182,31 @@ def put_back(context: SkillContext, arm: str, held: HeldObject, boxes: Mapping[s
         hand.open()
 
 
-def stands_there(image: CameraImage, centre: np.ndarray, held: HeldObject,
-                 others: Sequence[MapBox] = ()) -> bool:
+def stands_there(
+    image: CameraImage, centre: np.ndarray, held: HeldObject, others: Sequence[MapBox] = ()
+) -> bool:
     """Whether an image shows something as high as the object, and upright, at its place.
 
     :param centre: (3,) m in base_footprint, where the object's centre should be.
     :param others: what stands beside the place. It does not count.
     """
     stride = image.stride(COLUMNS)
-    points = points_of(image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera,
-                       stride=stride).reshape(-1, 3)
+    points = points_of(
+        image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera, stride=stride
+    ).reshape(-1, 3)
     beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
     bottom = centre[2] - held.half[2]
-    there = points[(beside < NEAR) & (points[:, 2] > bottom + 0.02) &
-                   (points[:, 2] < bottom + 3 * held.half[2])]
+    there = points[
+        (beside < NEAR)
+        & (points[:, 2] > bottom + 0.02)
+        & (points[:, 2] < bottom + 3 * held.half[2])
+    ]
     for box in others:
         there = there[(beyond(there, box) >= BLUR).any(axis=1)]
-    high = len(there) >= LEAST_POINTS and np.percentile(there[:, 2],
-                                                        90) > bottom + UPRIGHT * 2 * held.half[2]
+    high = (
+        len(there) >= LEAST_POINTS
+        and np.percentile(there[:, 2], 90) > bottom + UPRIGHT * 2 * held.half[2]
+    )
     return bool(high) and not _leans(there, held)
 
 
@@ -205,7 +226,9 @@ def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox, drop: flo
         raise SkillError(
             'there is nothing to stand on at x {:.2f}, y {:.2f}, z {:.2f} m: the support is '
             '{:.2f} m high and the place is {:.0f} cm {} its edge'.format(
-                x, y, z, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'))
+                x, y, z, top, 100 * abs(max(inside)), 'beyond' if max(inside) > 0 else 'within'
+            )
+        )
     return np.array([x, y, height + drop])
 
 
@@ -213,8 +236,9 @@ def _who_stands(taken: Sequence[str]) -> str:
     return '{} {}'.format(' and '.join(taken), 'stand' if len(taken) > 1 else 'stands')
 
 
-def _poses(spots: Sequence[np.ndarray],
-           held: HeldObject) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+def _poses(
+    spots: Sequence[np.ndarray], held: HeldObject
+) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
     """Free spots, with poses of the tool that bring the object there, best first."""
     stood = held.grasp @ held.tool_from_object
     object_from_tool = inverse(held.tool_from_object)
@@ -224,8 +248,9 @@ def _poses(spots: Sequence[np.ndarray],
             yield there, transform(there, rotation) @ object_from_tool
 
 
-def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
-               support: str, level: bool) -> Tuple[np.ndarray, _PlacePath]:
+def _find_path(
+    hand: Arm, spots: Sequence[np.ndarray], held: HeldObject, support: str, level: bool
+) -> Tuple[np.ndarray, _PlacePath]:
     reasons: List[str] = []
     start = hand.now()
     for there, pose in _poses(spots, held):
@@ -253,12 +278,16 @@ def _find_path(hand: Arm, spots: Sequence[np.ndarray], held: HeldObject,
                 return there, _PlacePath(way, down, *release)
             except PlanningError as err:
                 reasons.append(str(err))
-    raise SkillError('no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
-        spots[0][0], spots[0][1], summary(reasons)))
+    raise SkillError(
+        'no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
+            spots[0][0], spots[0][1], summary(reasons)
+        )
+    )
 
 
-def _release(hand: Arm, q: np.ndarray, pose: np.ndarray, held: HeldObject,
-             support: str) -> Optional[Tuple[float, np.ndarray]]:
+def _release(
+    hand: Arm, q: np.ndarray, pose: np.ndarray, held: HeldObject, support: str
+) -> Optional[Tuple[float, np.ndarray]]:
     """Return how wide to open the fingers (m) and a path back (m, 7), or None if there is no room.
 
     :param q: (7,), of the hand at `pose` (4x4), where it lets go.

@@ -1,4 +1,5 @@
 """Spots to put something down: the place itself, and free spots next to it."""
+
 from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
@@ -19,14 +20,23 @@ def spots(centre: np.ndarray, tolerance: float) -> Iterator[np.ndarray]:
     """Places (3,) within `tolerance` m of a place, the nearest first. 0 means within USUAL."""
     reach = tolerance if tolerance > 0 else USUAL
     steps = int(np.floor(reach / GRID + 1e-9))
-    beside = [(GRID * i, GRID * j) for i in range(-steps, steps + 1)
-              for j in range(-steps, steps + 1) if np.hypot(i, j) * GRID <= reach + 1e-9]
+    beside = [
+        (GRID * i, GRID * j)
+        for i in range(-steps, steps + 1)
+        for j in range(-steps, steps + 1)
+        if np.hypot(i, j) * GRID <= reach + 1e-9
+    ]
     for x, y in sorted(beside, key=lambda each: (round(float(np.hypot(*each)), 6), each)):
         yield centre + [x, y, 0.0]
 
 
-def free_spots(centre: np.ndarray, tolerance: float, half: np.ndarray,
-               boxes: Mapping[str, MapBox], support: str) -> Tuple[List[np.ndarray], List[str]]:
+def free_spots(
+    centre: np.ndarray,
+    tolerance: float,
+    half: np.ndarray,
+    boxes: Mapping[str, MapBox],
+    support: str,
+) -> Tuple[List[np.ndarray], List[str]]:
     """The spots on which nothing stands, best first, and the names of what stands on others.
 
     The nearest are best. A spot with a thing close by is as good as one that is farther by CROWDED

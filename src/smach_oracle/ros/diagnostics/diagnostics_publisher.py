@@ -1,4 +1,5 @@
 """Publishes on /diagnostics how the oracle of this node fares, once a second."""
+
 import threading
 import time
 from typing import List, Optional
@@ -53,8 +54,12 @@ class DiagnosticsPublisher:
         rows = [row for machine in self._machines for row in oracle_of(machine).rates()]
         writers = running_writers()
         behind = {writer.path: writer.error for writer in writers if writer.is_behind}
-        return [questions_status(node, self._queries), states_status(node, rows),
-                recorder_status(node, self._recorder), store_status(node, behind, len(writers))]
+        return [
+            questions_status(node, self._queries),
+            states_status(node, rows),
+            recorder_status(node, self._recorder),
+            store_status(node, behind, len(writers)),
+        ]
 
     def _take_queries(self, message: OpenQueries) -> None:
         self._queries = list(message.queries)

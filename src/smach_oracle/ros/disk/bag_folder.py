@@ -1,4 +1,5 @@
 """The bags of a folder: which trials each has, who holds it, and how it goes."""
+
 import fcntl
 import glob
 import os
@@ -9,8 +10,11 @@ from smach_oracle.msg import OracleEvent
 
 from .limits import KnownBag, Plan, Removal
 
-_ENDS_QUESTION = (OracleEvent.QUERY_ANSWERED, OracleEvent.QUERY_EXPIRED,
-                  OracleEvent.QUERY_CANCELLED)
+_ENDS_QUESTION = (
+    OracleEvent.QUERY_ANSWERED,
+    OracleEvent.QUERY_EXPIRED,
+    OracleEvent.QUERY_CANCELLED,
+)
 _BESIDE = ('.active', '.mending', '.damaged')  # files of a bag that is not done with
 NOT_OURS = 'it has no events of the executive'
 
@@ -35,8 +39,10 @@ class BagFolder:
     def totals(self) -> Tuple[int, float]:
         """Return the bytes of all bags, and when the oldest was closed, s since the epoch."""
         found = [status for _, status in self._files()]
-        return (sum(status.st_size for status in found),
-                min([status.st_mtime for status in found], default=float('inf')))
+        return (
+            sum(status.st_size for status in found),
+            min([status.st_mtime for status in found], default=float('inf')),
+        )
 
     def bags(self) -> List[KnownBag]:
         """Return all bags of the folder itself, none of those that are being written.
@@ -49,8 +55,9 @@ class BagFolder:
             key = (path, status.st_size, status.st_mtime_ns)
             told = read[key] = self._read.get(key) or _trials_of(path)
             why = told.why_kept or _why_held(path, opened)
-            found.append(KnownBag(path, status.st_size, status.st_mtime, told.trials, told.ended,
-                                  why))
+            found.append(
+                KnownBag(path, status.st_size, status.st_mtime, told.trials, told.ended, why)
+            )
         self._read = read
         return found
 
@@ -69,6 +76,7 @@ class BagFolder:
 def _trials_of(path: str) -> _TrialsOfBag:
     """Read which trials a bag has, and which of them it sees end."""
     import rosbag  # half a second, and not before there is something to remove
+
     trials: Dict[str, Set[str]] = {}  # with their open questions
     ended: List[str] = []
     try:

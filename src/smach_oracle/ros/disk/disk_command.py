@@ -1,4 +1,5 @@
 """The command oracle_disk: what bags and stores take of the disk, and what of it may go."""
+
 import argparse
 import math
 import os
@@ -33,17 +34,29 @@ def main(arguments: Optional[List[str]] = None) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog='oracle_disk', description='Name the bags of folders, and the trials of stores, that '
+        prog='oracle_disk',
+        description='Name the bags of folders, and the trials of stores, that '
         'are over a limit, and remove them with --delete. What is open, being written or held by a '
-        'program stays, and so does a trial that has not ended or whose question is open.')
+        'program stays, and so does a trial that has not ended or whose question is open.',
+    )
     parser.add_argument('paths', nargs='+', metavar='PATH', help='a folder of bags, or a store')
-    parser.add_argument('--keep-days', type=_amount, default=0.0, metavar='DAYS',
-                        help='remove trials that ended more than DAYS days ago')
-    parser.add_argument('--keep-gb', type=_amount, default=0.0, metavar='GB',
-                        help='remove the oldest until each folder and store has at most '
-                        'GB * 10^9 bytes')
-    parser.add_argument('--delete', action='store_true',
-                        help='remove them; without this option they are only named')
+    parser.add_argument(
+        '--keep-days',
+        type=_amount,
+        default=0.0,
+        metavar='DAYS',
+        help='remove trials that ended more than DAYS days ago',
+    )
+    parser.add_argument(
+        '--keep-gb',
+        type=_amount,
+        default=0.0,
+        metavar='GB',
+        help='remove the oldest until each folder and store has at most GB * 10^9 bytes',
+    )
+    parser.add_argument(
+        '--delete', action='store_true', help='remove them; without this option they are only named'
+    )
     return parser
 
 
@@ -53,8 +66,9 @@ def _amount(text: str) -> float:
     except ValueError:
         amount = math.nan
     if not 0 < amount < math.inf:
-        raise argparse.ArgumentTypeError('{} is not allowed; allowed: a number above 0'.format(
-            text))
+        raise argparse.ArgumentTypeError(
+            '{} is not allowed; allowed: a number above 0'.format(text)
+        )
     return amount
 
 
@@ -77,8 +91,11 @@ def _folder(path: str, limits: Limits, delete: bool) -> int:
     if not delete:
         for removal in plan.removals:
             _say('would go {}'.format(told(removal)))
-        _say('{}: {} bags would go, {:.1f} MB; {} over the limits stay'.format(
-            path, len(plan.removals), sizes(plan.removals) / 1e6, len(plan.kept)))
+        _say(
+            '{}: {} bags would go, {:.1f} MB; {} over the limits stay'.format(
+                path, len(plan.removals), sizes(plan.removals) / 1e6, len(plan.kept)
+            )
+        )
         return 0
     gone = remove(plan, _say, _complain)
     _say('{}: {} bags are gone; {} over the limits stay'.format(path, gone, len(plan.kept)))
@@ -97,8 +114,11 @@ def _store(path: str, limits: Limits, delete: bool) -> int:
         for dropped in retention.going:
             _say('{} {}'.format('removes' if delete else 'would go', _trial(path, dropped)))
         if not delete or not retention.going:
-            _say('{}: {} trials would go; {} over the limits stay'.format(
-                path, len(retention.going), len(retention.kept)))
+            _say(
+                '{}: {} trials would go; {} over the limits stay'.format(
+                    path, len(retention.going), len(retention.kept)
+                )
+            )
         if delete and retention.going:
             before = _size_on_disk(path)
             retention.drop()
@@ -114,8 +134,9 @@ def _size_on_disk(path: str) -> int:
 
 def _trial(path: str, dropped: Dropped) -> str:
     trial = dropped.trial
-    return '{}: trial {} of {}, {} moments: {}'.format(path, trial.number, trial.machine,
-                                                       trial.moments, dropped.why)
+    return '{}: trial {} of {}, {} moments: {}'.format(
+        path, trial.number, trial.machine, trial.moments, dropped.why
+    )
 
 
 def _say(text: str) -> None:

@@ -1,4 +1,5 @@
 """The limits of a disk, and the trials that go: the oldest that have ended. Pure."""
+
 from typing import Iterable, List, NamedTuple, Sequence, Set
 
 DAY_S = 86400.0
@@ -83,8 +84,11 @@ def _why_kept(group: Sequence[KnownBag]) -> str:
             return bag.why_kept if len(group) == 1 else '{}: {}'.format(bag.path, bag.why_kept)
     ended = {trial for bag in group for trial in bag.ended}
     open_trials = sorted({trial for bag in group for trial in bag.trials} - ended)
-    return 'trial {} has not ended, or has a question open'.format(
-        open_trials[0]) if open_trials else ''
+    return (
+        'trial {} has not ended, or has a question open'.format(open_trials[0])
+        if open_trials
+        else ''
+    )
 
 
 def _groups(bags: Sequence[KnownBag]) -> List[List[KnownBag]]:
@@ -105,5 +109,3 @@ def _groups(bags: Sequence[KnownBag]) -> List[List[KnownBag]]:
 def sizes(removals: Iterable[Removal]) -> int:
     """Return the bytes of what goes."""
     return sum(removal.bag.size for removal in removals)
-
-

@@ -1,4 +1,5 @@
 """Prunes the folder of a recorder when a trial's bag is closed, in a thread of its own."""
+
 import threading
 import time
 from typing import Optional
@@ -43,7 +44,9 @@ class Pruner:
         """
         size, oldest = self._bags.totals()
         limits, now = self._limits, time.time()
-        if not ((limits.gb and size > limits.gb * GB)
-                or (limits.days and now - oldest > limits.days * DAY_S)):
+        if not (
+            (limits.gb and size > limits.gb * GB)
+            or (limits.days and now - oldest > limits.days * DAY_S)
+        ):
             return
         remove(planned(self._bags.bags(), limits, now), self._say, self._warn)

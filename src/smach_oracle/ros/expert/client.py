@@ -1,4 +1,5 @@
 """Asks the experts: sends questions as goals to an ExpertQuery server, own or shared."""
+
 import math
 import threading
 import time
@@ -50,8 +51,13 @@ class ExpertQueryClient(Expert):
     id, until the deadline.
     """
 
-    def __init__(self, server: str = '', robot: str = '', server_wait_s: float = SERVER_WAIT_S,
-                 cameras: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        server: str = '',
+        robot: str = '',
+        server_wait_s: float = SERVER_WAIT_S,
+        cameras: Sequence[str] = (),
+    ) -> None:
         """
         :param server: name of a shared server. '' hosts one of this node's own, `~expert_query`,
             and asks that.
@@ -69,8 +75,9 @@ class ExpertQueryClient(Expert):
         self._interfaces: Dict[str, GoalLink] = {}
         self._interfaces_lock = threading.Lock()
 
-    def ask(self, question: Question, cancelled: threading.Event,
-            progress: Progress) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Progress
+    ) -> Optional[Answer]:
         """Return the answer, or None where there is none by the deadline or `cancelled` was set.
 
         :raises AnswerError: if the answer cannot be used here, such as outputs of a message type
@@ -80,8 +87,13 @@ class ExpertQueryClient(Expert):
         with self._watch.while_open(question):
             return _SentQuestion(self._link, to_goal(question, self.robot), progress).run(cancelled)
 
-    def run_interface(self, offer: InterfaceOffer, question: Question, cancelled: threading.Event,
-                      progress: Progress) -> Optional[Answer]:
+    def run_interface(
+        self,
+        offer: InterfaceOffer,
+        question: Question,
+        cancelled: threading.Event,
+        progress: Progress,
+    ) -> Optional[Answer]:
         """Run a shared-autonomy interface. Return None where it fails or is cancelled.
 
         It is started where it is not there.
@@ -118,8 +130,9 @@ class ExpertQueryClient(Expert):
         goal.deadline = 0.0
         return self._link.send(goal, time.monotonic())
 
-    def _run(self, offer: InterfaceOffer, question: Question,
-             cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
+    def _run(
+        self, offer: InterfaceOffer, question: Question, cancelled: threading.Event
+    ) -> Optional[SharedAutonomyResult]:
         link = self._interface(offer.action)
         started = self._provide(offer, link, question.question_id, cancelled)
         try:
@@ -129,38 +142,47 @@ class ExpertQueryClient(Expert):
                 started.publish_status(InterfaceOutput.STOPPED, 'it is being stopped')
                 started.stop()
 
-    def _provide(self, offer: InterfaceOffer, link: GoalLink, query_id: str,
-                 cancelled: threading.Event) -> Optional[StartedInterface]:
+    def _provide(
+        self, offer: InterfaceOffer, link: GoalLink, query_id: str, cancelled: threading.Event
+    ) -> Optional[StartedInterface]:
         """Wait for the action server. Start it where it can be started and nobody else has."""
         if (offer.start is None or _advertised(link)) and _wait_until_ready(
-                link, self._server_wait_s, cancelled):
+            link, self._server_wait_s, cancelled
+        ):
             return None
         if offer.start is None or cancelled.is_set():
-            raise InterfaceError('taken back' if cancelled.is_set(
-            ) else 'no action server at {} within {:g} s'.format(link.name, self._server_wait_s))
+            raise InterfaceError(
+                'taken back'
+                if cancelled.is_set()
+                else 'no action server at {} within {:g} s'.format(link.name, self._server_wait_s)
+            )
         started = self._starter.start(offer, query_id)
         until_s = time.monotonic() + offer.start.limit_s
         while not link.ready():
             why = ''
             if started.exit_code is not None:
                 why = 'it ended by itself with exit code {}: {}'.format(
-                    started.exit_code, started.last_lines)
+                    started.exit_code, started.last_lines
+                )
             elif cancelled.is_set() or rospy.is_shutdown():
                 why = 'taken back'
             elif time.monotonic() > until_s:
                 why = 'it brought up no action server {} within {:g} s'.format(
-                    link.name, offer.start.limit_s)
+                    link.name, offer.start.limit_s
+                )
             if why:
                 started.publish_status(InterfaceOutput.FAILED, why)
                 started.stop()
                 raise InterfaceError(why)
             cancelled.wait(POLL_S)
-        started.publish_status(InterfaceOutput.RUNNING,
-                               'its action server {} is there'.format(link.name))
+        started.publish_status(
+            InterfaceOutput.RUNNING, 'its action server {} is there'.format(link.name)
+        )
         return started
 
-    def _result(self, offer: InterfaceOffer, link: GoalLink, question: Question,
-                cancelled: threading.Event) -> Optional[SharedAutonomyResult]:
+    def _result(
+        self, offer: InterfaceOffer, link: GoalLink, question: Question, cancelled: threading.Event
+    ) -> Optional[SharedAutonomyResult]:
         if not _wait_until_ready(link, self._server_wait_s, cancelled):
             return None
         sent = link.send(to_interface_goal(offer, question), time.monotonic())
@@ -234,8 +256,12 @@ class _SentQuestion:
             rospy.loginfo('Question %s is asked again at %s', self._goal.query_id, self._link.name)
 
     def _lose(self, what: str) -> None:
-        rospy.logwarn('The expert query server %s %s; question %s waits for it to come back',
-                      self._link.name, what, self._goal.query_id)
+        rospy.logwarn(
+            'The expert query server %s %s; question %s waits for it to come back',
+            self._link.name,
+            what,
+            self._goal.query_id,
+        )
         self._sent = None
         self._retry_s = time.monotonic() + _RETRY_S
         self._released('the expert query server {}'.format(what))
@@ -271,8 +297,11 @@ def _server_lost(link: GoalLink, sent: SentGoal, now_s: float) -> bool:
 
 def _answer_of(event: GoalEvent) -> Optional[Answer]:
     result: Optional[ExpertQueryResult] = event.result
-    if (event.status == GoalStatus.SUCCEEDED and result is not None
-            and result.status == ExpertQueryResult.ANSWERED):
+    if (
+        event.status == GoalStatus.SUCCEEDED
+        and result is not None
+        and result.status == ExpertQueryResult.ANSWERED
+    ):
         return to_answer(result.decision)
     if event.status == GoalStatus.REJECTED:
         rospy.logerr('The expert query server refused a question; nobody was asked')
@@ -300,8 +329,11 @@ def _interface_result(offer: InterfaceOffer, event: GoalEvent) -> Optional[Share
     if event.status == GoalStatus.SUCCEEDED and event.result is not None:
         return event.result
     rospy.logwarn(
-        'Interface %s ended as %s%s', offer.name, GoalStatus.to_string(event.status),
-        ': ' + event.result.text if event.result is not None and event.result.text else '')
+        'Interface %s ended as %s%s',
+        offer.name,
+        GoalStatus.to_string(event.status),
+        ': ' + event.result.text if event.result is not None and event.result.text else '',
+    )
     return None
 
 
@@ -316,5 +348,6 @@ def _to_supersede(offer: InterfaceOffer, result: SharedAutonomyResult) -> Option
         rospy.logwarn('Interface %s: %s', offer.name, err)
         return None
     # no `by`: the decision was that of the expert who started the interface
-    return Answer(AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None,
-                  why=result.text)
+    return Answer(
+        AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None, why=result.text
+    )

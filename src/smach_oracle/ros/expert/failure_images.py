@@ -3,6 +3,7 @@
 The cameras are listened to all the time, for the frame must be there when the failure is. Nothing
 of it is waited for.
 """
+
 import threading
 from typing import Dict, List, Sequence, Tuple, Union
 
@@ -55,13 +56,18 @@ class FailureCameras:
         """
         now = rospy.get_rostime()
         with self._lock:
-            newest = [(topic, *self._newest[topic]) for topic in self._topics
-                      if topic in self._newest]
-        images = [(topic, image) for topic, image, came in newest
-                  if abs((now - came).to_sec()) <= OLDEST_S]
+            newest = [
+                (topic, *self._newest[topic]) for topic in self._topics if topic in self._newest
+            ]
+        images = [
+            (topic, image)
+            for topic, image, came in newest
+            if abs((now - came).to_sec()) <= OLDEST_S
+        ]
         if images:
-            threading.Thread(target=self._publish, args=(question, images), name='failure images',
-                             daemon=True).start()
+            threading.Thread(
+                target=self._publish, args=(question, images), name='failure images', daemon=True
+            ).start()
 
     def stop(self) -> None:
         """Listen no longer."""
@@ -71,17 +77,25 @@ class FailureCameras:
 
     def _listen(self) -> None:
         """Subscribe to each as soon as its type is known."""
-        while len(self._subscribers) < len(
-                self._topics) and not rospy.is_shutdown() and not self._stopped.is_set():
+        while (
+            len(self._subscribers) < len(self._topics)
+            and not rospy.is_shutdown()
+            and not self._stopped.is_set()
+        ):
             try:
                 types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
             except (OSError, rosgraph.MasterException):
                 types = {}
             for topic in self._topics:
                 if topic not in self._subscribers and types.get(topic) in _TYPES:
-                    self._subscribers[topic] = rospy.Subscriber(topic, _TYPES[types[topic]],
-                                                                self._keep, callback_args=topic,
-                                                                queue_size=1, buff_size=1 << 24)
+                    self._subscribers[topic] = rospy.Subscriber(
+                        topic,
+                        _TYPES[types[topic]],
+                        self._keep,
+                        callback_args=topic,
+                        queue_size=1,
+                        buff_size=1 << 24,
+                    )
             self._stopped.wait(LOOK_AGAIN_S)
 
     def _keep(self, image: CameraMessage, topic: str) -> None:
@@ -95,8 +109,10 @@ class FailureCameras:
                 message.images.append(compressed(image))
                 message.topics.append(topic)
             except ValueError as err:
-                warn_once('The images of {} at failures cannot be published: {}. This is said once'
-                          .format(topic, err))
+                warn_once(
+                    'The images of {} at failures cannot be published: {}. This is said '
+                    'once'.format(topic, err)
+                )
         message.header.stamp = rospy.get_rostime()
         if message.images and not rospy.is_shutdown():
             with quiet_at_shutdown():
@@ -113,9 +129,10 @@ def compressed(image: CameraMessage) -> CompressedImage:
     import cv2  # takes a moment, and is wanted only where there are cameras
 
     from ..images import colour_of
-    done, data = cv2.imencode('.jpg',
-                              colour_of(image)[:, :, ::-1],
-                              [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+
+    done, data = cv2.imencode(
+        '.jpg', colour_of(image)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+    )
     if not done:
         raise ValueError('it cannot be encoded')
     return CompressedImage(image.header, 'jpeg', bytes(data))

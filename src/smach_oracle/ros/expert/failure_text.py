@@ -1,4 +1,5 @@
 """Finds why an action failed: the status text of its goal, or a text in its result."""
+
 import smach
 from smach_oracle.oracle.identity import own_mark
 

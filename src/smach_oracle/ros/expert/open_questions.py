@@ -4,6 +4,7 @@ Every method looks at the clock first, so that a lease or a deadline that has pa
 passed even where nobody has called `tick` since. News for the askers is collected as notices,
 in order, until `take_notices` takes them. The caller serialises the calls.
 """
+
 import math
 import time
 from collections import OrderedDict
@@ -87,16 +88,25 @@ class OpenQuestion:
 
     def to_msg(self, now_s: float) -> OpenQuery:
         """Return the question as it stands in the open list."""
-        return OpenQuery(query=self.goal, status=self.status, claimed_by=self.holder,
-                         age=now_s - self.opened_s, remaining=_remaining(self.deadline_s, now_s),
-                         lease_remaining=_remaining(self.lease_until_s, now_s))
+        return OpenQuery(
+            query=self.goal,
+            status=self.status,
+            claimed_by=self.holder,
+            age=now_s - self.opened_s,
+            remaining=_remaining(self.deadline_s, now_s),
+            lease_remaining=_remaining(self.lease_until_s, now_s),
+        )
 
 
 class OpenQuestions:
     """Open and settled questions by query id."""
 
-    def __init__(self, lease_s: float = LEASE_S, remember: int = REMEMBERED,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        lease_s: float = LEASE_S,
+        remember: int = REMEMBERED,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._lease_s = lease_s
         self._remember = remember
         self._clock = clock
@@ -168,8 +178,10 @@ class OpenQuestions:
             return AnswerReply(False, str(err), ExpertDecision())
         if question.holder not in ('', decision.by):
             return AnswerReply(
-                False, '{} works on this question; take it over first'.format(question.holder),
-                ExpertDecision())
+                False,
+                '{} works on this question; take it over first'.format(question.holder),
+                ExpertDecision(),
+            )
         self._settle(question, ExpertQueryResult.ANSWERED, decision, describe_decision(decision))
         return AnswerReply(True, '', decision)
 
@@ -188,8 +200,12 @@ class OpenQuestions:
         now_s = self._clock()
         for question in list(self._open.values()):
             if now_s >= question.deadline_s:
-                self._settle(question, ExpertQueryResult.EXPIRED, ExpertDecision(),
-                             'nobody answered by the deadline')
+                self._settle(
+                    question,
+                    ExpertQueryResult.EXPIRED,
+                    ExpertDecision(),
+                    'nobody answered by the deadline',
+                )
             elif now_s >= question.lease_until_s:
                 self._release(question, 'the claim of {} ran out'.format(question.holder))
 
@@ -233,10 +249,12 @@ class OpenQuestions:
         question.lease_until_s = math.inf
         if before:
             self._notices.append(
-                QuestionNotice(question.goal.query_id, ExpertQueryFeedback.PENDING, before, text))
+                QuestionNotice(question.goal.query_id, ExpertQueryFeedback.PENDING, before, text)
+            )
 
-    def _settle(self, question: OpenQuestion, status: int, decision: ExpertDecision,
-                text: str) -> None:
+    def _settle(
+        self, question: OpenQuestion, status: int, decision: ExpertDecision, text: str
+    ) -> None:
         goal = question.goal
         del self._open[goal.query_id]
         settled = SettledQuestion(goal, status, decision, text)
@@ -249,10 +267,12 @@ class OpenQuestions:
 
     def _notify(self, question: OpenQuestion, text: str) -> None:
         self._notices.append(
-            QuestionNotice(question.goal.query_id, question.status, question.holder, text))
+            QuestionNotice(question.goal.query_id, question.status, question.holder, text)
+        )
 
-    def _answer_closed(self, query_id: str, settled: Optional[SettledQuestion],
-              decision: ExpertDecision) -> AnswerReply:
+    def _answer_closed(
+        self, query_id: str, settled: Optional[SettledQuestion], decision: ExpertDecision
+    ) -> AnswerReply:
         if settled is None or settled.status != ExpertQueryResult.ANSWERED:
             return AnswerReply(False, self._why_closed(query_id), ExpertDecision())
         first = settled.decision
@@ -286,7 +306,9 @@ def _check_goal(goal: ExpertQueryGoal) -> None:
     if not 0 <= goal.deadline < math.inf:
         raise QuestionRefusedError(
             'deadline {} is not allowed; allowed: seconds, 0 waits without end'.format(
-                goal.deadline))
+                goal.deadline
+            )
+        )
 
 
 def _identity(goal: ExpertQueryGoal) -> ExpertQueryGoal:
@@ -294,9 +316,9 @@ def _identity(goal: ExpertQueryGoal) -> ExpertQueryGoal:
 
     Thousands of them are remembered.
     """
-    return ExpertQueryGoal(query_id=goal.query_id,
-                           **{field: getattr(goal, field)
-                              for field in _IDENTITY})
+    return ExpertQueryGoal(
+        query_id=goal.query_id, **{field: getattr(goal, field) for field in _IDENTITY}
+    )
 
 
 def _check_same(known: ExpertQueryGoal, goal: ExpertQueryGoal) -> None:
@@ -304,7 +326,9 @@ def _check_same(known: ExpertQueryGoal, goal: ExpertQueryGoal) -> None:
         if getattr(known, field) != getattr(goal, field):
             raise QuestionRefusedError(
                 'query id {!r} belongs to another question, with {} {!r} instead of {!r}'.format(
-                    goal.query_id, field, getattr(known, field), getattr(goal, field)))
+                    goal.query_id, field, getattr(known, field), getattr(goal, field)
+                )
+            )
 
 
 def _claim_problem(question: OpenQuestion, action: int, expert: str, lease_s: float) -> str:
@@ -312,12 +336,19 @@ def _claim_problem(question: OpenQuestion, action: int, expert: str, lease_s: fl
     if not expert.strip():
         return 'the claim does not say who claims: `expert` is empty'
     if not 0 <= lease_s < math.inf:
-        return ('lease {} is not allowed; '
-                'allowed: seconds from 0 (the server\'s own setting)'.format(lease_s))
-    if action not in (ClaimQueryRequest.CLAIM, ClaimQueryRequest.RENEW, ClaimQueryRequest.RELEASE,
-                      ClaimQueryRequest.TAKE_OVER):
-        return ('action {} is unknown; '
-                'allowed: CLAIM (1), RENEW (2), RELEASE (3), TAKE_OVER (4)'.format(action))
+        return "lease {} is not allowed; allowed: seconds from 0 (the server's own setting)".format(
+            lease_s
+        )
+    if action not in (
+        ClaimQueryRequest.CLAIM,
+        ClaimQueryRequest.RENEW,
+        ClaimQueryRequest.RELEASE,
+        ClaimQueryRequest.TAKE_OVER,
+    ):
+        return (
+            'action {} is unknown; '
+            'allowed: CLAIM (1), RENEW (2), RELEASE (3), TAKE_OVER (4)'.format(action)
+        )
     if question.goal.interface:
         return 'interface {} runs for this question'.format(question.goal.interface)
     if action == ClaimQueryRequest.TAKE_OVER or question.holder == expert:

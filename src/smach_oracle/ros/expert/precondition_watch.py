@@ -1,4 +1,5 @@
 """Publishes the status of a question's preconditions, for as long as somebody listens."""
+
 import contextlib
 import threading
 import time
@@ -18,16 +19,18 @@ LISTENER_PERIOD_S = 0.25  # how soon somebody who begins to listen is noticed
 MOST_PRECONDITIONS = 500  # of one question. Further ones are not checked
 MOST_HANGING = 32  # checks that have not come back, of all questions: each keeps a thread
 _RESULT = {
-    None: PreconditionCheck.UNKNOWN, True: PreconditionCheck.HOLDS,
-    False: PreconditionCheck.DOES_NOT_HOLD
+    None: PreconditionCheck.UNKNOWN,
+    True: PreconditionCheck.HOLDS,
+    False: PreconditionCheck.DOES_NOT_HOLD,
 }
 
 
 class _WatchedPrecondition:
     """One precondition: its latest status, and the thread that checks it."""
 
-    def __init__(self, probe: PreconditionProbe, number: int,
-                 free_threads: threading.Semaphore) -> None:
+    def __init__(
+        self, probe: PreconditionProbe, number: int, free_threads: threading.Semaphore
+    ) -> None:
         self.state, self.name = probe.names[number]
         self._free_threads = free_threads
         self._probe = probe
@@ -42,11 +45,13 @@ class _WatchedPrecondition:
         if self._thread is None or not self._thread.is_alive():
             if not self._free_threads.acquire(blocking=False):
                 self._latest = PreconditionStatus(
-                    None, 'not checked: {} checks have not come back'.format(MOST_HANGING))
+                    None, 'not checked: {} checks have not come back'.format(MOST_HANGING)
+                )
                 return
             self._began_s = time.monotonic()
-            self._thread = threading.Thread(target=self._check, name='check ' + self.name,
-                                            daemon=True)
+            self._thread = threading.Thread(
+                target=self._check, name='check ' + self.name, daemon=True
+            )
             self._thread.start()
         self._thread.join(max(0.0, self._began_s + PATIENCE_S - time.monotonic()))
 
@@ -56,10 +61,15 @@ class _WatchedPrecondition:
         status, at_s = self._latest, self._at_s
         if self._thread is not None and self._thread.is_alive():
             status = PreconditionStatus(
-                None, '{} has not come back for {:.0f} s'.format(self.name, now_s - self._began_s))
-        return PreconditionCheck(self.state, self.name, _RESULT[status.holds],
-                                 sendable_text(status.text),
-                                 -1.0 if at_s is None else now_s - at_s)
+                None, '{} has not come back for {:.0f} s'.format(self.name, now_s - self._began_s)
+            )
+        return PreconditionCheck(
+            self.state,
+            self.name,
+            _RESULT[status.holds],
+            sendable_text(status.text),
+            -1.0 if at_s is None else now_s - at_s,
+        )
 
     def _check(self) -> None:
         try:
@@ -74,9 +84,14 @@ class _WatchedPrecondition:
 class _QuestionWatch:
     """One open question."""
 
-    def __init__(self, question: Question, probe: PreconditionProbe,
-                 publish: Callable[[PreconditionChecks], None], listened: Callable[[], bool],
-                 free_threads: threading.Semaphore) -> None:
+    def __init__(
+        self,
+        question: Question,
+        probe: PreconditionProbe,
+        publish: Callable[[PreconditionChecks], None],
+        listened: Callable[[], bool],
+        free_threads: threading.Semaphore,
+    ) -> None:
         self.ended = threading.Event()
         self._query_id = question.question_id
         self._watched = [
@@ -125,9 +140,13 @@ class PreconditionWatch:
         probe = question.preconditions
         watch = None
         if probe is not None and probe.names:
-            watch = _QuestionWatch(question, probe, self._publisher.publish,
-                                   lambda: self._publisher.get_num_connections() > 0,
-                                   self._free_threads)
+            watch = _QuestionWatch(
+                question,
+                probe,
+                self._publisher.publish,
+                lambda: self._publisher.get_num_connections() > 0,
+                self._free_threads,
+            )
         try:
             yield
         finally:

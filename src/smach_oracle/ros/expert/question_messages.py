@@ -1,4 +1,5 @@
 """Questions and answers of the executive to and from their messages."""
+
 from typing import Optional
 
 import genpy
@@ -30,32 +31,58 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
     """
     return _sendable(
         ExpertQueryGoal(
-            query_id=question.question_id, trial_id=question.trial_id,
+            query_id=question.question_id,
+            trial_id=question.trial_id,
             asked=asked or rospy.Time.now(),
-            robot=robot, container_path=question.container_path, failed_state=question.failed_state,
-            failure_kind=int(question.failure_kind), outcome=question.outcome, text=question.text,
-            failure_class=int(question.failure_class), rate=question.rate,
-            continuous=question.continuous, recoveries=question.recoveries, reason=question.reason,
-            tried=list(question.tried), history=[
+            robot=robot,
+            container_path=question.container_path,
+            failed_state=question.failed_state,
+            failure_kind=int(question.failure_kind),
+            outcome=question.outcome,
+            text=question.text,
+            failure_class=int(question.failure_class),
+            rate=question.rate,
+            continuous=question.continuous,
+            recoveries=question.recoveries,
+            reason=question.reason,
+            tried=list(question.tried),
+            history=[
                 VisitedState(visit.state, visit.outcome, int(visit.result))
                 for visit in question.history
-            ], choices=[
-                StateChoice(choice.state, choice.predicted_success,
-                            int(choice.failure_class), choice.visits, list(choice.missing_keys),
-                            list(choice.preconditions), choice.blocked, list(choice.repeats),
-                            choice.container, list(choice.runs_again))
+            ],
+            choices=[
+                StateChoice(
+                    choice.state,
+                    choice.predicted_success,
+                    int(choice.failure_class),
+                    choice.visits,
+                    list(choice.missing_keys),
+                    list(choice.preconditions),
+                    choice.blocked,
+                    list(choice.repeats),
+                    choice.container,
+                    list(choice.runs_again),
+                )
                 for choice in question.choices
-            ], supersede_outcomes=[
+            ],
+            supersede_outcomes=[
                 OutcomeChoice(choice.outcome, choice.target)
                 for choice in question.supersede_outcomes
-            ], output_keys=list(question.output_keys),
-            give_up_outcomes=list(question.give_up_outcomes), give_up_above=[
+            ],
+            output_keys=list(question.output_keys),
+            give_up_outcomes=list(question.give_up_outcomes),
+            give_up_above=[
                 LevelOutcome(each.container, each.outcome) for each in question.give_up_above
-            ], interfaces=[
+            ],
+            interfaces=[
                 InterfaceOffer(offer.name, offer.action, offer.description)
                 for offer in question.interfaces
-            ], userdata=encode_all(question.userdata, SUMMARY_BYTES), deadline=question.deadline_s,
-            fallback=question.fallback))
+            ],
+            userdata=encode_all(question.userdata, SUMMARY_BYTES),
+            deadline=question.deadline_s,
+            fallback=question.fallback,
+        )
+    )
 
 
 def to_answer(decision: ExpertDecision) -> Answer:
@@ -67,10 +94,19 @@ def to_answer(decision: ExpertDecision) -> Answer:
         kind = AnswerKind(decision.kind)
         outputs = decode_all(decision.outputs)
     except ValueError as err:  # UserdataCodecError is one
-        raise AnswerError('the answer of {} cannot be used: {}'.format(
-            decision.by or 'nobody', err)) from err
-    return Answer(kind, decision.state, decision.outcome, decision.interface, outputs or None,
-                  decision.by, decision.why, decision.container)
+        raise AnswerError(
+            'the answer of {} cannot be used: {}'.format(decision.by or 'nobody', err)
+        ) from err
+    return Answer(
+        kind,
+        decision.state,
+        decision.outcome,
+        decision.interface,
+        outputs or None,
+        decision.by,
+        decision.why,
+        decision.container,
+    )
 
 
 def to_decision(answer: Answer) -> ExpertDecision:
@@ -81,21 +117,36 @@ def to_decision(answer: Answer) -> ExpertDecision:
     outputs = encode_all(answer.outputs or {})
     unsent = [item.key for item in outputs if item.encoding == UserdataItem.UNSENT]
     if unsent:
-        raise UserdataCodecError('outputs {} are neither plain data nor ROS messages'.format(
-            ', '.join(unsent)))
+        raise UserdataCodecError(
+            'outputs {} are neither plain data nor ROS messages'.format(', '.join(unsent))
+        )
     return _sendable(
-        ExpertDecision(int(answer.kind), answer.state, answer.outcome, answer.interface, outputs,
-                       answer.container, answer.by, answer.why))
+        ExpertDecision(
+            int(answer.kind),
+            answer.state,
+            answer.outcome,
+            answer.interface,
+            outputs,
+            answer.container,
+            answer.by,
+            answer.why,
+        )
+    )
 
 
 def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
     """Return the goal for a shared-autonomy interface. Here the userdata goes whole."""
     return _sendable(
-        SharedAutonomyGoal(query_id=question.question_id, container_path=question.container_path,
-                           state=question.failed_state, interface=offer.name,
-                           userdata=encode_all(question.input_userdata),
-                           outcomes=[choice.outcome for choice in question.supersede_outcomes],
-                           output_keys=list(question.output_keys)))
+        SharedAutonomyGoal(
+            query_id=question.question_id,
+            container_path=question.container_path,
+            state=question.failed_state,
+            interface=offer.name,
+            userdata=encode_all(question.input_userdata),
+            outcomes=[choice.outcome for choice in question.supersede_outcomes],
+            output_keys=list(question.output_keys),
+        )
+    )
 
 
 def _sendable(message: genpy.Message) -> genpy.Message:

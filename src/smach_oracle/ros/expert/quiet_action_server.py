@@ -1,4 +1,5 @@
 """An action server that tells nothing on closed topics, and takes no goal of a bag."""
+
 import time
 from typing import Any
 
@@ -31,8 +32,9 @@ class QuietActionServer(actionlib.ActionServer):
         timer = self.status_timer
         if timer is not None:
             timer.shutdown()
-            self.status_timer = rospy.Timer(rospy.Duration(1.0 / self.status_frequency),
-                                            self.publish_status_async, reset=True)
+            self.status_timer = rospy.Timer(
+                rospy.Duration(1.0 / self.status_frequency), self.publish_status_async, reset=True
+            )
 
     def internal_goal_callback(self, ros_goal: genpy.Message) -> None:
         """Take a goal. It runs in the thread of the goal's connection, without a lock."""
@@ -49,10 +51,14 @@ class QuietActionServer(actionlib.ActionServer):
         until_s = time.monotonic() + LISTENS_AFTER_S
         while node and not listens(self.result_pub, node):
             if time.monotonic() > until_s or rospy.is_shutdown():
-                warn_once('{}: ignores each {} of {}, which does not listen for the result. A bag '
-                          'that is played does that'.format(
-                              rospy.resolve_name(self.ns),
-                              'request to cancel' if hasattr(message, 'id') else 'goal', node))
+                warn_once(
+                    '{}: ignores each {} of {}, which does not listen for the result. A bag '
+                    'that is played does that'.format(
+                        rospy.resolve_name(self.ns),
+                        'request to cancel' if hasattr(message, 'id') else 'goal',
+                        node,
+                    )
+                )
                 return False
             time.sleep(_LOOK_S)
         return True

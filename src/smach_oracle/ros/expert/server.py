@@ -4,6 +4,7 @@ It hosts, under its name: the action, `open` (latched list of open questions), `
 (services). It runs in the node of the robot that asks, or as a node of its own that many robots
 share.
 """
+
 import math
 import threading
 import time
@@ -67,7 +68,8 @@ class _AskingGoal:
         """
         if self._connection is None:
             self._connection = next(
-                (each for each in connections if each.endpoint_id == self._node), None)
+                (each for each in connections if each.endpoint_id == self._node), None
+            )
         if any(each is self._connection for each in connections):
             self._seen_s = now_s
         return now_s - self._seen_s
@@ -80,8 +82,9 @@ class ExpertQueryServer:
     anyway.
     """
 
-    def __init__(self, name: str = SERVER_NAME, lease_s: float = LEASE_S,
-                 asker_gone_s: float = ASKER_GONE_S) -> None:
+    def __init__(
+        self, name: str = SERVER_NAME, lease_s: float = LEASE_S, asker_gone_s: float = ASKER_GONE_S
+    ) -> None:
         """
         :param name: resolved relative to the node.
         :param lease_s: how long a claim holds that asks for no other lease.
@@ -95,13 +98,17 @@ class ExpertQueryServer:
         self._listed_s = -math.inf
         self._wake = threading.Event()
         self._stopped = False
-        self._open_publisher = rospy.Publisher(self.name + '/open', OpenQueries, latch=True,
-                                               queue_size=2)
-        self._action = QuietActionServer(self.name, ExpertQueryAction, self._on_goal,
-                                         self._on_cancel, auto_start=False)
+        self._open_publisher = rospy.Publisher(
+            self.name + '/open', OpenQueries, latch=True, queue_size=2
+        )
+        self._action = QuietActionServer(
+            self.name, ExpertQueryAction, self._on_goal, self._on_cancel, auto_start=False
+        )
         self._lock = self._action.lock
-        self._services = [rospy.Service(self.name + '/claim', ClaimQuery, self._on_claim),
-                          rospy.Service(self.name + '/answer', AnswerQuery, self._on_answer)]
+        self._services = [
+            rospy.Service(self.name + '/claim', ClaimQuery, self._on_claim),
+            rospy.Service(self.name + '/answer', AnswerQuery, self._on_answer),
+        ]
         self._start()
 
     def stop(self) -> None:
@@ -146,9 +153,14 @@ class ExpertQueryServer:
             return
         if not goal.interface:
             still_runs = goal.failure_kind == ExpertQueryGoal.STILL_RUNNING
-            rospy.loginfo('Question %s of %s: %s in %s %s', goal.query_id, goal.robot,
-                          goal.failed_state, goal.container_path,
-                          'still runs' if still_runs else 'failed')
+            rospy.loginfo(
+                'Question %s of %s: %s in %s %s',
+                goal.query_id,
+                goal.robot,
+                goal.failed_state,
+                goal.container_path,
+                'still runs' if still_runs else 'failed',
+            )
         self._askers.setdefault(goal.query_id, []).append(_AskingGoal(handle))
         self._send_claim(goal.query_id, handle)
         self._changed()
@@ -162,14 +174,18 @@ class ExpertQueryServer:
     def _on_cancel(self, handle: actionlib.ServerGoalHandle) -> None:
         goal = handle.get_goal()
         self._questions.close(
-            goal.query_id, 'interface {} ended'.format(goal.interface)
-            if goal.interface else 'taken back by the asker')
+            goal.query_id,
+            'interface {} ended'.format(goal.interface)
+            if goal.interface
+            else 'taken back by the asker',
+        )
         self._changed()
 
     def _on_claim(self, request: ClaimQueryRequest) -> ClaimQueryResponse:
         with self._lock:
-            reply = self._questions.claim(request.action, request.query_id, request.expert,
-                                     request.lease)
+            reply = self._questions.claim(
+                request.action, request.query_id, request.expert, request.lease
+            )
             self._changed()
         return ClaimQueryResponse(*reply)
 
@@ -178,8 +194,9 @@ class ExpertQueryServer:
             reply = self._questions.answer(request.query_id, request.decision)
             self._changed()
         if not reply.ok:
-            rospy.logwarn('Answer of %s refused: %s', request.decision.by or 'nobody',
-                          reply.message)
+            rospy.logwarn(
+                'Answer of %s refused: %s', request.decision.by or 'nobody', reply.message
+            )
         return AnswerQueryResponse(*reply)
 
     def _changed(self) -> None:
@@ -200,7 +217,8 @@ class ExpertQueryServer:
                 continue
             for asker in self._askers.get(notice.query_id, ()):
                 asker.handle.publish_feedback(
-                    ExpertQueryFeedback(notice.status, notice.by, notice.text))
+                    ExpertQueryFeedback(notice.status, notice.by, notice.text)
+                )
         return bool(notices)
 
     def _publish_list(self) -> None:
@@ -274,10 +292,14 @@ def settings_from_parameters() -> Tuple[str, float, float]:
     """
     name = name_of('~server_name', SERVER_NAME)
     if not rosgraph.names.is_legal_name(name):
-        raise SettingsError(rospy.resolve_name('~server_name'), name,
-                          'a ROS name: letters, digits, _ and /')
-    return (name, number_of('~lease_s', LEASE_S, 1.0, LONGEST_LEASE_S),
-            number_of('~asker_gone_s', ASKER_GONE_S, 0.5, LONGEST_LEASE_S))
+        raise SettingsError(
+            rospy.resolve_name('~server_name'), name, 'a ROS name: letters, digits, _ and /'
+        )
+    return (
+        name,
+        number_of('~lease_s', LEASE_S, 1.0, LONGEST_LEASE_S),
+        number_of('~asker_gone_s', ASKER_GONE_S, 0.5, LONGEST_LEASE_S),
+    )
 
 
 def main() -> None:
@@ -285,7 +307,8 @@ def main() -> None:
     parameters_only(
         'Node: one query server for many robots. Parameters: ~server_name, ~lease_s, '
         '~asker_gone_s; '
-        'see doc/expert.md.')
+        'see doc/expert.md.'
+    )
     rospy.init_node('expert_query_server')
     try:
         settings = settings_from_parameters()

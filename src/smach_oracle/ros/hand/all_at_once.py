@@ -1,4 +1,5 @@
 """A command for several machines of a node: one that hangs delays none of the others."""
+
 import threading
 import time
 from typing import Callable, List, Sequence, Tuple
@@ -33,8 +34,9 @@ class _Commanded(threading.Thread):
             self.refused.append('{}: {!r}'.format(self.path, err))
 
 
-def command_all(meant: Sequence[Tuple[str, OperatorHand]],
-                command: Command) -> Tuple[List[str], List[str]]:
+def command_all(
+    meant: Sequence[Tuple[str, OperatorHand]], command: Command
+) -> Tuple[List[str], List[str]]:
     """Command all of them at the same time.
 
     :param meant: machines, each with its path.
@@ -45,8 +47,11 @@ def command_all(meant: Sequence[Tuple[str, OperatorHand]],
     commanded = [_Commanded(path, hand, command) for path, hand in meant]
     for each in commanded:
         each.join(max(0.0, deadline_s - time.monotonic()))
-    silent = ['{} has not answered yet'.format(each.path) for each in commanded
-              if not each.told and not each.refused]
+    silent = [
+        '{} has not answered yet'.format(each.path)
+        for each in commanded
+        if not each.told and not each.refused
+    ]
     told = [text for each in commanded for text in each.told]
     refused = [text for each in commanded for text in each.refused]
     return (told + silent, refused) if told else ([], refused + silent)

@@ -3,6 +3,7 @@
 They are called in threads of rospy's. Machines are kept weakly: a script may build one for each
 trial.
 """
+
 import weakref
 from typing import Any, Callable, Dict, List, Tuple
 
@@ -35,10 +36,16 @@ from .viewer_commands import ViewerCommands
 NAMESPACE = '~oracle/'
 TREE_COMMANDS = ('pause', 'resume', 'preempt')
 PLACE_COMMANDS = ('step', 'confirm')
-_CHANGES = frozenset([
-    EventKind.TRIAL_START, EventKind.TRIAL_END, EventKind.HOLD_START, EventKind.HOLD_END,
-    EventKind.OPERATOR_COMMAND, EventKind.SENT
-])
+_CHANGES = frozenset(
+    [
+        EventKind.TRIAL_START,
+        EventKind.TRIAL_END,
+        EventKind.HOLD_START,
+        EventKind.HOLD_END,
+        EventKind.OPERATOR_COMMAND,
+        EventKind.SENT,
+    ]
+)
 
 
 class HandServer(OwnObserver):
@@ -96,26 +103,41 @@ class HandServer(OwnObserver):
         def handle(request: CommandMachineRequest) -> CommandMachineResponse:
             by = _caller(request)
             if name in TREE_COMMANDS:
-                return CommandMachineResponse(*self._each(
-                    request.path, lambda hand: str(getattr(hand, name)(by))))
+                return CommandMachineResponse(
+                    *self._each(request.path, lambda hand: str(getattr(hand, name)(by)))
+                )
             path = request.path.strip('/')
-            return CommandMachineResponse(*self._each(
-                path, lambda hand: str(getattr(hand, name)(path, by))))
+            return CommandMachineResponse(
+                *self._each(path, lambda hand: str(getattr(hand, name)(path, by)))
+            )
+
         return handle
 
     def _on_send(self, request: SendMachineRequest) -> SendMachineResponse:
-        return SendMachineResponse(*self._each(request.path, lambda hand: hand.go_to(
-            request.path, request.state, _caller(request), request.confirm_repeats), only=True))
+        return SendMachineResponse(
+            *self._each(
+                request.path,
+                lambda hand: hand.go_to(
+                    request.path, request.state, _caller(request), request.confirm_repeats
+                ),
+                only=True,
+            )
+        )
 
     def _on_breakpoint(self, request: SetBreakpointRequest) -> SetBreakpointResponse:
         def command(hand: OperatorHand) -> str:
             act = hand.remove_breakpoint if request.remove else hand.set_breakpoint
             return act(request.pattern, _caller(request))
+
         return SetBreakpointResponse(*self._each(request.path, command))
 
     def _on_autonomy(self, request: SetAutonomyRequest) -> SetAutonomyResponse:
-        return SetAutonomyResponse(*self._each(request.path, lambda hand: hand.set_autonomy(
-            request.pattern, request.level, _caller(request))))
+        return SetAutonomyResponse(
+            *self._each(
+                request.path,
+                lambda hand: hand.set_autonomy(request.pattern, request.level, _caller(request)),
+            )
+        )
 
     def _each(self, path: str, command: Command, only: bool = False) -> Tuple[bool, str]:
         """Command the machines that are meant.
@@ -128,7 +150,8 @@ class HandServer(OwnObserver):
         meant = [(each, hand) for each, hand in hands if _is_in(path, each)]
         if not meant or (only and len(meant) > 1):
             return False, 'there is no machine {!r} here; there are: {}'.format(
-                path, ', '.join(each for each, _ in hands) or 'none; the first has yet to run')
+                path, ', '.join(each for each, _ in hands) or 'none; the first has yet to run'
+            )
         told, refused = command_all(meant, command)
         self._status.changed()
         return bool(told), '; '.join(told or refused)

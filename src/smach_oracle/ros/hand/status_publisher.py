@@ -1,4 +1,5 @@
 """The topic `~oracle/control`: how the machines of a node stand as operators see them."""
+
 import threading
 import time
 from typing import Callable, Sequence, Tuple
@@ -58,8 +59,14 @@ class ControlPublisher:
 def to_msg(status: HandStatus) -> MachineControl:
     """Return a status as a message."""
     return MachineControl(
-        path=status.path, running=status.running, paused=status.paused, paused_by=status.paused_by,
+        path=status.path,
+        running=status.running,
+        paused=status.paused,
+        paused_by=status.paused_by,
         active=[ActiveState(*each) for each in status.active],
-        breakpoints=list(status.breakpoints), autonomy_patterns=list(status.autonomy),
-        autonomy_levels=list(status.autonomy.values()), jump_containers=list(status.jumps),
-        jump_states=list(status.jumps.values()))
+        breakpoints=list(status.breakpoints),
+        autonomy_patterns=list(status.autonomy),
+        autonomy_levels=list(status.autonomy.values()),
+        jump_containers=list(status.jumps),
+        jump_states=list(status.jumps.values()),
+    )

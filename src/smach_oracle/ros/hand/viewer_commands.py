@@ -3,6 +3,7 @@
 Our introspection server hands it over. One that a program has made with upstream's smach_ros sets
 the initial state, which does nothing to a machine that runs: its topic is listened to as well.
 """
+
 import threading
 import time
 import types
@@ -45,7 +46,8 @@ class ViewerCommands:
                     self._shown[shown] = weakref.ref(container)
                     if shown[0] not in self._subscribers:
                         self._subscribers[shown[0]] = rospy.Subscriber(
-                            shown[0], SmachContainerInitialStatusCmd, self._on_command, shown[0])
+                            shown[0], SmachContainerInitialStatusCmd, self._on_command, shown[0]
+                        )
 
     def _on_command(self, command: SmachContainerInitialStatusCmd, topic: str) -> None:
         known = self._shown.get((topic, command.path))
@@ -60,8 +62,7 @@ class ViewerCommands:
         for label in list(command.initial_states)[:1]:
             self.send(container, label, written, sender_of(command))
 
-    def send(self, container: Any, label: str, written: Collection[str],
-             by: str) -> Optional[bool]:
+    def send(self, container: Any, label: str, written: Collection[str], by: str) -> Optional[bool]:
         """Send a machine that runs under an oracle to a state, as an operator would.
 
         :param written: userdata keys that come with the command.
@@ -88,8 +89,9 @@ class ViewerCommands:
     def _answered(self, wish: _Wish) -> Optional[bool]:
         """Whether an equal wish that was just heard was sent. It is None where there was none."""
         now_s = time.monotonic()
-        self._heard = {each: heard for each, heard in self._heard.items()
-                       if now_s - heard[0] < _SAME_S}
+        self._heard = {
+            each: heard for each, heard in self._heard.items() if now_s - heard[0] < _SAME_S
+        }
         return self._heard[wish][1] if wish in self._heard else None
 
 

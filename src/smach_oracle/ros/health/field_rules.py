@@ -1,4 +1,5 @@
 """The rules by which a message, or a status of diagnostics, says that the robot is well. Pure."""
+
 from typing import Any, NamedTuple
 
 from smach_oracle.oracle.number_checks import is_number
@@ -33,9 +34,11 @@ def why_unwell_by_message(condition: HealthCondition, message: Any) -> str:
         return '{} is no number'.format(shortened(repr(value), LONGEST))
     if condition.at_least <= value <= condition.at_most:
         return ''
-    return ('{:g}, at least {:g}'.format(value, condition.at_least)
-            if value < condition.at_least else '{:g}, at most {:g}'.format(
-                value, condition.at_most))
+    return (
+        '{:g}, at least {:g}'.format(value, condition.at_least)
+        if value < condition.at_least
+        else '{:g}, at most {:g}'.format(value, condition.at_most)
+    )
 
 
 def _field(message: Any, path: str) -> Any:

@@ -1,4 +1,5 @@
 """The port by which the executive learns of topics and diagnostics whether the robot is well."""
+
 import threading
 import time
 from functools import partial
@@ -31,8 +32,13 @@ class TopicHealth:
 
     def __init__(self, conditions: Sequence[HealthCondition], topics: HealthTopics) -> None:
         self._heard: List[_Heard] = [
-            _Heard(each, topics.message(each.source) if each.kind is HealthKind.TOPIC
-                   else topics.status(each.source)) for each in conditions
+            _Heard(
+                each,
+                topics.message(each.source)
+                if each.kind is HealthKind.TOPIC
+                else topics.status(each.source),
+            )
+            for each in conditions
         ]
         self._topics = topics
         new = {_source_of(each) for each in conditions} - topics.watched
@@ -68,8 +74,11 @@ class TopicHealth:
             source, warned = _source_of(condition), self._topics.warned
             if latest.age_s() is None and source not in warned and not rospy.is_shutdown():
                 warned.add(source)
-                rospy.logwarn('healthy: %s has not published yet, so its condition %s', source,
-                              'holds' if condition.max_age_s is None else 'does not hold')
+                rospy.logwarn(
+                    'healthy: %s has not published yet, so its condition %s',
+                    source,
+                    'holds' if condition.max_age_s is None else 'does not hold',
+                )
 
 
 def _why_by(condition: HealthCondition, what: Any) -> str:
@@ -86,8 +95,9 @@ def _source_of(condition: HealthCondition) -> str:
     return '{} {}'.format(condition.kind.value, condition.source)
 
 
-def listen_to_health(topics: HealthTopics,
-                     conditions: Sequence[HealthCondition]) -> Optional[TopicHealth]:
+def listen_to_health(
+    topics: HealthTopics, conditions: Sequence[HealthCondition]
+) -> Optional[TopicHealth]:
     """Make a port for conditions, or None where the node shuts down."""
     try:
         return outside_main_thread(partial(TopicHealth, conditions, topics))

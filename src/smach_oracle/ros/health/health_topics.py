@@ -4,6 +4,7 @@ rospy has one subscriber per topic and process, of the type that came first, so 
 subscribed to with its true type. A type that is not installed here is read by its definition, which
 its publisher sends.
 """
+
 import threading
 import time
 from collections import deque
@@ -93,16 +94,19 @@ class HealthTopics:
             is_first = not self._statuses
             latest = self._statuses.setdefault(name.strip('/'), Latest())
             if is_first:
-                self._unknown.update((rospy.resolve_name(topic), self._take_diagnostics)
-                                     for topic in DIAGNOSTICS)
+                self._unknown.update(
+                    (rospy.resolve_name(topic), self._take_diagnostics) for topic in DIAGNOSTICS
+                )
                 self._has_more.set()
         self._subscribe()
         return latest
 
     def _take_diagnostics(self, message: Any) -> None:
         try:
-            found = [(status.name.strip('/'), Status(level_of(status.level), str(status.message)))
-                     for status in decoded(message).status]
+            found = [
+                (status.name.strip('/'), Status(level_of(status.level), str(status.message)))
+                for status in decoded(message).status
+            ]
         except (UnreadableMessage, AttributeError, TypeError, ValueError) as err:
             # of another type than theirs, or damaged
             rospy.logwarn_throttle(60.0, 'healthy: diagnostics that cannot be read: {}'.format(err))

@@ -8,6 +8,7 @@ started it holds the other end of the pipe: if that process dies, in whatever wa
 as well. All descendants stay its own, also those that begin a session of their own, because it is
 their subreaper.
 """
+
 import ctypes
 import os
 import select
@@ -111,8 +112,9 @@ def main(interrupt_s: float, terminate_s: float, command: Sequence[str]) -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _raise_exit)
     try:
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL,
-                                   preexec_fn=lambda: _prepare(prctl))
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, preexec_fn=lambda: _prepare(prctl)
+        )
     except OSError as err:
         print('{}: {}'.format(command[0], err), flush=True)
         return 127
@@ -121,8 +123,11 @@ def main(interrupt_s: float, terminate_s: float, command: Sequence[str]) -> int:
         while True:
             for pid, status in _reap():
                 if pid == process.pid:
-                    code = os.WEXITSTATUS(status) if os.WIFEXITED(
-                        status) else 128 + os.WTERMSIG(status)
+                    code = (
+                        os.WEXITSTATUS(status)
+                        if os.WIFEXITED(status)
+                        else 128 + os.WTERMSIG(status)
+                    )
                     return code
             if select.select([0], [], [], _PERIOD_S)[0] and not os.read(0, 1024):
                 return code

@@ -2,6 +2,7 @@
 
 An interface is ended with all that it has started.
 """
+
 import os
 import re
 import subprocess
@@ -47,23 +48,30 @@ def command_of(start: InterfaceStart) -> List[str]:
             rospkg.RosPack().get_path(start.package)
             # never a master of its own: it would be one that nobody else knows
             return [
-                'roslaunch', '--wait', '--screen', '--disable-title', start.package, start.target,
-                *start.args
+                'roslaunch',
+                '--wait',
+                '--screen',
+                '--disable-title',
+                start.package,
+                start.target,
+                *start.args,
             ]
         found = roslib.packages.find_node(start.package, start.target)
     except (rospkg.ResourceNotFound, roslib.packages.ROSPkgException) as err:
         raise InterfaceError('there is no package {}'.format(start.package)) from err
     if not found:
-        raise InterfaceError('there is no node {} in package {}'.format(
-            start.target, start.package))
+        raise InterfaceError(
+            'there is no node {} in package {}'.format(start.target, start.package)
+        )
     return [found[0], *start.args]
 
 
 class StartedInterface:
     """One interface's processes, from their start to their end."""
 
-    def __init__(self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput],
-                                                                               None]) -> None:
+    def __init__(
+        self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput], None]
+    ) -> None:
         """Start it.
 
         :raises InterfaceError: where it cannot be started.
@@ -80,13 +88,18 @@ class StartedInterface:
             raise InterfaceError('nothing is said about how to start it')
         command = command_of(offer.start)
         # relative names mean the same in it as in this node's settings
-        environment = dict(os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/',
-                           PYTHONUNBUFFERED='1')
+        environment = dict(
+            os.environ, ROS_NAMESPACE=rospy.get_namespace().rstrip('/') or '/', PYTHONUNBUFFERED='1'
+        )
         try:
             self._process = subprocess.Popen(
                 [sys.executable, '-I', str(_KEEPER), str(INTERRUPT_S), str(TERMINATE_S), *command],
-                stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT, env=environment, start_new_session=True)
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
         except OSError as err:
             raise InterfaceError('it cannot be started: {}'.format(err)) from err
         in_child(self._let_go)
@@ -137,8 +150,9 @@ class StartedInterface:
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
-            text = shortened(_ESCAPE_SEQUENCE.sub('', line.decode('utf-8', 'replace')).rstrip(),
-                             LONGEST_LINE)
+            text = shortened(
+                _ESCAPE_SEQUENCE.sub('', line.decode('utf-8', 'replace')).rstrip(), LONGEST_LINE
+            )
             with self._lock:
                 self._lines.append(text)
             self._changed.set()
@@ -152,8 +166,13 @@ class StartedInterface:
 
     def _send(self) -> None:
         with self._lock:
-            message = InterfaceOutput(query_id=self._query_id, interface=self._name,
-                                      status=self._status, text=self._text, lines=list(self._lines))
+            message = InterfaceOutput(
+                query_id=self._query_id,
+                interface=self._name,
+                status=self._status,
+                text=self._text,
+                lines=list(self._lines),
+            )
         self._publish(message)
 
 
@@ -177,12 +196,20 @@ class InterfaceStarter:
             if not before.ended(END_LIMIT_S):
                 raise InterfaceError(
                     'what was started for an earlier question has not ended within {:g} s'.format(
-                        END_LIMIT_S))
+                        END_LIMIT_S
+                    )
+                )
         try:
             started = StartedInterface(offer, query_id, self._publish)
         except InterfaceError as err:
-            self._publish(InterfaceOutput(query_id=query_id, interface=offer.name,
-                                          status=InterfaceOutput.FAILED, text=str(err)))
+            self._publish(
+                InterfaceOutput(
+                    query_id=query_id,
+                    interface=offer.name,
+                    status=InterfaceOutput.FAILED,
+                    text=str(err),
+                )
+            )
             raise
         with self._lock:
             self._last[offer.name] = started

@@ -1,4 +1,5 @@
 """Seeing what the containers of a machine do, without slowing or changing them."""
+
 import threading
 import weakref
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
@@ -69,11 +70,15 @@ class ContainerWatch(object):
             attributes = vars(self.container)
             if attributes.get(name):
                 # another list: the machine may be in the midst of this one
-                attributes[name] = [each for each in attributes[name]
-                                    if not any(each[0] is hook for hook in self._hooks)]
+                attributes[name] = [
+                    each
+                    for each in attributes[name]
+                    if not any(each[0] is hook for hook in self._hooks)
+                ]
 
-    def happened(self, info: str, userdata: Any, states: Sequence[str],
-                 args: Sequence[Any]) -> None:
+    def happened(
+        self, info: str, userdata: Any, states: Sequence[str], args: Sequence[Any]
+    ) -> None:
         """Note what has happened. The executing thread calls it."""
         if info == 'TERMINATION':
             self.jump_to = None
@@ -89,16 +94,20 @@ class ContainerWatch(object):
         label, self.jump_to = self.jump_to, None
         if label not in self.container.get_children():
             return states
-        smach.logwarn("Going to '%s' instead of %s, as asked through introspection" %
-                      (label, list(states)))
+        smach.logwarn(
+            "Going to '%s' instead of %s, as asked through introspection" % (label, list(states))
+        )
         self.container._set_current_state(label)
         return [str(label)]
 
 
 def is_watched(container: Any) -> bool:
     """Whether a server of ours follows what this container does."""
-    return any(isinstance(each[0], _Hook) and each[0].is_live()
-               for name in CALLBACK_LISTS for each in vars(container).get(name, ()))
+    return any(
+        isinstance(each[0], _Hook) and each[0].is_live()
+        for name in CALLBACK_LISTS
+        for each in vars(container).get(name, ())
+    )
 
 
 def _children(container: Any) -> Dict[str, Any]:
@@ -155,17 +164,17 @@ class ContainerTree(object):
             for path, container in found.items():
                 paths.setdefault(id(container), []).append(path)
                 self._known[id(container)] = known.get(id(container)) or ContainerWatch(
-                    container, self._report, self._is_heard)
+                    container, self._report, self._is_heard
+                )
             for key, watch in self._known.items():
                 watch.paths = paths[key]
-            self.by_path = {
-                path: self._known[id(container)] for path, container in found.items()
-            }
+            self.by_path = {path: self._known[id(container)] for path, container in found.items()}
             for key in set(known).difference(self._known):
                 known[key].detach()
 
-    def _collect(self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int,
-                                                                                  ...]) -> None:
+    def _collect(
+        self, path: str, state: Any, found: Dict[str, Any], above: Tuple[int, ...]
+    ) -> None:
         if not isinstance(state, smach.Container) or id(state) in above:
             return
         found[path] = state

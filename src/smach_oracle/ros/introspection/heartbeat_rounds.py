@@ -4,6 +4,7 @@ rospy keeps the last `queue_size` messages of what it reads at once, up to 64 kB
 others. smach_viewer has 50 there. A large tree that goes out at once would be shown in part, always
 the same part. So a heartbeat is a round: each container has its turn in it, a few at a time.
 """
+
 import math
 from typing import Callable, List, Sequence
 
@@ -53,7 +54,7 @@ class HeartbeatRounds(object):
             return []
         elif not self._left:
             self._begin(now_s, quick=False)
-        part, self._left = self._left[:self._size], self._left[self._size:]
+        part, self._left = self._left[: self._size], self._left[self._size :]
         if self._is_quick and self._left:
             step_s = GREETING_STEP_S
         else:

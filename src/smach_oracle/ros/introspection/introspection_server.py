@@ -3,6 +3,7 @@
 One thread and two publishers serve a whole tree of containers, of our engine or of upstream's. The
 thread ends with the process: those of upstream's server, two for each container, keep it alive.
 """
+
 import collections
 import functools
 import threading
@@ -53,6 +54,7 @@ LARGE_DATA characters.
 
 class _Change(NamedTuple):
     """A status as it was in the executing thread."""
+
     watch: ContainerWatch
     paths: Sequence[str]
     info: str
@@ -100,14 +102,17 @@ class IntrospectionServer(object):
         if self._thread is not None:
             return
         name = self._server_name
-        self._structure_pub = WireTopic(name + STRUCTURE_TOPIC, SmachContainerStructure,
-                                        self._greet)
+        self._structure_pub = WireTopic(
+            name + STRUCTURE_TOPIC, SmachContainerStructure, self._greet
+        )
         self._status_pub = WireTopic(name + STATUS_TOPIC, SmachContainerStatus, self._greet)
         self._tree.add_root(self._path, self._state)
-        self._init_sub = rospy.Subscriber(name + INIT_TOPIC, SmachContainerInitialStatusCmd,
-                                          self._on_init_command)
-        self._thread = threading.Thread(target=self._run, name='introspection %s' % name,
-                                        daemon=True)
+        self._init_sub = rospy.Subscriber(
+            name + INIT_TOPIC, SmachContainerInitialStatusCmd, self._on_init_command
+        )
+        self._thread = threading.Thread(
+            target=self._run, name='introspection %s' % name, daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
@@ -145,17 +150,27 @@ class IntrospectionServer(object):
         self._rounds.greet()
         self._wake.set()
 
-    def _note_change(self, watch: ContainerWatch, info: str, active_states: List[str],
-                     userdata: Any) -> None:
+    def _note_change(
+        self, watch: ContainerWatch, info: str, active_states: List[str], userdata: Any
+    ) -> None:
         """In the executing thread: leave the status to the publishing one."""
         if len(self._changes) == LONGEST_BACKLOG:
             if not self._dropped:
-                smach.logwarn("Introspection '%s' cannot keep up: status messages are dropped" %
-                              self._server_name)
+                smach.logwarn(
+                    "Introspection '%s' cannot keep up: status messages are dropped"
+                    % self._server_name
+                )
             self._dropped += 1
         self._changes.append(
-            _Change(watch, watch.paths, info, active_states, dict(getattr(userdata, '_data', {})),
-                    rospy.get_rostime()))
+            _Change(
+                watch,
+                watch.paths,
+                info,
+                active_states,
+                dict(getattr(userdata, '_data', {})),
+                rospy.get_rostime(),
+            )
+        )
         self._wake.set()
 
     def _run(self) -> None:
@@ -172,8 +187,7 @@ class IntrospectionServer(object):
         while self._changes:
             change = self._changes.popleft()
             for path in change.paths:
-                self._publish(self._status_pub, path,
-                              functools.partial(self._status, path, change))
+                self._publish(self._status_pub, path, functools.partial(self._status, path, change))
 
     def _begin_round(self) -> List[str]:
         """Look what there is to be told of. It does nothing while nobody listens."""
@@ -191,15 +205,20 @@ class IntrospectionServer(object):
     def _publish_heartbeats(self, paths: Sequence[str]) -> None:
         stamp, by_path = rospy.get_rostime(), self._tree.by_path
         shown = [path for path in paths if path in by_path]  # else cleared meanwhile
-        for topic, make in ((self._structure_pub, self._structure),
-                            (self._status_pub, self._heartbeat)):
+        for topic, make in (
+            (self._structure_pub, self._structure),
+            (self._status_pub, self._heartbeat),
+        ):
             if topic is not None and topic.is_heard():
-                made = (self._made(path, functools.partial(make, path, by_path[path], stamp))
-                        for path in shown)
+                made = (
+                    self._made(path, functools.partial(make, path, by_path[path], stamp))
+                    for path in shown
+                )
                 topic.send([message for message in made if message is not None], to_lagging=False)
 
-    def _publish(self, topic: Optional[WireTopic], path: str,
-                 make: Callable[[], WireMessage]) -> None:
+    def _publish(
+        self, topic: Optional[WireTopic], path: str, make: Callable[[], WireMessage]
+    ) -> None:
         message = self._made(path, make)
         if message is not None and topic is not None:
             topic.send([message])
@@ -221,16 +240,19 @@ class IntrospectionServer(object):
         if len(data) > LARGE_DATA and self._waiting_bytes() > BACKLOG_BYTES:
             self._tell_heavy()
             data = encode_userdata({}, lambda key, err: None)
-        return self._latest_statuses.make(change.stamp, path, initial_states, change.active_states,
-                                          data, change.info)
+        return self._latest_statuses.make(
+            change.stamp, path, initial_states, change.active_states, data, change.info
+        )
 
-    def _current_status(self, path: str, watch: ContainerWatch, info: str,
-                        stamp: Optional[rospy.Time] = None) -> WireMessage:
+    def _current_status(
+        self, path: str, watch: ContainerWatch, info: str, stamp: Optional[rospy.Time] = None
+    ) -> WireMessage:
         container = watch.container
         active = [str(label) for label in container.get_active_states()]
         data = dict(getattr(container.userdata, '_data', {}))
         return self._status(
-            path, _Change(watch, (), info, active, data, stamp or rospy.get_rostime()))
+            path, _Change(watch, (), info, active, data, stamp or rospy.get_rostime())
+        )
 
     def _heartbeat(self, path: str, watch: ContainerWatch, stamp: rospy.Time) -> WireMessage:
         return self._current_status(path, watch, 'HEARTBEAT', stamp)
@@ -246,15 +268,17 @@ class IntrospectionServer(object):
         if not self._said_heavy:
             self._said_heavy = True
             smach.logwarn(
-                "A viewer of '%s' does not keep up; large userdata is left out of its statuses" %
-                self._server_name)
+                "A viewer of '%s' does not keep up; large userdata is left out of its statuses"
+                % self._server_name
+            )
 
     def _tell_left_out(self, path: str, key: str, err: BaseException) -> None:
         if (path, key) not in self._left_out:
             self._left_out.add((path, key))
             smach.logwarn(
-                "Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s" %
-                (text_of(key), path, text_of(err) or type_name(err)))
+                "Userdata key '%s' of '%s' cannot be pickled and is left out of its status: %s"
+                % (text_of(key), path, text_of(err) or type_name(err))
+            )
 
     def _on_init_command(self, command: SmachContainerInitialStatusCmd) -> None:
         watch = self._tree.by_path.get(command.path)
@@ -271,8 +295,9 @@ class IntrospectionServer(object):
             self._publish(self._status_pub, command.path, confirm)
 
 
-def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str, Any],
-                       by: str = '') -> bool:
+def set_initial_states(
+    watch: ContainerWatch, labels: List[str], data: Dict[str, Any], by: str = ''
+) -> bool:
     """Let the container start in ``labels`` with ``data`` from now on, as ``by`` has asked.
 
     Returns False, and logs why, where it has no such states or refuses them. A StateMachine that
@@ -282,8 +307,10 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
     container = watch.container
     unknown = [label for label in labels if label not in container.get_children()]
     if unknown:
-        smach.logerr('Initial state %s not set: the container has only the states %s'
-                     % (unknown, sorted(container.get_children())))
+        smach.logerr(
+            'Initial state %s not set: the container has only the states %s'
+            % (unknown, sorted(container.get_children()))
+        )
         return False
     is_machine = len(labels) == 1 and isinstance(container, smach.StateMachine)
     goes_there = is_machine and container.is_running()
@@ -306,9 +333,14 @@ def set_initial_states(watch: ContainerWatch, labels: List[str], data: Dict[str,
 
 def structure_fields(container: Any) -> Tuple[List[str], ...]:
     """Return the graph of ``container``: the fields of SmachContainerStructure behind its path."""
-    edges = [(str(outcome), str(source), str(target))
-             for outcome, source, target in container.get_internal_edges()]
-    return ([str(label) for label in container.get_children()],
-            [outcome for outcome, _, _ in edges], [source for _, source, _ in edges],
-            [target for _, _, target in edges],
-            [str(outcome) for outcome in container.get_registered_outcomes()])
+    edges = [
+        (str(outcome), str(source), str(target))
+        for outcome, source, target in container.get_internal_edges()
+    ]
+    return (
+        [str(label) for label in container.get_children()],
+        [outcome for outcome, _, _ in edges],
+        [source for _, source, _ in edges],
+        [target for _, _, target in edges],
+        [str(outcome) for outcome in container.get_registered_outcomes()],
+    )

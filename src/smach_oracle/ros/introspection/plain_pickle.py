@@ -4,6 +4,7 @@ Writing leaves out what cannot be pickled. Reading admits plain data only (numbe
 None, lists, tuples, dicts, sets): a pickle that names any class or function could run code of its
 sender's choice, and is refused.
 """
+
 import base64
 import binascii
 import io
@@ -65,8 +66,10 @@ def decode_userdata(text: str) -> Dict[str, Any]:
     if not text:
         return {}
     if len(text) > LONGEST_TEXT:
-        raise RefusedDataError('local_data of %d characters is too long; at most %d are read'
-                               % (len(text), LONGEST_TEXT))
+        raise RefusedDataError(
+            'local_data of %d characters is too long; at most %d are read'
+            % (len(text), LONGEST_TEXT)
+        )
     try:
         data = PlainUnpickler(io.BytesIO(base64.b64decode(text))).load()
     except (binascii.Error, pickle.UnpicklingError, EOFError) as err:
@@ -79,8 +82,9 @@ def decode_userdata(text: str) -> Dict[str, Any]:
     return data
 
 
-def encode_userdata(data: Mapping[str, Any],
-                    leave_out: Callable[[str, BaseException], None]) -> str:
+def encode_userdata(
+    data: Mapping[str, Any], leave_out: Callable[[str, BaseException], None]
+) -> str:
     """Return ``data`` as ``local_data``.
 
     A key that cannot be pickled is left out and handed to ``leave_out(key, error)``.

@@ -2,6 +2,7 @@
 
 The introspection knows nothing of who may do that: what has a hand on the machines says so here.
 """
+
 from typing import Any, Callable, Collection, List, Optional
 
 # container, label, userdata keys that come with it, who wants it. None means it is none of theirs,

@@ -3,6 +3,7 @@
 rospy serialises a message each time it publishes it, and hands each to the thread of each
 subscriber by itself. For a thousand messages in two seconds that was most of what they cost.
 """
+
 import io
 import struct
 import threading
@@ -97,7 +98,6 @@ def _sendable(value: Any) -> Any:
 
 
 class _Newcomers(rospy.SubscribeListener):
-
     def __init__(self, on_newcomer: Callable[[], None]) -> None:
         super().__init__()
         self._on_newcomer = on_newcomer
@@ -109,15 +109,17 @@ class _Newcomers(rospy.SubscribeListener):
 class WireTopic(object):
     """A topic that takes such messages. Any thread may send."""
 
-    def __init__(self, name: str, message_class: Type[genpy.Message],
-                 on_newcomer: Callable[[], None]) -> None:
+    def __init__(
+        self, name: str, message_class: Type[genpy.Message], on_newcomer: Callable[[], None]
+    ) -> None:
         """
         :param name: of the topic, remapped as any.
         :param on_newcomer: called, in a thread of rospy's, for each new subscriber.
         """
         self._listener = _Newcomers(on_newcomer)
-        self._publisher = rospy.Publisher(name, message_class, subscriber_listener=self._listener,
-                                          queue_size=SUBSCRIBER_QUEUE)
+        self._publisher = rospy.Publisher(
+            name, message_class, subscriber_listener=self._listener, queue_size=SUBSCRIBER_QUEUE
+        )
         self.impl = self._publisher.impl
         """rospy's, with its connections; None once the topic is closed."""
         self._lock = threading.Lock()
@@ -159,13 +161,15 @@ class WireTopic(object):
     def _is_flushed(self) -> bool:
         """Whether rospy's threads have written all. They take it out of their queues before."""
         with self._lock:
-            return all(connection.done or connection.stat_num_msg >= count
-                       for connection, count in self._sent.items())
+            return all(
+                connection.done or connection.stat_num_msg >= count
+                for connection, count in self._sent.items()
+            )
 
 
 def _frames(messages: Sequence[WireMessage], seq: int) -> List[bytes]:
     return [
-        _HEAD.pack(_STAMP_BYTES + len(body), number & 0xffffffff, stamp.secs, stamp.nsecs) + body
+        _HEAD.pack(_STAMP_BYTES + len(body), number & 0xFFFFFFFF, stamp.secs, stamp.nsecs) + body
         for number, (stamp, body) in enumerate(messages, seq)
     ]
 
@@ -185,4 +189,5 @@ def waiting_bytes(connections: Iterable[Any]) -> int:
     A hung one must not eat the robot's memory.
     """
     return sum(
-        len(data) for connection in connections for data in list(getattr(connection, '_queue', ())))
+        len(data) for connection in connections for data in list(getattr(connection, '_queue', ()))
+    )

@@ -3,6 +3,7 @@
 A text may have what differs each time, such as the details of an error. So only so many texts are
 kept. Once there are more, each may be said again.
 """
+
 from typing import Any, Callable, Set, Tuple
 
 import rospy

@@ -4,6 +4,7 @@ Nothing here imports rospy: the process is told of the private master before any
 The master listens to this machine alone. Of the real one only the parameters are read, so that the
 script finds what it is set to.
 """
+
 import os
 import socket
 import sys
@@ -20,8 +21,9 @@ _ELSEWHERE = ('__master:=', '__ip:=', '__hostname:=')
 
 def start(args: Sequence[str]) -> None:
     """Go on as a new process, which runs `main` with these arguments. It does not return."""
-    code = ('import sys; sys.path[:] = {!r}; '
-            'from {} import main; main()'.format(list(sys.path), __name__))
+    code = 'import sys; sys.path[:] = {!r}; from {} import main; main()'.format(
+        list(sys.path), __name__
+    )
     sys.stdout.flush()
     sys.stderr.flush()
     os.execv(sys.executable, [sys.executable, '-c', code] + list(args))
@@ -41,6 +43,7 @@ def replace_master(args: Sequence[str]) -> List[str]:
     :returns: what people should know of it.
     """
     from rosmaster.master import Master
+
     real = _real_master(args)
     os.environ['ROS_HOSTNAME'] = 'localhost'
     os.environ.pop('ROS_IP', None)
@@ -62,7 +65,7 @@ def replace_master(args: Sequence[str]) -> List[str]:
 def _real_master(args: Sequence[str]) -> str:
     for arg in args:
         if arg.startswith('__master:='):
-            return arg[len('__master:='):]
+            return arg[len('__master:=') :]
     return os.environ.get('ROS_MASTER_URI', '')
 
 

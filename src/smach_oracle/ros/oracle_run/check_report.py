@@ -1,4 +1,5 @@
 """The report of `oracle_run --check` on a machine, as text for people, 100 columns wide."""
+
 import textwrap
 from collections import Counter
 from dataclasses import fields
@@ -17,8 +18,13 @@ from smach_oracle.oracle.settings.settings import Settings, StateSettings
 from .setting_words import in_words
 
 WIDTH = 100
-_IN_WORDS = {Action.REVISIT: 'retry', Action.STEP_BACK: 'step back', Action.RESTART: 'start over',
-             Action.ASK: 'ask', Action.GIVE_UP: 'give up'}
+_IN_WORDS = {
+    Action.REVISIT: 'retry',
+    Action.STEP_BACK: 'step back',
+    Action.RESTART: 'start over',
+    Action.ASK: 'ask',
+    Action.GIVE_UP: 'give up',
+}
 # told by lines of their own
 _TOLD = ('preconditions', 'time_limit_s')
 _PARTS = ('defaults', 'states', 'interfaces', 'policy_parameters')
@@ -40,35 +46,52 @@ def wrapped(text: str, indent: int, hanging: int = 0) -> List[str]:
 
     `indent`: columns before it. `hanging`: more before all lines but the first.
     """
-    return textwrap.wrap(text, WIDTH, initial_indent=' ' * indent,
-                         subsequent_indent=' ' * (indent + hanging),
-                         break_on_hyphens=False) or ['']
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent=' ' * indent,
+        subsequent_indent=' ' * (indent + hanging),
+        break_on_hyphens=False,
+    ) or ['']
 
 
 def _heading(container: ContainerProspect) -> List[str]:
     settings = container.settings
     title = '{} begins at {}; ends in {}'.format(
-        container.path, container.initial or '(no state)', ', '.join(map(str, container.outcomes)))
+        container.path, container.initial or '(no state)', ', '.join(map(str, container.outcomes))
+    )
     lines = wrapped(title, 0, 4)
     if not container.recovers:
         return lines + wrapped('The oracle recovers nothing here: it observes.', 2)
     if not container.is_top and settings.escalate:
         lines += wrapped('Before it asks, the oracle of the machine around it may decide.', 2)
-    back = ('each state is on its own, so that a step back is a retry' if container.has_branches
-            else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
-                'what ran before it in the machine around it, or to ' + container.initial
-                if settings.step_back_across and not container.is_top else container.initial))
+    back = (
+        'each state is on its own, so that a step back is a retry'
+        if container.has_branches
+        else 'a step back leads to an earlier state, to {} where none has succeeded'.format(
+            'what ran before it in the machine around it, or to ' + container.initial
+            if settings.step_back_across and not container.is_top
+            else container.initial
+        )
+    )
     lines += _entry('policy', '{}; {}'.format(_policy(settings), back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
-    lines += _entry('set', ', '.join(_changed(settings, Settings(), _PARTS) +
-                                     _changed(settings.defaults, StateSettings(), ())), 2)
+    lines += _entry(
+        'set',
+        ', '.join(
+            _changed(settings, Settings(), _PARTS)
+            + _changed(settings.defaults, StateSettings(), ())
+        ),
+        2,
+    )
     return lines
 
 
 def _policy(settings: Settings) -> str:
-    parameters = ', '.join('{} {:g}'.format(*each)
-                           for each in sorted(settings.policy_parameters.items()))
+    parameters = ', '.join(
+        '{} {:g}'.format(*each) for each in sorted(settings.policy_parameters.items())
+    )
     return '{} ({})'.format(settings.policy, parameters) if parameters else settings.policy
 
 
@@ -77,7 +100,8 @@ def _not_repeated(container: ContainerProspect) -> str:
         return ''
     return '{}: where a retry or a step back would do so, the oracle {}'.format(
         ', '.join(container.guarded),
-        'asks' if POLICIES[container.settings.policy].asks else 'gives up')
+        'asks' if POLICIES[container.settings.policy].asks else 'gives up',
+    )
 
 
 def _asking(settings: Settings) -> str:
@@ -87,7 +111,8 @@ def _asking(settings: Settings) -> str:
     if not settings.deadline_s:
         return 'an expert, without end'
     return 'an expert; without an answer in {:g} s, or without an expert: {}'.format(
-        settings.deadline_s, fallback)
+        settings.deadline_s, fallback
+    )
 
 
 def _state(container: ContainerProspect, state: StateProspect, usual: str) -> Iterator[str]:
@@ -101,8 +126,7 @@ def _state(container: ContainerProspect, state: StateProspect, usual: str) -> It
     if settings.time_limit_s is not None:
         yield from _entry('time limit', '{:g} s'.format(settings.time_limit_s), 4)
     yield from _entry('interfaces', ', '.join(offer.name for offer in state.offers), 4)
-    yield from _entry('set', ', '.join(
-        _changed(settings, container.settings.defaults, _TOLD)), 4)
+    yield from _entry('set', ', '.join(_changed(settings, container.settings.defaults, _TOLD)), 4)
 
 
 def _kind(state: smach.State) -> str:
@@ -117,8 +141,9 @@ def _kind(state: smach.State) -> str:
 
 
 def _outcome_lines(container: ContainerProspect, state: StateProspect) -> Iterator[str]:
-    rows = [(str(each.outcome), _target(each), _meaning(container, each))
-            for each in state.outcomes]
+    rows = [
+        (str(each.outcome), _target(each), _meaning(container, each)) for each in state.outcomes
+    ]
     for line in _aligned(rows):
         yield from wrapped(line, 4, 4)
 
@@ -135,8 +160,11 @@ def _meaning(container: ContainerProspect, outcome: OutcomeProspect) -> str:
         return ''
     if not container.recovers:
         return 'failure'
-    return 'failure, the author\'s own way is kept' if outcome.author_recovers else (
-        'failure, the oracle takes it up')
+    return (
+        "failure, the author's own way is kept"
+        if outcome.author_recovers
+        else ('failure, the oracle takes it up')
+    )
 
 
 def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:
@@ -144,8 +172,10 @@ def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:
         return []
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     # a long name must not push all others out of sight
-    return ['  '.join(cell.ljust(min(width, 32)) for cell, width in zip(row, widths)).rstrip()
-            for row in rows]
+    return [
+        '  '.join(cell.ljust(min(width, 32)) for cell, width in zip(row, widths)).rstrip()
+        for row in rows
+    ]
 
 
 def _usual_actions(container: ContainerProspect) -> str:
@@ -162,14 +192,18 @@ def _actions(container: ContainerProspect, state: StateProspect) -> str:
         return _IN_WORDS[every.pop()[0]]
     last = 'ask' if POLICIES[container.settings.policy].asks else 'give up'
     if len(every) == 1:
-        return '{}; after {} recoveries: {}'.format(_either(every.pop()), settings.max_recoveries,
-                                                    last)
-    limits = {FailureClass.LOW: 'rate below {:g}'.format(settings.moderate_from),
-              FailureClass.MODERATE: '{:g} to {:g}'.format(settings.moderate_from,
-                                                           settings.high_from),
-              FailureClass.HIGH: 'from {:g}'.format(settings.high_from)}
-    told = '; '.join('{}: {}'.format(limits[failure_class], _either(actions))
-                     for failure_class, actions in state.actions)
+        return '{}; after {} recoveries: {}'.format(
+            _either(every.pop()), settings.max_recoveries, last
+        )
+    limits = {
+        FailureClass.LOW: 'rate below {:g}'.format(settings.moderate_from),
+        FailureClass.MODERATE: '{:g} to {:g}'.format(settings.moderate_from, settings.high_from),
+        FailureClass.HIGH: 'from {:g}'.format(settings.high_from),
+    }
+    told = '; '.join(
+        '{}: {}'.format(limits[failure_class], _either(actions))
+        for failure_class, actions in state.actions
+    )
     return '{}; after {} recoveries: {}'.format(told, settings.max_recoveries, last)
 
 
@@ -179,9 +213,11 @@ def _either(actions: Sequence[Action]) -> str:
 
 def _changed(settings: Any, others: Any, left_out: Sequence[str]) -> List[str]:
     """The fields in which settings differ from others, as "memory 5"."""
-    return ['{} {}'.format(each.name, in_words(getattr(settings, each.name)))
-            for each in fields(settings) if each.name not in left_out
-            and getattr(settings, each.name) != getattr(others, each.name)]
+    return [
+        '{} {}'.format(each.name, in_words(getattr(settings, each.name)))
+        for each in fields(settings)
+        if each.name not in left_out and getattr(settings, each.name) != getattr(others, each.name)
+    ]
 
 
 def _entry(name: str, text: str, indent: int) -> List[str]:

@@ -1,4 +1,5 @@
 """The signal that ends a check, whatever handlers rospy and the script have for it."""
+
 import signal
 from typing import Optional
 

@@ -3,6 +3,7 @@
 Waits return at once, as if all were there. Services and actions answer with an empty message. Each
 is told once.
 """
+
 from typing import Any, Callable, Dict, Optional, Tuple
 
 import actionlib
@@ -32,6 +33,7 @@ def install(note: Note, spin: Callable[[], None]) -> None:
 def _wait_for_service(note: Note) -> Callable[..., None]:
     def wait_for_service(service: str, timeout: Optional[float] = None) -> None:
         note('waits for service {}: taken as there'.format(service))
+
     return wait_for_service
 
 
@@ -39,6 +41,7 @@ def _wait_for_message(note: Note) -> Callable[..., Any]:
     def wait_for_message(topic: str, topic_type: Any, timeout: Optional[float] = None) -> Any:
         note('waits for a message on {}: gets an empty one'.format(topic))
         return topic_type()
+
     return wait_for_message
 
 
@@ -50,8 +53,11 @@ def _stub_services(note: Note) -> None:
     def wait_for_service(self: Any, timeout: Optional[float] = None) -> None:
         note('waits for service {}: taken as there'.format(self.resolved_name))
 
-    for name, function in (('__call__', call), ('call', call),
-                           ('wait_for_service', wait_for_service)):
+    for name, function in (
+        ('__call__', call),
+        ('call', call),
+        ('wait_for_service', wait_for_service),
+    ):
         setattr(rospy.ServiceProxy, name, function)
 
 
@@ -79,8 +85,13 @@ def _simple_client(note: Note) -> Dict[str, Callable[..., Any]]:
         note('waits for action server {}: taken as there'.format(self.action_client.ns))
         return True
 
-    def send_goal(self: Any, goal: Any, done_cb: Optional[Callable[..., None]] = None,
-                  active_cb: Any = None, feedback_cb: Any = None) -> None:
+    def send_goal(
+        self: Any,
+        goal: Any,
+        done_cb: Optional[Callable[..., None]] = None,
+        active_cb: Any = None,
+        feedback_cb: Any = None,
+    ) -> None:
         note('sends a goal to {}: taken as reached'.format(self.action_client.ns))
         if done_cb is not None:
             done_cb(*result_of(self))
@@ -90,12 +101,15 @@ def _simple_client(note: Note) -> Dict[str, Callable[..., Any]]:
         return result_of(self)[0]
 
     return {
-        'wait_for_server': wait, 'send_goal': send_goal, 'send_goal_and_wait': send_goal_and_wait,
+        'wait_for_server': wait,
+        'send_goal': send_goal,
+        'send_goal_and_wait': send_goal_and_wait,
         'wait_for_result': lambda self, *timeout, **named: True,
         'get_result': lambda self: result_of(self)[1],
         'get_state': lambda self: result_of(self)[0],
         'get_goal_status_text': lambda self: '',
-        'cancel_goal': lambda self: None, 'cancel_all_goals': lambda self: None,
+        'cancel_goal': lambda self: None,
+        'cancel_all_goals': lambda self: None,
         'cancel_goals_at_and_before_time': lambda self, time: None,
-        'stop_tracking_goal': lambda self: None
+        'stop_tracking_goal': lambda self: None,
     }

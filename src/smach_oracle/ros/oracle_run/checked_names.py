@@ -1,4 +1,5 @@
 """The names in the settings that no machine has which `oracle_run --check` has reached."""
+
 from typing import List, Set, Tuple
 
 import smach
@@ -38,8 +39,10 @@ class CheckedNames:
 
     def mistakes(self) -> List[SettingsError]:
         """Return an error for each name that nothing has, each once."""
-        return [unfit.error if unfit.kind is UnfitKind.MISPLACED else with_way_out(unfit)
-                for unfit in self._unknown(in_sources=False)]
+        return [
+            unfit.error if unfit.kind is UnfitKind.MISPLACED else with_way_out(unfit)
+            for unfit in self._unknown(in_sources=False)
+        ]
 
     def doubts(self) -> List[SettingsError]:
         """Return an error for each name that is no mistake, and that no machine has."""
@@ -56,7 +59,8 @@ class CheckedNames:
 
     def _may_be_made(self, unfit: UnfitName) -> bool:
         return not is_known(unfit.name, self._known) and (
-            unfit.kind is UnfitKind.GENERAL or is_in_sources(unfit.name))
+            unfit.kind is UnfitKind.GENERAL or is_in_sources(unfit.name)
+        )
 
 
 def _place_of(error: SettingsError) -> Tuple[str, str]:

@@ -4,6 +4,7 @@
 asks whether the machine is to be wrapped. What is called is always the outermost `execute`, so that
 an author's override runs once.
 """
+
 import functools
 import os
 import threading
@@ -51,8 +52,9 @@ class Interception:
         if os.getpid() != self._process:
             if self._told_in != os.getpid():
                 self._told_in = os.getpid()
-                smach.logwarn('a machine runs in a child process of the program, and without an '
-                              'oracle there')
+                smach.logwarn(
+                    'a machine runs in a child process of the program, and without an oracle there'
+                )
             return False
         with self._lock:
             if machine in self._left_bare:

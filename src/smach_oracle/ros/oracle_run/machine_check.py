@@ -1,4 +1,5 @@
 """Every machine that a checked script executes: it is checked, and not executed."""
+
 import functools
 import threading
 from contextlib import ExitStack
@@ -31,9 +32,13 @@ class MachineCheck:
     :param tell: takes lines of text for people.
     """
 
-    def __init__(self, wrap: Callable[[smach.StateMachine], None],
-                 settings: Callable[[], Settings], tell: Callable[[List[str]], None],
-                 names: CheckedNames) -> None:
+    def __init__(
+        self,
+        wrap: Callable[[smach.StateMachine], None],
+        settings: Callable[[], Settings],
+        tell: Callable[[List[str]], None],
+        names: CheckedNames,
+    ) -> None:
         self._wrap = wrap
         self._settings = settings
         self._tell = tell
@@ -62,9 +67,17 @@ class MachineCheck:
                     for machine in list(_top_machines(container)):
                         self._check(machine, running)
                 outcome = good_outcome(container, self._settings())
-            self._tell(wrapped('It is not executed; the script goes on with {}.'.format(
-                'no outcome: all of them are failures' if outcome is None
-                else 'the outcome {}'.format(outcome)), 0) + [''])
+            self._tell(
+                wrapped(
+                    'It is not executed; the script goes on with {}.'.format(
+                        'no outcome: all of them are failures'
+                        if outcome is None
+                        else 'the outcome {}'.format(outcome)
+                    ),
+                    0,
+                )
+                + ['']
+            )
             return outcome
 
     def _warn(self, texts: Iterable[str]) -> None:
@@ -102,16 +115,20 @@ def _refuse_faults(container: smach.Container) -> None:
     except MachineFaultError:  # it says so again, by its name
         is_refused = True
     if is_refused:
-        raise MachineFaultError('\n'.join(
-            str(fault) for fault in faults_of(container, _name_of(container)) if fault.is_certain))
+        raise MachineFaultError(
+            '\n'.join(
+                str(fault)
+                for fault in faults_of(container, _name_of(container))
+                if fault.is_certain
+            )
+        )
 
 
 def _name_of(container: smach.Container) -> str:
     """Return the name by which a container is reported."""
     if isinstance(container, OracleContainer):
         return oracle_of(container).path
-    name = machine_names().name_of(container) if isinstance(
-        container, smach.StateMachine) else ''
+    name = machine_names().name_of(container) if isinstance(container, smach.StateMachine) else ''
     return name or type(container).__name__
 
 
@@ -129,8 +146,9 @@ def _prepare(machine: OracleContainer, running: ExitStack, strict: Strictness) -
 
 def _without_name(prospects: Sequence[ContainerProspect], name: str) -> Tuple[str, ...]:
     """Return the report on a machine without its name, which is the same for machines alike."""
-    return tuple(line for each in prospects
-                 for line in lines_of(each._replace(path=each.path[len(name):])))
+    return tuple(
+        line for each in prospects for line in lines_of(each._replace(path=each.path[len(name) :]))
+    )
 
 
 class _heard_warnings:

@@ -1,4 +1,5 @@
 """A check that the preconditions in the settings name states of a script's machine."""
+
 from typing import Dict, Iterator, List, NamedTuple, Set, Tuple
 
 import smach
@@ -45,14 +46,18 @@ def sorted_preconditions(machine: smach.StateMachine, settings: Settings) -> Sor
             right.add(use[:2])
         else:
             wrong.setdefault(use[:2], use)
-    return SortedPreconditions([_misplaced(use, paths) for place, use in wrong.items()
-                          if place not in right], right)
+    return SortedPreconditions(
+        [_misplaced(use, paths) for place, use in wrong.items() if place not in right], right
+    )
 
 
 def _misplaced(use: _Use, paths: Set[str]) -> SettingsError:
-    return SettingsError(use.key, use.named, 'the labels of the other states there: '
-                         + ', '.join(use.others),
-                         problem='is not allowed' + did_you_mean(use.named, use.names(paths)))
+    return SettingsError(
+        use.key,
+        use.named,
+        'the labels of the other states there: ' + ', '.join(use.others),
+        problem='is not allowed' + did_you_mean(use.named, use.names(paths)),
+    )
 
 
 def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator[_Use]:

@@ -3,6 +3,7 @@
 A name is refused only where it cannot be there: a module that changes `sys.path`, or that makes
 names in other ways than by saying them, is believed until the name is used.
 """
+
 import ast
 import os
 import sys
@@ -44,11 +45,11 @@ def _source_of(script: str, module: str, attribute: str) -> Optional[str]:
     found: Optional[ModuleSpec] = None
     parts = module.split('.')
     for number in range(len(parts)):
-        parent, found = found, _find('.'.join(parts[:number + 1]), path)
+        parent, found = found, _find('.'.join(parts[: number + 1]), path)
         if found is None:
             if _changes_path(script) or parent is not None and _extends_path(parent):
                 return None
-            raise ImportError('No module named {!r}'.format('.'.join(parts[:number + 1])))
+            raise ImportError('No module named {!r}'.format('.'.join(parts[: number + 1])))
         path = found.submodule_search_locations
     if found is None or (path is not None and _find(module + '.' + attribute, path) is not None):
         return None  # a module in a package

@@ -1,4 +1,5 @@
 """Ends a script's process with exit code 2 where one of its machines cannot begin."""
+
 import sys
 import threading
 from contextlib import contextmanager
@@ -59,7 +60,12 @@ class Refusal:
         self._tell(err)
         self._guard.arm(USAGE_ERROR)
         if threading.current_thread() is not threading.main_thread() and (
-                rospy.core.is_initialized()):
+            rospy.core.is_initialized()
+        ):
             # a hook of the script may wait for this very thread
-            threading.Thread(target=rospy.signal_shutdown, args=('a machine cannot begin',),
-                             name='refusal', daemon=True).start()
+            threading.Thread(
+                target=rospy.signal_shutdown,
+                args=('a machine cannot begin',),
+                name='refusal',
+                daemon=True,
+            ).start()

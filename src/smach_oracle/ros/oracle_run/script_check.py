@@ -1,4 +1,5 @@
 """`oracle_run --check`, second half: the script runs up to its machines, which are not executed."""
+
 import faulthandler
 import os
 import sys
@@ -45,15 +46,22 @@ def check_script(args: Sequence[str], notes: Sequence[str]) -> NoReturn:
     invocation = parse(args)
     give_names(invocation)
     watch = _ScriptWatch(_report_stream())
-    watch.tell(wrapped('Checking {}: no machine is executed, and no robot is reached.'.format(
-        invocation.script), 0))
+    watch.tell(
+        wrapped(
+            'Checking {}: no machine is executed, and no robot is reached.'.format(
+                invocation.script
+            ),
+            0,
+        )
+    )
     for note in notes:
         watch.note(note)
     watch.tell([''])
     refusal = Refusal(ShutdownGuard(_nothing, lambda timeout_s: None), tell)
     wrapper = MachineWrapper(invocation, refusal, lambda machine, is_first: watch.names.complain)
-    check = MachineCheck(wrapper.wrap, lambda: read_settings(load(invocation)), watch.tell,
-                         watch.names)
+    check = MachineCheck(
+        wrapper.wrap, lambda: read_settings(load(invocation)), watch.tell, watch.names
+    )
 
     def reached(container: smach.Container) -> Any:
         try:
@@ -99,8 +107,10 @@ def _run(script: str, args: Sequence[str], watch: '_ScriptWatch') -> str:
         if why_refused is not None:
             watch.refuse(why_refused)
         if watch.machines:
-            return ('The script has ended in the error above: with the machines not executed, that '
-                    'may be no mistake of its own.')
+            return (
+                'The script has ended in the error above: with the machines not executed, that '
+                'may be no mistake of its own.'
+            )
         return 'The script has ended in the error above.'
     return ''
 
@@ -213,8 +223,11 @@ class _ScriptWatch:
             if waits and self.machines and waited_s > QUIET_S:
                 self.end()
             if waited_s > LIMIT_S:
-                self.end('The script has not reached a{} machine in {:g} s; it is at {}.'.format(
-                    ' further' if self.machines else '', LIMIT_S, _place(main)))
+                self.end(
+                    'The script has not reached a{} machine in {:g} s; it is at {}.'.format(
+                        ' further' if self.machines else '', LIMIT_S, _place(main)
+                    )
+                )
 
 
 def _place(thread_id: int) -> str:
@@ -234,4 +247,6 @@ def _summary(machines: int, warnings: int) -> str:
         return 'The script has executed no machine: nothing could be checked.'
     return '{}: no error in the settings for {} machine{}.'.format(
         '{} warning{}'.format(warnings, 's' * (warnings > 1)) if warnings else 'All is well',
-        machines, 's' * (machines > 1))
+        machines,
+        's' * (machines > 1),
+    )

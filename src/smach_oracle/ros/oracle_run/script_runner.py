@@ -3,6 +3,7 @@
 All state machines of the script are wrapped. It runs as `python3 SCRIPT` would run it: __main__,
 __file__, sys.argv, sys.path[0], exit code and tracebacks are its own.
 """
+
 import argparse
 import atexit
 import os
@@ -40,8 +41,18 @@ from .refusal import USAGE_ERROR, Refusal
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
-OPTIONS_WITH_VALUE = ('--config', '--name', '--policy', '--rates-file', '--record',
-                      '--record-topic', '--checkpoint', '--from', '--resume-map', '--repeat')
+OPTIONS_WITH_VALUE = (
+    '--config',
+    '--name',
+    '--policy',
+    '--rates-file',
+    '--record',
+    '--record-topic',
+    '--checkpoint',
+    '--from',
+    '--resume-map',
+    '--repeat',
+)
 
 
 class CommandLine(NamedTuple):
@@ -79,42 +90,79 @@ def split(args: Sequence[str]) -> CommandLine:
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of our own options."""
     parser = argparse.ArgumentParser(
-        prog='oracle_run', usage=USAGE, allow_abbrev=False,
+        prog='oracle_run',
+        usage=USAGE,
+        allow_abbrev=False,
         description='Run a SMACH script, as it is, with all its state machines under an oracle.',
-        epilog=
-        'Options stand before SCRIPT; all that follows it belongs to the script. The parameter '
-        '~oracle of the '
-        "script's node overrides the file; options override both.")
+        epilog='Options stand before SCRIPT; all that follows it belongs to the script. The '
+        "parameter ~oracle of the script's node overrides the file; options override both.",
+    )
     parser.add_argument('--config', metavar='FILE', help='settings of the oracle (YAML)')
     parser.add_argument('--policy', choices=sorted(POLICIES), help='how the oracle decides')
-    parser.add_argument('--rates-file', metavar='FILE',
-                        help='keep learned failure rates in this file across runs')
-    parser.add_argument('--name', default='',
-                        help="name of the first machine (default: the node's)")
+    parser.add_argument(
+        '--rates-file', metavar='FILE', help='keep learned failure rates in this file across runs'
+    )
+    parser.add_argument(
+        '--name', default='', help="name of the first machine (default: the node's)"
+    )
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
-    parser.add_argument('--without-oracle', action='store_true',
-                        help='recover nothing: publish and record only, and let every machine '
-                        'end as its author wrote it')
-    parser.add_argument('--check', action='store_true',
-                        help='execute no machine: check the settings against the machines of the '
-                        'script, and list what the oracle may do in each state')
+    parser.add_argument(
+        '--without-oracle',
+        action='store_true',
+        help='recover nothing: publish and record only, and let every machine '
+        'end as its author wrote it',
+    )
+    parser.add_argument(
+        '--check',
+        action='store_true',
+        help='execute no machine: check the settings against the machines of the '
+        'script, and list what the oracle may do in each state',
+    )
     parser.add_argument('--record', metavar='FOLDER', help='write one bag per trial to this folder')
-    parser.add_argument('--record-topic', metavar='TOPIC', action='append', default=[],
-                        help='record this topic as well (repeatable)')
-    parser.add_argument('--checkpoint', metavar='FILE',
-                        help='store in this file where the machines stand, to go on from there '
-                        'after a crash')
-    parser.add_argument('--resume', metavar='HOW', nargs='?', const='recover',
-                        help='go on with the trial that was stopped; --resume=HOW: recover '
-                        '(default), ask, restart or state:LABEL')
-    parser.add_argument('--from', metavar='NUMBER', type=int, dest='moment',
-                        help='go on from an earlier stored moment of that trial, by its number')
-    parser.add_argument('--resume-map', metavar='OLD=NEW', action='append', default=[],
-                        type=_renamed, help='where the script has changed: the state that was OLD '
-                        'is NEW now, each a label or a path (repeatable)')
-    parser.add_argument('--repeat', metavar='STATE', action='append', default=[],
-                        help='let the trial that goes on repeat this state once, whatever its '
-                        'on_retry says: a label or a path (repeatable)')
+    parser.add_argument(
+        '--record-topic',
+        metavar='TOPIC',
+        action='append',
+        default=[],
+        help='record this topic as well (repeatable)',
+    )
+    parser.add_argument(
+        '--checkpoint',
+        metavar='FILE',
+        help='store in this file where the machines stand, to go on from there after a crash',
+    )
+    parser.add_argument(
+        '--resume',
+        metavar='HOW',
+        nargs='?',
+        const='recover',
+        help='go on with the trial that was stopped; --resume=HOW: recover '
+        '(default), ask, restart or state:LABEL',
+    )
+    parser.add_argument(
+        '--from',
+        metavar='NUMBER',
+        type=int,
+        dest='moment',
+        help='go on from an earlier stored moment of that trial, by its number',
+    )
+    parser.add_argument(
+        '--resume-map',
+        metavar='OLD=NEW',
+        action='append',
+        default=[],
+        type=_renamed,
+        help='where the script has changed: the state that was OLD '
+        'is NEW now, each a label or a path (repeatable)',
+    )
+    parser.add_argument(
+        '--repeat',
+        metavar='STATE',
+        action='append',
+        default=[],
+        help='let the trial that goes on repeat this state once, whatever its '
+        'on_retry says: a label or a path (repeatable)',
+    )
     return parser
 
 
@@ -153,8 +201,9 @@ def parse(args: Sequence[str]) -> Invocation:
     if '/' in given.name:
         parser.error('--name {}: a name without / is wanted'.format(given.name))
     if line.script is None or line.script == NONE:
-        parser.error('no script is given: name it after the options, or with script:=FILE '
-                     'under roslaunch')
+        parser.error(
+            'no script is given: name it after the options, or with script:=FILE under roslaunch'
+        )
     script = path_of(line.script)
     why = _why_not_readable(script)
     if why:
@@ -168,9 +217,16 @@ def parse(args: Sequence[str]) -> Invocation:
     if given.no_nested:
         overrides['nested'] = False
     record = os.path.abspath(path_of(given.record)) if given.record else ''
-    return Invocation(script, line.script_args, given.config, overrides, not given.without_oracle,
-                      attachment.RecordingOptions(record, tuple(given.record_topic)), given.name,
-                      given.check)
+    return Invocation(
+        script,
+        line.script_args,
+        given.config,
+        overrides,
+        not given.without_oracle,
+        attachment.RecordingOptions(record, tuple(given.record_topic)),
+        given.name,
+        given.check,
+    )
 
 
 def _stored(given: argparse.Namespace) -> Dict[str, Any]:
@@ -214,12 +270,20 @@ def check(invocation: Invocation) -> None:
             check_writable('checkpoint', settings.checkpoint, replaced=True)
     if invocation.options.record and not invocation.only_check:
         from ..recorder import prepare_folder
+
         try:
             prepare_folder(invocation.options.record)
         except OSError as err:
-            raise SettingsError('--record', invocation.options.record, 'a folder for bags', (
-                '--record {}: no bags can be written there ({})'.format(
-                    invocation.options.record, err.strerror or err))) from err
+            raise SettingsError(
+                '--record',
+                invocation.options.record,
+                'a folder for bags',
+                (
+                    '--record {}: no bags can be written there ({})'.format(
+                        invocation.options.record, err.strerror or err
+                    )
+                ),
+            ) from err
 
 
 def _check_name(script: str, name: str) -> Callable[[smach.UserData], bool]:
@@ -267,8 +331,12 @@ class MachineWrapper:
     machine, and whether it is the first one.
     """
 
-    def __init__(self, invocation: Invocation, refusal: Refusal,
-                 judge: Callable[[smach.StateMachine, bool], Decide] = NameJudge) -> None:
+    def __init__(
+        self,
+        invocation: Invocation,
+        refusal: Refusal,
+        judge: Callable[[smach.StateMachine, bool], Decide] = NameJudge,
+    ) -> None:
         self._invocation = invocation
         self._refusal = refusal
         self._judge = judge
@@ -288,6 +356,7 @@ class MachineWrapper:
         :raises SettingsError: where the settings do not fit the machine.
         """
         from ..container import OracleContainer
+
         loaded = load(self._invocation)
         with _located(loaded):
             settings = read_settings(loaded)
@@ -297,9 +366,14 @@ class MachineWrapper:
             if self._invocation.recover:
                 for problem in sorted_preconditions(machine, settings).misplaced:
                     complain(UnfitName(problem, str(problem.value), UnfitKind.MISPLACED))
-            OracleContainer.wrap(machine, settings=settings, nested=settings.nested,
-                                 name=machine_names().name_of(machine), strict=complain,
-                                 recover=self._invocation.recover)
+            OracleContainer.wrap(
+                machine,
+                settings=settings,
+                nested=settings.nested,
+                name=machine_names().name_of(machine),
+                strict=complain,
+                recover=self._invocation.recover,
+            )
             self._is_first = False
 
 
@@ -322,8 +396,13 @@ def run_script(script: str, script_args: Sequence[str]) -> None:
         text = source.read()
     file_name = os.path.abspath(script) if sys.version_info >= (3, 9) else script
     module = types.ModuleType('__main__')
-    module.__dict__.update(__file__=file_name, __builtins__=__builtins__, __cached__=None,
-                           __annotations__={}, __loader__=SourceFileLoader('__main__', file_name))
+    module.__dict__.update(
+        __file__=file_name,
+        __builtins__=__builtins__,
+        __cached__=None,
+        __annotations__={},
+        __loader__=SourceFileLoader('__main__', file_name),
+    )
     # It stays there: threads and exit handlers of the script may pickle its classes after its last
     # line.
     sys.modules['__main__'] = module
@@ -346,6 +425,7 @@ def _show_only_frames_of(file_name: str) -> None:
             show(kind, error.with_traceback(None), None)
         else:
             show(kind, error.with_traceback(inside or trace), inside or trace)
+
     sys.excepthook = excepthook
 
 
@@ -366,13 +446,16 @@ def main(args: Optional[Sequence[str]] = None) -> None:
         sys.exit(USAGE_ERROR)
     if invocation.only_check:
         from .check_process import start
+
         start(words)
     from .interception import Interception
+
     attachment.configure(invocation.options)
     give_names(invocation)
     attachments = attachment.attachments()
-    guard = shutdown.ShutdownGuard(attachments.preempt, attachments.close,
-                                   after_preempt_s=attachments.after_preempt_s)
+    guard = shutdown.ShutdownGuard(
+        attachments.preempt, attachments.close, after_preempt_s=attachments.after_preempt_s
+    )
     guard.install()
     atexit.register(attachments.close, 1.0)
     refusal = Refusal(guard, tell)

@@ -1,4 +1,5 @@
 """Values of settings in words."""
+
 import math
 from typing import Any, Iterator
 
@@ -22,10 +23,16 @@ def in_words(value: Any) -> str:
 
 
 def _budget(budget: Budget) -> str:
-    limits = [(budget.recoveries, 'recovery', 'recoveries'), (budget.minutes, 'minute', 'minutes'),
-              (budget.questions, 'question', 'questions')]
-    told = ['{:g} {}'.format(limit, one if limit == 1 else more)
-            for limit, one, more in limits if limit is not None]
+    limits = [
+        (budget.recoveries, 'recovery', 'recoveries'),
+        (budget.minutes, 'minute', 'minutes'),
+        (budget.questions, 'question', 'questions'),
+    ]
+    told = [
+        '{:g} {}'.format(limit, one if limit == 1 else more)
+        for limit, one, more in limits
+        if limit is not None
+    ]
     return 'of a trial: ' + (' and '.join(told) if told else 'no limit')
 
 

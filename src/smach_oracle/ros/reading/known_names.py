@@ -2,6 +2,7 @@
 
 One file of settings serves all machines of a script, and not each of them has every state.
 """
+
 import gc
 from typing import Any, Callable, Iterator, List, Mapping, Set
 
@@ -19,8 +20,9 @@ class Complaint:
     A copy of the machine warns of such names (`strict=False`).
     """
 
-    def __init__(self, decide: Callable[[UnfitName], None],
-                 located: Callable[[SettingsError], SettingsError]) -> None:
+    def __init__(
+        self, decide: Callable[[UnfitName], None], located: Callable[[SettingsError], SettingsError]
+    ) -> None:
         self._decide = decide
         self._located = located
 
@@ -58,8 +60,11 @@ class NameJudge:
             return
         is_here = is_known(unfit.name, names_in(self._machine))
         is_elsewhere = is_known(unfit.name, names_of_others(self._machine))
-        if self._is_error(unfit, is_here) and not is_elsewhere and (
-                is_here or not is_in_sources(unfit.name)):
+        if (
+            self._is_error(unfit, is_here)
+            and not is_elsewhere
+            and (is_here or not is_in_sources(unfit.name))
+        ):
             raise with_way_out(unfit)
         if is_here or not is_elsewhere or unfit.kind is UnfitKind.MISPLACED:
             smach.logwarn('A machine of the script: {}'.format(unfit.error))
@@ -68,14 +73,16 @@ class NameJudge:
         if not self._may_refuse:
             return False
         return unfit.kind is UnfitKind.MISPLACED or (
-            unfit.kind is UnfitKind.PROTECTION and not is_here)
+            unfit.kind is UnfitKind.PROTECTION and not is_here
+        )
 
 
 def with_way_out(unfit: UnfitName) -> SettingsError:
     """Return the error of a name, with what to do if a machine that is made later has it."""
     return unfit.error.allowing(
         ', or a name of a machine that the script makes later: then write the name somewhere in '
-        'the script, for example in a comment, # {}'.format(unfit.name))
+        'the script, for example in a comment, # {}'.format(unfit.name)
+    )
 
 
 def is_known(name: str, names: Set[str]) -> bool:

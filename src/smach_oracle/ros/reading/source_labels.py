@@ -3,6 +3,7 @@
 A label of a machine that does not exist yet stands somewhere in the source, as a word or a text, or
 as a text that is filled in: `'PICK'`, `Step.PICK`, `f'PICK_{side}'`, `'PICK_' + side`.
 """
+
 import ast
 import os
 import re
@@ -13,8 +14,12 @@ from smach_oracle.oracle.settings.patterns import matches
 
 _OTHERS = ('smach', 'smach_ros', 'smach_oracle', 'rospy')  # no program's own machines
 # here a file that does not name SMACH has no labels
-_INSTALLED = ('/opt/ros/', '/usr/lib/python', '/usr/local/lib/python',
-              *(os.path.join(root, 'lib', 'python') for root in (sys.prefix, sys.base_prefix)))
+_INSTALLED = (
+    '/opt/ros/',
+    '/usr/lib/python',
+    '/usr/local/lib/python',
+    *(os.path.join(root, 'lib', 'python') for root in (sys.prefix, sys.base_prefix)),
+)
 _FILLED = re.compile(r'\{[^{}]*\}|%[-+ #0-9.]*[a-zA-Z]')
 _ANY = '.*'
 
@@ -22,8 +27,7 @@ _ANY = '.*'
 def is_in_sources(name: str) -> bool:
     """Whether the sources of this program mention a label, or each label of a path or pattern."""
     texts, forms = _texts_of_program()
-    return all(part == '**' or _mentions(part, texts, forms)
-               for part in name.strip('/').split('/'))
+    return all(part == '**' or _mentions(part, texts, forms) for part in name.strip('/').split('/'))
 
 
 def _mentions(label: str, texts: Set[str], forms: Set[str]) -> bool:
@@ -57,7 +61,8 @@ def _texts_of_program() -> Tuple[Set[str], Set[str]]:
             waiting += _imported_files(node, path)
             form = _form(node)
             if re.search('[A-Za-z0-9]', form.replace(_ANY, '')) and not isinstance(
-                    node, ast.Constant):
+                node, ast.Constant
+            ):
                 forms.add(form)
     return texts, forms
 
@@ -82,8 +87,12 @@ def _imported_files(node: ast.AST, path: str) -> List[str]:
         folders = [above] if node.level else sys.path
     else:
         return []
-    places = [os.path.join(folder, *module.split('.')) for folder in folders for module in modules
-              if module and module.split('.')[0] not in _OTHERS]
+    places = [
+        os.path.join(folder, *module.split('.'))
+        for folder in folders
+        for module in modules
+        if module and module.split('.')[0] not in _OTHERS
+    ]
     found = [place + ending for place in places for ending in ('.py', '/__init__.py')]
     return [each for each in found if os.path.isfile(each)]
 
@@ -102,8 +111,9 @@ def _form(node: ast.AST) -> str:
     elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
         text, verb = getattr(node.func.value, 'value', None), node.func.attr
         if verb == 'join' and isinstance(text, str):
-            return re.escape(text).join(_form(part) for each in node.args
-                                        for part in getattr(each, 'elts', [each]))
+            return re.escape(text).join(
+                _form(part) for each in node.args for part in getattr(each, 'elts', [each])
+            )
         template = text if verb == 'format' else None
     if not isinstance(template, str):
         return _ANY

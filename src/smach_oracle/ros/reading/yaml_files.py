@@ -3,6 +3,7 @@
 Keys are taken as they are written, and so are dates. `1e3` is a number. All else is as YAML 1.1
 has it.
 """
+
 import math
 import re
 from collections import deque
@@ -39,8 +40,9 @@ def read_yaml(path: str, what: str = 'settings file') -> Tuple[Dict[str, Any], D
         place = _marked(str(path), err)
         raise SettingsError(place, why, 'YAML', NOT_YAML.format(place, why)) from err
     except RecursionError as err:
-        raise SettingsError(str(path), 'something that contains itself',
-                            'a tree of settings') from err
+        raise SettingsError(
+            str(path), 'something that contains itself', 'a tree of settings'
+        ) from err
     except Exception as err:  # a value that is not what its tag says can make PyYAML raise anything
         raise SettingsError(str(path), str(err), 'YAML', NOT_YAML.format(path, err)) from err
     if values is None:
@@ -54,8 +56,9 @@ def _text_of(path: str, what: str) -> str:
     try:
         return Path(path).read_text(encoding='utf-8')
     except FileNotFoundError as err:
-        raise SettingsError(what, str(path), 'a readable YAML file',
-                            '{}: no such file: {}'.format(what, path)) from err
+        raise SettingsError(
+            what, str(path), 'a readable YAML file', '{}: no such file: {}'.format(what, path)
+        ) from err
     except (OSError, UnicodeDecodeError) as err:
         raise SettingsError(what, str(path), 'a readable YAML file ({})'.format(err)) from err
 
@@ -77,7 +80,8 @@ class _Loader(yaml.SafeLoader):
 
     yaml_implicit_resolvers = {
         first: [each for each in resolvers if each[0] not in (_TAG + 'timestamp', _TAG + 'value')]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()}
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
 
     def construct_mapping(self, node: yaml.Node, deep: bool = False) -> Dict[Any, Any]:
         """Return a mapping, with merge keys resolved."""
@@ -87,7 +91,8 @@ class _Loader(yaml.SafeLoader):
                 if isinstance(key, yaml.ScalarNode):
                     key.tag = _TAG + 'str'
         mapping: Dict[Any, Any] = yaml.constructor.BaseConstructor.construct_mapping(
-            self, node, deep=deep)
+            self, node, deep=deep
+        )
         return mapping
 
     def word(self, node: yaml.ScalarNode) -> Optional[WrittenWord]:
@@ -105,8 +110,9 @@ class _Loader(yaml.SafeLoader):
 
     def number(self, node: yaml.ScalarNode) -> Any:
         """Return a number. One without a fraction is whole: 1e3."""
-        value = (float(node.value) if _EXPONENT.match(node.value)
-                 else self.construct_yaml_float(node))
+        value = (
+            float(node.value) if _EXPONENT.match(node.value) else self.construct_yaml_float(node)
+        )
         is_whole = math.isfinite(value) and value.is_integer() and '.' not in node.value
         number: Any = WrittenInt(value) if is_whole else WrittenFloat(value)
         number.text = node.value
@@ -114,8 +120,12 @@ class _Loader(yaml.SafeLoader):
 
 
 _Loader.add_implicit_resolver(_TAG + 'float', _EXPONENT, list('-+.0123456789'))
-for _name, _construct in (('bool', _Loader.word), ('null', _Loader.word), ('int', _Loader.whole),
-                          ('float', _Loader.number)):
+for _name, _construct in (
+    ('bool', _Loader.word),
+    ('null', _Loader.word),
+    ('int', _Loader.whole),
+    ('float', _Loader.number),
+):
     _Loader.add_constructor(_TAG + _name, _construct)
 
 
@@ -124,8 +134,9 @@ def _check_is_tree(value: Any) -> None:
 
     :raises RecursionError: where one contains itself.
     """
-    for each in (value.values() if isinstance(value, dict)
-                 else value if isinstance(value, list) else ()):
+    for each in (
+        value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
+    ):
         _check_is_tree(each)
 
 
@@ -153,8 +164,9 @@ def _line_numbers(path: str, root: Optional[yaml.Node]) -> Dict[str, int]:
     return lines
 
 
-def _entries(path: str, prefix: str, node: yaml.MappingNode,
-             lines: Dict[str, int]) -> List[Tuple[str, yaml.Node]]:
+def _entries(
+    path: str, prefix: str, node: yaml.MappingNode, lines: Dict[str, int]
+) -> List[Tuple[str, yaml.Node]]:
     entries = []
     first_lines: Dict[str, int] = {}
     for key, value in node.value:
@@ -162,9 +174,14 @@ def _entries(path: str, prefix: str, node: yaml.MappingNode,
         line = key.start_mark.line + 1
         if dotted in first_lines and key.tag != _MERGE:
             place, first = '{} line {}: {}'.format(path, line, dotted), first_lines[dotted]
-            raise SettingsError(place, value.value, 'each key once',
-                                '{}: given a second time (first in line {}); allowed: each key '
-                                'once'.format(place, first))
+            raise SettingsError(
+                place,
+                value.value,
+                'each key once',
+                '{}: given a second time (first in line {}); allowed: each key once'.format(
+                    place, first
+                ),
+            )
         first_lines[dotted] = line
         entries.append((dotted + '.', value))
     lines.update(first_lines)

@@ -2,6 +2,7 @@
 
 A message that cannot be deserialised would keep every reader from the rest of its bag.
 """
+
 import io
 import re
 import typing
@@ -83,11 +84,14 @@ def parse_connection(fields: Fields, data: bytes) -> BagConnection:
     :raises BagFormatError: where topic or type is damaged.
     :raises UnicodeDecodeError: where the topic, the type or another field is.
     """
-    texts = {name: value.decode('utf-8', 'replace' if name == 'message_definition' else 'strict')
-             for name, value in bag_format.parse_fields(data).items()}
+    texts = {
+        name: value.decode('utf-8', 'replace' if name == 'message_definition' else 'strict')
+        for name, value in bag_format.parse_fields(data).items()
+    }
     topics = {fields.get('topic', b'').decode('utf-8'), texts.pop('topic', '')}
-    kind = _kind(texts.pop('type', ''), texts.pop('md5sum', ''),
-                 texts.pop('message_definition', ''))
+    kind = _kind(
+        texts.pop('type', ''), texts.pop('md5sum', ''), texts.pop('message_definition', '')
+    )
     if len(topics) > 1 and kind == EVENT_TYPE:
         topics = {topic for topic in topics if topic.endswith(EVENTS)}
     topic = topics.pop() if len(topics) == 1 else ''
@@ -143,5 +147,5 @@ def _events_topic(topics: List[str]) -> str:
     for topic in topics:
         for end in _OF_THE_SAME_NODE:
             if topic.endswith(end):
-                return topic[:-len(end)] + EVENTS
+                return topic[: -len(end)] + EVENTS
     return EVENTS

@@ -5,6 +5,7 @@
 A record is a header (fields of `name=value`) and data, each behind its length as a little-endian
 uint32. All offsets and sizes are in bytes. Pure: no ROS, no file is opened here.
 """
+
 import struct
 from typing import BinaryIO, Dict, List, NamedTuple, Tuple, Union
 
@@ -60,11 +61,15 @@ def pack_bag_header(index_position: int, connections: int, chunks: int) -> bytes
 
     Index position 0 means: no index.
     """
-    header = pack_header({
-        'op': bytes((OP_BAG_HEADER,)), 'index_pos': UINT64.pack(index_position),
-        'conn_count': UINT32.pack(connections), 'chunk_count': UINT32.pack(chunks),
-        WRITER_FIELD: WRITER_NAME
-    })
+    header = pack_header(
+        {
+            'op': bytes((OP_BAG_HEADER,)),
+            'index_pos': UINT64.pack(index_position),
+            'conn_count': UINT32.pack(connections),
+            'chunk_count': UINT32.pack(chunks),
+            WRITER_FIELD: WRITER_NAME,
+        }
+    )
     padding = HEADER_RECORD_SIZE - (len(header) - 4)
     return header + UINT32.pack(padding) + b' ' * padding
 
@@ -75,33 +80,47 @@ def pack_connection(connection: int, topic: str, details: Dict[str, str]) -> byt
     :param details: the fields of the connection header (type, md5sum, message_definition).
     """
     data = pack_header({'topic': topic, **details})
-    return pack_header(
-        {'op': bytes((OP_CONNECTION,)), 'topic': topic, 'conn': UINT32.pack(connection)}) + data
+    return (
+        pack_header(
+            {'op': bytes((OP_CONNECTION,)), 'topic': topic, 'conn': UINT32.pack(connection)}
+        )
+        + data
+    )
 
 
 def pack_chunk_header(size: int) -> bytes:
     """Pack the header of an uncompressed chunk of `size` bytes, with the length of its data."""
-    return pack_header({'op': bytes(
-        (OP_CHUNK,)), 'compression': 'none', 'size': UINT32.pack(size)}) + UINT32.pack(size)
+    return pack_header(
+        {'op': bytes((OP_CHUNK,)), 'compression': 'none', 'size': UINT32.pack(size)}
+    ) + UINT32.pack(size)
 
 
 def pack_index(connection: int, count: int, entries: bytes) -> bytes:
     """Pack the index of one connection in one chunk. Entries are packed INDEX_ENTRYs."""
     return pack_record(
         {
-            'op': bytes((OP_INDEX,)), 'ver': UINT32.pack(1), 'conn': UINT32.pack(connection),
-            'count': UINT32.pack(count)
-        }, entries)
+            'op': bytes((OP_INDEX,)),
+            'ver': UINT32.pack(1),
+            'conn': UINT32.pack(connection),
+            'count': UINT32.pack(count),
+        },
+        entries,
+    )
 
 
 def pack_chunk_info(info: ChunkInfo) -> bytes:
     """Pack a chunk info record of the bag's index."""
     return pack_record(
         {
-            'op': bytes((OP_CHUNK_INFO,)), 'ver': UINT32.pack(1), 'chunk_pos': UINT64.pack(
-                info.position), 'start_time': STAMP.pack(*info.start),
-            'end_time': STAMP.pack(*info.end), 'count': UINT32.pack(len(info.counts))
-        }, b''.join(COUNT_ENTRY.pack(*item) for item in info.counts.items()))
+            'op': bytes((OP_CHUNK_INFO,)),
+            'ver': UINT32.pack(1),
+            'chunk_pos': UINT64.pack(info.position),
+            'start_time': STAMP.pack(*info.start),
+            'end_time': STAMP.pack(*info.end),
+            'count': UINT32.pack(len(info.counts)),
+        },
+        b''.join(COUNT_ENTRY.pack(*item) for item in info.counts.items()),
+    )
 
 
 def stamp_at(data: bytes, offset: int) -> Stamp:
@@ -121,7 +140,7 @@ def parse_fields(header: bytes) -> Fields:
         if position + 4 > len(header):
             raise BagFormatError('a header ends inside a field length')
         size = UINT32.unpack_from(header, position)[0]
-        name, equals, value = header[position + 4:position + 4 + size].partition(b'=')
+        name, equals, value = header[position + 4 : position + 4 + size].partition(b'=')
         position += 4 + size
         if position > len(header) or not equals:
             raise BagFormatError('a header field is damaged')

@@ -1,7 +1,10 @@
-"""Writes a new bag of what can be read of a damaged one, and reads it back. The damaged one stays.
+"""Writes a new bag of what can be read of a damaged one, and reads it back.
+
+The damaged one stays.
 
     MendError (an OSError): the mended bag does not hold what was found
 """
+
 import os
 import zlib
 from typing import BinaryIO, Callable, Dict, List, NamedTuple, Optional
@@ -13,7 +16,7 @@ from .bag_salvage import Found, Salvage
 from .bag_writer import MAX_CHUNK_BYTES, BagWriter
 from .event_packing import event_number
 
-_NANOSECONDS = 10 ** 9
+_NANOSECONDS = 10**9
 
 
 class MendError(OSError):
@@ -34,9 +37,15 @@ class Saved(NamedTuple):
         """Return what is lost, in words, or '' where nothing is."""
         parts = []
         if self.bytes_lost:
-            parts.append('{} bytes in at least {} chunk{}, among them {} event{}'.format(
-                self.bytes_lost, self.chunks_lost, 's' * (self.chunks_lost != 1), self.events_lost,
-                's' * (self.events_lost != 1)))
+            parts.append(
+                '{} bytes in at least {} chunk{}, among them {} event{}'.format(
+                    self.bytes_lost,
+                    self.chunks_lost,
+                    's' * (self.chunks_lost != 1),
+                    self.events_lost,
+                    's' * (self.events_lost != 1),
+                )
+            )
         if self.torn_bytes:
             parts.append('the last {} bytes, which were torn'.format(self.torn_bytes))
         return ' and '.join(parts)
@@ -61,9 +70,14 @@ def read_back(path: str, saved: Saved) -> None:
     with open(path, 'rb') as bag:
         found = contents(bag)
         if found.losses() or found[:2] != saved[:2]:
-            raise MendError('{} does not hold what was written: {} messages of {}{}'.format(
-                path, found.messages, saved.messages, found.losses() and ', lost: '
-                + found.losses()))
+            raise MendError(
+                '{} does not hold what was written: {} messages of {}{}'.format(
+                    path,
+                    found.messages,
+                    saved.messages,
+                    found.losses() and ', lost: ' + found.losses(),
+                )
+            )
         try:
             _check_index(bag, saved.messages)
         except BagFormatError as err:
@@ -122,8 +136,14 @@ class _Pass:
                     self._salvage.lose(found.record.end - found.record.position)
             else:
                 self._take(found, writer)
-        return Saved(self._messages, self._checksum, self._salvage.bytes_lost,
-                     self._salvage.places_lost, self._events_lost, self._salvage.torn_bytes)
+        return Saved(
+            self._messages,
+            self._checksum,
+            self._salvage.bytes_lost,
+            self._salvage.places_lost,
+            self._events_lost,
+            self._salvage.torn_bytes,
+        )
 
     def _take(self, found: Found, writer: Optional[BagWriter]) -> None:
         number = bag_format.uint32_field(found.record.fields, 'conn')
@@ -133,8 +153,11 @@ class _Pass:
             self.used[number] = None
         if connection is None:
             self.connections.add_orphan(number, found.data)
-        if connection is None or stamp[1] >= _NANOSECONDS or not self._is_readable(
-                connection, found):
+        if (
+            connection is None
+            or stamp[1] >= _NANOSECONDS
+            or not self._is_readable(connection, found)
+        ):
             self._salvage.lose(found.record.end - found.record.position)
         else:
             self._save(connection, stamp, found.data, writer)
@@ -147,8 +170,9 @@ class _Pass:
             self._count_lost_events(number)
         return number is not None
 
-    def _save(self, connection: BagConnection, stamp: Stamp, data: bytes,
-              writer: Optional[BagWriter]) -> None:
+    def _save(
+        self, connection: BagConnection, stamp: Stamp, data: bytes, writer: Optional[BagWriter]
+    ) -> None:
         self._messages += 1
         head = connection.topic.encode() + bag_format.STAMP.pack(*stamp)
         self._checksum = (self._checksum + zlib.crc32(data, zlib.crc32(head))) % (1 << 64)
@@ -175,15 +199,18 @@ def _check_index(bag: BinaryIO, messages: int) -> None:
     bag.seek(bag_format.UINT64.unpack(fields['index_pos'])[0])
     for _ in range(bag_format.uint32_field(fields, 'conn_count')):
         _next_record(bag, bag_format.OP_CONNECTION)
-    chunks = [_next_record(bag, bag_format.OP_CHUNK_INFO)
-              for _ in range(bag_format.uint32_field(fields, 'chunk_count'))]
+    chunks = [
+        _next_record(bag, bag_format.OP_CHUNK_INFO)
+        for _ in range(bag_format.uint32_field(fields, 'chunk_count'))
+    ]
     indexed = 0
     for chunk in chunks:
         bag.seek(bag_format.UINT64.unpack(chunk['chunk_pos'])[0])
         _next_record(bag, bag_format.OP_CHUNK)
-        counts: List[int] = [bag_format.uint32_field(_next_record(bag, bag_format.OP_INDEX),
-                                                     'count')
-                             for _ in range(bag_format.uint32_field(chunk, 'count'))]
+        counts: List[int] = [
+            bag_format.uint32_field(_next_record(bag, bag_format.OP_INDEX), 'count')
+            for _ in range(bag_format.uint32_field(chunk, 'count'))
+        ]
         indexed += sum(counts)
     if indexed != messages:
         raise BagFormatError('it leads to {} messages of {}'.format(indexed, messages))

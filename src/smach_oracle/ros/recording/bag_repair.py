@@ -8,6 +8,7 @@ record` names its files alike.
 `NAME.bag.damaged` and the copy to `NAME.bag`. When that has been read back, the damaged one goes.
 If the process is killed at any moment, the next start goes on from there.
 """
+
 import fcntl
 import os
 import re
@@ -78,7 +79,7 @@ def _recover(path: str, tools: _Tools) -> Optional[str]:
 
 
 def _mend(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
-    target = path[:-len('.active')]
+    target = path[: -len('.active')]
     if os.path.exists(target) or os.path.exists(target + '.damaged'):
         target = free_name(target)
     saved = mend(bag, target + '.mending')
@@ -102,8 +103,11 @@ def _leave_empty(bag: BinaryIO, path: str, saved: Saved, warn: Log) -> None:
     if size <= bag_format.BAG_HEADER_END or _begins_with_a_torn_chunk(bag, saved):
         os.unlink(path)
     else:
-        warn('Nothing can be read in the bag {} of a recorder that died; it is left as it is'
-             .format(path))
+        warn(
+            'Nothing can be read in the bag {} of a recorder that died; it is left as it is'.format(
+                path
+            )
+        )
 
 
 def _begins_with_a_torn_chunk(bag: BinaryIO, saved: Saved) -> bool:
@@ -122,7 +126,7 @@ def _begins_with_a_torn_chunk(bag: BinaryIO, saved: Saved) -> bool:
 
 def _go_on(bag: BinaryIO, path: str, tools: _Tools) -> Optional[str]:
     """Finish what another recorder began before it died."""
-    target = path[:-len('.damaged')]
+    target = path[: -len('.damaged')]
     if os.path.exists(target):
         _drop_damaged(target, contents(bag), tools)
         return target
@@ -139,14 +143,19 @@ def _drop_damaged(target: str, saved: Saved, tools: _Tools) -> None:
         read_back(target, saved)
         _sync_folder(os.path.dirname(target))
     except OSError as err:
-        tools.warn('The mended bag {} cannot be read back, its original stays as {}.damaged: '
-                   '{}'.format(target, target, err))
+        tools.warn(
+            'The mended bag {} cannot be read back, its original stays as {}.damaged: {}'.format(
+                target, target, err
+            )
+        )
         return
     os.unlink(target + '.damaged')
     losses = saved.losses()
     (tools.warn if saved.bytes_lost else tools.info)(
         'Mended the bag of a recorder that died: {}, {} messages{}'.format(
-            target, saved.messages, losses and '; lost: ' + losses))
+            target, saved.messages, losses and '; lost: ' + losses
+        )
+    )
 
 
 def _sync_folder(folder: str) -> None:
@@ -186,7 +195,7 @@ def free_name(path: str) -> str:
 
     A name is taken where a bag of that name is there, being written or being mended.
     """
-    stem, number = path[:-len('.bag')], 1
+    stem, number = path[: -len('.bag')], 1
     while any(os.path.exists(path + suffix) for suffix in ('', '.active', '.damaged')):
         number += 1
         path = '{}_{}.bag'.format(stem, number)

@@ -4,6 +4,7 @@ A sound bag is a chain of records, each of which says where the next begins. Whe
 the file is searched on for the next record that parses, inside a chunk as well. Index records are
 passed over: whoever saves the messages makes new ones. Opens no file, needs no ROS.
 """
+
 import os
 from typing import BinaryIO, Iterator, NamedTuple, Optional
 
@@ -70,8 +71,11 @@ class Salvage:
                 record = self._record_at(position)
                 continue
             if record.op in (bag_format.OP_MESSAGE, bag_format.OP_CONNECTION):
-                yield Found(record, self._window.read(record.data_start,
-                                                      record.end - record.data_start), is_sure)
+                yield Found(
+                    record,
+                    self._window.read(record.data_start, record.end - record.data_start),
+                    is_sure,
+                )
             elif record.op == bag_format.OP_CHUNK:
                 self._is_place_open = False
             position, record = record.end, following
@@ -115,8 +119,7 @@ class Salvage:
         except BagFormatError:
             return None
         sizes = _FIELD_SIZES.get(op)
-        if sizes is None or any(len(fields.get(name, b'')) != size
-                                for name, size in sizes.items()):
+        if sizes is None or any(len(fields.get(name, b'')) != size for name, size in sizes.items()):
             return None
         end = data_start
         if op != bag_format.OP_CHUNK:
@@ -144,7 +147,7 @@ class _Window:
             self._source.seek(position)
             self._block = self._source.read(max(size, _BLOCK))
             self._start, offset = position, 0
-        return self._block[offset:offset + size]
+        return self._block[offset : offset + size]
 
     def find(self, pattern: bytes, position: int) -> int:
         """Return where the pattern is, from `position` on. -1 means nowhere."""

@@ -7,6 +7,7 @@ at a known end. A failing write is cut off again, so that what was written stays
 holds one chunk, and some ten bytes for each chunk before it. Chunks 1, 2, 4, 8 and so on repeat all
 connections: where the first chunk is damaged, the messages of later ones still have a type.
 """
+
 import errno
 import fcntl
 import os
@@ -88,8 +89,14 @@ class BagWriter:
         """Return the size of the chunk in memory."""
         return len(self._buffer)
 
-    def add(self, topic: str, message_type: MessageType, stamp: Stamp, data: bytes,
-            details: Optional[Dict[str, str]] = None) -> None:
+    def add(
+        self,
+        topic: str,
+        message_type: MessageType,
+        stamp: Stamp,
+        data: bytes,
+        details: Optional[Dict[str, str]] = None,
+    ) -> None:
         """Put a message, serialised to `data`, into the chunk in memory. Touches no disk.
 
         `details` are further fields of the connection header (latching, callerid).
@@ -100,18 +107,24 @@ class BagWriter:
         if header is None:
             header = _message_header(connection.number)
             self._message_headers[connection.number] = header
-        self._buffer += header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(
-            len(data)) + data
+        self._buffer += (
+            header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(len(data)) + data
+        )
         self._index.setdefault(connection.number, []).append((stamp[0], stamp[1], offset))
 
-    def _connection(self, topic: str, message_type: MessageType, details: Dict[str,
-                                                                               str]) -> _Connection:
+    def _connection(
+        self, topic: str, message_type: MessageType, details: Dict[str, str]
+    ) -> _Connection:
         key = (topic, message_type.md5sum, details.get('callerid', ''))
         connection = self._connections.get(key)
         if connection is None:
             number = len(self._connections)
-            fields = {'type': message_type.name, 'md5sum': message_type.md5sum,
-                      'message_definition': message_type.definition, **details}
+            fields = {
+                'type': message_type.name,
+                'md5sum': message_type.md5sum,
+                'message_definition': message_type.definition,
+                **details,
+            }
             connection = _Connection(number, bag_format.pack_connection(number, topic, fields))
             self._connections[key] = connection
             self._buffer += connection.record
@@ -152,8 +165,12 @@ class BagWriter:
         """
         try:
             self.flush()
-            write_bag_index(self._fd, self._end,
-                            [item.record for item in self._connections.values()], self._chunks)
+            write_bag_index(
+                self._fd,
+                self._end,
+                [item.record for item in self._connections.values()],
+                self._chunks,
+            )
             if sync:
                 self.sync()
         finally:
@@ -200,19 +217,26 @@ def write_bag_index(fd: int, end: int, connections: List[bytes], chunks: List[Ch
     :raises OSError: where the disk does not take it. The file is then cut off at `end`.
     """
     try:
-        _write_at(fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)),
-                  end)
+        _write_at(
+            fd, b''.join(connections) + b''.join(map(bag_format.pack_chunk_info, chunks)), end
+        )
     except OSError:
         _cut_off(fd, end)
         raise
-    _write_at(fd, bag_format.pack_bag_header(end, len(connections), len(chunks)),
-              len(bag_format.MAGIC))
+    _write_at(
+        fd, bag_format.pack_bag_header(end, len(connections), len(chunks)), len(bag_format.MAGIC)
+    )
 
 
 def _message_header(connection: int) -> bytes:
     """A message record's header up to the value of its last field, which is the time."""
-    whole = bag_format.pack_header({'op': bytes((bag_format.OP_MESSAGE,)),
-                                    'conn': bag_format.UINT32.pack(connection), 'time': bytes(8)})
+    whole = bag_format.pack_header(
+        {
+            'op': bytes((bag_format.OP_MESSAGE,)),
+            'conn': bag_format.UINT32.pack(connection),
+            'time': bytes(8),
+        }
+    )
     return whole[:-8]
 
 

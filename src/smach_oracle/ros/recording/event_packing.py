@@ -2,6 +2,7 @@
 
 Through a message object an event costs five times as much, and the machine waits.
 """
+
 import io
 import struct
 from typing import Callable, Optional
@@ -20,8 +21,7 @@ from .bag_writer import MessageType
 # message object.
 PACKED_MD5 = 'c55b3669678f23608a1881f94e335911'
 # Of earlier definitions with the same fields, which had fewer kinds of event.
-EARLIER_MD5S = frozenset(['04f09f94edfdd6b539964b195d7837e8',
-                          '67052263768e7d7c201c9b0c957ecc48'])
+EARLIER_MD5S = frozenset(['04f09f94edfdd6b539964b195d7837e8', '67052263768e7d7c201c9b0c957ecc48'])
 EVENT_TYPE = MessageType(OracleEvent._type, OracleEvent._md5sum, OracleEvent._full_text)
 
 _HEAD = struct.Struct('<BIIII')  # kind, header: seq, stamp, no frame_id
@@ -46,13 +46,24 @@ def _pack_through_message(event: Event, stamp: Stamp) -> bytes:
 
 def _pack_directly(event: Event, stamp: Stamp) -> bytes:
     return b''.join(
-        (_HEAD.pack(event.kind, 0, stamp[0], stamp[1],
-                    0), _WALL_TIME.pack(event.wall_time), _string(event.trial_id),
-         _UINT64.pack(event.seq), _string(event.path), _string(event.state), _string(event.outcome),
-         _string(event.target),
-         _FAILURE.pack(event.failure_kind, event.failure_class, event.rate,
-                       bool(event.continuous)), _string(event.query_id), _string(event.by),
-         _string(event.text), _string(event_messages.json_of(event.data))))
+        (
+            _HEAD.pack(event.kind, 0, stamp[0], stamp[1], 0),
+            _WALL_TIME.pack(event.wall_time),
+            _string(event.trial_id),
+            _UINT64.pack(event.seq),
+            _string(event.path),
+            _string(event.state),
+            _string(event.outcome),
+            _string(event.target),
+            _FAILURE.pack(
+                event.failure_kind, event.failure_class, event.rate, bool(event.continuous)
+            ),
+            _string(event.query_id),
+            _string(event.by),
+            _string(event.text),
+            _string(event_messages.json_of(event.data)),
+        )
+    )
 
 
 def _string(value: object) -> bytes:

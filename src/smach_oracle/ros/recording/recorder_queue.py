@@ -1,4 +1,5 @@
 """The queue between the machine's threads and the recorder's writer thread."""
+
 import threading
 import time
 from typing import Callable, List, NamedTuple, Optional, Tuple, Union

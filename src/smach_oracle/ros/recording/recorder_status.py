@@ -1,4 +1,5 @@
 """The recorder's state: what was lost, and whether the disk hangs."""
+
 import threading
 import time
 from collections import OrderedDict

@@ -4,6 +4,7 @@ rospy has one subscriber per topic and process, of the type that came first: wit
 recorder would hand undecoded messages to the robot's own callbacks. So it subscribes with the true
 type of a topic, and takes what comes.
 """
+
 import threading
 import time
 from typing import Callable, Dict, List, Mapping, Optional, Sequence, Type
@@ -56,8 +57,12 @@ def now() -> Moment:
 class TopicListener:
     """Subscribes to topics of any type, as soon as the type is known, and hands on each message."""
 
-    def __init__(self, topics: Sequence[str], hand_on: Callable[[MessageItem], None],
-                 types: Optional[Mapping[str, MessageClass]] = None) -> None:
+    def __init__(
+        self,
+        topics: Sequence[str],
+        hand_on: Callable[[MessageItem], None],
+        types: Optional[Mapping[str, MessageClass]] = None,
+    ) -> None:
         """
         :param types: message classes of topics that nobody may have advertised yet, so that nothing
             is missed.
@@ -87,13 +92,21 @@ class TopicListener:
                 self._unknown.remove(topic)
                 # No queue_size: it would be that of the robot's own subscriber of this topic, too.
                 self._subscribers.append(
-                    rospy.Subscriber(topic, classes[topic], self._received, callback_args=topic))
+                    rospy.Subscriber(topic, classes[topic], self._received, callback_args=topic)
+                )
 
     def _received(self, message: genpy.Message, topic: str) -> None:
         header = message._connection_header
         self._hand_on(
-            MessageItem(topic, type_of(message), data_of(message), now(),
-                        header.get('latching') == '1', header.get('callerid', '')))
+            MessageItem(
+                topic,
+                type_of(message),
+                data_of(message),
+                now(),
+                header.get('latching') == '1',
+                header.get('callerid', ''),
+            )
+        )
 
     def close(self) -> None:
         """Unsubscribe."""
@@ -111,8 +124,12 @@ def types_in_process() -> Dict[str, MessageClass]:
     """
     manager = get_topic_manager()
     with manager.lock:
-        return {name: known.data_class for known_by_name in (manager.pubs, manager.subs)
-                for name, known in known_by_name.items() if known.data_class is not None}
+        return {
+            name: known.data_class
+            for known_by_name in (manager.pubs, manager.subs)
+            for name, known in known_by_name.items()
+            if known.data_class is not None
+        }
 
 
 def types_at_master() -> Dict[str, MessageClass]:
@@ -124,8 +141,7 @@ def types_at_master() -> Dict[str, MessageClass]:
     """
     types = rosgraph.Master(rospy.get_name()).getTopicTypes()
     return {
-        name: _class_of(type_name) or rospy.AnyMsg
-        for name, type_name in types if type_name != '*'
+        name: _class_of(type_name) or rospy.AnyMsg for name, type_name in types if type_name != '*'
     }
 
 

@@ -1,4 +1,5 @@
 """The bag of one trial while it is being written."""
+
 import os
 import re
 import time
@@ -51,8 +52,9 @@ class TrialBag:
     :raises OSError: in all methods, where the disk does not take it.
     """
 
-    def __init__(self, folder: str, trial_id: str, when: Moment, watch: DiskWatch,
-                 budget: SyncBudget) -> None:
+    def __init__(
+        self, folder: str, trial_id: str, when: Moment, watch: DiskWatch, budget: SyncBudget
+    ) -> None:
         self.trial_id = trial_id
         self.events_written = 0
         self.over: Optional[Moment] = None  # when its trial ended
@@ -89,8 +91,9 @@ class TrialBag:
         self._events_in_chunk += 1  # before the chunk may be flushed: it is lost with it
         self._add(topic, EVENT_TYPE, data, when, {})
 
-    def add_message(self, topic: str, message: genpy.Message, when: Moment,
-                    latching: bool = False) -> None:
+    def add_message(
+        self, topic: str, message: genpy.Message, when: Moment, latching: bool = False
+    ) -> None:
         """Add another message (genpy.Message) of this process."""
         kind = MessageType(message._type, message._md5sum, message._full_text)  # genpy's own names
         self._add(topic, kind, serialise(message), when, {'latching': '1'} if latching else {})
@@ -102,8 +105,9 @@ class TrialBag:
             details['latching'] = '1'
         self._add(item.topic, item.message_type, item.data, item.when, details)
 
-    def _add(self, topic: str, kind: MessageType, data: bytes, when: Moment,
-             details: Dict[str, str]) -> None:
+    def _add(
+        self, topic: str, kind: MessageType, data: bytes, when: Moment, details: Dict[str, str]
+    ) -> None:
         self._writer.add(topic, kind, self.stamp(when), data, details)
         if self._chunk_since is None:
             self._chunk_since = when.monotonic
@@ -167,7 +171,7 @@ class TrialBag:
 def wall_stamp(wall_time: float) -> Stamp:
     """Return seconds since the epoch as seconds and nanoseconds."""
     nanoseconds = int(round(wall_time * 1e9))
-    return nanoseconds // 10 ** 9, nanoseconds % 10 ** 9
+    return nanoseconds // 10**9, nanoseconds % 10**9
 
 
 def file_name(trial_id: str, wall_time: float) -> str:
@@ -177,9 +181,10 @@ def file_name(trial_id: str, wall_time: float) -> str:
     """
     seconds, nanoseconds = wall_stamp(wall_time)
     stamp = time.strftime('%Y%m%dT%H%M%S', time.gmtime(seconds)) + '.{:03d}Z'.format(
-        nanoseconds // 10**6)
+        nanoseconds // 10**6
+    )
     clean = re.sub(r'[^A-Za-z0-9._-]', '_', trial_id)[:_LONGEST_ID] or 'trial'
-    return '{}_{}{}'.format(stamp, clean, ACTIVE_SUFFIX[:-len('.active')])
+    return '{}_{}{}'.format(stamp, clean, ACTIVE_SUFFIX[: -len('.active')])
 
 
 def ros_stamp_of(seconds: int, nanoseconds: int) -> Optional[Stamp]:

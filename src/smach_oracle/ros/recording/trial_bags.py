@@ -2,6 +2,7 @@
 
 A bag is given up where the disk does not take it.
 """
+
 import threading
 import time
 from typing import Callable, Dict, NamedTuple, Optional, Tuple, Union
@@ -47,8 +48,15 @@ class TrialBags:
     after five, and at the start of every trial) finds that the disk takes a file again.
     """
 
-    def __init__(self, folder: str, topics: RecorderTopics, reporter: Reporter, losses: LossCounter,
-                 watch: DiskWatch, late_s: float = 0.0) -> None:
+    def __init__(
+        self,
+        folder: str,
+        topics: RecorderTopics,
+        reporter: Reporter,
+        losses: LossCounter,
+        watch: DiskWatch,
+        late_s: float = 0.0,
+    ) -> None:
         """
         :param late_s: how long a bag stays open after its trial, for messages on their way.
         """
@@ -113,8 +121,11 @@ class TrialBags:
                 self._close(bag, bag.over)
 
     def _open(self, event: Event, when: Moment) -> Optional[TrialBag]:
-        if self._error and time.monotonic(
-        ) < self._retry_at and event.kind != EventKind.TRIAL_START:
+        if (
+            self._error
+            and time.monotonic() < self._retry_at
+            and event.kind != EventKind.TRIAL_START
+        ):
             return None
         try:
             bag = TrialBag(self._folder, event.trial_id, when, self._watch, self._budget)
@@ -160,13 +171,18 @@ class TrialBags:
         self._error = '{}: {}'.format(self._folder, err.strerror or err)
         self._reporter.warn(
             'Trials are not recorded any more, events are dropped and counted; {}'.format(
-                self._error))
+                self._error
+            )
+        )
         self._report(bag, RecorderState.DROPPING)
 
     def _works_again(self, bag: TrialBag) -> None:
         self._error = ''
-        self._reporter.info('Trials are recorded again, into {}; {} events were lost so far'.format(
-            bag.path, self._losses.events))
+        self._reporter.info(
+            'Trials are recorded again, into {}; {} events were lost so far'.format(
+                bag.path, self._losses.events
+            )
+        )
         self._report(bag, RecorderState.RECORDING)
         self.recover()
 
@@ -176,10 +192,22 @@ class TrialBags:
     def _status(self, bag: Optional[TrialBag], state: RecorderState) -> RecordingStatus:
         losses = self._losses
         if bag is None:
-            return RecordingStatus(state, events_lost_in_total=losses.events,
-                          messages_dropped=losses.messages, text=self._error)
-        return RecordingStatus(state, bag.path, bag.trial_id, bag.events_written,
-                      losses.of_trial(bag.trial_id), losses.events, losses.messages, self._error)
+            return RecordingStatus(
+                state,
+                events_lost_in_total=losses.events,
+                messages_dropped=losses.messages,
+                text=self._error,
+            )
+        return RecordingStatus(
+            state,
+            bag.path,
+            bag.trial_id,
+            bag.events_written,
+            losses.of_trial(bag.trial_id),
+            losses.events,
+            losses.messages,
+            self._error,
+        )
 
     def _keep(self, item: MessageItem) -> None:
         """Remember messages that later bags need to be understood.
@@ -205,14 +233,18 @@ class TrialBags:
         try:
             recover_folder(self._folder, self._reporter.info, self._reporter.warn)
         except OSError as err:
-            self._reporter.warn('{} cannot be searched for bags to mend: {}'.format(
-                self._folder, err))
+            self._reporter.warn(
+                '{} cannot be searched for bags to mend: {}'.format(self._folder, err)
+            )
 
     def wait_s(self) -> Optional[float]:
         """Return how long the writer thread may sleep. None means until something comes."""
         times = [due for due in (bag.due_s() for bag in self._bags.values()) if due is not None]
-        times += [max(0.0, bag.over.monotonic + self._late_s - time.monotonic())
-                  for bag in self._bags.values() if bag.over]
+        times += [
+            max(0.0, bag.over.monotonic + self._late_s - time.monotonic())
+            for bag in self._bags.values()
+            if bag.over
+        ]
         return min(times) if times else None
 
     def tick(self) -> None:
@@ -239,12 +271,13 @@ def kept_key(item: MessageItem) -> Optional[KeptKey]:
 def container_path(structure: bytes) -> bytes:
     """Return the path of a serialised SmachContainerStructure: the string behind its Header."""
     frame_id_end = 16 + int.from_bytes(structure[12:16], 'little')
-    size = int.from_bytes(structure[frame_id_end:frame_id_end + 4], 'little')
-    return structure[frame_id_end + 4:frame_id_end + 4 + size]
+    size = int.from_bytes(structure[frame_id_end : frame_id_end + 4], 'little')
+    return structure[frame_id_end + 4 : frame_id_end + 4 + size]
 
 
 def status_message(status: RecordingStatus) -> RecorderStatus:
     """Translate to a RecorderStatus message, without a stamp."""
-    return RecorderStatus(state=int(status.state),
-                          **{name: getattr(status, name)
-                             for name in RecordingStatus._fields[1:]})
+    return RecorderStatus(
+        state=int(status.state),
+        **{name: getattr(status, name) for name in RecordingStatus._fields[1:]},
+    )

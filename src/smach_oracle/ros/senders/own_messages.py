@@ -2,6 +2,7 @@
 
 A player publishes under the robot's names. It listens to nothing, and it serves nothing.
 """
+
 from typing import Any, Callable, Iterable, List, Set, Tuple, Type
 
 import genpy
@@ -37,8 +38,11 @@ def publishers_of(topic: str) -> List[str]:
     """Return the nodes from which this process hears a topic now, the first one in front."""
     implementation = get_topic_manager().subs.get(topic)
     connections = implementation.connections if implementation is not None else ()
-    return [str(getattr(each, 'callerid_pub', '')) for each in connections
-            if getattr(each, 'socket', None) is not None]
+    return [
+        str(getattr(each, 'callerid_pub', ''))
+        for each in connections
+        if getattr(each, 'socket', None) is not None
+    ]
 
 
 _named: Set[Tuple[str, str]] = set()  # who was named in the log, and the owner of the topics
@@ -59,12 +63,18 @@ class OwnMessages:
             self._take(message)
         elif (node, owner) not in _named:
             _named.add((node, owner))
-            rospy.logwarn('%s publishes on topics of %s, such as %s: its messages are ignored. A '
-                          'bag that is played beside the robot does that', node, owner, self._topic)
+            rospy.logwarn(
+                '%s publishes on topics of %s, such as %s: its messages are ignored. A '
+                'bag that is played beside the robot does that',
+                node,
+                owner,
+                self._topic,
+            )
 
 
-def subscribe_to_owner(topic: str, kind: Type[genpy.Message], take: Take,
-                       **options: Any) -> rospy.Subscriber:
+def subscribe_to_owner(
+    topic: str, kind: Type[genpy.Message], take: Take, **options: Any
+) -> rospy.Subscriber:
     """Return a subscriber that takes the messages of the node that the topic belongs to."""
     return rospy.Subscriber(topic, kind, OwnMessages(rospy.resolve_name(topic), take), **options)
 
@@ -73,4 +83,5 @@ def listens(publisher: rospy.Publisher, node: str) -> bool:
     """Whether a node listens to what this one publishes there."""
     implementation = publisher.impl
     return implementation is not None and any(
-        getattr(each, 'endpoint_id', '') == node for each in implementation.connections)
+        getattr(each, 'endpoint_id', '') == node for each in implementation.connections
+    )

@@ -1,4 +1,5 @@
 """Ends a program by force, and its child processes before."""
+
 import os
 import sys
 import time

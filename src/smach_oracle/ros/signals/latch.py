@@ -4,6 +4,7 @@ Python runs a handler in the main thread, between any two instructions of it. `t
 `threading.Thread` take locks that are not re-entrant: where the main thread is inside one of them,
 the handler would wait for itself.
 """
+
 import _thread
 import threading
 from typing import Any, Callable, List, Optional
@@ -51,5 +52,6 @@ def start_thread(function: Callable[[], object]) -> Latch:
             function()
         finally:
             ended.set()
+
     _thread.start_new_thread(call, ())
     return ended

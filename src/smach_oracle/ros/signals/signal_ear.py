@@ -1,4 +1,5 @@
 """Hears the signals of this process, also while its main thread sits in a C call."""
+
 import os
 import signal
 import socket
@@ -29,8 +30,9 @@ class SignalEar:
         self._sender.setblocking(False)
         self._set_wakeup_fd = signal.set_wakeup_fd
         self._asking = threading.RLock()
-        self._asked_by_script = self._set_wakeup_fd(self._sender.fileno(),
-                                                    warn_on_full_buffer=False)
+        self._asked_by_script = self._set_wakeup_fd(
+            self._sender.fileno(), warn_on_full_buffer=False
+        )
         setattr(signal, 'set_wakeup_fd', self._set_for_script)
         in_child(self._let_go)
 
@@ -47,9 +49,13 @@ class SignalEar:
 
     def _read(self, flags: int) -> Iterator[int]:
         numbers, credentials, _, _ = self._receiver.recvmsg(
-            _MOST, socket.CMSG_SPACE(_CREDENTIALS.size), flags)
-        if not any(_CREDENTIALS.unpack(data)[0] == os.getpid() for _, kind, data in credentials
-                   if kind == socket.SCM_CREDENTIALS):
+            _MOST, socket.CMSG_SPACE(_CREDENTIALS.size), flags
+        )
+        if not any(
+            _CREDENTIALS.unpack(data)[0] == os.getpid()
+            for _, kind, data in credentials
+            if kind == socket.SCM_CREDENTIALS
+        ):
             return
         with self._asking:
             if self._asked_by_script != -1:

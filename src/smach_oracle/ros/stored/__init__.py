@@ -1,4 +1,5 @@
 """The values of ROS in a store: messages and arrays in userdata, and the goals that run."""
+
 from smach_oracle.oracle.records.running_goals import GOALS
 
 from .goal_ending import end_goals

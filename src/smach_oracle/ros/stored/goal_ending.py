@@ -1,4 +1,5 @@
 """Ends the goals of a program that was killed: cancels them, and waits until they have ended."""
+
 import threading
 import time
 from typing import Callable, Dict, List, Mapping
@@ -13,8 +14,9 @@ CANCEL_EACH_S = 1.0
 # a server that nobody has connected to by then is taken as gone
 SERVER_WAIT_S = 5.0
 TELL_EACH_S = 10.0
-_RUNS = frozenset((GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING,
-                   GoalStatus.RECALLING))
+_RUNS = frozenset(
+    (GoalStatus.PENDING, GoalStatus.ACTIVE, GoalStatus.PREEMPTING, GoalStatus.RECALLING)
+)
 
 
 def end_goals(servers: Mapping[str, str], must_stop: Callable[[], bool]) -> Dict[str, str]:
@@ -36,8 +38,10 @@ def end_goals(servers: Mapping[str, str], must_stop: Callable[[], bool]) -> Dict
                 break
             if time.monotonic() - told_s > TELL_EACH_S:
                 told_s = time.monotonic()
-                rospy.logwarn('Waits for goals of the killed program to end: %s', ', '.join(
-                    each.name for each in ending if each.left))
+                rospy.logwarn(
+                    'Waits for goals of the killed program to end: %s',
+                    ', '.join(each.name for each in ending if each.left),
+                )
             time.sleep(POLL_S)
     finally:
         for each in ending:
@@ -53,13 +57,15 @@ class _Server:
         self._lock = threading.Lock()
         self._cancelled_s: Dict[str, float] = {}
         self._cancel = rospy.Publisher(name + '/cancel', GoalID, queue_size=10)
-        self._status = rospy.Subscriber(name + '/status', GoalStatusArray, self._on_status,
-                                        queue_size=1)
+        self._status = rospy.Subscriber(
+            name + '/status', GoalStatusArray, self._on_status, queue_size=1
+        )
 
     def is_waited_for(self, waited_s: float) -> bool:
         """Whether goals are left, and a server that can end them."""
-        return bool(self.left) and (waited_s < SERVER_WAIT_S or bool(
-            live_connections(self._status)))
+        return bool(self.left) and (
+            waited_s < SERVER_WAIT_S or bool(live_connections(self._status))
+        )
 
     def close(self) -> None:
         self._status.unregister()

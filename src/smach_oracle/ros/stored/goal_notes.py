@@ -1,4 +1,5 @@
 """Notes which goals this process has sent, before they are sent."""
+
 import functools
 from typing import Callable
 

@@ -1,4 +1,5 @@
 """Codecs that store ROS messages, ROS times and numpy arrays. Nothing is pickled."""
+
 import io
 import struct
 from typing import TYPE_CHECKING, Any, List
@@ -48,8 +49,9 @@ def _to_message(told: List[Any]) -> genpy.Message:
     if kind is None:
         raise ValueError('the message type {} is not installed'.format(name))
     if kind._md5sum != md5:
-        raise ValueError('the message type {} has md5 {} here, and had {}'.format(
-            name, kind._md5sum, md5))
+        raise ValueError(
+            'the message type {} has md5 {} here, and had {}'.format(name, kind._md5sum, md5)
+        )
     message: genpy.Message = kind()
     message.deserialize(data)
     return message
@@ -61,11 +63,13 @@ def _of_time(time: genpy.rostime.TVal) -> List[int]:
 
 def _to_time(told: List[int]) -> genpy.Time:
     import rospy
+
     return rospy.Time(*told)
 
 
 def _to_duration(told: List[int]) -> genpy.Duration:
     import rospy
+
     return rospy.Duration(*told)
 
 
@@ -75,6 +79,7 @@ def _of_array(array: 'numpy.ndarray') -> List[object]:
     :raises ValueError: for an array of objects, and for a subclass, whose own parts are not known.
     """
     import numpy
+
     if type(array) is not numpy.ndarray:
         raise ValueError('a {} needs a codec of its own'.format(type(array).__name__))
     return [_of_dtype(array.dtype), list(array.shape), array.tobytes()]
@@ -82,6 +87,7 @@ def _of_array(array: 'numpy.ndarray') -> List[object]:
 
 def _to_array(told: List[Any]) -> 'numpy.ndarray':
     import numpy
+
     described, shape, data = told
     dtype = _to_dtype(described)
     if not dtype.itemsize:  # such as of empty texts, which frombuffer refuses
@@ -106,6 +112,7 @@ def _of_dtype(dtype: 'numpy.dtype') -> object:
     :raises ValueError: where it has Python objects in it.
     """
     from numpy.lib import format as array_format
+
     if dtype.hasobject:
         raise ValueError('an array of Python objects is not stored')
     described: object = array_format.dtype_to_descr(dtype)
@@ -118,6 +125,7 @@ def _to_dtype(described: object) -> 'numpy.dtype':
     :raises ValueError: where it has Python objects in it.
     """
     from numpy.lib import format as array_format
+
     dtype = array_format.descr_to_dtype(described)
     if dtype.hasobject:
         raise ValueError('an array of Python objects is not read')

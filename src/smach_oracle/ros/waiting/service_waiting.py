@@ -3,6 +3,7 @@
 A simulated world that stands still while nobody moves would otherwise be the same after a wait. A
 real robot has no such service, and simply waits.
 """
+
 import time
 from typing import Optional
 

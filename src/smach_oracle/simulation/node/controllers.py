@@ -1,4 +1,5 @@
 """The PR2's controllers: actions whose goals move parts of the robot."""
+
 from functools import partial
 from typing import Callable, Dict, Optional, Tuple
 
@@ -48,16 +49,29 @@ class Controller:
     :param feed: a motion to the action's feedback.
     """
 
-    def __init__(self, name: str, spec: type, part: str, loop: WorldLoop, motions: MotionTable,
-                 make: MakeMotion, report: MakeMessage, feed: MakeMessage) -> None:
+    def __init__(
+        self,
+        name: str,
+        spec: type,
+        part: str,
+        loop: WorldLoop,
+        motions: MotionTable,
+        make: MakeMotion,
+        report: MakeMessage,
+        feed: MakeMessage,
+    ) -> None:
         self._part = part
         self._motions = motions
         self._make, self._report, self._feed = make, report, feed
         self._refusal = type(spec().action_result.result)
         self._handle: Optional[actionlib.ServerGoalHandle] = None
         self._server = actionlib.ActionServer(
-            name, spec, lambda handle: loop.post(partial(self._begin, handle)),
-            lambda handle: loop.post(partial(self._cancel, handle)), auto_start=False)
+            name,
+            spec,
+            lambda handle: loop.post(partial(self._begin, handle)),
+            lambda handle: loop.post(partial(self._cancel, handle)),
+            auto_start=False,
+        )
         self._server.start()
 
     def _begin(self, handle: actionlib.ServerGoalHandle) -> None:
@@ -102,43 +116,99 @@ class Controllers:
         refused.
     """
 
-    def __init__(self, world: World, loop: WorldLoop, motions: MotionTable,
-                 now_s: Callable[[], float], streamed: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        world: World,
+        loop: WorldLoop,
+        motions: MotionTable,
+        now_s: Callable[[], float],
+        streamed: Callable[[], object],
+    ) -> None:
         self._world, self._loop, self._motions, self._now_s = world, loop, motions, now_s
         self._streamed = streamed
         self._limits: Dict[str, Dict[str, Tuple[float, float]]] = {
-            arm: {name: world.robot.limits[name] for name in ARM_JOINTS[arm]} for arm in ARMS}
+            arm: {name: world.robot.limits[name] for name in ARM_JOINTS[arm]} for arm in ARMS
+        }
         self._all = [
-            self._one('head_traj_controller/point_head_action', PointHeadAction, 'head', self._head,
-                      feedback.head_result, feedback.head),
-            self._one('torso_controller/position_joint_action', SingleJointPositionAction, 'torso',
-                      self._torso, feedback.torso_result, feedback.torso),
-            self._one('move_base', MoveBaseAction, 'base', self._base, feedback.base_result,
-                      feedback.base)
+            self._one(
+                'head_traj_controller/point_head_action',
+                PointHeadAction,
+                'head',
+                self._head,
+                feedback.head_result,
+                feedback.head,
+            ),
+            self._one(
+                'torso_controller/position_joint_action',
+                SingleJointPositionAction,
+                'torso',
+                self._torso,
+                feedback.torso_result,
+                feedback.torso,
+            ),
+            self._one(
+                'move_base', MoveBaseAction, 'base', self._base, feedback.base_result, feedback.base
+            ),
         ]
         for arm in ARMS:
             self._add_arm(arm)
-        rospy.Subscriber('initialpose', PoseWithCovarianceStamped,
-                         lambda message: self._loop.post(partial(self._localise, message)),
-                         queue_size=2, tcp_nodelay=True)
+        rospy.Subscriber(
+            'initialpose',
+            PoseWithCovarianceStamped,
+            lambda message: self._loop.post(partial(self._localise, message)),
+            queue_size=2,
+            tcp_nodelay=True,
+        )
 
     def _add_arm(self, arm: str) -> None:
         side = arm[0]
         self._all.append(
-            self._one(side + '_arm_controller/follow_joint_trajectory', FollowJointTrajectoryAction,
-                      arm + '_arm', partial(self._arm, arm), feedback.arm_result, feedback.arm))
+            self._one(
+                side + '_arm_controller/follow_joint_trajectory',
+                FollowJointTrajectoryAction,
+                arm + '_arm',
+                partial(self._arm, arm),
+                feedback.arm_result,
+                feedback.arm,
+            )
+        )
         self._all.append(
-            self._one(side + '_gripper_controller/gripper_action', GripperCommandAction,
-                      arm + '_gripper', partial(self._gripper, arm),
-                      partial(feedback.gripper_result, arm), partial(feedback.gripper, arm)))
-        rospy.Subscriber(side + '_arm_controller/command', JointTrajectory,
-                         lambda message: self._loop.post(partial(self._stream, arm, message)),
-                         queue_size=10, tcp_nodelay=True)
+            self._one(
+                side + '_gripper_controller/gripper_action',
+                GripperCommandAction,
+                arm + '_gripper',
+                partial(self._gripper, arm),
+                partial(feedback.gripper_result, arm),
+                partial(feedback.gripper, arm),
+            )
+        )
+        rospy.Subscriber(
+            side + '_arm_controller/command',
+            JointTrajectory,
+            lambda message: self._loop.post(partial(self._stream, arm, message)),
+            queue_size=10,
+            tcp_nodelay=True,
+        )
 
-    def _one(self, name: str, spec: type, part: str, make: MakeMotion, report: MakeMessage,
-             feed: MakeMessage) -> Controller:
-        return Controller(name, spec, part, self._loop, self._motions, make,
-                          partial(report, self._world), partial(feed, self._world))
+    def _one(
+        self,
+        name: str,
+        spec: type,
+        part: str,
+        make: MakeMotion,
+        report: MakeMessage,
+        feed: MakeMessage,
+    ) -> Controller:
+        return Controller(
+            name,
+            spec,
+            part,
+            self._loop,
+            self._motions,
+            make,
+            partial(report, self._world),
+            partial(feed, self._world),
+        )
 
     def publish_feedback(self) -> None:
         """Publish the feedback of every motion that is under way."""
@@ -147,24 +217,32 @@ class Controllers:
 
     def _head(self, goal: PointHeadGoal) -> Motion:
         goals.check_axis(goal.pointing_axis, goal.pointing_frame, CAMERA_FRAMES)
-        return HeadMotion(self._world, goals.point_in_base(goal.target,
-                                                           self._world.odom_from_base()))
+        return HeadMotion(
+            self._world, goals.point_in_base(goal.target, self._world.odom_from_base())
+        )
 
     def _torso(self, goal: SingleJointPositionGoal) -> Motion:
-        return TorsoMotion(self._world,
-                           goals.height_of(goal.position, self._world.robot.limits[TORSO_JOINT]))
+        return TorsoMotion(
+            self._world, goals.height_of(goal.position, self._world.robot.limits[TORSO_JOINT])
+        )
 
     def _base(self, goal: MoveBaseGoal) -> Motion:
         return BaseMotion(goals.odom_from_pose(goal.target_pose, self._world.odom_from_base()))
 
     def _gripper(self, arm: str, goal: GripperCommandGoal) -> Motion:
         return GripperMotion(
-            arm, *goals.gap_of(goal.command.position, goal.command.max_effort, DEFAULT_EFFORT))
+            arm, *goals.gap_of(goal.command.position, goal.command.max_effort, DEFAULT_EFFORT)
+        )
 
     def _arm(self, arm: str, goal: FollowJointTrajectoryGoal) -> Motion:
         checked = goals.checked_trajectory(goal, self._limits[arm], self._now_s())
-        motion = Trajectory(checked.joints, checked.positions, checked.times, checked.velocities,
-                            tolerances=checked.tolerances)
+        motion = Trajectory(
+            checked.joints,
+            checked.positions,
+            checked.times,
+            checked.velocities,
+            tolerances=checked.tolerances,
+        )
         wrong = motion.refusal(self._world)
         if wrong:
             raise goals.BadGoal(wrong)

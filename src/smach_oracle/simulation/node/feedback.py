@@ -1,4 +1,5 @@
 """Feedback and results of the controllers' actions."""
+
 from typing import List
 
 import numpy as np
@@ -27,9 +28,11 @@ from ..physics.trajectory import Motion, Trajectory
 from ..physics.world import World
 from .motion_table import MotionEnd
 
-CODES = {'': FollowJointTrajectoryResult.INVALID_GOAL,
-         'path': FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
-         'goal': FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED}
+CODES = {
+    '': FollowJointTrajectoryResult.INVALID_GOAL,
+    'path': FollowJointTrajectoryResult.PATH_TOLERANCE_VIOLATED,
+    'goal': FollowJointTrajectoryResult.GOAL_TOLERANCE_VIOLATED,
+}
 
 
 def _header(frame_id: str = '') -> Header:
@@ -40,8 +43,13 @@ def arm(world: World, motion: Trajectory) -> FollowJointTrajectoryFeedback:
     """Return where the joints should be, and where they are."""
     wanted = [world.robot.target(name) for name in motion.joints]
     found = [world.robot.position(name) for name in motion.joints]
-    return FollowJointTrajectoryFeedback(_header(), motion.joints, _point(wanted), _point(found),
-                                         _point([a - b for a, b in zip(wanted, found)]))
+    return FollowJointTrajectoryFeedback(
+        _header(),
+        motion.joints,
+        _point(wanted),
+        _point(found),
+        _point([a - b for a, b in zip(wanted, found)]),
+    )
 
 
 def _point(positions: List[float]) -> JointTrajectoryPoint:
@@ -60,8 +68,9 @@ def gripper(name: str, world: World, _motion: GripperMotion) -> GripperCommandFe
     return GripperCommandFeedback(world.gap(name), world.robot.finger_force(name), False, False)
 
 
-def gripper_result(name: str, world: World, _motion: GripperMotion,
-                   end: MotionEnd) -> GripperCommandResult:
+def gripper_result(
+    name: str, world: World, _motion: GripperMotion, end: MotionEnd
+) -> GripperCommandResult:
     """Return where the fingers came to rest."""
     state = end.result.gripper if end.result else None
     if state is None:
@@ -86,8 +95,9 @@ def torso(world: World, motion: TorsoMotion) -> SingleJointPositionFeedback:
     """Return how far the torso is."""
     name = motion.joints[0]
     position = world.robot.position(name)
-    return SingleJointPositionFeedback(_header(), position,
-                                       world.joint_velocities()[name], motion.height - position)
+    return SingleJointPositionFeedback(
+        _header(), position, world.joint_velocities()[name], motion.height - position
+    )
 
 
 def torso_result(_world: World, _motion: TorsoMotion, _end: MotionEnd) -> SingleJointPositionResult:
@@ -99,7 +109,8 @@ def base(world: World, _motion: Motion) -> MoveBaseFeedback:
     """Return where the robot believes that it is."""
     pose = world.odom_from_base()
     return MoveBaseFeedback(
-        PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))))
+        PoseStamped(_header(ODOM_FRAME), Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))))
+    )
 
 
 def base_result(_world: World, _motion: Motion, _end: MotionEnd) -> MoveBaseResult:

@@ -1,4 +1,5 @@
 """Tells in captions what a machine does, from the events of its oracle."""
+
 from typing import Callable, Dict, NamedTuple, Optional
 
 from smach_oracle.msg import OracleEvent
@@ -7,8 +8,12 @@ from ..pictures.caption import BLUE, GREEN, ORANGE, RED, Caption
 
 SUCCEEDED = 'succeeded'  # the outcome of a trial that did
 # what an expert answers, by the outcome of the event
-ANSWERS = {'goto': 'go on with {}', 'supersede': 'it is done, and ended with {}',
-           'interface': 'helps with {}', 'give_up': 'give up'}
+ANSWERS = {
+    'goto': 'go on with {}',
+    'supersede': 'it is done, and ended with {}',
+    'interface': 'helps with {}',
+    'give_up': 'give up',
+}
 
 
 class Told(NamedTuple):
@@ -58,5 +63,5 @@ _TOLD: Dict[int, Callable[[OracleEvent], Told]] = {
     OracleEvent.DECISION: lambda event: Told(Caption('Oracle', event.text, BLUE)),
     OracleEvent.PRECONDITION_START: _precondition,
     OracleEvent.QUERY_ANSWERED: _answer,
-    OracleEvent.TRIAL_END: _end
+    OracleEvent.TRIAL_END: _end,
 }

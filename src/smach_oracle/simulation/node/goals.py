@@ -1,4 +1,5 @@
 """The meaning of a controller's goal, or why it is refused: messages in, data out, no node."""
+
 import math
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -40,8 +41,9 @@ class CheckedTrajectory(NamedTuple):
     tolerances: Tolerances
 
 
-def checked_trajectory(goal: FollowJointTrajectoryGoal, limits: Limits,
-                       now_s: float) -> CheckedTrajectory:
+def checked_trajectory(
+    goal: FollowJointTrajectoryGoal, limits: Limits, now_s: float
+) -> CheckedTrajectory:
     """A trajectory for some of the joints that have `limits`.
 
     :raises BadGoal: naming joint and point.
@@ -52,22 +54,30 @@ def checked_trajectory(goal: FollowJointTrajectoryGoal, limits: Limits,
         raise BadGoal(
             'the trajectory is to begin {:.2f} s from now; allowed: at once (a stamp of 0), or '
             'within '
-            '{:g} s'.format(start - now_s, LEAD_S))
+            '{:g} s'.format(start - now_s, LEAD_S)
+        )
     if 0 < start and start + times[-1] < now_s:
         raise BadGoal(
             'the trajectory should have ended {:.2f} s ago'.format(now_s - start - times[-1]),
-            FollowJointTrajectoryResult.OLD_HEADER_TIMESTAMP)
+            FollowJointTrajectoryResult.OLD_HEADER_TIMESTAMP,
+        )
     velocities = [point.velocities for point in goal.trajectory.points]
     return CheckedTrajectory(
-        joints, positions, times,
+        joints,
+        positions,
+        times,
         np.array(velocities) if all(velocities) else None,
-        Tolerances(_tolerances('path_tolerance', goal.path_tolerance, joints),
-                   _tolerances('goal_tolerance', goal.goal_tolerance, joints),
-                   max(0.0, goal.goal_time_tolerance.to_sec())))
+        Tolerances(
+            _tolerances('path_tolerance', goal.path_tolerance, joints),
+            _tolerances('goal_tolerance', goal.goal_tolerance, joints),
+            max(0.0, goal.goal_time_tolerance.to_sec()),
+        ),
+    )
 
 
-def points_of_trajectory(message: JointTrajectory,
-                         limits: Limits) -> Tuple[List[str], np.ndarray, np.ndarray]:
+def points_of_trajectory(
+    message: JointTrajectory, limits: Limits
+) -> Tuple[List[str], np.ndarray, np.ndarray]:
     """Joints, positions (n, joints) and times (n,).
 
     :raises BadGoal: naming joint and point.
@@ -75,59 +85,81 @@ def points_of_trajectory(message: JointTrajectory,
     joints = list(message.joint_names)
     unknown = [name for name in joints if name not in limits]
     if not joints or unknown or len(set(joints)) < len(joints):
-        wrong = 'no joint is named' if not joints else (
-            'unknown joint {!r}'.format(unknown[0]) if unknown else 'a joint is named twice: ' +
-            ', '.join(joints))
-        raise BadGoal('{}; allowed: {}'.format(wrong, ', '.join(limits)),
-                      FollowJointTrajectoryResult.INVALID_JOINTS)
+        wrong = (
+            'no joint is named'
+            if not joints
+            else (
+                'unknown joint {!r}'.format(unknown[0])
+                if unknown
+                else 'a joint is named twice: ' + ', '.join(joints)
+            )
+        )
+        raise BadGoal(
+            '{}; allowed: {}'.format(wrong, ', '.join(limits)),
+            FollowJointTrajectoryResult.INVALID_JOINTS,
+        )
     if not message.points:
         raise BadGoal('the trajectory has no points')
     before = 0.0
     for number, point in enumerate(message.points):
         before = _check_point(point, 'point {}'.format(number), joints, limits, before)
-    return (joints, np.array([point.positions for point in message.points], float),
-            np.array([point.time_from_start.to_sec() for point in message.points]))
+    return (
+        joints,
+        np.array([point.positions for point in message.points], float),
+        np.array([point.time_from_start.to_sec() for point in message.points]),
+    )
 
 
-def _check_point(point: JointTrajectoryPoint, where: str, joints: Sequence[str], limits: Limits,
-                 before: float) -> float:
+def _check_point(
+    point: JointTrajectoryPoint, where: str, joints: Sequence[str], limits: Limits, before: float
+) -> float:
     """The point's time, s.
 
     :param before: s, of the point before it.
     :raises BadGoal: naming the point.
     """
     if len(point.positions) != len(joints):
-        raise BadGoal('{} has {} positions for {} joints'.format(where, len(point.positions),
-                                                                 len(joints)))
+        raise BadGoal(
+            '{} has {} positions for {} joints'.format(where, len(point.positions), len(joints))
+        )
     for field in ('velocities', 'accelerations'):
         values = getattr(point, field)
         if len(values) not in (0, len(joints)) or not np.isfinite(values).all():
             raise BadGoal(
                 '{} has {} {}: {}; allowed: none, or a finite one for each of the {} joints'.format(
-                    where, len(values), field, list(values), len(joints)))
+                    where, len(values), field, list(values), len(joints)
+                )
+            )
     for name, position in zip(joints, point.positions):
         lower, upper = limits[name]
         if not lower - 1e-3 <= position <= upper + 1e-3 or math.isinf(position):
-            raise BadGoal('{}: {} cannot be at {:.4g} rad; allowed: {:.4g} to {:.4g}'.format(
-                where, name, position, lower, upper))
+            raise BadGoal(
+                '{}: {} cannot be at {:.4g} rad; allowed: {:.4g} to {:.4g}'.format(
+                    where, name, position, lower, upper
+                )
+            )
     time_s: float = point.time_from_start.to_sec()
     if time_s <= before and not (where == 'point 0' and time_s == 0):
         raise BadGoal(
-            '{} is at {:.3f} s, and the one before it at {:.3f} s; times must increase from 0'.
-            format(where, time_s, before))
+            '{} is at {:.3f} s, and the one before it at {:.3f} s; times must increase '
+            'from 0'.format(where, time_s, before)
+        )
     if time_s > LONGEST_S:
         raise BadGoal('{} is at {:.0f} s; allowed: up to {:g} s'.format(where, time_s, LONGEST_S))
     return time_s
 
 
-def _tolerances(field: str, values: Sequence[JointTolerance],
-                joints: Sequence[str]) -> Dict[str, float]:
+def _tolerances(
+    field: str, values: Sequence[JointTolerance], joints: Sequence[str]
+) -> Dict[str, float]:
     found = {}
     for value in values:
         if value.name not in joints or math.isnan(value.position):
             raise BadGoal(
                 '{}: {!r} with {}; allowed: numbers for the joints of the trajectory, {}'.format(
-                    field, value.name, value.position, ', '.join(joints)))
+                    field, value.name, value.position, ', '.join(joints)
+                )
+            )
         if value.position:
             found[value.name] = value.position if value.position > 0 else math.inf
     return found
@@ -139,12 +171,17 @@ def gap_of(position: float, max_effort: float, default_effort: float) -> Tuple[f
     :raises BadGoal: for values that are not allowed.
     """
     if not -0.001 <= position <= GRIPPER_OPEN + 0.001:
-        raise BadGoal('position {} m; allowed: 0 to {:g} m between the finger tips'.format(
-            position, GRIPPER_OPEN))
+        raise BadGoal(
+            'position {} m; allowed: 0 to {:g} m between the finger tips'.format(
+                position, GRIPPER_OPEN
+            )
+        )
     if not max_effort <= MOST_EFFORT:
         raise BadGoal(
             'max_effort {} N; allowed: up to {:g} N, 0 or less for the default of {:g} N'.format(
-                max_effort, MOST_EFFORT, default_effort))
+                max_effort, MOST_EFFORT, default_effort
+            )
+        )
     return min(max(position, 0.0), GRIPPER_OPEN), max_effort if max_effort > 0 else default_effort
 
 
@@ -165,8 +202,9 @@ def point_in_base(point: PointStamped, odom_from_base: np.ndarray) -> np.ndarray
     """
     where = np.array([point.point.x, point.point.y, point.point.z])
     if not np.isfinite(where).all() or np.abs(where).max() > LOOKS_TO:
-        raise BadGoal('target {} is not a finite point at most {:g} m away'.format(
-            where.tolist(), LOOKS_TO))
+        raise BadGoal(
+            'target {} is not a finite point at most {:g} m away'.format(where.tolist(), LOOKS_TO)
+        )
     return apply(_base_from(point.header, odom_from_base), where)
 
 
@@ -184,8 +222,11 @@ def odom_from_pose(pose: PoseStamped, odom_from_base: np.ndarray) -> np.ndarray:
         raise BadGoal('target_pose: the base cannot be tilted; only turns about z are allowed')
     found: np.ndarray = odom_from_base @ _base_from(pose.header, odom_from_base) @ goal
     if np.abs(found[:2, 3]).max() > FARTHEST:
-        raise BadGoal('target_pose: x {:.3g}, y {:.3g} m in {}; allowed: -{:g} to {:g} m'.format(
-            found[0, 3], found[1, 3], ODOM_FRAME, FARTHEST, FARTHEST))
+        raise BadGoal(
+            'target_pose: x {:.3g}, y {:.3g} m in {}; allowed: -{:g} to {:g} m'.format(
+                found[0, 3], found[1, 3], ODOM_FRAME, FARTHEST, FARTHEST
+            )
+        )
     return found
 
 
@@ -193,8 +234,9 @@ def _base_from(header: Header, odom_from_base: np.ndarray) -> np.ndarray:
     """4x4, base_footprint from the header's frame."""
     frame = header.frame_id.lstrip('/')
     if frame not in GOAL_FRAMES:
-        raise BadGoal('unknown frame {!r}; allowed: {}'.format(header.frame_id,
-                                                               ', '.join(GOAL_FRAMES)))
+        raise BadGoal(
+            'unknown frame {!r}; allowed: {}'.format(header.frame_id, ', '.join(GOAL_FRAMES))
+        )
     if frame == ODOM_FRAME:
         return inverse(odom_from_base)
     return transform((0.0, 0.0, BASE_LINK_HEIGHT if frame == 'base_link' else 0.0))
@@ -207,10 +249,14 @@ def check_axis(axis: Vector3, frame: str, camera_frames: Sequence[str]) -> None:
     """
     wanted = np.array([axis.x, axis.y, axis.z])
     if frame and frame.lstrip('/') not in camera_frames:
-        raise BadGoal('pointing_frame {!r}; allowed: {}, or none'.format(
-            frame, ', '.join(camera_frames)))
-    if wanted.any() and not (np.isfinite(wanted).all() and np.allclose(wanted[:2], 0.0)
-                             and wanted[2] > 0):
+        raise BadGoal(
+            'pointing_frame {!r}; allowed: {}, or none'.format(frame, ', '.join(camera_frames))
+        )
+    if wanted.any() and not (
+        np.isfinite(wanted).all() and np.allclose(wanted[:2], 0.0) and wanted[2] > 0
+    ):
         raise BadGoal(
             'pointing_axis {}; allowed: 0 0 1, along which the camera looks, or 0 0 0'.format(
-                wanted.tolist()))
+                wanted.tolist()
+            )
+        )

@@ -1,4 +1,5 @@
 """A lab that goes on from trial to trial, as the world's node keeps it."""
+
 import json
 import math
 from pathlib import Path
@@ -30,10 +31,17 @@ class Lab:
         :raises ValueError: for a seed before the run's first.
         """
         if seed < self._run.seed:
-            raise ValueError('seed is {}; allowed: {} or more, where the run begins'.format(
-                seed, self._run.seed))
-        return lab_scene(self._settings.task, self._run, seed, self._state, self._settings.benign,
-                         self._settings.lasting)
+            raise ValueError(
+                'seed is {}; allowed: {} or more, where the run begins'.format(seed, self._run.seed)
+            )
+        return lab_scene(
+            self._settings.task,
+            self._run,
+            seed,
+            self._state,
+            self._settings.benign,
+            self._settings.lasting,
+        )
 
     def leave(self, world: World, verdict: TrialVerdict, took_s: float) -> Dict[str, Any]:
         """Have a trial end, and return what its line of truth says of it.
@@ -54,8 +62,10 @@ def read_lab(settings: WorldSettings) -> Lab:
         data = json.loads(Path(settings.lab).read_text(encoding='utf-8'))
         seed, slot_h, left = data['seed'], data['slot_h'], data['left']
         if not isinstance(seed, int) or seed < 0 or not 0 < slot_h < math.inf:
-            raise ValueError('seed is {}, slot_h is {}; allowed: a whole number from 0, and a '
-                             'number of hours above 0'.format(seed, slot_h))
+            raise ValueError(
+                'seed is {}, slot_h is {}; allowed: a whole number from 0, and a '
+                'number of hours above 0'.format(seed, slot_h)
+            )
         state = state_from(left) if isinstance(left, Mapping) else None
     except (OSError, ValueError, KeyError, TypeError) as err:
         raise LabFileError('~lab: {}: {!r}'.format(settings.lab, err)) from err

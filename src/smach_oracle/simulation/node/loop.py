@@ -1,4 +1,5 @@
 """The one thread that owns the physics: it does jobs, moves the robot, and keeps the time."""
+
 import queue
 import threading
 import time
@@ -48,8 +49,13 @@ class WorldLoop:
     :param after_tick: called after each control period. It publishes what is due.
     """
 
-    def __init__(self, motions: MotionTable, clock: SimClock, settings: WorldSettings,
-                 after_tick: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        motions: MotionTable,
+        clock: SimClock,
+        settings: WorldSettings,
+        after_tick: Callable[[], None],
+    ) -> None:
         self._motions = motions
         self._clock = clock
         self._settings = settings
@@ -89,9 +95,13 @@ class WorldLoop:
         What is due is published on the way. In a world that runs at a pace it does nothing.
         """
         if self._settings.lock_step:
-            pass_time(world, round(seconds / PERIOD_S), self._tick,
-                      lambda periods: self._clock.skip(periods * PERIOD_S),
-                      lambda: bool(self._motions))
+            pass_time(
+                world,
+                round(seconds / PERIOD_S),
+                self._tick,
+                lambda periods: self._clock.skip(periods * PERIOD_S),
+                lambda: bool(self._motions),
+            )
 
     def run(self, closed: Callable[[], None]) -> None:
         """Run until stop(). What a motion or a job raises ends it.

@@ -1,4 +1,5 @@
 """The world node: physics, controllers, camera, and the record of each trial's truth."""
+
 import sys
 import threading
 import time
@@ -88,28 +89,39 @@ class WorldNode:
         if settings.film != NONE:
             self._film = TrialFilm(Path(settings.film), settings.film_events)
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
-        self._clock = SimClock(lambda now: clock.publish(Clock(ros_time(now))),
-                               CLOCK_S[settings.lock_step])
+        self._clock = SimClock(
+            lambda now: clock.publish(Clock(ros_time(now))), CLOCK_S[settings.lock_step]
+        )
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
-        self._state = StatePublisher(publish_description(), list(self._world.joints()),
-                                     settings.lock_step)
+        self._state = StatePublisher(
+            publish_description(), list(self._world.joints()), settings.lock_step
+        )
         self._camera = CameraPublisher()
         self._recognition = Recognition(self._world)
         self._cause = rospy.Publisher('world/cause', TrialCause, queue_size=10, latch=True)
         self._state_due = self._image_due = 0.0
         self._published = -1  # the world's periods at the last state that was published
-        self._controllers = Controllers(self._world, self._loop, self._motions,
-                                        lambda: self._clock.now_ns / 1e9, self._publish_state)
-        self._services = [rospy.Service('world/reset', ResetWorld, self._answer_reset),
-                          # before snapshots: who has these finds it, and charges it from the start
-                          rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
-                          rospy.Service('world/charge_time', ChargeTime, self._answer_charge),
-                          rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
-                          rospy.Service('world/recognise', Recognise, self._answer_recognise)]
+        self._controllers = Controllers(
+            self._world,
+            self._loop,
+            self._motions,
+            lambda: self._clock.now_ns / 1e9,
+            self._publish_state,
+        )
+        self._services = [
+            rospy.Service('world/reset', ResetWorld, self._answer_reset),
+            # before snapshots: who has these finds it, and charges it from the start
+            rospy.Service('world/pass_time', PassTime, self._answer_pass_time),
+            rospy.Service('world/charge_time', ChargeTime, self._answer_charge),
+            rospy.Service('world/snapshot', Snapshot, self._answer_snapshot),
+            rospy.Service('world/recognise', Recognise, self._answer_recognise),
+        ]
         if settings.reveal:  # where experiments run nobody can ask for the truth
-            self._services += [rospy.Service('world/reveal', Reveal, self._answer_reveal),
-                               rospy.Service('world/judge', Judge, self._answer_judge)]
+            self._services += [
+                rospy.Service('world/reveal', Reveal, self._answer_reveal),
+                rospy.Service('world/judge', Judge, self._answer_judge),
+            ]
 
     def run(self) -> None:
         """Serve until close(), in the thread that owns the physics."""
@@ -120,8 +132,9 @@ class WorldNode:
     def close(self) -> None:
         """Stop serving, and end the process within UNREGISTERING_S of the last trial's line."""
         self._loop.stop(LAST_WORDS_S)
-        ShutdownGuard(lambda: None, lambda limit_s: None,
-                      limit_s=UNREGISTERING_S).arm(self.exit_code)
+        ShutdownGuard(lambda: None, lambda limit_s: None, limit_s=UNREGISTERING_S).arm(
+            self.exit_code
+        )
 
     # in the world's thread
 
@@ -194,8 +207,14 @@ class WorldNode:
         self._clock.begin_trial()
         causes = self._world.scene.causes
         self._cause.publish(
-            TrialCause(Header(stamp=ros_time(self._clock.now_ns)), seed, self._settings.task,
-                       [cause.kind for cause in causes], [cause.text for cause in causes]))
+            TrialCause(
+                Header(stamp=ros_time(self._clock.now_ns)),
+                seed,
+                self._settings.task,
+                [cause.kind for cause in causes],
+                [cause.text for cause in causes],
+            )
+        )
         self._publish_state()
 
     def _judge(self) -> TrialVerdict:
@@ -212,8 +231,13 @@ class WorldNode:
         truth.happened(self._world.cause_spans())
         self._world.step(round(REST_S / PERIOD_S))
         verdict = self._judge()
-        record = truth.record(verdict, self._world.harm.found(self._world), sim_s,
-                              self._loop.watch.spent, self._loop.watch.used)
+        record = truth.record(
+            verdict,
+            self._world.harm.found(self._world),
+            sim_s,
+            self._loop.watch.spent,
+            self._loop.watch.used,
+        )
         record.update(self._clock.trial_record())
         if self._lab:
             record.update(self._lab.leave(self._world, verdict, record['sim_s']))
@@ -239,18 +263,21 @@ class WorldNode:
 
     def _answer_snapshot(self, request: SnapshotRequest) -> SnapshotResponse:
         try:
-            return SnapshotResponse(True, '',
-                                    self._loop.call(lambda: self._snapshot(request.camera)))
+            return SnapshotResponse(
+                True, '', self._loop.call(lambda: self._snapshot(request.camera))
+            )
         except WorldStopped as err:
             return SnapshotResponse(False, str(err), rospy.Time())
 
     def _answer_pass_time(self, request: PassTimeRequest) -> PassTimeResponse:
         if not 0 <= request.seconds <= LONGEST_PASS_S:
-            raise rospy.ServiceException('seconds is {}; allowed: 0 to {:g}'.format(
-                request.seconds, LONGEST_PASS_S))
+            raise rospy.ServiceException(
+                'seconds is {}; allowed: 0 to {:g}'.format(request.seconds, LONGEST_PASS_S)
+            )
         try:
             return PassTimeResponse(
-                self._loop.call(lambda: self._pass_time(request.seconds, request.what)))
+                self._loop.call(lambda: self._pass_time(request.seconds, request.what))
+            )
         except WorldStopped as err:
             raise rospy.ServiceException(str(err)) from err
 
@@ -270,7 +297,8 @@ class WorldNode:
     def _answer_reveal(self, request: RevealRequest) -> RevealResponse:
         try:
             bodies = self._loop.call(
-                lambda: reveal(self._world, request.names, ros_time(self._clock.now_ns)))
+                lambda: reveal(self._world, request.names, ros_time(self._clock.now_ns))
+            )
         except (ValueError, WorldStopped) as err:
             return RevealResponse(ok=False, message=str(err))
         scene = self._world.scene
@@ -289,14 +317,16 @@ def main() -> None:
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
         '~lasting, ~lab, ~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, '
-        '~camera_rate, ~camera_binning, ~film, ~film_events, ~reveal; see doc/simulation.md.')
+        '~camera_rate, ~camera_binning, ~film, ~film_events, ~reveal; see doc/simulation.md.'
+    )
     sys.setswitchinterval(SWITCH_S)
     try:
         # before the node is made: rospy looks at it only then
         rospy.set_param('/use_sim_time', True)
     except OSError as err:
-        raise SystemExit('pr2_world: no ROS master at {}: {}'.format(rosgraph.get_master_uri(),
-                                                                     err)) from err
+        raise SystemExit(
+            'pr2_world: no ROS master at {}: {}'.format(rosgraph.get_master_uri(), err)
+        ) from err
     rospy.init_node('pr2_world')
     try:
         node = WorldNode(read_settings(rospy.get_param))

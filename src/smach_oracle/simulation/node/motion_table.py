@@ -1,4 +1,5 @@
 """The motions under way: at most one for each part of the robot."""
+
 from typing import Callable, Dict, List, NamedTuple, Optional
 
 from ..physics.trajectory import Motion, MotionResult
@@ -37,8 +38,9 @@ class MotionTable:
         running = self._running.get(part)
         return running.motion if running else None
 
-    def start(self, part: str, motion: Motion, ended: Callable[[MotionEnd], object],
-              newer: str = '') -> None:
+    def start(
+        self, part: str, motion: Motion, ended: Callable[[MotionEnd], object], newer: str = ''
+    ) -> None:
         """Begin a motion. An older one of the same part ends with the text `newer`.
 
         :param ended: called once, when it has ended.
@@ -77,7 +79,8 @@ class MotionTable:
         over: List[str] = []
         if not self._world.disturbed:
             over = [
-                part for part, running in sorted(self._running.items())
+                part
+                for part, running in sorted(self._running.items())
                 if running.result is not None
             ]
         ended = [self._running.pop(part) for part in over]

@@ -1,4 +1,5 @@
 """The service for people's eyes: what can be recognised in an image that was published."""
+
 from collections import OrderedDict
 from typing import Tuple
 
@@ -40,24 +41,31 @@ class Recognition:
         view = self._views.get(request.stamp)
         chance = chance_of(self._world.scene.seed)
         if view is None:
-            return RecogniseResponse(ok=False, chance=chance,
-                                     message='no image with the stamp {:.3f} is known'.format(
-                                         request.stamp.to_sec()))
+            return RecogniseResponse(
+                ok=False,
+                chance=chance,
+                message='no image with the stamp {:.3f} is known'.format(request.stamp.to_sec()),
+            )
         wanted = self._world.scene.goal.body
         found = recognised(view, request.names or self._world.movable())
         things = [
-            self._message(name, mask, request.stamp) for name, mask in sorted(
-                found.items(), key=lambda item: (item[0] != wanted, item[0]))
+            self._message(name, mask, request.stamp)
+            for name, mask in sorted(found.items(), key=lambda item: (item[0] != wanted, item[0]))
         ]
         return RecogniseResponse(True, '', chance, things)
 
     def _message(self, name: str, mask: np.ndarray, stamp: rospy.Time) -> SeenThing:
         (top, bottom), (left, right) = _span(mask.any(axis=1)), _span(mask.any(axis=0))
-        region = RegionOfInterest(x_offset=left, y_offset=top, width=right - left,
-                                  height=bottom - top)
-        return SeenThing(name, name == self._world.scene.goal.body, name in self._world.movable(),
-                         region,
-                         mask_image(mask[top:bottom, left:right], Header(0, stamp, CAMERA_FRAME)))
+        region = RegionOfInterest(
+            x_offset=left, y_offset=top, width=right - left, height=bottom - top
+        )
+        return SeenThing(
+            name,
+            name == self._world.scene.goal.body,
+            name in self._world.movable(),
+            region,
+            mask_image(mask[top:bottom, left:right], Header(0, stamp, CAMERA_FRAME)),
+        )
 
 
 def _span(there: np.ndarray) -> Tuple[int, int]:

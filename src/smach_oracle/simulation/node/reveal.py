@@ -1,4 +1,5 @@
 """The truth for an expert: the bodies as they are, and where the camera has them."""
+
 import xml.etree.ElementTree as ElementTree
 from typing import Dict, List, NamedTuple, Sequence, Tuple
 
@@ -38,8 +39,9 @@ def reveal(world: World, names: Sequence[str], stamp: rospy.Time) -> List[Reveal
     parts = _body_parts(world)
     unknown = [name for name in names if name not in parts]
     if unknown:
-        raise ValueError('no body {!r} in this scene; there: {}'.format(
-            unknown[0], ', '.join(parts) or 'none'))
+        raise ValueError(
+            'no body {!r} in this scene; there: {}'.format(unknown[0], ', '.join(parts) or 'none')
+        )
     seen = RenderedView(world, camera_pose(world), size_of(world)).bodies
     return [_message(world, name, parts[name], seen, stamp) for name in names or parts]
 
@@ -49,8 +51,9 @@ def _body_parts(world: World) -> Dict[str, _BodyPart]:
     for name in world.body_names:
         body = world.body(name)
         size = np.array(body.size) * ([2, 2, 1] if body.shape == 'cylinder' else [1, 1, 1])
-        found[name] = _BodyPart(name, world.body_pose(name),
-                             np.zeros(3) if body.shape == 'urdf' else size)
+        found[name] = _BodyPart(
+            name, world.body_pose(name), np.zeros(3) if body.shape == 'urdf' else size
+        )
         if dict(body.joint_friction).get(DOOR_JOINT) is not None:
             for part, (pose, extent) in _door_parts(body.urdf).items():
                 found[part] = _BodyPart(name, world.body_pose(name, 'door') @ pose, extent)
@@ -76,17 +79,27 @@ def _extent(solid: ElementTree.Element) -> np.ndarray:
     return np.array([across, across, float(solid.get('length', 0))])
 
 
-def _message(world: World, name: str, part: _BodyPart, seen: np.ndarray,
-             stamp: rospy.Time) -> RevealedBody:
+def _message(
+    world: World, name: str, part: _BodyPart, seen: np.ndarray, stamp: rospy.Time
+) -> RevealedBody:
     pose = inverse(world.true_base()) @ part.pose
     body = world.body(part.body)
     region, visible = _region(world, part, seen) if part.size.any() else (RegionOfInterest(), 0.0)
     return RevealedBody(
-        name=name, size=Vector3(*part.size), movable=name in world.movable(), region=region,
-        visible=visible, pose=PoseStamped(Header(stamp=stamp, frame_id=BASE_FRAME),
-                                          Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose)))),
-        held=world.holding(part.body) if name == part.body else '', angle=world.body_joint(
-            part.body, DOOR_JOINT) if DOOR_JOINT in dict(body.joint_friction) else 0.0)
+        name=name,
+        size=Vector3(*part.size),
+        movable=name in world.movable(),
+        region=region,
+        visible=visible,
+        pose=PoseStamped(
+            Header(stamp=stamp, frame_id=BASE_FRAME),
+            Pose(Point(*pose[:3, 3]), Quaternion(*quaternion(pose))),
+        ),
+        held=world.holding(part.body) if name == part.body else '',
+        angle=world.body_joint(part.body, DOOR_JOINT)
+        if DOOR_JOINT in dict(body.joint_friction)
+        else 0.0,
+    )
 
 
 def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfInterest, float]:
@@ -100,18 +113,25 @@ def _region(world: World, part: _BodyPart, seen: np.ndarray) -> Tuple[RegionOfIn
     width, height = size_of(world)
     left, top = np.maximum(np.floor(pixels[:, :2].min(axis=0)).astype(int), 0)
     right, bottom = np.minimum(
-        np.ceil(pixels[:, :2].max(axis=0)).astype(int), (width - 1, height - 1))
+        np.ceil(pixels[:, :2].max(axis=0)).astype(int), (width - 1, height - 1)
+    )
     if right < left or bottom < top:
         return RegionOfInterest(), 0.0
-    window = seen[top:bottom + 1, left:right + 1]
+    window = seen[top : bottom + 1, left : right + 1]
     own = [index for index in np.unique(window) if world.seen_as(int(index)) == part.body]
     rows, columns = np.nonzero(np.isin(window, own))
     if not len(rows):
         return RegionOfInterest(), 0.0
     outline = _area(pixels[:, :2])
-    return (RegionOfInterest(x_offset=int(left + columns.min()), y_offset=int(top + rows.min()),
-                             width=int(np.ptp(columns)) + 1, height=int(np.ptp(rows)) + 1),
-            float(min(1.0, len(rows) / max(outline, 1.0))))
+    return (
+        RegionOfInterest(
+            x_offset=int(left + columns.min()),
+            y_offset=int(top + rows.min()),
+            width=int(np.ptp(columns)) + 1,
+            height=int(np.ptp(rows)) + 1,
+        ),
+        float(min(1.0, len(rows) / max(outline, 1.0))),
+    )
 
 
 def _area(points: np.ndarray) -> float:

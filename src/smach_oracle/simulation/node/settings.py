@@ -1,4 +1,5 @@
 """The parameters of the world node."""
+
 import os
 from typing import Any, Callable, NamedTuple, TypeVar
 
@@ -56,6 +57,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
     :param get: ``get(name, default)``, as rospy.get_param.
     :raises SettingsError: naming the parameter, its value and what is allowed.
     """
+
     def number(name: str, default: float, low: float, high: float) -> float:
         allowed = 'a number from {:g} to {:g}'.format(low, high)
         return taken(name, default, checks.number(low, high, allowed))
@@ -66,7 +68,8 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
 
     factor = number('real_time_factor', 0.0, 0.0, 100.0)
     return WorldSettings(
-        task=taken('task', TASKS[0], checks.choice(TASKS)), real_time_factor=factor,
+        task=taken('task', TASKS[0], checks.choice(TASKS)),
+        real_time_factor=factor,
         seed=taken('seed', 0, checks.whole(0, 'a whole number from 0')),
         benign=taken('benign', False, checks.flag),
         lasting=number('lasting', LASTING_SHARE, 0.0, 1.0),
@@ -74,11 +77,13 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
         idle_speed=number('idle_speed', 10.0, 0.0, 1000.0),
         idle_grace=number('idle_grace', 0.1, 0.0, 60.0),
         truth_file=taken('truth_file', NONE, _writable_file),
-        lab=taken('lab', NONE, _file), film=taken('film', NONE, _folder),
+        lab=taken('lab', NONE, _file),
+        film=taken('film', NONE, _folder),
         film_events=taken('film_events', NONE, _topic),
         state_rate=number('state_rate', 10.0 if factor else 1.0, 0.1, 60.0),
         camera_rate=number('camera_rate', 2.0 if factor else 0.0, 0.0, 30.0),
-        camera_binning=taken('camera_binning', 1, _one_or_two))
+        camera_binning=taken('camera_binning', 1, _one_or_two),
+    )
 
 
 def _one_or_two(key: str, value: object) -> int:

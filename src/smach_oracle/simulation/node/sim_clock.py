@@ -1,4 +1,5 @@
 """Simulated time, which only goes forward."""
+
 from typing import Any, Callable, Dict, List, Tuple
 
 MIN_STEP_NS = 1_000_000  # between two stamps that were asked for
@@ -67,8 +68,12 @@ class SimClock:
         A pause is a time in which the world stood still, as [begin, length], s. So a time of this
         clock can be told in the world's time.
         """
-        return {'clock_s': round(self._trial_ns / 1e9, 3), 'pauses': [
-            [round(begin / 1e9, 3), round(length / 1e9, 3)] for begin, length in self._pauses]}
+        return {
+            'clock_s': round(self._trial_ns / 1e9, 3),
+            'pauses': [
+                [round(begin / 1e9, 3), round(length / 1e9, 3)] for begin, length in self._pauses
+            ],
+        }
 
     def publish(self) -> None:
         """Publish the time now."""

@@ -1,4 +1,5 @@
 """Joint states, transforms and odometry of the simulated PR2, and its description."""
+
 from typing import List, Mapping
 
 import numpy as np
@@ -55,12 +56,15 @@ class StatePublisher:
             other.
         """
         self._tree = TransformTree(urdf, joints)
-        self._states = rospy.Publisher('joint_states', JointState, queue_size=100, tcp_nodelay=True,
-                                       latch=latch)
-        self._odometry = rospy.Publisher('base_odometry/odom', Odometry, queue_size=100,
-                                         tcp_nodelay=True, latch=latch)
-        self._moving = rospy.Publisher('/tf', TFMessage, queue_size=100, tcp_nodelay=True,
-                                       latch=latch)
+        self._states = rospy.Publisher(
+            'joint_states', JointState, queue_size=100, tcp_nodelay=True, latch=latch
+        )
+        self._odometry = rospy.Publisher(
+            'base_odometry/odom', Odometry, queue_size=100, tcp_nodelay=True, latch=latch
+        )
+        self._moving = rospy.Publisher(
+            '/tf', TFMessage, queue_size=100, tcp_nodelay=True, latch=latch
+        )
         self._fixed = rospy.Publisher('/tf_static', TFMessage, queue_size=10, latch=True)
         self._fixed_sent = False
 
@@ -74,12 +78,21 @@ class StatePublisher:
         self._odometry.publish(odometry(world.odom_from_base(), world.robot.base_velocity(), stamp))
         velocities, efforts = world.joint_velocities(), world.joint_efforts()
         names = sorted(positions)
-        self._states.publish(JointState(Header(stamp=stamp), names, *(
-            [values[name] for name in names] for values in (positions, velocities, efforts))))
+        self._states.publish(
+            JointState(
+                Header(stamp=stamp),
+                names,
+                *([values[name] for name in names] for values in (positions, velocities, efforts)),
+            )
+        )
 
 
-def transforms(tree: TransformTree, positions: Mapping[str, float], odom_from_base: np.ndarray,
-               stamp: rospy.Time) -> TFMessage:
+def transforms(
+    tree: TransformTree,
+    positions: Mapping[str, float],
+    odom_from_base: np.ndarray,
+    stamp: rospy.Time,
+) -> TFMessage:
     """The transforms of what moves, as a message for /tf.
 
     :param positions: rad or m by joint.
@@ -100,12 +113,18 @@ def odometry(odom_from_base: np.ndarray, velocity: np.ndarray, stamp: rospy.Time
     link = link_transform(ODOM_FRAME, BASE_FRAME, odom_from_base)
     forward, left, turn = velocity
     return Odometry(
-        Header(stamp=stamp, frame_id=link.parent), link.child,
+        Header(stamp=stamp, frame_id=link.parent),
+        link.child,
         PoseWithCovariance(Pose(Point(*link.position), Quaternion(*link.turn)), [0.0] * 36),
-        TwistWithCovariance(Twist(Vector3(forward, left, 0.0), Vector3(0.0, 0.0, turn)),
-                            [0.0] * 36))
+        TwistWithCovariance(
+            Twist(Vector3(forward, left, 0.0), Vector3(0.0, 0.0, turn)), [0.0] * 36
+        ),
+    )
 
 
 def _stamped(link: LinkTransform, stamp: rospy.Time) -> TransformStamped:
-    return TransformStamped(Header(stamp=stamp, frame_id=link.parent), link.child,
-                            Transform(Vector3(*link.position), Quaternion(*link.turn)))
+    return TransformStamped(
+        Header(stamp=stamp, frame_id=link.parent),
+        link.child,
+        Transform(Vector3(*link.position), Quaternion(*link.turn)),
+    )

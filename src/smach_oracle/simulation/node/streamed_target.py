@@ -1,4 +1,5 @@
 """Joint targets that come in a stream, as from a person who drives an arm."""
+
 from typing import Dict, Optional, Sequence
 
 from ..physics.pr2_body import PERIOD

@@ -1,4 +1,5 @@
 """Videos of trials, for people: one for each, as seen from where one might stand."""
+
 import queue
 from pathlib import Path
 from typing import Optional

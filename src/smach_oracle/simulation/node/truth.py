@@ -1,4 +1,5 @@
 """The record of a trial's truth: one line of JSON for each trial that has ended."""
+
 import json
 import os
 import time
@@ -22,8 +23,9 @@ class TrialTruth:
         self._sim_s = sim_s
         self._began = time.monotonic() if began_s is None else began_s
         self._causes: List[Dict[str, Any]] = []
-        self.happened([CauseSpan(each.kind, each.text, each.lasting, None, None)
-                       for each in scene.causes])
+        self.happened(
+            [CauseSpan(each.kind, each.text, each.lasting, None, None) for each in scene.causes]
+        )
         self._passed: Dict[str, float] = {}  # s of the world's time, by what took it
         self._charged: Dict[str, float] = {}  # simulated s at which work began that goes on
 
@@ -49,8 +51,14 @@ class TrialTruth:
         """Take the world's log of the causes, as it is at the trial's end."""
         self._causes = [each._asdict() for each in spans]
 
-    def record(self, verdict: TrialVerdict, harm: Tuple[Harm, ...], sim_s: float,
-               spent: Mapping[str, float], used: Mapping[str, float]) -> Dict[str, Any]:
+    def record(
+        self,
+        verdict: TrialVerdict,
+        harm: Tuple[Harm, ...],
+        sim_s: float,
+        spent: Mapping[str, float],
+        used: Mapping[str, float],
+    ) -> Dict[str, Any]:
         """Return the record that is to be written at its end.
 
         :param harm: all that came to harm in it.
@@ -61,17 +69,20 @@ class TrialTruth:
         for what in tuple(self._charged):
             self.charge(what, False, sim_s)
         return {
-            'seed': self._scene.seed, 'task': self._scene.task, 'success': verdict.success,
-            'why': verdict.why, 'wrong_object': verdict.wrong_object, 'damage': harm_record(harm),
+            'seed': self._scene.seed,
+            'task': self._scene.task,
+            'success': verdict.success,
+            'why': verdict.why,
+            'wrong_object': verdict.wrong_object,
+            'damage': harm_record(harm),
             'causes': self._causes,
-            'sim_s': round(sim_s - self._sim_s, 3), 'passed_s': {
-                what: round(seconds, 3)
-                for what, seconds in sorted(self._passed.items())
-            }, 'wall_s': round(wall, 3), 'share': {
-                what: round(seconds / max(wall, 1e-9), 4)
-                for what, seconds in sorted(spent.items())
-            }, 'cpu_s': {what: round(seconds, 4)
-                         for what, seconds in sorted(used.items())}
+            'sim_s': round(sim_s - self._sim_s, 3),
+            'passed_s': {what: round(seconds, 3) for what, seconds in sorted(self._passed.items())},
+            'wall_s': round(wall, 3),
+            'share': {
+                what: round(seconds / max(wall, 1e-9), 4) for what, seconds in sorted(spent.items())
+            },
+            'cpu_s': {what: round(seconds, 4) for what, seconds in sorted(used.items())},
         }
 
 

@@ -1,4 +1,5 @@
 """The head camera: PyBullet's software renderer, with the errors of a depth camera."""
+
 import math
 from typing import List, Optional, Tuple
 
@@ -22,13 +23,23 @@ FOCAL = HEIGHT / 2 / math.tan(math.radians(FIELD_OF_VIEW) / 2)  # pixels
 
 def _intrinsics(binning: int) -> np.ndarray:
     focal = FOCAL / binning
-    return np.array([[focal, 0.0, (WIDTH // binning - 1) / 2],
-                     [0.0, focal, (HEIGHT // binning - 1) / 2], [0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [focal, 0.0, (WIDTH // binning - 1) / 2],
+            [0.0, focal, (HEIGHT // binning - 1) / 2],
+            [0.0, 0.0, 1.0],
+        ]
+    )
 
 
 INTRINSICS = _intrinsics(1)  # of the sensor
-LIGHT = {'lightDirection': [1.0, 1.5, 3.0], 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.5,
-         'lightSpecularCoeff': 0.05, 'shadow': 0}
+LIGHT = {
+    'lightDirection': [1.0, 1.5, 3.0],
+    'lightAmbientCoeff': 0.55,
+    'lightDiffuseCoeff': 0.5,
+    'lightSpecularCoeff': 0.05,
+    'shadow': 0,
+}
 IMAGE_PERIODS = 2  # control periods that an image takes
 BASELINE = 0.075  # m, between projector and sensor: gives the steps in which depth comes
 EDGE = 0.03  # m: a jump of depth between neighbours from which the edge is lost, mostly
@@ -64,9 +75,15 @@ class RenderedView:
     It has `colour` (h, w, 3) uint8 RGB, `depth` (h, w) m, and `bodies` (h, w) by their numbers.
     """
 
-    def __init__(self, world: World, world_from_camera: np.ndarray,
-                 size: Tuple[int, int] = (WIDTH, HEIGHT), field_of_view: float = FIELD_OF_VIEW,
-                 far: float = FAR, **light: object) -> None:
+    def __init__(
+        self,
+        world: World,
+        world_from_camera: np.ndarray,
+        size: Tuple[int, int] = (WIDTH, HEIGHT),
+        field_of_view: float = FIELD_OF_VIEW,
+        far: float = FAR,
+        **light: object,
+    ) -> None:
         """Render the world.
 
         :param world_from_camera: 4x4, m, z forward, x right, y down.
@@ -76,13 +93,22 @@ class RenderedView:
         :param light: options of pybullet.getCameraImage that override LIGHT.
         """
         width, height = size
-        eye, forward, up = world_from_camera[:3, 3], world_from_camera[:3,
-                                                                       2], -world_from_camera[:3, 1]
+        eye, forward, up = (
+            world_from_camera[:3, 3],
+            world_from_camera[:3, 2],
+            -world_from_camera[:3, 1],
+        )
         matrix = pybullet.computeViewMatrix(eye.tolist(), (eye + forward).tolist(), up.tolist())
         projection = _projection(size, field_of_view, far)
-        image = pybullet.getCameraImage(width, height, matrix, projection,
-                                        renderer=pybullet.ER_TINY_RENDERER,
-                                        physicsClientId=world.client, **dict(LIGHT, **light))
+        image = pybullet.getCameraImage(
+            width,
+            height,
+            matrix,
+            projection,
+            renderer=pybullet.ER_TINY_RENDERER,
+            physicsClientId=world.client,
+            **dict(LIGHT, **light),
+        )
         self.colour = np.asarray(image[2], np.uint8).reshape(height, width, 4)[..., :3].copy()
         buffer = np.asarray(image[3], float).reshape(height, width)
         # m along the axis. `far` where there is nothing
@@ -98,10 +124,14 @@ def _projection(size: Tuple[int, int], field_of_view: float, far: float) -> List
     """
     width, height = size
     pixel = NEAR * 2 * math.tan(math.radians(field_of_view) / 2) / height
-    matrix: List[float] = pybullet.computeProjectionMatrix(pixel * (1 - width) / 2,
-                                                           pixel * (width + 1) / 2,
-                                                           pixel * (1 - height) / 2,
-                                                           pixel * (height + 1) / 2, NEAR, far)
+    matrix: List[float] = pybullet.computeProjectionMatrix(
+        pixel * (1 - width) / 2,
+        pixel * (width + 1) / 2,
+        pixel * (1 - height) / 2,
+        pixel * (height + 1) / 2,
+        NEAR,
+        far,
+    )
     return matrix
 
 
@@ -123,18 +153,24 @@ def take_image(world: World, counted: bool = True) -> CameraImage:
     dazzled = lights.dazzled(world.periods, pose, intrinsics_of(world), size_of(world))
     world.labels = rendered.bodies
     generator = np.random.default_rng([world.scene.seed, 102, world.periods])
-    image = CameraImage(world.time,
-                        noisy_colour(rendered.colour, quality, generator, dazzled),
-                        noisy_depth(rendered.depth, quality, generator, world.binning, dazzled),
-                        intrinsics_of(world),
-                        believed_camera(world))
+    image = CameraImage(
+        world.time,
+        noisy_colour(rendered.colour, quality, generator, dazzled),
+        noisy_depth(rendered.depth, quality, generator, world.binning, dazzled),
+        intrinsics_of(world),
+        believed_camera(world),
+    )
     if counted:
         world.happened('see')
     return image
 
 
-def noisy_colour(colour: np.ndarray, quality: CameraQuality, generator: np.random.Generator,
-                 dazzled: Optional[np.ndarray] = None) -> np.ndarray:
+def noisy_colour(
+    colour: np.ndarray,
+    quality: CameraQuality,
+    generator: np.random.Generator,
+    dazzled: Optional[np.ndarray] = None,
+) -> np.ndarray:
     """(h, w, 3) uint8, as dark as the light is and with noise in every channel.
 
     :param dazzled: (h, w), the share of each pixel that is lost to glare: white where it is 1.
@@ -146,8 +182,13 @@ def noisy_colour(colour: np.ndarray, quality: CameraQuality, generator: np.rando
     return np.clip(seen, 0, 255).astype(np.uint8)
 
 
-def noisy_depth(depth: np.ndarray, quality: CameraQuality, generator: np.random.Generator,
-                binning: int = 1, dazzled: Optional[np.ndarray] = None) -> np.ndarray:
+def noisy_depth(
+    depth: np.ndarray,
+    quality: CameraQuality,
+    generator: np.random.Generator,
+    binning: int = 1,
+    dazzled: Optional[np.ndarray] = None,
+) -> np.ndarray:
     """(h, w) float32 m, with a Kinect's noise, steps, lost edges and lost pixels.
 
     NaN beyond FAR. The camera brings its own light: in the dark it sees a little less, and no
@@ -164,7 +205,7 @@ def noisy_depth(depth: np.ndarray, quality: CameraQuality, generator: np.random.
     chance = generator.random(depth.shape, np.float32)
     jumps = ndimage.maximum_filter(known, 3) - ndimage.minimum_filter(known, 3) > EDGE
     at_edge = jumps & (chance < LOST_EDGE / binning)
-    missing = np.full(depth.shape, quality.dropout + LOST_IN_THE_DARK * dark ** 2)
+    missing = np.full(depth.shape, quality.dropout + LOST_IN_THE_DARK * dark**2)
     if dazzled is not None:
         missing += dazzled
     lost = at_edge | (chance > 1.0 - np.minimum(1.0, missing))

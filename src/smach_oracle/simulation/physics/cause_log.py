@@ -1,4 +1,5 @@
 """The world's own log of a trial's causes: when each began, and when it ended."""
+
 from typing import Dict, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 import numpy as np
@@ -68,8 +69,12 @@ class CauseLog:
         :param busy: whether a disturbance is still moving something.
         """
         for cause in self._causes:
-            if not cause.until or cause.kind in self._ended or busy or \
-                    self._began.get(cause.kind, world.periods + 1) > world.periods:
+            if (
+                not cause.until
+                or cause.kind in self._ended
+                or busy
+                or self._began.get(cause.kind, world.periods + 1) > world.periods
+            ):
                 continue
             now = {name: _place(world, name) for name in cause.until}
             start = self._starts.setdefault(cause.kind, now)
@@ -82,18 +87,28 @@ class CauseLog:
         :param since: the control period at which the trial began.
         :param period: that at which it ended.
         """
+
         def second(moments: Dict[str, int], kind: str) -> Optional[float]:
             moment = moments.get(kind)
             if moment is None or moment > period:
                 return None
             return round(max(0, moment - since) * PERIOD, 2)
-        return [CauseSpan(each.kind, each.text, each.lasting, second(self._began, each.kind),
-                          second(self._ended, each.kind)) for each in self._causes]
+
+        return [
+            CauseSpan(
+                each.kind,
+                each.text,
+                each.lasting,
+                second(self._began, each.kind),
+                second(self._ended, each.kind),
+            )
+            for each in self._causes
+        ]
 
 
 def _place(world: LoggedWorld, name: str) -> Start:
     if name.startswith(ARM_PREFIX):
-        return world.joints()[name[len(ARM_PREFIX):]]
+        return world.joints()[name[len(ARM_PREFIX) :]]
     if name == LOCALISATION:
         return world.map_error[:3, 3]
     return world.body_pose(name)[:3, 3]

@@ -21,6 +21,7 @@ right), torso, look_at, depart, drive, see. A disturbance that has ``near`` coun
 happen near to that place. The place of look_at and see is the camera's, that of depart is where
 the drive goes, and that of all others is the base's.
 """
+
 import math
 from typing import Dict, List, NamedTuple, Protocol
 
@@ -37,7 +38,8 @@ from .pr2_body import PERIOD, Pr2Body, arm_of
 from .pushed_arm import SETTLING_S
 
 EVENTS = ('start', 'follow', 'torso', 'look_at', 'depart', 'drive', 'see') + tuple(
-    '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS)
+    '{}_{}'.format(what, arm) for what in ('follow', 'open', 'close') for arm in ARMS
+)
 SEEING = ('look_at', 'see')  # events that happen where the camera is
 FASTEST = 0.5  # m/s, of a nudge
 LOOK_PERIODS = 30  # control periods from one look at what has become of the causes to the next
@@ -93,8 +95,9 @@ class _Outstanding:
     def comes_with(self, event: str, place: np.ndarray) -> bool:
         """Whether an event at a place (3,) is the one. It is counted."""
         near = self.disturbance.near
-        if event == self._event and (near is None or float(
-                np.linalg.norm(place - near.place)) <= near.within):
+        if event == self._event and (
+            near is None or float(np.linalg.norm(place - near.place)) <= near.within
+        ):
             self._left -= 1
             return self._left == 0
         return False
@@ -176,8 +179,14 @@ class Disturbances:
             values = _values(disturbance)
             self.log.began(disturbance.cause, world.periods)
             self._moving.append(
-                _ActiveDisturbance(disturbance, values, _periods(disturbance, values),
-                                   world.periods, _start(world, disturbance)))
+                _ActiveDisturbance(
+                    disturbance,
+                    values,
+                    _periods(disturbance, values),
+                    world.periods,
+                    _start(world, disturbance),
+                )
+            )
         self._due = [each for each in self._due if each not in now]
         for active in list(self._moving):
             done = world.periods - active.begun
@@ -185,8 +194,11 @@ class Disturbances:
                 self._moving.remove(active)
                 self.log.ended(active.cause.cause, world.periods)
             if active.cause.kind == 'arm' and not done:
-                world.push_arm({name: active.values[name] for name in active.start},
-                               active.values['duration'], bool(active.values['motors']))
+                world.push_arm(
+                    {name: active.values[name] for name in active.start},
+                    active.values['duration'],
+                    bool(active.values['motors']),
+                )
             elif active.cause.kind.startswith('swing'):
                 _swing_body(world, active, done)
             elif active.cause.kind != 'arm':
@@ -196,8 +208,15 @@ class Disturbances:
 def _move_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
     name, share = active.cause.kind.partition(':')[2], min(1.0, (done + 1) / active.periods)
     x, y = world.body_pose(name)[:2, 3]
-    pace = np.array([active.start['x'] + share * active.values['dx'] - x,
-                     active.start['y'] + share * active.values['dy'] - y]) / PERIOD
+    pace = (
+        np.array(
+            [
+                active.start['x'] + share * active.values['dx'] - x,
+                active.start['y'] + share * active.values['dy'] - y,
+            ]
+        )
+        / PERIOD
+    )
     let_go = done >= active.periods
     pace *= 0.0 if let_go else min(1.0, FASTEST / max(float(np.hypot(*pace)), 1e-9))
     world.slide_body(name, pace[0], pace[1], let_go)
@@ -206,14 +225,16 @@ def _move_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> 
 def _swing_body(world: DisturbedWorld, active: _ActiveDisturbance, done: int) -> None:
     name, let_go = active.cause.kind.partition(':')[2], done >= active.periods
     for joint, start in active.start.items():
-        goal = start + eased(min(1.0,
-                                 (done + 1) / active.periods)) * (active.values['angle'] - start)
+        goal = start + eased(min(1.0, (done + 1) / active.periods)) * (
+            active.values['angle'] - start
+        )
         world.turn_body(name, joint, (goal - world.body_joint(name, joint)) / PERIOD, let_go)
 
 
 def _values(disturbance: Disturbance) -> Dict[str, float]:
-    return dict({'delay': 0.0, **OPTIONS[disturbance.kind.partition(':')[0]]},
-                **dict(disturbance.values))
+    return dict(
+        {'delay': 0.0, **OPTIONS[disturbance.kind.partition(':')[0]]}, **dict(disturbance.values)
+    )
 
 
 def _periods(disturbance: Disturbance, values: Dict[str, float]) -> int:
@@ -233,8 +254,9 @@ def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
 
 def _joints(disturbance: Disturbance) -> List[str]:
     """Those that an ``arm`` names."""
-    return [name for name, _ in disturbance.values
-            if name not in OPTIONS['arm'] and name != 'delay']
+    return [
+        name for name, _ in disturbance.values if name not in OPTIONS['arm'] and name != 'delay'
+    ]
 
 
 def _numbered(event: str) -> str:
@@ -249,13 +271,16 @@ def _check(disturbance: Disturbance, scene: Scene, robot: Pr2Body) -> None:
         wrong = 'unknown kind; allowed: {}'.format(', '.join(OPTIONS))
     elif event not in EVENTS or not number.isdigit() or int(number) < 1:
         wrong = 'unknown event {!r}; allowed: {}, each with :NUMBER'.format(
-            disturbance.after, ', '.join(EVENTS))
-    elif disturbance.near and not (disturbance.near.within > 0 and all(
-            map(math.isfinite, disturbance.near.place))):
+            disturbance.after, ', '.join(EVENTS)
+        )
+    elif disturbance.near and not (
+        disturbance.near.within > 0 and all(map(math.isfinite, disturbance.near.place))
+    ):
         wrong = 'near is {}; allowed: a place of finite m, within more than 0 m'.format(
-            tuple(disturbance.near))
+            tuple(disturbance.near)
+        )
     elif kind == 'swing' and body not in [
-            each.name for each in scene.bodies if each.shape == 'urdf'
+        each.name for each in scene.bodies if each.shape == 'urdf'
     ]:
         wrong = 'no body {!r} with joints'.format(body)
     elif kind == 'nudge' and body not in [each.name for each in scene.bodies if each.mass > 0]:

@@ -1,4 +1,5 @@
 """Doors that fall shut by themselves, as those of many refrigerators do, and dry friction."""
+
 from typing import Dict, List, Mapping, Tuple
 
 import pybullet
@@ -17,8 +18,10 @@ class DoorHinges:
         self._client = client
         self._placed = placed
         self._closing: List[Tuple[str, str, ClosingHinge]] = [
-            (name, joint, hinge) for name, each in placed.items()
-            for joint, hinge in each.body.joint_closing]
+            (name, joint, hinge)
+            for name, each in placed.items()
+            for joint, hinge in each.body.joint_closing
+        ]
         self._driven: Dict[Tuple[str, str], bool] = {}  # by a person, just now
 
     def tick(self) -> None:
@@ -46,13 +49,20 @@ class DoorHinges:
         return dict(self._placed[name].body.joint_friction).get(joint, 0.0)
 
     def _angle(self, name: str, joint: str) -> float:
-        angle: float = pybullet.getJointState(self._placed[name].number,
-                                              self._placed[name].joints[joint],
-                                              physicsClientId=self._client)[0]
+        angle: float = pybullet.getJointState(
+            self._placed[name].number,
+            self._placed[name].joints[joint],
+            physicsClientId=self._client,
+        )[0]
         return angle
 
     def _drive(self, name: str, joint: str, speed: float, torque: float) -> None:
         placed = self._placed[name]
-        pybullet.setJointMotorControl2(placed.number, placed.joints[joint],
-                                       pybullet.VELOCITY_CONTROL, targetVelocity=speed,
-                                       force=torque, physicsClientId=self._client)
+        pybullet.setJointMotorControl2(
+            placed.number,
+            placed.joints[joint],
+            pybullet.VELOCITY_CONTROL,
+            targetVelocity=speed,
+            force=torque,
+            physicsClientId=self._client,
+        )

@@ -3,6 +3,7 @@
 It looks at every thing ten times a second, and judges a thing when that has come to rest again. It
 only looks: physics is the same with it and without.
 """
+
 from typing import Dict, List, NamedTuple, Protocol, Tuple
 
 import numpy as np
@@ -68,8 +69,9 @@ class HarmWatch:
             pose = world.body_pose(name)
             seen = self._things.get(name)
             if seen is None:
-                self._things[name] = _Watched(pose, False, _bottom(world.body(name), pose),
-                                            _stands(pose))
+                self._things[name] = _Watched(
+                    pose, False, _bottom(world.body(name), pose), _stands(pose)
+                )
             else:
                 self._things[name] = self._looked(world, name, seen, pose)
 
@@ -79,8 +81,11 @@ class HarmWatch:
 
     def found(self, world: HarmedWorld) -> Tuple[Harm, ...]:
         """All that came to harm so far, in its order. What still moves is judged as it is."""
-        now = [(name, self._harm(world, name, seen, world.body_pose(name)))
-               for name, seen in self._things.items() if not seen.held]
+        now = [
+            (name, self._harm(world, name, seen, world.body_pose(name)))
+            for name, seen in self._things.items()
+            if not seen.held
+        ]
         return tuple(self._done + [Harm(kind, name) for name, kind in now if kind])
 
     def _looked(self, world: HarmedWorld, name: str, seen: _Watched, pose: np.ndarray) -> _Watched:

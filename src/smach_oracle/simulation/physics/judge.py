@@ -1,4 +1,5 @@
 """Whether a trial was a true success, by the world's bodies alone."""
+
 from typing import List, NamedTuple, Tuple
 
 import numpy as np
@@ -38,15 +39,22 @@ def judge(world: World, goal: Goal) -> TrialVerdict:
         faults = _faults(world, goal, name, off)
         if not faults:
             return TrialVerdict(
-                True, '{} {}, {:.1f} cm off'.format(
-                    name, 'stands at its goal'
-                    if goal.kind == 'stands_at' else 'is in the receiving hand', 100 * off))
+                True,
+                '{} {}, {:.1f} cm off'.format(
+                    name,
+                    'stands at its goal'
+                    if goal.kind == 'stands_at'
+                    else 'is in the receiving hand',
+                    100 * off,
+                ),
+            )
         found.append((off, name, ', '.join(faults)))
     _, name, text = min(found)
     why = '{} {}'.format(name, text)
     wrong = _wrong_object(world, goal) if goal.body else ''
     return TrialVerdict(
-        False, 'wrong object: {} was brought, {}'.format(wrong, why) if wrong else why, wrong)
+        False, 'wrong object: {} was brought, {}'.format(wrong, why) if wrong else why, wrong
+    )
 
 
 def _wrong_object(world: World, goal: Goal) -> str:
@@ -79,8 +87,9 @@ def _faults(world: World, goal: Goal, name: str, off: float) -> List[str]:
     if goal.kind == 'in_hand' and RECEIVER not in touching:
         faults.append('does not lie in the {}'.format(RECEIVER))
     if goal.kind == 'stands_at' and abs(height) > HEIGHT:
-        faults.append('is {:.0f} cm too {}'.format(100 * abs(height),
-                                                   'high' if height > 0 else 'low'))
+        faults.append(
+            'is {:.0f} cm too {}'.format(100 * abs(height), 'high' if height > 0 else 'low')
+        )
     if goal.kind == 'stands_at' and not touching - {'robot'}:
         faults.append('stands on nothing')
     return faults

@@ -1,4 +1,5 @@
 """The end of a trial in a lab where the robot goes on: what a person does there then."""
+
 from typing import Tuple
 
 import numpy as np
@@ -22,14 +23,14 @@ def left_by(world: World, success: bool, began: float, ended: float) -> LabState
     :param began: h of the run at which the trial began.
     :param ended: likewise.
     """
-    things = tuple(_left(world, name) for name in world.movable()
-                   if name != world.scene.goal.body)
+    things = tuple(_left(world, name) for name in world.movable() if name != world.scene.goal.body)
     state = LabState(began, ended, things)
     if not success:
         return state
     odom = world.odom_from_base() @ inverse(world.true_base())
-    return state._replace(joints=_joints(world), base=_planar(world.true_base()),
-                          localisation=_planar(odom))
+    return state._replace(
+        joints=_joints(world), base=_planar(world.true_base()), localisation=_planar(odom)
+    )
 
 
 def _left(world: World, name: str) -> Body:
@@ -45,8 +46,7 @@ def _left(world: World, name: str) -> Body:
 def _joints(world: World) -> Tuple[Tuple[str, float], ...]:
     """Return where the joints are by their encoders, within their limits."""
     limits, found = world.robot.limits, world.joints()
-    return tuple((name, min(max(found[name], limits[name][0]), limits[name][1]))
-                 for name in JOINTS)
+    return tuple((name, min(max(found[name], limits[name][0]), limits[name][1])) for name in JOINTS)
 
 
 def _planar(pose: np.ndarray) -> Vector:

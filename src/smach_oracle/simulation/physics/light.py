@@ -5,6 +5,7 @@ the ray to that point, the place itself is too bright, and so is its mirror imag
 the opposite side of the image's centre: from a base or a torso elsewhere there is none, and with
 another direction of the head the patch lies on other things.
 """
+
 from typing import Dict, List, NamedTuple, Tuple
 
 import numpy as np
@@ -16,8 +17,17 @@ from ..scenes.scene import CameraQuality
 # of a disturbance: what may be given, and what it is where it is not
 OPTIONS: Dict[str, Dict[str, float]] = {
     'dim': {'brightness': 0.15, 'duration': 60.0},
-    'glare': {'x': 0.0, 'y': 0.0, 'z': 0.0, 'eye_x': 0.0, 'eye_y': 0.0, 'eye_z': 0.0,
-              'radius': 0.2, 'lobe': 0.2, 'duration': 60.0},
+    'glare': {
+        'x': 0.0,
+        'y': 0.0,
+        'z': 0.0,
+        'eye_x': 0.0,
+        'eye_y': 0.0,
+        'eye_z': 0.0,
+        'radius': 0.2,
+        'lobe': 0.2,
+        'duration': 60.0,
+    },
 }
 PLACES = ('x', 'y', 'z', 'eye_x', 'eye_y', 'eye_z')  # which may be negative, m in the world
 SOFT = 1.3  # times the radius of a patch, or of a lobe, where it has faded out
@@ -49,12 +59,18 @@ class Lights:
         :param quality: of the camera undisturbed.
         """
         for each in self._at('dim', period):
-            quality = quality._replace(brightness=min(quality.brightness,
-                                                      each.values['brightness']))
+            quality = quality._replace(
+                brightness=min(quality.brightness, each.values['brightness'])
+            )
         return quality
 
-    def dazzled(self, period: int, world_from_camera: np.ndarray, intrinsics: np.ndarray,
-                size: Tuple[int, int]) -> np.ndarray:
+    def dazzled(
+        self,
+        period: int,
+        world_from_camera: np.ndarray,
+        intrinsics: np.ndarray,
+        size: Tuple[int, int],
+    ) -> np.ndarray:
         """Return how much of each pixel is lost to glare, (h, w), 0 to 1.
 
         :param world_from_camera: 4x4, z forward.
@@ -67,12 +83,17 @@ class Lights:
         return lost
 
     def _at(self, kind: str, period: int) -> List[Light]:
-        return [each for each in self._all
-                if each.kind == kind and each.begins <= period < each.ends]
+        return [
+            each for each in self._all if each.kind == kind and each.begins <= period < each.ends
+        ]
 
 
-def patches(values: Dict[str, float], world_from_camera: np.ndarray, intrinsics: np.ndarray,
-            size: Tuple[int, int]) -> np.ndarray:
+def patches(
+    values: Dict[str, float],
+    world_from_camera: np.ndarray,
+    intrinsics: np.ndarray,
+    size: Tuple[int, int],
+) -> np.ndarray:
     """The patches of one glare; parameters and result as of `Lights.dazzled`.
 
     :param values: as in OPTIONS; radius and lobe in rad.
@@ -84,13 +105,19 @@ def patches(values: Dict[str, float], world_from_camera: np.ndarray, intrinsics:
     if glint[2] < np.cos(INTO_LENS) * np.linalg.norm(glint):
         return np.zeros(size[::-1], np.float32)
     columns, rows = np.meshgrid(np.arange(size[0]), np.arange(size[1]))
-    rays = np.stack([(columns - intrinsics[0, 2]) / intrinsics[0, 0],
-                     (rows - intrinsics[1, 2]) / intrinsics[1, 1],
-                     np.ones(columns.shape)], axis=-1)
+    rays = np.stack(
+        [
+            (columns - intrinsics[0, 2]) / intrinsics[0, 0],
+            (rows - intrinsics[1, 2]) / intrinsics[1, 1],
+            np.ones(columns.shape),
+        ],
+        axis=-1,
+    )
     mirrored = glint * (-1.0, -1.0, 1.0)
     radius = values['radius']
-    bright = np.maximum(_share(_angle(rays, glint), radius / 2),
-                        _share(_angle(rays, mirrored), radius))
+    bright = np.maximum(
+        _share(_angle(rays, glint), radius / 2), _share(_angle(rays, mirrored), radius)
+    )
     return np.asarray(_share(off, values['lobe']) * bright, np.float32)
 
 

@@ -1,4 +1,5 @@
 """Motions of the PR2's other controllers: grippers, torso, head, base."""
+
 import math
 from typing import List, Optional, Sequence
 
@@ -42,7 +43,9 @@ class GripperMotion:
         if not 0.0 <= position <= GRIPPER_OPEN + 1e-3 or not 0.0 < max_effort <= 200.0:
             raise ValueError(
                 '{} gripper: {} m with {} N; allowed: 0 to {} m, above 0 to 200 N'.format(
-                    arm, position, max_effort, GRIPPER_OPEN))
+                    arm, position, max_effort, GRIPPER_OPEN
+                )
+            )
         self._arm, self._goal, self._effort = arm, min(position, GRIPPER_OPEN), max_effort
         self._gaps: List[float] = []
         self._sent = self._start = 0.0
@@ -59,8 +62,10 @@ class GripperMotion:
         self._sent += min(max(self._goal - self._sent, -step), step)
         world.set_gripper(self._arm, min(max(self._sent, 0.0), GRIPPER_OPEN), self._effort)
         window = round(STALL_S / PERIOD)
-        trembling = len(
-            self._gaps) <= window or max(self._gaps[-window:]) - min(self._gaps[-window:]) > 3e-4
+        trembling = (
+            len(self._gaps) <= window
+            or max(self._gaps[-window:]) - min(self._gaps[-window:]) > 3e-4
+        )
         if trembling and len(self._gaps) * PERIOD < LONGEST_S:
             return None
         reached = abs(gap - self._goal) < 2e-3
@@ -78,8 +83,9 @@ class GripperMotion:
 
         Its pr2_gripper_action sends the present gap, with no effort, where a goal is cancelled.
         """
-        world.set_gripper(self._arm, min(max(world.gap(self._arm), 0.0), GRIPPER_OPEN),
-                          self._effort)
+        world.set_gripper(
+            self._arm, min(max(world.gap(self._arm), 0.0), GRIPPER_OPEN), self._effort
+        )
 
 
 class TorsoMotion(Trajectory):
@@ -95,8 +101,9 @@ class TorsoMotion(Trajectory):
             raise ValueError('torso: height is {}; allowed: 0 to 0.31 m'.format(height))
         self.height = height
         way = abs(height - world.robot.position('torso_lift_joint'))
-        super().__init__(['torso_lift_joint'], np.array([[height]]),
-                         np.array([max(way / TORSO_SPEED, PERIOD)]))
+        super().__init__(
+            ['torso_lift_joint'], np.array([[height]]), np.array([max(way / TORSO_SPEED, PERIOD)])
+        )
 
     def events(self) -> Sequence[str]:
         """See Motion."""
@@ -117,12 +124,14 @@ class HeadMotion(Trajectory):
         here = [world.robot.position(name) for name in NECK[1:]]
         for name, angle in zip(NECK[1:], turn):
             if world.robot.refusal(name, angle):
-                raise ValueError('cannot look at {}: {}'.format(
-                    np.round(np.asarray(point, float), 3).tolist(),
-                    world.robot.refusal(name, angle)))
+                raise ValueError(
+                    'cannot look at {}: {}'.format(
+                        np.round(np.asarray(point, float), 3).tolist(),
+                        world.robot.refusal(name, angle),
+                    )
+                )
         span = max(0.2, float(np.abs(turn - here).max()) / HEAD_SPEED)
-        super().__init__(NECK[1:], turn[None], np.array([span]),
-                         np.zeros((1, 2)))
+        super().__init__(NECK[1:], turn[None], np.array([span]), np.zeros((1, 2)))
 
     def events(self) -> Sequence[str]:
         """See Motion."""
@@ -158,12 +167,14 @@ class BaseMotion:
         done = (world.periods - self._begun) / self._periods
         here, there = (self._place_at(min(1.0, done + more)) for more in (0.0, 1.0 / self._periods))
         lag = np.abs(
-            [world.robot.position(name) - wanted for name, wanted in zip(BASE_JOINTS, here)]).max()
+            [world.robot.position(name) - wanted for name, wanted in zip(BASE_JOINTS, here)]
+        ).max()
         if lag > 0.05:
             self.stop(world)
             return MotionResult(
                 False,
-                'the base is {:.2f} off its way (m or rad): something is in its way'.format(lag))
+                'the base is {:.2f} off its way (m or rad): something is in its way'.format(lag),
+            )
         if done >= 1.0:
             return self._arrive(world, done, lag)
         for name, before, after in zip(BASE_JOINTS, here, there):
@@ -171,13 +182,15 @@ class BaseMotion:
         share = eased(min(1.0, done + 1.0 / self._periods))
         world.belief_error = from_rpy(
             (*(self._errors[0] + share * (self._errors[1] - self._errors[0]))[:2], 0.0),
-            yaw=(self._errors[0] + share * (self._errors[1] - self._errors[0]))[2])
+            yaw=(self._errors[0] + share * (self._errors[1] - self._errors[0]))[2],
+        )
         return None
 
     def _begin(self, world: World) -> None:
         way = inverse(world.odom_from_base()) @ self._goal
         error = world.drive_error(
-            min(1.0, (float(np.hypot(way[0, 3], way[1, 3])) + abs(yaw_of(way))) / LONG_DRIVE))
+            min(1.0, (float(np.hypot(way[0, 3], way[1, 3])) + abs(yaw_of(way))) / LONG_DRIVE)
+        )
         true_goal = inverse(world.map_error) @ self._goal @ error
         self._begun = world.periods
         self._start = np.array([world.robot.position(name) for name in BASE_JOINTS])
@@ -198,8 +211,11 @@ class BaseMotion:
         waited = (done - 1.0) * self._periods * PERIOD
         if lag < GOAL_TOLERANCE and waited >= ARRIVAL_S[0]:
             return MotionResult(True)
-        return MotionResult(False, 'the base ended {:.2f} (m or rad) from its goal'.format(lag)) \
-            if waited > ARRIVAL_S[1] else None
+        return (
+            MotionResult(False, 'the base ended {:.2f} (m or rad) from its goal'.format(lag))
+            if waited > ARRIVAL_S[1]
+            else None
+        )
 
     def events(self) -> Sequence[str]:
         """See Motion."""

@@ -1,4 +1,5 @@
 """The neck with the head camera: where it is by the encoders, and how it is turned to a point."""
+
 import math
 from functools import lru_cache
 from typing import Sequence
@@ -31,8 +32,9 @@ def head_angles(torso: float, point: VectorLike) -> np.ndarray:
     def miss(angles: np.ndarray) -> np.ndarray:
         seen = apply(inverse(neck().forward(np.concatenate([[torso], angles]))), where)
         return np.array(
-            [np.arctan2(seen[0], seen[2]),
-             np.arctan2(seen[1], np.hypot(seen[0], seen[2]))])
+            [np.arctan2(seen[0], seen[2]), np.arctan2(seen[1], np.hypot(seen[0], seen[2]))]
+        )
+
     angles = np.array([math.atan2(where[1], where[0]), 0.0])
     for _ in range(20):
         error = miss(angles)

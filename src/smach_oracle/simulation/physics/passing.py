@@ -1,4 +1,5 @@
 """Time that passes in a world while nobody commands it: in one leap, as long as nothing moves."""
+
 from typing import Callable, Optional
 
 from .world import World
@@ -11,9 +12,13 @@ LOOK_PERIODS = 6  # control periods of physics from one look whether all stands 
 UNREST_PERIODS = 240
 
 
-def pass_time(world: World, periods: int, tick: Optional[Callable[[], None]] = None,
-              leaped: Optional[Callable[[int], None]] = None,
-              moving: Callable[[], bool] = lambda: False) -> None:
+def pass_time(
+    world: World,
+    periods: int,
+    tick: Optional[Callable[[], None]] = None,
+    leaped: Optional[Callable[[int], None]] = None,
+    moving: Callable[[], bool] = lambda: False,
+) -> None:
     """Let time pass.
 
     What begins or ends meanwhile does so at its time.

@@ -1,4 +1,5 @@
 """The PR2 in a physics client: encoders, motors that hold or follow, where its links are."""
+
 import math
 import xml.etree.ElementTree as ElementTree
 from typing import Callable, Collection, Dict, List, Optional, Sequence, Set
@@ -29,14 +30,23 @@ DRY_FRICTION = (1.0, 1.0, 0.5, 0.5, 0.2, 0.2, 0.1)
 STIFFNESS = 0.51  # share of an error that is taken back in one step of physics
 TIP_FRICTION = 1.2
 STAND = {  # how a PR2 stands unless the scene says otherwise
-    'torso_lift_joint': 0.20, 'head_tilt_joint': 0.0, 'l_shoulder_pan_joint': 1.6,
-    'l_shoulder_lift_joint': 0.2, 'l_upper_arm_roll_joint': 1.5, 'l_elbow_flex_joint': -1.5,
-    'l_forearm_roll_joint': -0.5, 'l_wrist_flex_joint': -0.6, 'l_wrist_roll_joint': 0.0,
-    'r_shoulder_pan_joint': -1.6, 'r_shoulder_lift_joint': 0.2, 'r_upper_arm_roll_joint': -1.5,
-    'r_elbow_flex_joint': -1.5, 'r_forearm_roll_joint': 0.5, 'r_wrist_flex_joint': -0.6,
-    'r_wrist_roll_joint': 0.0, **{jaw: JAW_OPEN
-                                  for jaws in FINGER_JOINTS.values()
-                                  for jaw in jaws}
+    'torso_lift_joint': 0.20,
+    'head_tilt_joint': 0.0,
+    'l_shoulder_pan_joint': 1.6,
+    'l_shoulder_lift_joint': 0.2,
+    'l_upper_arm_roll_joint': 1.5,
+    'l_elbow_flex_joint': -1.5,
+    'l_forearm_roll_joint': -0.5,
+    'l_wrist_flex_joint': -0.6,
+    'l_wrist_roll_joint': 0.0,
+    'r_shoulder_pan_joint': -1.6,
+    'r_shoulder_lift_joint': 0.2,
+    'r_upper_arm_roll_joint': -1.5,
+    'r_elbow_flex_joint': -1.5,
+    'r_forearm_roll_joint': 0.5,
+    'r_wrist_flex_joint': -0.6,
+    'r_wrist_roll_joint': 0.0,
+    **{jaw: JAW_OPEN for jaws in FINGER_JOINTS.values() for jaw in jaws},
 }
 
 
@@ -51,11 +61,16 @@ class Pr2Body:
         """
         self._client = client
         files = pr2_files()
-        self.index: int = pybullet.loadURDF(str(files.mobile), useFixedBase=True,
-                                            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-                                            physicsClientId=client)
-        infos = [pybullet.getJointInfo(self.index, number, physicsClientId=client)
-                 for number in range(pybullet.getNumJoints(self.index, physicsClientId=client))]
+        self.index: int = pybullet.loadURDF(
+            str(files.mobile),
+            useFixedBase=True,
+            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+        )
+        infos = [
+            pybullet.getJointInfo(self.index, number, physicsClientId=client)
+            for number in range(pybullet.getNumJoints(self.index, physicsClientId=client))
+        ]
         self.numbers = {info[1].decode(): number for number, info in enumerate(infos)}
         self.links = {info[12].decode(): number for number, info in enumerate(infos)}
         self.limits = {
@@ -80,22 +95,28 @@ class Pr2Body:
         self._stand(start)
         for arm in ARMS:
             for finger in FINGERS[arm]:
-                pybullet.changeDynamics(self.index, self.links[finger],
-                                        lateralFriction=TIP_FRICTION * (1.0 - start.tip_wear),
-                                        spinningFriction=0.005,
-                                        rollingFriction=0.0005, physicsClientId=client)
+                pybullet.changeDynamics(
+                    self.index,
+                    self.links[finger],
+                    lateralFriction=TIP_FRICTION * (1.0 - start.tip_wear),
+                    spinningFriction=0.005,
+                    rollingFriction=0.0005,
+                    physicsClientId=client,
+                )
 
     def _stand(self, start: RobotStart) -> None:
         for name, error in start.encoder_errors:
             if name not in self.encoders:
-                raise SceneBuildError('robot: no joint {!r}; there: {}'.format(
-                    name, ', '.join(self.encoders)))
+                raise SceneBuildError(
+                    'robot: no joint {!r}; there: {}'.format(name, ', '.join(self.encoders))
+                )
             self._read_more[self.numbers[name]] = error
         wanted = dict(STAND)
         for name, position in start.joints:
             if name not in self.encoders:
-                raise SceneBuildError('robot: no joint {!r}; there: {}'.format(
-                    name, ', '.join(self.encoders)))
+                raise SceneBuildError(
+                    'robot: no joint {!r}; there: {}'.format(name, ', '.join(self.encoders))
+                )
             wanted[name] = position
         wanted.update(zip(BASE_JOINTS, start.base))
         for name, position in wanted.items():
@@ -103,8 +124,9 @@ class Pr2Body:
             if wrong:
                 raise SceneBuildError('robot: ' + wrong)
             number = self.numbers[name]
-            pybullet.resetJointState(self.index, number, position - self._read_more[number],
-                                     physicsClientId=self._client)
+            pybullet.resetJointState(
+                self.index, number, position - self._read_more[number], physicsClientId=self._client
+            )
             self._targets[self.numbers[name]] = position
         for arm in ARMS:
             self._grips[arm] = (sum(wanted[jaw] for jaw in FINGER_JOINTS[arm]), GRIP)
@@ -113,8 +135,9 @@ class Pr2Body:
         """Leave out the collisions of all but the arms with the floor, which they cannot reach."""
         for name, number in self.links.items():
             if name[:2] not in ('l_', 'r_'):
-                pybullet.setCollisionFilterPair(self.index, floor, number, -1, 0,
-                                                physicsClientId=self._client)
+                pybullet.setCollisionFilterPair(
+                    self.index, floor, number, -1, 0, physicsClientId=self._client
+                )
 
     def refusal(self, name: str, position: float) -> str:
         """Return why a joint cannot be sent to a position, or ''."""
@@ -123,7 +146,8 @@ class Pr2Body:
         lower, upper = self.limits[name]
         if not lower - 1e-3 <= position <= upper + 1e-3:
             return '{} cannot be at {:.4g}; allowed: {:.4g} to {:.4g}'.format(
-                name, position, lower, upper)
+                name, position, lower, upper
+            )
         return ''
 
     def states(self, field: int) -> Dict[str, float]:
@@ -142,8 +166,9 @@ class Pr2Body:
     def position(self, name: str) -> float:
         """rad or m of one joint, as its encoder reads it, also of the base's."""
         number = self.numbers[name]
-        position: float = pybullet.getJointState(self.index, number,
-                                                 physicsClientId=self._client)[0]
+        position: float = pybullet.getJointState(self.index, number, physicsClientId=self._client)[
+            0
+        ]
         return position + float(self._read_more[number])
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
@@ -159,10 +184,15 @@ class Pr2Body:
 
     def base_velocity(self) -> np.ndarray:
         """(3,) of base_footprint in its own axes: m/s forward, m/s to the left, rad/s of yaw."""
-        (_, _, theta), (x, y, turn) = ([
-            pybullet.getJointState(self.index, self.numbers[name],
-                                   physicsClientId=self._client)[field] for name in BASE_JOINTS
-        ] for field in (0, 1))
+        (_, _, theta), (x, y, turn) = (
+            [
+                pybullet.getJointState(
+                    self.index, self.numbers[name], physicsClientId=self._client
+                )[field]
+                for name in BASE_JOINTS
+            ]
+            for field in (0, 1)
+        )
         cos, sin = math.cos(theta), math.sin(theta)
         return np.array([cos * x + sin * y, cos * y - sin * x, turn])
 
@@ -172,15 +202,21 @@ class Pr2Body:
         :raises ValueError: for one that is not there.
         """
         if link not in self._frames:
-            raise ValueError('no link {!r} in the PR2; there: {}'.format(
-                link, ', '.join(sorted(self._frames))))
+            raise ValueError(
+                'no link {!r} in the PR2; there: {}'.format(link, ', '.join(sorted(self._frames)))
+            )
         holder, holder_from_link = self._frames[link]
-        state = pybullet.getLinkState(self.index, self.links[holder], computeForwardKinematics=True,
-                                      physicsClientId=self._client)
+        state = pybullet.getLinkState(
+            self.index,
+            self.links[holder],
+            computeForwardKinematics=True,
+            physicsClientId=self._client,
+        )
         return pose_of(state[4], state[5]) @ holder_from_link
 
-    def set_target(self, name: str, position: float, velocity: float,
-                   force: Optional[float]) -> None:
+    def set_target(
+        self, name: str, position: float, velocity: float, force: Optional[float]
+    ) -> None:
         """Send a joint to a position (rad or m, by its encoder) at the end of the coming period.
 
         :param velocity: rad/s or m/s until then.
@@ -196,9 +232,14 @@ class Pr2Body:
         """Switch an arm's motors off: it stays where it is, and what pushes it takes it along."""
         numbers = [self.numbers[name] for name in ARM_JOINTS[arm]]
         self._limp.update(numbers)
-        pybullet.setJointMotorControlArray(self.index, numbers, pybullet.VELOCITY_CONTROL,
-                                           targetVelocities=[0.0] * len(numbers),
-                                           forces=DRY_FRICTION, physicsClientId=self._client)
+        pybullet.setJointMotorControlArray(
+            self.index,
+            numbers,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[0.0] * len(numbers),
+            forces=DRY_FRICTION,
+            physicsClientId=self._client,
+        )
 
     def hold(self, arm: str) -> None:
         """Switch an arm's motors on again: they hold it where it is."""
@@ -212,9 +253,14 @@ class Pr2Body:
         :param point: (3,) m, where, in the world.
         :param force: (3,) N, in the world's axes.
         """
-        pybullet.applyExternalForce(self.index, self.links[self._frames[link][0]], force.tolist(),
-                                    point.tolist(), pybullet.WORLD_FRAME,
-                                    physicsClientId=self._client)
+        pybullet.applyExternalForce(
+            self.index,
+            self.links[self._frames[link][0]],
+            force.tolist(),
+            point.tolist(),
+            pybullet.WORLD_FRAME,
+            physicsClientId=self._client,
+        )
 
     def target(self, name: str) -> float:
         """rad or m, where a joint was sent last."""
@@ -263,11 +309,16 @@ class Pr2Body:
             return
         rates = self._rates[chosen]
         pybullet.setJointMotorControlArray(
-            self.index, chosen, pybullet.POSITION_CONTROL,
+            self.index,
+            chosen,
+            pybullet.POSITION_CONTROL,
             targetPositions=self._targets[chosen] - self._read_more[chosen] - left * STEP * rates,
             targetVelocities=rates,
-            forces=self._forces[chosen], positionGains=[STIFFNESS] * len(chosen),
-            velocityGains=[1.0] * len(chosen), physicsClientId=self._client)
+            forces=self._forces[chosen],
+            positionGains=[STIFFNESS] * len(chosen),
+            velocityGains=[1.0] * len(chosen),
+            physicsClientId=self._client,
+        )
 
     def _drive_jaws(self, arm: str) -> None:
         """Send both fingers the same way, neither further than LEAD from the middle of the two."""

@@ -3,6 +3,7 @@
 It goes by the pixels that show a thing, and by whether their colours can be told apart: nothing is
 recognised in the dark or in a glare. The outlines err as those that people draw.
 """
+
 import zlib
 from typing import Dict, Mapping, NamedTuple, Sequence
 
@@ -37,10 +38,13 @@ def view_of(world: World, colour: np.ndarray) -> SeenView:
     """
     numbers = np.unique(world.labels)
     names = {int(number): world.seen_as(int(number)) for number in numbers}
-    return SeenView(colour, world.labels, {
-        number: name
-        for number, name in names.items() if name not in ('', 'floor')
-    }, world.periods, world.scene.seed)
+    return SeenView(
+        colour,
+        world.labels,
+        {number: name for number, name in names.items() if name not in ('', 'floor')},
+        world.periods,
+        world.scene.seed,
+    )
 
 
 def chance_of(seed: int) -> int:
@@ -57,8 +61,10 @@ def recognised(view: SeenView, names: Sequence[str]) -> Dict[str, np.ndarray]:
         pixels = int(shown.sum())
         seen = int((shown & told).sum())
         if name in names and seen >= max(LEAST * shown.size, SHARE_SEEN * pixels, 1):
-            outline = drawn(shown & ndimage.binary_dilation(told, iterations=2), np.random.
-                            default_rng([view.seed, 103, view.moment, zlib.crc32(name.encode())]))
+            outline = drawn(
+                shown & ndimage.binary_dilation(told, iterations=2),
+                np.random.default_rng([view.seed, 103, view.moment, zlib.crc32(name.encode())]),
+            )
             if outline.any():
                 found[name] = outline
     return found

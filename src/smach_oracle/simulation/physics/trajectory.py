@@ -5,6 +5,7 @@
 A motion is ticked before each control period, and returns None until it has ended. Several may be
 ticked side by side.
 """
+
 import math
 from typing import List, Mapping, NamedTuple, Optional, Protocol, Sequence, Tuple
 
@@ -75,9 +76,15 @@ class Trajectory:
     Between two points it goes straight, or cubic where velocities are given.
     """
 
-    def __init__(self, joints: Sequence[str], positions: np.ndarray, times: np.ndarray,
-                 velocities: Optional[np.ndarray] = None, check_speed: bool = True,
-                 tolerances: Tolerances = USUAL) -> None:
+    def __init__(
+        self,
+        joints: Sequence[str],
+        positions: np.ndarray,
+        times: np.ndarray,
+        velocities: Optional[np.ndarray] = None,
+        check_speed: bool = True,
+        tolerances: Tolerances = USUAL,
+    ) -> None:
         """Take a command.
 
         :param positions: (n, len(joints)), rad or m. Continuous joints are taken the short way to
@@ -122,10 +129,12 @@ class Trajectory:
             for step, span in zip(steps[:, column], spans):
                 if abs(step) > limit * span + 0.01:
                     return '{} would go {:.3g} in {:.3g} s; its limit is {:.3g}/s'.format(
-                        name, abs(step), span, world.robot.speeds[name])
+                        name, abs(step), span, world.robot.speeds[name]
+                    )
             if self._velocities is not None and np.abs(self._velocities[:, column]).max() > limit:
                 return '{} would pass a point at {:.3g}/s; its limit is {:.3g}/s'.format(
-                    name, np.abs(self._velocities[:, column]).max(), world.robot.speeds[name])
+                    name, np.abs(self._velocities[:, column]).max(), world.robot.speeds[name]
+                )
         return ''
 
     def _from_here(self, world: World) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -154,13 +163,15 @@ class Trajectory:
             return MotionResult(False, behind, missed='path')
         if done >= len(self._setpoints) - 1:
             return self._arrive(world)
-        for name, before, after in zip(self._joints, self._setpoints[done],
-                                       self._setpoints[done + 1]):
+        for name, before, after in zip(
+            self._joints, self._setpoints[done], self._setpoints[done + 1]
+        ):
             world.robot.set_target(name, after, (after - before) / PERIOD, None)
         return None
 
-    def _begin(self, world: World, start: np.ndarray, positions: np.ndarray,
-               times: np.ndarray) -> None:
+    def _begin(
+        self, world: World, start: np.ndarray, positions: np.ndarray, times: np.ndarray
+    ) -> None:
         self._begun = world.periods
         drop = int(times[0] <= 0.0 and len(times) > 1)
         knots = np.concatenate([[0.0], np.maximum(times[drop:], PERIOD)])
@@ -168,11 +179,13 @@ class Trajectory:
         moments = PERIOD * np.arange(math.ceil(knots[-1] / PERIOD - 1e-9) + 1)
         if self._velocities is None:
             self._setpoints = _blended(
-                np.column_stack([np.interp(moments, knots, column) for column in points.T]))
+                np.column_stack([np.interp(moments, knots, column) for column in points.T])
+            )
         else:
             slopes = np.vstack([np.zeros(len(start)), self._velocities[drop:]])
-            self._setpoints = CubicHermiteSpline(knots, points,
-                                                 slopes)(np.minimum(moments, knots[-1]))
+            self._setpoints = CubicHermiteSpline(knots, points, slopes)(
+                np.minimum(moments, knots[-1])
+            )
 
     def _behind(self, world: World, done: int) -> str:
         wanted = self._setpoints[min(done, len(self._setpoints) - 1)]
@@ -180,7 +193,8 @@ class Trajectory:
         for name, error in zip(self._joints, errors.tolist()):
             if error > self._tolerances.path.get(name, PATH_TOLERANCE):
                 return '{} is {:.2f} off its path after {:.1f} s: something is in its way'.format(
-                    name, error, done * PERIOD)
+                    name, error, done * PERIOD
+                )
         return ''
 
     def _arrive(self, world: World) -> Optional[MotionResult]:
@@ -202,8 +216,10 @@ class Trajectory:
         worst = int(np.argmax(shares))
         self.stop(world)
         return MotionResult(
-            False, '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]),
-            missed='goal')
+            False,
+            '{} ended {:.3f} from its goal'.format(self._joints[worst], errors[worst]),
+            missed='goal',
+        )
 
     def events(self) -> Sequence[str]:
         """See Motion."""
@@ -220,8 +236,8 @@ def _blended(way: np.ndarray) -> np.ndarray:
     """A path (periods, joints) whose corners take BLEND_S, and which ends that much later."""
     width = max(1, round(BLEND_S / PERIOD))
     padded = np.vstack(
-        [np.repeat(way[:1], width - 1, axis=0), way,
-         np.repeat(way[-1:], width, axis=0)])
+        [np.repeat(way[:1], width - 1, axis=0), way, np.repeat(way[-1:], width, axis=0)]
+    )
     total = np.cumsum(np.vstack([np.zeros(way.shape[1]), padded]), axis=0)
     return (total[width:] - total[:-width]) / width
 
@@ -232,21 +248,36 @@ def _held(world: World, name: str) -> float:
     return target if abs(target - position) < 0.02 else position
 
 
-def _check_points(joints: List[str], positions: np.ndarray, times: np.ndarray,
-                  velocities: Optional[np.ndarray]) -> None:
+def _check_points(
+    joints: List[str], positions: np.ndarray, times: np.ndarray, velocities: Optional[np.ndarray]
+) -> None:
     count = len(joints)
     if not count or len(set(joints)) != count:
         raise ValueError(
-            'trajectory: joints are {}; allowed: at least one, none twice'.format(joints))
-    if positions.ndim != 2 or positions.shape[1] != count or not len(
-            positions) or times.shape != positions.shape[:1]:
-        raise ValueError('trajectory: positions {} and times {} do not fit to {} joints'.format(
-            positions.shape, times.shape, count))
+            'trajectory: joints are {}; allowed: at least one, none twice'.format(joints)
+        )
+    if (
+        positions.ndim != 2
+        or positions.shape[1] != count
+        or not len(positions)
+        or times.shape != positions.shape[:1]
+    ):
+        raise ValueError(
+            'trajectory: positions {} and times {} do not fit to {} joints'.format(
+                positions.shape, times.shape, count
+            )
+        )
     if velocities is not None and velocities.shape != positions.shape:
-        raise ValueError('trajectory: velocities {} do not fit to positions {}'.format(
-            velocities.shape, positions.shape))
-    if not (np.isfinite(positions).all() and np.isfinite(times).all()
-            and (velocities is None or np.isfinite(velocities).all())):
+        raise ValueError(
+            'trajectory: velocities {} do not fit to positions {}'.format(
+                velocities.shape, positions.shape
+            )
+        )
+    if not (
+        np.isfinite(positions).all()
+        and np.isfinite(times).all()
+        and (velocities is None or np.isfinite(velocities).all())
+    ):
         raise ValueError('trajectory: a position, velocity or time is not finite')
     if times[0] < 0 or (np.diff(times) <= 0).any():
         raise ValueError('trajectory: times {} are not increasing from 0'.format(times.tolist()))

@@ -4,6 +4,7 @@ A PR2's arms are balanced by springs and counterweights, and spindle and wheels 
 it: to its motors it weighs nothing. The physics engine knows one gravity for all. So there is none,
 and each step of physics pulls at the things alone.
 """
+
 from typing import Iterable, Sequence
 
 import pybullet
@@ -31,12 +32,20 @@ class Weights:
     def pull(self) -> None:
         """Pull for the coming step of physics."""
         for number, link, force in self._pulls:
-            pybullet.applyExternalForce(number, link, force, self._centre(number, link),
-                                        pybullet.WORLD_FRAME, physicsClientId=self._client)
+            pybullet.applyExternalForce(
+                number,
+                link,
+                force,
+                self._centre(number, link),
+                pybullet.WORLD_FRAME,
+                physicsClientId=self._client,
+            )
 
     def _centre(self, number: int, link: int) -> Sequence[float]:
         """(3,) m in the world, the centre of mass of a link. -1 is the root."""
-        state: Sequence[Sequence[float]] = pybullet.getBasePositionAndOrientation(
-            number, physicsClientId=self._client) if link < 0 else pybullet.getLinkState(
-                number, link, physicsClientId=self._client)
+        state: Sequence[Sequence[float]] = (
+            pybullet.getBasePositionAndOrientation(number, physicsClientId=self._client)
+            if link < 0
+            else pybullet.getLinkState(number, link, physicsClientId=self._client)
+        )
         return state[0]

@@ -3,6 +3,7 @@
 The same scene and the same calls give the same states to the last bit: every reset begins in a
 fresh physics client, and nothing here reads a clock or shares a random generator.
 """
+
 import math
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
@@ -87,8 +88,12 @@ class World:
         self.happened('start')
 
     def _build(self, client: int, scene: Scene) -> Tuple[int, Pr2Body, Dict[str, PlacedBody]]:
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, numSolverIterations=ITERATIONS,
-                                           deterministicOverlappingPairs=1, physicsClientId=client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=STEP,
+            numSolverIterations=ITERATIONS,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
         floor = add_floor(client)
         robot = Pr2Body(client, scene.robot)
         robot.never_meets(floor)
@@ -138,8 +143,9 @@ class World:
         """
         for event in events:
             here = self.link_pose(CAMERA_FRAME) if event in SEEING else self.true_base()
-            self._disturbances.happened(event, self.periods,
-                                        here[:3, 3] if place is None else place)
+            self._disturbances.happened(
+                event, self.periods, here[:3, 3] if place is None else place
+            )
 
     @property
     def disturbed(self) -> bool:
@@ -180,8 +186,9 @@ class World:
         """Return the efforts of the motors, N m or N."""
         return self._robot.states(3)
 
-    def set_target(self, joint: str, position: float, velocity: float = 0.0,
-                   max_force: Optional[float] = None) -> None:
+    def set_target(
+        self, joint: str, position: float, velocity: float = 0.0, max_force: Optional[float] = None
+    ) -> None:
         """Send a joint to a position at the end of the coming control period, and hold it there.
 
         :param velocity: rad/s or m/s on the way. It holds for that one period.
@@ -205,7 +212,9 @@ class World:
         if not 0.0 <= gap <= 0.0901 or not 0.0 < max_effort <= 200.0:
             raise ValueError(
                 '{} gripper: gap {} m with {} N; allowed: 0 to 0.09 m, above 0 to 200 N'.format(
-                    arm, gap, max_effort))
+                    arm, gap, max_effort
+                )
+            )
         self._robot.set_grip(arm, min(gap, 0.09), max_effort)
 
     def gap(self, arm: str) -> float:
@@ -234,11 +243,12 @@ class World:
         :param share: of the error that is drawn again: a short drive keeps most of the last one's.
         """
         self.drives += 1
-        drawn = np.random.default_rng([self.scene.seed, 101,
-                                       self.drives]).normal(0.0, self.scene.robot.drive_error)
+        drawn = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(
+            0.0, self.scene.robot.drive_error
+        )
         before = np.array(
-            [self.belief_error[0, 3], self.belief_error[1, 3],
-             yaw_of(self.belief_error)])
+            [self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)]
+        )
         x, y, yaw = (1.0 - share) * before + share * drawn
         return from_rpy((x, y, 0.0), yaw=yaw)
 
@@ -272,12 +282,18 @@ class World:
         """
         placed = self._find(name)
         if link not in placed.links:
-            raise ValueError('no link {!r} in {!r}; there: {}'.format(
-                link, name, ', '.join(filter(None, placed.links))))
+            raise ValueError(
+                'no link {!r} in {!r}; there: {}'.format(
+                    link, name, ', '.join(filter(None, placed.links))
+                )
+            )
         if link:
-            state = pybullet.getLinkState(placed.number, placed.links[link],
-                                          computeForwardKinematics=True,
-                                          physicsClientId=self._client)
+            state = pybullet.getLinkState(
+                placed.number,
+                placed.links[link],
+                computeForwardKinematics=True,
+                physicsClientId=self._client,
+            )
             return pose_of(state[4], state[5])
         pose = pybullet.getBasePositionAndOrientation(placed.number, physicsClientId=self._client)
         if placed.body.shape != 'urdf':
@@ -288,16 +304,23 @@ class World:
     def body_speed(self, name: str) -> Tuple[float, float]:
         """Return how fast a body moves and turns, m/s and rad/s."""
         linear, angular = pybullet.getBaseVelocity(
-            self._find(name).number, physicsClientId=self._client)
+            self._find(name).number, physicsClientId=self._client
+        )
         return float(np.linalg.norm(linear)), float(np.linalg.norm(angular))
 
     def fastest(self, name: str) -> float:
         """Return the highest speed of a body and its joints, m/s or rad/s."""
         placed = self._find(name)
-        joints = [
-            abs(state[1]) for state in pybullet.getJointStates(
-                placed.number, list(placed.joints.values()), physicsClientId=self._client)
-        ] if placed.joints else []
+        joints = (
+            [
+                abs(state[1])
+                for state in pybullet.getJointStates(
+                    placed.number, list(placed.joints.values()), physicsClientId=self._client
+                )
+            ]
+            if placed.joints
+            else []
+        )
         return max([*self.body_speed(name), *joints])
 
     def body_joint(self, name: str, joint: str) -> float:
@@ -307,10 +330,14 @@ class World:
         """
         placed = self._find(name)
         if joint not in placed.joints:
-            raise ValueError('no joint {!r} in {!r}; there: {}'.format(
-                joint, name, ', '.join(placed.joints) or 'none'))
-        position: float = pybullet.getJointState(placed.number, placed.joints[joint],
-                                                 physicsClientId=self._client)[0]
+            raise ValueError(
+                'no joint {!r} in {!r}; there: {}'.format(
+                    joint, name, ', '.join(placed.joints) or 'none'
+                )
+            )
+        position: float = pybullet.getJointState(
+            placed.number, placed.joints[joint], physicsClientId=self._client
+        )[0]
         return position
 
     def body_joints(self, name: str) -> List[str]:
@@ -324,11 +351,13 @@ class World:
         """
         placed = self._find(name)
         friction = placed.body.friction if let_go else 0.0
-        pybullet.changeDynamics(placed.number, -1, lateralFriction=friction,
-                                physicsClientId=self._client)
+        pybullet.changeDynamics(
+            placed.number, -1, lateralFriction=friction, physicsClientId=self._client
+        )
         linear, _ = pybullet.getBaseVelocity(placed.number, physicsClientId=self._client)
-        pybullet.resetBaseVelocity(placed.number, [x, y, linear[2]], [0.0] * 3,
-                                   physicsClientId=self._client)
+        pybullet.resetBaseVelocity(
+            placed.number, [x, y, linear[2]], [0.0] * 3, physicsClientId=self._client
+        )
 
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool = False) -> None:
         """Drive a joint of a body at rad/s with a person's strength. What is in its way stops it.
@@ -349,22 +378,29 @@ class World:
             # the solver presses on what is a hair's breadth away, too
             if point[8] <= 0 or point[9] > 0:
                 found.append(
-                    Contact(self._names[point[2]], self._link_name(point[2], point[4]),
-                            np.array(point[6]), point[9]))
+                    Contact(
+                        self._names[point[2]],
+                        self._link_name(point[2], point[4]),
+                        np.array(point[6]),
+                        point[9],
+                    )
+                )
         return found
 
     def holding(self, name: str) -> str:
         """The arm both of whose fingers touch a body, or ''."""
         touching = {
             contact.link
-            for contact in self.contacts(name) if contact.other == 'robot' and contact.force > 0
+            for contact in self.contacts(name)
+            if contact.other == 'robot' and contact.force > 0
         }
         return next((arm for arm in ARMS if touching.issuperset(FINGERS[arm])), '')
 
     def movable(self) -> List[str]:
         """The bodies that can be carried, in the scene's order."""
         return [
-            name for name, placed in self._placed.items()
+            name
+            for name, placed in self._placed.items()
             if placed.body.mass > 0 and placed.body.shape != 'urdf'
         ]
 
@@ -381,8 +417,11 @@ class World:
 
     def _find(self, name: str) -> PlacedBody:
         if name not in self._placed:
-            raise ValueError('no body {!r} in this scene; there: {}'.format(
-                name, ', '.join(self._placed) or 'none'))
+            raise ValueError(
+                'no body {!r} in this scene; there: {}'.format(
+                    name, ', '.join(self._placed) or 'none'
+                )
+            )
         return self._placed[name]
 
     @staticmethod

@@ -1,4 +1,5 @@
 """Captions of a video: a strip below each image, with a heading and up to two lines of details."""
+
 import textwrap
 from functools import lru_cache
 from typing import List, NamedTuple, Tuple
@@ -35,18 +36,32 @@ def captioned(image: np.ndarray, caption: Caption) -> np.ndarray:
 def strip(caption: Caption, width: int) -> np.ndarray:
     """(HEIGHT, width, 3) uint8 RGB: the strip with a caption. Too much detail ends in '...'."""
     drawn = np.full((FINER * HEIGHT, FINER * width, 3), PAPER, np.uint8)
-    drawn[:, :FINER * BAR] = caption.colour
+    drawn[:, : FINER * BAR] = caption.colour
     _write(drawn, caption.heading, BASELINES[0], HEADING_SIZE, caption.colour, 2)
     for line, baseline in zip(_lines(caption.detail, width - LEFT - BAR), BASELINES[1:]):
         _write(drawn, line, baseline, DETAIL_SIZE, INK, 1)
     return cv2.resize(drawn, (width, HEIGHT), interpolation=cv2.INTER_AREA)
 
 
-def _write(drawn: np.ndarray, text: str, baseline: int, size: float, colour: Tuple[int, int, int],
-           weight: int) -> None:
+def _write(
+    drawn: np.ndarray,
+    text: str,
+    baseline: int,
+    size: float,
+    colour: Tuple[int, int, int],
+    weight: int,
+) -> None:
     # Hershey fonts have ASCII alone
-    cv2.putText(drawn, text.encode('ascii', 'replace').decode(), (FINER * LEFT, FINER * baseline),
-                FONT, FINER * size, colour, weight * FINER // 2, cv2.LINE_AA)
+    cv2.putText(
+        drawn,
+        text.encode('ascii', 'replace').decode(),
+        (FINER * LEFT, FINER * baseline),
+        FONT,
+        FINER * size,
+        colour,
+        weight * FINER // 2,
+        cv2.LINE_AA,
+    )
 
 
 def _lines(text: str, width: int) -> List[str]:

@@ -1,4 +1,5 @@
 """Pictures of the world from a viewpoint of its own: for people, not for the robot."""
+
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -10,8 +11,11 @@ from ..physics.world import World
 
 SIZE = (960, 640)  # pixels
 LIGHT = {
-    'shadow': 1, 'lightAmbientCoeff': 0.55, 'lightDiffuseCoeff': 0.48, 'lightSpecularCoeff': 0.12,
-    'lightDistance': 6.0
+    'shadow': 1,
+    'lightAmbientCoeff': 0.55,
+    'lightDiffuseCoeff': 0.48,
+    'lightSpecularCoeff': 0.12,
+    'lightDistance': 6.0,
 }
 # where it stands: to the left of the camera, rad, and m above
 LIGHT_TURN, LIGHT_HEIGHT = np.radians(40.0), 4.0
@@ -38,8 +42,9 @@ KITCHEN = 'drink_retrieval'  # the task with these two. Others: AT_TABLE
 GLIDE = (0.05, 0.42)
 
 
-def portrait(world: World, size: Tuple[int, int] = SIZE,
-             viewpoint: Optional[Viewpoint] = None) -> np.ndarray:
+def portrait(
+    world: World, size: Tuple[int, int] = SIZE, viewpoint: Optional[Viewpoint] = None
+) -> np.ndarray:
     """(h, w, 3) uint8 RGB: the world as seen from a viewpoint, or from that of `usual_viewpoint`.
 
     :param size: width and height, pixels.
@@ -51,12 +56,20 @@ def portrait(world: World, size: Tuple[int, int] = SIZE,
     return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
 
 
-def rendered(world: World, size: Tuple[int, int],
-             viewpoint: Optional[Viewpoint] = None) -> RenderedView:
+def rendered(
+    world: World, size: Tuple[int, int], viewpoint: Optional[Viewpoint] = None
+) -> RenderedView:
     """Return the view that a portrait shows, as the renderer draws it."""
     eye, target, field_of_view = usual_viewpoint(world) if viewpoint is None else viewpoint
-    return RenderedView(world, _looking(eye, target), size, field_of_view, FAR,
-                        lightDirection=_light(eye, target), **LIGHT)
+    return RenderedView(
+        world,
+        _looking(eye, target),
+        size,
+        field_of_view,
+        FAR,
+        lightDirection=_light(eye, target),
+        **LIGHT,
+    )
 
 
 def usual_viewpoint(world: World) -> Viewpoint:
@@ -73,11 +86,16 @@ def usual_viewpoint(world: World) -> Viewpoint:
 
 def _between(one: Viewpoint, other: Viewpoint, share: float) -> Viewpoint:
     """Return one viewpoint at share 0, the other at share 1."""
+
     def mixed(here: Point, there: Point) -> Point:
         x, y, z = ((1.0 - share) * a + share * b for a, b in zip(here, there))
         return x, y, z
-    return Viewpoint(mixed(one.eye, other.eye), mixed(one.target, other.target),
-                     (1.0 - share) * one.field_of_view + share * other.field_of_view)
+
+    return Viewpoint(
+        mixed(one.eye, other.eye),
+        mixed(one.target, other.target),
+        (1.0 - share) * one.field_of_view + share * other.field_of_view,
+    )
 
 
 def _light(eye: Sequence[float], target: Sequence[float]) -> List[float]:

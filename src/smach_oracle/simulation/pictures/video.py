@@ -1,4 +1,5 @@
 """A video that is written image by image (MP4)."""
+
 from pathlib import Path
 from typing import Optional
 
@@ -29,11 +30,13 @@ class VideoFile:
         """
         if self._writer is None:
             height, width = image.shape[:2]
-            self._writer = cv2.VideoWriter(str(self._path), cv2.VideoWriter.fourcc(*'mp4v'),
-                                           self._frames_s, (width, height))
+            self._writer = cv2.VideoWriter(
+                str(self._path), cv2.VideoWriter.fourcc(*'mp4v'), self._frames_s, (width, height)
+            )
             if not self._writer.isOpened():
-                raise VideoError('{}: cannot be written, or OpenCV has no codec for it'.format(
-                    self._path))
+                raise VideoError(
+                    '{}: cannot be written, or OpenCV has no codec for it'.format(self._path)
+                )
         self._writer.write(cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
 
     def close(self) -> None:

@@ -1,4 +1,5 @@
 """The PR2 in the same process as its world, without ROS: for unit tests, and for tuning."""
+
 from typing import Callable, Dict, Sequence
 
 import numpy as np

@@ -3,6 +3,7 @@
 The steps are those of tasks/drink_retrieval.py, done by the same code as behind the actions. When a
 state is done again, it is done otherwise, as there.
 """
+
 import math
 from typing import Any, Callable, Dict, List, Tuple
 
@@ -47,8 +48,9 @@ class DrinkRetrievalRehearsal:
         model = installed_model()
         self.skills = KitchenSkills(SkillContext(self.robot, model), Kitchen())
         self.eyes = Perception(self.robot, read_joints(model.urdf), Kitchen())
-        palm = PoseStamped(Header(frame_id=ODOM_FRAME),
-                           Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0)))
+        palm = PoseStamped(
+            Header(frame_id=ODOM_FRAME), Pose(Point(*PALM), Quaternion(0.0, 0.0, 0.0, 1.0))
+        )
         self.states: List[Tuple[str, Callable[[], None]]] = [
             ('RAISE_TORSO', lambda: self.robot.torso(TORSO_HEIGHT)),
             ('LOCALISE', lambda: self.skills.localise_at_fridge(LocaliseAtFridgeGoal(), no_report)),
@@ -59,7 +61,8 @@ class DrinkRetrievalRehearsal:
             ('MOVE_OUT', lambda: self._drive(*DRIVES['MOVE_OUT'])),
             ('CLOSE_FRIDGE', lambda: self.skills.close_door(CloseDoorGoal('left'), no_report)),
             ('MOVE_HOME', lambda: self._drive(*DRIVES['MOVE_HOME'])),
-            ('HAND_OVER', lambda: self.skills.hand_over(HandOverGoal('right', palm), no_report))]
+            ('HAND_OVER', lambda: self.skills.hand_over(HandOverGoal('right', palm), no_report)),
+        ]
         self.begin()
 
     def begin(self) -> None:
@@ -78,8 +81,9 @@ class DrinkRetrievalRehearsal:
     def pick_goal(self) -> PickGoal:
         """As of the state PICK_DRINK."""
         self.picks += 1
-        return PickGoal('right', self.data['drink'], self.data['size'], FRIDGE,
-                        min(self.picks - 1, 255))
+        return PickGoal(
+            'right', self.data['drink'], self.data['size'], FRIDGE, min(self.picks - 1, 255)
+        )
 
     def _drive(self, x: float, y: float, yaw: float) -> None:
         self.robot.drive(from_rpy((x, y, 0.0), yaw=yaw))

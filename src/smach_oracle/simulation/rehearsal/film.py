@@ -1,4 +1,5 @@
 """A picture and a video of the robot at work, for people: a trial in one process, without ROS."""
+
 import argparse
 import sys
 from pathlib import Path
@@ -32,8 +33,10 @@ class FilmedTask(NamedTuple):
     seed: int  # of a scene that looks well
 
 
-TASKS = {'pick_and_place': FilmedTask(tabletop_scene.draw, PickAndPlaceRehearsal, 2.0, 23),
-         'drink_retrieval': FilmedTask(kitchen_scene.draw, DrinkRetrievalRehearsal, 3.2, 600)}
+TASKS = {
+    'pick_and_place': FilmedTask(tabletop_scene.draw, PickAndPlaceRehearsal, 2.0, 23),
+    'drink_retrieval': FilmedTask(kitchen_scene.draw, DrinkRetrievalRehearsal, 3.2, 600),
+}
 
 
 class FilmedWorld(World):
@@ -82,8 +85,11 @@ def film(task: FilmedTask, seed: int, frames_s: float) -> Tuple[np.ndarray, List
     try:
         done = rehearse(task.draw(seed, True), world, task.steps)
         if world.picture is None:
-            why = '{} failed: {}'.format(done.failed, done.reason) if done.failed else (
-                'nothing was held for {:g} s'.format(task.carried_s))
+            why = (
+                '{} failed: {}'.format(done.failed, done.reason)
+                if done.failed
+                else ('nothing was held for {:g} s'.format(task.carried_s))
+            )
             raise RuntimeError('seed {}: {}'.format(seed, why))
         return world.picture, world.shots
     finally:
@@ -112,8 +118,9 @@ def check_file(path: str, suffixes: Sequence[str]) -> None:
     :raises ValueError: for another suffix, or a file that cannot be written.
     """
     if not path.lower().endswith(tuple(suffixes)):
-        raise ValueError('{}: what kind of file? Its name may end in {}'.format(
-            path, ', '.join(suffixes)))
+        raise ValueError(
+            '{}: what kind of file? Its name may end in {}'.format(path, ', '.join(suffixes))
+        )
     why = why_not_writable(path)
     if why:
         raise ValueError('{}: {}'.format(path, why))
@@ -122,14 +129,21 @@ def check_file(path: str, suffixes: Sequence[str]) -> None:
 def main(argv: Optional[List[str]] = None) -> int:
     """Entry point."""
     parser = argparse.ArgumentParser(prog='pr2_film', description=__doc__)
-    parser.add_argument('picture', type=path_of,
-                        help='file of the picture ({})'.format(', '.join(PICTURES)))
-    parser.add_argument('--video', metavar='FILE', type=path_of,
-                        help='also write a video ({}), at simulated time'.format(', '.join(VIDEOS)))
-    parser.add_argument('--fps', type=float, default=5.0,
-                        help='frames of the video per simulated s (default: 5)')
-    parser.add_argument('--task', choices=sorted(TASKS), default='pick_and_place',
-                        help='(default: %(default)s)')
+    parser.add_argument(
+        'picture', type=path_of, help='file of the picture ({})'.format(', '.join(PICTURES))
+    )
+    parser.add_argument(
+        '--video',
+        metavar='FILE',
+        type=path_of,
+        help='also write a video ({}), at simulated time'.format(', '.join(VIDEOS)),
+    )
+    parser.add_argument(
+        '--fps', type=float, default=5.0, help='frames of the video per simulated s (default: 5)'
+    )
+    parser.add_argument(
+        '--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)'
+    )
     parser.add_argument('--seed', type=int, help='of the scene (default: one that looks well)')
     args = parser.parse_args(argv)
     task = TASKS[args.task]
@@ -152,6 +166,9 @@ def main(argv: Optional[List[str]] = None) -> int:
         return 1
     print('Picture: {}'.format(args.picture))
     if args.video:
-        print('Video: {}'.format(
-            args.video if write_video(args.video, frames, args.fps) else 'no codec here for one'))
+        print(
+            'Video: {}'.format(
+                args.video if write_video(args.video, frames, args.fps) else 'no codec here for one'
+            )
+        )
     return 0

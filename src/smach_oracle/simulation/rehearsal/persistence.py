@@ -4,6 +4,7 @@ In one process, without an executive. A state that is tried again varies its goa
 does. A script that is started over remembers nothing. The world's own log says what a try finds of
 the cause.
 """
+
 from typing import Callable, Iterable, List, NamedTuple, Sequence
 
 from ..physics.judge import judge
@@ -78,7 +79,8 @@ class _Tries:
     def _note(self, what: str) -> None:
         now = self._world.time - self._since
         self.there[what] |= any(
-            span.there_at(now) for span in self._world.cause_spans() if span.kind == self._kind)
+            span.there_at(now) for span in self._world.cause_spans() if span.kind == self._kind
+        )
 
 
 def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) -> RehearsedTrial:
@@ -97,12 +99,20 @@ def run_scene(scene: Scene, world: World, task: Callable[[World], Rehearsal]) ->
                 left = tries.go(0, 0, 'restart')
                 cured = 'restart' if left < 0 else ''
     world.step(SETTLING)
-    return RehearsedTrial(scene.seed, kind, tries.failed, cured, tries.there['retry'],
-                  tries.there['restart'], judge(world, scene.goal).success)
+    return RehearsedTrial(
+        scene.seed,
+        kind,
+        tries.failed,
+        cured,
+        tries.there['retry'],
+        tries.there['restart'],
+        judge(world, scene.goal).success,
+    )
 
 
-def scenes_of(draw: Callable[[int], Scene], kind: str, count: int,
-              seeds: Iterable[int]) -> List[Scene]:
+def scenes_of(
+    draw: Callable[[int], Scene], kind: str, count: int, seeds: Iterable[int]
+) -> List[Scene]:
     """The first scenes of these seeds that have this cause, and no other."""
     found: List[Scene] = []
     for seed in seeds:

@@ -3,6 +3,7 @@
 The steps are those of tasks/pick_and_place.py, done by the same code as behind the actions. When a
 state is done again, it is done otherwise, as there.
 """
+
 import time
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Protocol, Tuple
 
@@ -35,8 +36,9 @@ from .direct_robot import DirectRobot, no_report
 
 # m in ODOM_FRAME, what the head is pointed at, in turn after each look that showed too little
 VIEWS = ((0.65, 0.0, 0.801), (0.85, 0.0, 0.801), (0.50, 0.0, 0.801))
-PLACE = PoseStamped(Header(frame_id=ODOM_FRAME),
-                    Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0)))
+PLACE = PoseStamped(
+    Header(frame_id=ODOM_FRAME), Pose(Point(0.6, -0.35, 0.851), Quaternion(0.0, 0.0, 0.0, 1.0))
+)
 FROM_ABOVE = 2  # the attempt at which the hand comes from above
 MIN_HEIGHT, TOLERANCE = 0.02, 0.045  # m
 FAILURES = (SkillError, RobotError, PlanningError, NotSeen)
@@ -74,10 +76,15 @@ class PickAndPlaceRehearsal:
         self.skills = Manipulation(SkillContext(self.robot, installed_model()))
         self.eyes = Perception(self.robot, read_joints(self.skills.context.model.urdf), Kitchen())
         self.states: List[Tuple[str, Callable[[], None]]] = [
-            ('MOVE_ARMS_ASIDE', lambda: self.skills.move_arms_aside(
-                MoveArmsAsideGoal(), no_report)),
-            ('POINT_HEAD', self._point), ('DETECT_TABLETOP', self._detect),
-            ('BUILD_COLLISION_MAP', self._map), ('PICK', self._pick), ('PLACE', self._place)
+            (
+                'MOVE_ARMS_ASIDE',
+                lambda: self.skills.move_arms_aside(MoveArmsAsideGoal(), no_report),
+            ),
+            ('POINT_HEAD', self._point),
+            ('DETECT_TABLETOP', self._detect),
+            ('BUILD_COLLISION_MAP', self._map),
+            ('PICK', self._pick),
+            ('PLACE', self._place),
         ]
         self.begin()
 
@@ -91,13 +98,15 @@ class PickAndPlaceRehearsal:
     def head_goal(self) -> PointHeadGoal:
         """As of the state POINT_HEAD."""
         view = VIEWS[self.missed % len(VIEWS)]
-        return PointHeadGoal(self.look_at or PointStamped(Header(frame_id=ODOM_FRAME),
-                                                          Point(*view)))
+        return PointHeadGoal(
+            self.look_at or PointStamped(Header(frame_id=ODOM_FRAME), Point(*view))
+        )
 
     def detect_goal(self) -> DetectTabletopGoal:
         """As of the state DETECT_TABLETOP."""
-        return DetectTabletopGoal(MIN_HEIGHT, self.colour, self.size,
-                                  PointStamped(header=Header(frame_id=ODOM_FRAME)))
+        return DetectTabletopGoal(
+            MIN_HEIGHT, self.colour, self.size, PointStamped(header=Header(frame_id=ODOM_FRAME))
+        )
 
     def _point(self) -> None:
         self.skills.point_head(self.head_goal(), no_report)
@@ -121,8 +130,13 @@ class PickAndPlaceRehearsal:
     def pick_goal(self) -> PickGoal:
         """As of the state PICK."""
         self.picks += 1
-        return PickGoal('right', self.data['objects'][0], self.data['sizes'][0],
-                        self.data['map_id'], min(self.picks - 1, 255))
+        return PickGoal(
+            'right',
+            self.data['objects'][0],
+            self.data['sizes'][0],
+            self.data['map_id'],
+            min(self.picks - 1, 255),
+        )
 
     def _pick(self) -> None:
         self.data['grasp'] = self.skills.pick(self.pick_goal(), no_report).grasp
@@ -133,8 +147,11 @@ class PickAndPlaceRehearsal:
         self.skills.place(goal, no_report)
 
 
-def rehearse(scene: Scene, world: Optional[World] = None,
-             task: Callable[[World], Rehearsal] = PickAndPlaceRehearsal) -> RehearsalResult:
+def rehearse(
+    scene: Scene,
+    world: Optional[World] = None,
+    task: Callable[[World], Rehearsal] = PickAndPlaceRehearsal,
+) -> RehearsalResult:
     """One trial up to its first failure, in a world of its own, where none is given."""
     if world is None:
         world = World()
@@ -160,5 +177,13 @@ def rehearse(scene: Scene, world: Optional[World] = None,
     elapsed = world.time - start
     world.step(60)
     verdict = judge(world, scene.goal)
-    return RehearsalResult(scene.seed, failed, reason, verdict.success, verdict.why,
-                           tuple(cause.kind for cause in scene.causes), wall, elapsed)
+    return RehearsalResult(
+        scene.seed,
+        failed,
+        reason,
+        verdict.success,
+        verdict.why,
+        tuple(cause.kind for cause in scene.causes),
+        wall,
+        elapsed,
+    )

@@ -5,6 +5,7 @@ bundle adjustment (V. Pradeep, K. Konolige, E. Berger, "Calibrating a multi-arm 
 ISER 2010, calibrates joint offsets and camera poses together): all of it together takes a hand that
 goes to what the camera sees there up to about 1 cm off.
 """
+
 from typing import Tuple
 
 import numpy as np
@@ -16,14 +17,17 @@ from .chance import generator_for
 ENCODER_SIGMA = 0.0015  # rad
 CAMERA_SIGMA = (0.003, 0.0025)  # m along each axis, rad about each
 MOST = 2.0  # sigmas: worse than that and it would be calibrated again
-JOINTS = tuple(name for arm in ARMS for name in ARM_JOINTS[arm]) + ('head_pan_joint',
-                                                                    'head_tilt_joint')
+JOINTS = tuple(name for arm in ARMS for name in ARM_JOINTS[arm]) + (
+    'head_pan_joint',
+    'head_tilt_joint',
+)
 
 
 def encoder_errors(seed: int) -> Tuple[Tuple[str, float], ...]:
     """Draw how much too high the joints of arms and head read, rad by joint."""
-    return encoder_errors_of(generator_for(seed, 'encoder_errors').normal(
-        0.0, 1.0, len(JOINTS)).clip(-MOST, MOST))
+    return encoder_errors_of(
+        generator_for(seed, 'encoder_errors').normal(0.0, 1.0, len(JOINTS)).clip(-MOST, MOST)
+    )
 
 
 def encoder_errors_of(sigmas: np.ndarray) -> Tuple[Tuple[str, float], ...]:
@@ -33,8 +37,9 @@ def encoder_errors_of(sigmas: np.ndarray) -> Tuple[Tuple[str, float], ...]:
 
 def camera_error(seed: int) -> Tuple[float, float, float, float, float, float]:
     """Draw how the camera sits, from where the URDF has it: m, then rad of roll, pitch, yaw."""
-    return camera_error_of(generator_for(seed, 'camera_error').normal(0.0, 1.0, 6).clip(
-        -MOST, MOST))
+    return camera_error_of(
+        generator_for(seed, 'camera_error').normal(0.0, 1.0, 6).clip(-MOST, MOST)
+    )
 
 
 def camera_error_of(sigmas: np.ndarray) -> Tuple[float, float, float, float, float, float]:

@@ -2,6 +2,7 @@
 
 Every draw has a generator of its own, so that another kind of cause leaves the others as they were.
 """
+
 from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
@@ -14,8 +15,9 @@ ANOTHER = 0.10  # chance of a second cause, where there is one
 WEIGHTS = Mapping[str, float]
 
 
-def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGHTS],
-                lasting: float) -> Iterator[Tuple[str, np.random.Generator]]:
+def drawn_kinds(
+    seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGHTS], lasting: float
+) -> Iterator[Tuple[str, np.random.Generator]]:
     """The kinds of causes of a trial, each with the generator for its values.
 
     With another `lasting` the same trials have causes, and a kind has the same values. The second
@@ -32,9 +34,11 @@ def drawn_kinds(seed: int, stream: int, amount: float, kinds: Mapping[str, WEIGH
         there, lasts, which = generator.random(3)
         if there >= (ANOTHER if number else amount):
             return
-        weights = {name: weight
-                   for name, weight in kinds[LASTING if lasts < lasting else PASSING].items()
-                   if name not in found}
+        weights = {
+            name: weight
+            for name, weight in kinds[LASTING if lasts < lasting else PASSING].items()
+            if name not in found
+        }
         if not weights:
             return
         found.append(_chosen(weights, which))
@@ -58,8 +62,9 @@ def cloud_minutes(generator: np.random.Generator) -> float:
     return float(min(60.0, generator.lognormal(np.log(8.0), 0.6)))
 
 
-def dazzling(eye: np.ndarray, looks_at: np.ndarray, thing: np.ndarray,
-             generator: np.random.Generator) -> Tuple[Tuple[str, float], ...]:
+def dazzling(
+    eye: np.ndarray, looks_at: np.ndarray, thing: np.ndarray, generator: np.random.Generator
+) -> Tuple[Tuple[str, float], ...]:
     """Values of a glare that hides a thing from a camera.
 
     What reflects the light stands where the thing would be if it were mirrored at the middle of the
@@ -75,6 +80,10 @@ def dazzling(eye: np.ndarray, looks_at: np.ndarray, thing: np.ndarray,
     aside = np.cross(axis, generator.normal(size=3))
     turn = rotation_about(aside / np.linalg.norm(aside), float(generator.normal(0.0, 0.05)))
     place = eye + turn @ mirrored
-    values = dict(zip(('x', 'y', 'z'), place), **dict(zip(('eye_x', 'eye_y', 'eye_z'), eye)),
-                  radius=generator.uniform(0.10, 0.22), lobe=generator.uniform(0.15, 0.25))
+    values = dict(
+        zip(('x', 'y', 'z'), place),
+        **dict(zip(('eye_x', 'eye_y', 'eye_z'), eye)),
+        radius=generator.uniform(0.10, 0.22),
+        lobe=generator.uniform(0.15, 0.25),
+    )
     return tuple((name, float(value)) for name, value in values.items())

@@ -1,4 +1,5 @@
 """Random numbers of a trial: each use has a name, and so draws of its own."""
+
 import zlib
 
 import numpy as np

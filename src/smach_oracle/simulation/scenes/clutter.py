@@ -1,4 +1,5 @@
 """Other things on a table: of other shapes and colours than cans and cartons."""
+
 import colorsys
 from typing import Callable, Sequence, Tuple
 
@@ -30,8 +31,11 @@ def _ball(generator: np.random.Generator) -> Drawn:
 
 
 def _packet(generator: np.random.Generator) -> Drawn:
-    size = (float(generator.uniform(0.08, 0.11)), float(generator.uniform(0.045, 0.06)),
-            float(generator.uniform(0.05, 0.20)))
+    size = (
+        float(generator.uniform(0.08, 0.11)),
+        float(generator.uniform(0.045, 0.06)),
+        float(generator.uniform(0.05, 0.20)),
+    )
     return 'box', size, 0.40
 
 
@@ -49,13 +53,21 @@ def another(generator: np.random.Generator, thing: Body, floor: float) -> Body:
         return thing
     shape, size, mass = MAKERS[int(generator.integers(len(MAKERS)))](generator)
     place = (thing.position[0], thing.position[1], floor + size[2] / 2 + 0.001)
-    return thing._replace(shape=shape, size=size, mass=mass, position=place, colour=_colour(
-        generator), yaw=float(generator.uniform(-1.5, 1.5)))
+    return thing._replace(
+        shape=shape,
+        size=size,
+        mass=mass,
+        position=place,
+        colour=_colour(generator),
+        yaw=float(generator.uniform(-1.5, 1.5)),
+    )
 
 
 def _colour(generator: np.random.Generator) -> Vector:
     """Any colour that is neither black nor glaring."""
-    red, green, blue = colorsys.hsv_to_rgb(float(generator.random()),
-                                           float(generator.uniform(0.1, 0.9)),
-                                           float(generator.uniform(0.35, 0.95)))
+    red, green, blue = colorsys.hsv_to_rgb(
+        float(generator.random()),
+        float(generator.uniform(0.1, 0.9)),
+        float(generator.uniform(0.35, 0.95)),
+    )
     return red, green, blue

@@ -1,4 +1,5 @@
 """Scenes to which causes are being added."""
+
 from typing import Any, Callable, Collection, Protocol, Tuple, TypeVar
 
 from .scene import Disturbance, SceneCause
@@ -23,8 +24,9 @@ class SceneDraft(Protocol):
 Draft = TypeVar('Draft', bound=SceneDraft)
 
 
-def caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance,
-           until: Tuple[str, ...] = ()) -> Draft:
+def caused(
+    draft: Draft, kind: str, text: str, *disturbances: Disturbance, until: Tuple[str, ...] = ()
+) -> Draft:
     """The draft with one more cause, and with what that makes happen.
 
     :param kind: as in SceneCause.
@@ -32,8 +34,10 @@ def caused(draft: Draft, kind: str, text: str, *disturbances: Disturbance,
     :param until: likewise.
     """
     belonging = tuple(each._replace(cause=kind) for each in disturbances)
-    changed: Draft = draft._replace(disturbances=draft.disturbances + belonging,
-                                    causes=draft.causes + (SceneCause(kind, text, until),))
+    changed: Draft = draft._replace(
+        disturbances=draft.disturbances + belonging,
+        causes=draft.causes + (SceneCause(kind, text, until),),
+    )
     return changed
 
 
@@ -43,5 +47,6 @@ def declared(draft: Draft, lasting: Collection[str]) -> Draft:
     :param lasting: the kinds that do.
     """
     changed: Draft = draft._replace(
-        causes=tuple(each._replace(lasting=each.kind in lasting) for each in draft.causes))
+        causes=tuple(each._replace(lasting=each.kind in lasting) for each in draft.causes)
+    )
     return changed

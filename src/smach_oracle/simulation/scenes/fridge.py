@@ -3,6 +3,7 @@
 Many a real one's door falls shut from where it is not open far enough: a cam in the hinge, or feet
 that tilt the whole, pull it. Past a stop it stays.
 """
+
 import xml.etree.ElementTree as ElementTree
 from typing import Optional, Tuple
 
@@ -33,15 +34,24 @@ def fridge(kitchen: Kitchen, closing: Optional[ClosingHinge] = None) -> Body:
     """
     x, y, yaw = kitchen.place
     hinges = () if closing is None else ((DOOR_JOINT, closing),)
-    return Body('fridge', 'urdf', (0.0, 0.0, 0.0), (x, y, 0.0), yaw, urdf=fridge_urdf(kitchen),
-                joints=((DOOR_JOINT, 0.0),), joint_friction=((DOOR_JOINT, DOOR_FRICTION),),
-                joint_closing=hinges)
+    return Body(
+        'fridge',
+        'urdf',
+        (0.0, 0.0, 0.0),
+        (x, y, 0.0),
+        yaw,
+        urdf=fridge_urdf(kitchen),
+        joints=((DOOR_JOINT, 0.0),),
+        joint_friction=((DOOR_JOINT, DOOR_FRICTION),),
+        joint_closing=hinges,
+    )
 
 
 def closing_hinge(generator: np.random.Generator) -> ClosingHinge:
     """One of a door that falls shut: no two makes have the same."""
-    return ClosingHinge(float(generator.uniform(*CLOSING_TORQUE)),
-                        float(generator.uniform(*CLOSING_STOP)))
+    return ClosingHinge(
+        float(generator.uniform(*CLOSING_TORQUE)), float(generator.uniform(*CLOSING_STOP))
+    )
 
 
 def fridge_urdf(kitchen: Kitchen) -> str:
@@ -57,8 +67,9 @@ def fridge_urdf(kitchen: Kitchen) -> str:
     ElementTree.SubElement(joint, 'child', link='door')
     ElementTree.SubElement(joint, 'origin', xyz=_text((0.0, kitchen.width / 2, 0.0)))
     ElementTree.SubElement(joint, 'axis', xyz='0 0 -1')
-    ElementTree.SubElement(joint, 'limit', lower='0', upper=str(DOOR_LIMIT), effort='100',
-                           velocity='5')
+    ElementTree.SubElement(
+        joint, 'limit', lower='0', upper=str(DOOR_LIMIT), effort='100', velocity='5'
+    )
     ElementTree.SubElement(joint, 'dynamics', damping='0.5', friction='0')
     return ElementTree.tostring(robot, encoding='unicode')
 
@@ -83,29 +94,40 @@ def _door(robot: ElementTree.Element, kitchen: Kitchen) -> None:
     and outside is -x.
     """
     thick, width, height = kitchen.door_thickness, kitchen.width, kitchen.height - 2 * GAP
-    link = _link(robot, 'door', DOOR_MASS, (-thick / 2, -width / 2, kitchen.height / 2),
-                 (1.5, 1.5, 0.3))
+    link = _link(
+        robot, 'door', DOOR_MASS, (-thick / 2, -width / 2, kitchen.height / 2), (1.5, 1.5, 0.3)
+    )
     _box(link, (thick, width, height), (-thick / 2, -width / 2, kitchen.height / 2), WHITE)
     low, high = kitchen.handle_span
     axis = -(width - kitchen.handle_inset)
     bar = '<cylinder radius="{}" length="{}"/>'.format(kitchen.handle_radius, high - low)
     _shape(link, bar, (-thick - kitchen.handle_stand_off, axis, (low + high) / 2), DARK)
     for end in (low + 0.01, high - 0.01):
-        _box(link, (kitchen.handle_stand_off, 0.02, 0.02),
-             (-thick - kitchen.handle_stand_off / 2, axis, end), DARK)
+        _box(
+            link,
+            (kitchen.handle_stand_off, 0.02, 0.02),
+            (-thick - kitchen.handle_stand_off / 2, axis, end),
+            DARK,
+        )
 
 
-def _link(robot: ElementTree.Element, name: str, mass: float, centre: Triple,
-          inertia: Triple) -> ElementTree.Element:
+def _link(
+    robot: ElementTree.Element, name: str, mass: float, centre: Triple, inertia: Triple
+) -> ElementTree.Element:
     link = ElementTree.SubElement(robot, 'link', name=name)
     inertial = ElementTree.SubElement(link, 'inertial')
     ElementTree.SubElement(inertial, 'origin', xyz=_text(centre))
     ElementTree.SubElement(inertial, 'mass', value=str(mass))
     ElementTree.SubElement(
-        inertial, 'inertia',
+        inertial,
+        'inertia',
         dict(
-            zip(('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'),
-                [str(value) for value in inertia + (0.0, 0.0, 0.0)])))
+            zip(
+                ('ixx', 'iyy', 'izz', 'ixy', 'ixz', 'iyz'),
+                [str(value) for value in inertia + (0.0, 0.0, 0.0)],
+            )
+        ),
+    )
     return link
 
 
@@ -119,8 +141,9 @@ def _shape(link: ElementTree.Element, geometry: str, centre: Triple, colour: Tri
         ElementTree.SubElement(part, 'origin', xyz=_text(centre))
         ElementTree.SubElement(part, 'geometry').append(ElementTree.fromstring(geometry))
         if kind == 'visual':
-            material = ElementTree.SubElement(part, 'material',
-                                              name='{:.2f}_{:.2f}_{:.2f}'.format(*colour))
+            material = ElementTree.SubElement(
+                part, 'material', name='{:.2f}_{:.2f}_{:.2f}'.format(*colour)
+            )
             ElementTree.SubElement(material, 'color', rgba=_text(colour + (1.0,)))
 
 

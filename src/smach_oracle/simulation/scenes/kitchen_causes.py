@@ -2,6 +2,7 @@
 
 Neither the executive nor the subsystems learn of them.
 """
+
 from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -22,9 +23,15 @@ from .scene import LOCALISATION, Body, ClosingHinge, Disturbance, Near, SceneCau
 # why, and why so often: doc/protocol.md
 AMOUNT = 0.70  # chance that a trial has a cause
 KINDS_OF = {
-    LASTING: {'base_misplaced': 0.25, 'glare': 0.20, 'crowded': 0.15, 'slippery_drink': 0.15,
-              'door_falls_shut': 0.15, 'dim_light': 0.10},
-    PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
+    LASTING: {
+        'base_misplaced': 0.25,
+        'glare': 0.20,
+        'crowded': 0.15,
+        'slippery_drink': 0.15,
+        'door_falls_shut': 0.15,
+        'dim_light': 0.10,
+    },
+    PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10},
 }
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
@@ -55,16 +62,18 @@ class KitchenDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE,
-                without: Collection[str] = ()) -> KitchenDraft:
+def with_causes(
+    draft: KitchenDraft, seed: int, lasting: float = LASTING_SHARE, without: Collection[str] = ()
+) -> KitchenDraft:
     """A kitchen with the causes that its seed has for it: mostly one, seldom two.
 
     :param lasting: the share of the causes that last, 0 to 1.
     :param without: kinds that are left out where they are drawn.
     """
     # a drink is moved to where there is room, with all others in their places
-    drawn = sorted(drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting),
-                   key=lambda each: each[0] == 'drink_moved')
+    drawn = sorted(
+        drawn_kinds(seed, 72, AMOUNT, KINDS_OF, lasting), key=lambda each: each[0] == 'drink_moved'
+    )
     for kind, generator in drawn:
         if kind not in without:
             draft = MAKERS[kind](draft, generator)
@@ -76,29 +85,40 @@ def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> Kitc
 
     It stays wrong until the robot has looked at something that it knows.
     """
-    x, y, yaw = (side * float(generator.uniform(least, most)) for side, least, most in zip(
-        generator.choice([-1.0, 1.0], 3), LOST_FROM, LOST_TO))
-    return caused(draft._replace(localisation_error=(x, y, yaw)), 'base_misplaced',
-                  'the robot believes to be {:+.1f} cm further on, {:+.1f} cm further left and '
-                  '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)),
-                  until=(LOCALISATION,))
+    x, y, yaw = (
+        side * float(generator.uniform(least, most))
+        for side, least, most in zip(generator.choice([-1.0, 1.0], 3), LOST_FROM, LOST_TO)
+    )
+    return caused(
+        draft._replace(localisation_error=(x, y, yaw)),
+        'base_misplaced',
+        'the robot believes to be {:+.1f} cm further on, {:+.1f} cm further left and '
+        '{:+.1f} degrees turned'.format(100 * x, 100 * y, np.degrees(yaw)),
+        until=(LOCALISATION,),
+    )
 
 
 def _door_swings_back(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """The opened door falls back, half shut, while the robot drives in."""
     angle = float(generator.uniform(0.5, 0.9))
-    return caused(draft, 'door_swings_back',
-                  'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
-                  Disturbance('swing:fridge', 'depart',
-                              (('angle', angle), ('duration', 1.5)), near=GOES_IN))
+    return caused(
+        draft,
+        'door_swings_back',
+        'the open door swings back to {:.0f} degrees'.format(np.degrees(angle)),
+        Disturbance('swing:fridge', 'depart', (('angle', angle), ('duration', 1.5)), near=GOES_IN),
+    )
 
 
 def _door_falls_shut(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """The hinge pulls the door shut, unless it stands open past its stop."""
     hinge = closing_hinge(generator)
-    return caused(draft._replace(closing=hinge), 'door_falls_shut',
-                  'the door falls shut where it is open by less than {:.0f} degrees'.format(
-                      np.degrees(hinge.stop)))
+    return caused(
+        draft._replace(closing=hinge),
+        'door_falls_shut',
+        'the door falls shut where it is open by less than {:.0f} degrees'.format(
+            np.degrees(hinge.stop)
+        ),
+    )
 
 
 def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -109,38 +129,73 @@ def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraf
     places = []
     for _ in range(HEADINGS):
         heading = float(
-            generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2))
-        places.append((target.position[0] + far * float(np.cos(heading)),
-                       target.position[1] + far * float(np.sin(heading)), other.position[2]))
+            generator.uniform(-0.5, 0.5) + (np.pi / 2 if generator.random() < 0.5 else -np.pi / 2)
+        )
+        places.append(
+            (
+                target.position[0] + far * float(np.cos(heading)),
+                target.position[1] + far * float(np.sin(heading)),
+                other.position[2],
+            )
+        )
     between = draft.drinks[1:-1]  # no other is to stand in what is moved
-    moved = other._replace(position=max(places, key=lambda place: min([0.0] + [
-        float(np.hypot(each.position[0] - place[0], each.position[1] - place[1]))
-        - each.size[0] - other.size[0] for each in between])))
-    return caused(draft._replace(drinks=draft.drinks[:-1] + (moved,)), 'crowded',
-                  'two drinks stand {:.1f} cm beside each other'.format(100 * gap),
-                  until=(target.name, other.name))
+    moved = other._replace(
+        position=max(
+            places,
+            key=lambda place: min(
+                [0.0]
+                + [
+                    float(np.hypot(each.position[0] - place[0], each.position[1] - place[1]))
+                    - each.size[0]
+                    - other.size[0]
+                    for each in between
+                ]
+            ),
+        )
+    )
+    return caused(
+        draft._replace(drinks=draft.drinks[:-1] + (moved,)),
+        'crowded',
+        'two drinks stand {:.1f} cm beside each other'.format(100 * gap),
+        until=(target.name, other.name),
+    )
 
 
 def _glare(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """The low sun falls through a window, and a glass shelf throws it into the lens."""
     minutes = float(generator.uniform(30.0, 90.0))
-    return _dazzled(draft, generator, 'glare', 60 * minutes,
-                    'the low sun dazzles the camera for {:.0f} minutes'.format(minutes))
+    return _dazzled(
+        draft,
+        generator,
+        'glare',
+        60 * minutes,
+        'the low sun dazzles the camera for {:.0f} minutes'.format(minutes),
+    )
 
 
 def _reflex(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """Something shiny that moves throws light into the lens."""
     seconds = passing_seconds(generator)
-    return _dazzled(draft, generator, 'reflex', seconds,
-                    'a reflection dazzles the camera for {:.1f} s'.format(seconds))
+    return _dazzled(
+        draft,
+        generator,
+        'reflex',
+        seconds,
+        'a reflection dazzles the camera for {:.1f} s'.format(seconds),
+    )
 
 
-def _dazzled(draft: KitchenDraft, generator: np.random.Generator, kind: str, seconds: float,
-             text: str) -> KitchenDraft:
+def _dazzled(
+    draft: KitchenDraft, generator: np.random.Generator, kind: str, seconds: float, text: str
+) -> KitchenDraft:
     """From when the camera has turned to the drinks for the first time."""
     values = dazzling(EYE, LOOKS_AT, np.array(draft.drinks[TARGET].position), generator)
-    return caused(draft, kind, text, Disturbance(
-        'glare', 'look_at', values + (('duration', seconds),), near=BEFORE_SHELF))
+    return caused(
+        draft,
+        kind,
+        text,
+        Disturbance('glare', 'look_at', values + (('duration', seconds),), near=BEFORE_SHELF),
+    )
 
 
 def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -148,9 +203,11 @@ def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDr
     brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
     values = (('brightness', brightness), ('duration', 60 * minutes))
     text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
-        100 * brightness, minutes)
+        100 * brightness, minutes
+    )
     return caused(
-        draft, 'dim_light', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF))
+        draft, 'dim_light', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF)
+    )
 
 
 def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -158,47 +215,67 @@ def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft
     brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
     values = (('brightness', brightness), ('duration', seconds))
     text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
-        seconds, 100 * brightness)
+        seconds, 100 * brightness
+    )
     return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF))
 
 
 def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     friction, mass = float(generator.uniform(0.045, 0.08)), float(generator.uniform(0.6, 0.75))
-    drinks = tuple(drink._replace(friction=friction, mass=mass)
-                   for drink in draft.drinks[:1]) + draft.drinks[1:]
+    drinks = (
+        tuple(drink._replace(friction=friction, mass=mass) for drink in draft.drinks[:1])
+        + draft.drinks[1:]
+    )
     return caused(
-        draft._replace(drinks=drinks), 'slippery_drink',
-        'the ordered drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass))
+        draft._replace(drinks=drinks),
+        'slippery_drink',
+        'the ordered drink is wet and full: friction {:.2f}, {:.2f} kg'.format(friction, mass),
+    )
 
 
 def _drink_moved(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     """Somebody moves the ordered drink to where there is room, after it has been detected."""
-    ways = [(float(generator.uniform(0.0, 0.06)), side * float(generator.uniform(0.05, 0.09)))
-            for _ in range(30) for side in (1.0, -1.0)]
+    ways = [
+        (float(generator.uniform(0.0, 0.06)), side * float(generator.uniform(0.05, 0.09)))
+        for _ in range(30)
+        for side in (1.0, -1.0)
+    ]
     x, y = draft.drinks[TARGET].position[:2]
     # what stands behind others may be moved towards the front, but not off the shelf
     ways += [(-dx, dy) for dx, dy in ways if x - dx > draft.front[0] + FOREMOST]
     dx, dy = max(ways, key=lambda way: min(ROOM, _room_at(draft, x + way[0], y + way[1])))
     values = (('dx', dx), ('dy', dy), ('duration', 0.8))
     return caused(
-        draft, 'drink_moved',
+        draft,
+        'drink_moved',
         'somebody moves the ordered drink by {:.0f} cm, once it has been seen'.format(
-            100 * float(np.hypot(dx, dy))),
-        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see', values, near=BEFORE_SHELF))
+            100 * float(np.hypot(dx, dy))
+        ),
+        Disturbance('nudge:' + draft.drinks[TARGET].name, 'see', values, near=BEFORE_SHELF),
+    )
 
 
 def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
     """m from a place for the ordered drink to the next drink's middle or, if nearer, to a wall."""
-    gaps = [float(np.hypot(other.position[0] - x, other.position[1] - y))
-            for number, other in enumerate(draft.drinks) if number != TARGET]
+    gaps = [
+        float(np.hypot(other.position[0] - x, other.position[1] - y))
+        for number, other in enumerate(draft.drinks)
+        if number != TARGET
+    ]
     return min(gaps + [draft.half_width - abs(y - draft.front[1])])
 
 
 Maker = Callable[[KitchenDraft, np.random.Generator], KitchenDraft]
 MAKERS: Dict[str, Maker] = {
-    'base_misplaced': _base_misplaced, 'door_falls_shut': _door_falls_shut,
-    'door_swings_back': _door_swings_back, 'crowded': _crowded, 'glare': _glare,
-    'reflex': _reflex, 'dim_light': _dim_light, 'shadow': _shadow,
-    'slippery_drink': _slippery_drink, 'drink_moved': _drink_moved
+    'base_misplaced': _base_misplaced,
+    'door_falls_shut': _door_falls_shut,
+    'door_swings_back': _door_swings_back,
+    'crowded': _crowded,
+    'glare': _glare,
+    'reflex': _reflex,
+    'dim_light': _dim_light,
+    'shadow': _shadow,
+    'slippery_drink': _slippery_drink,
+    'drink_moved': _drink_moved,
 }
 KINDS: List[str] = sorted(MAKERS)

@@ -1,4 +1,5 @@
 """The kitchen of the second use case (paper, VI-B): a refrigerator with drinks, and a person."""
+
 from typing import List, Sequence, Tuple
 
 import numpy as np
@@ -19,8 +20,13 @@ from .unlike_the_map import drink_size, localisation_error, true_kitchen, true_p
 TASK = 'drink_retrieval'
 DRINK_MASS = 0.33  # kg
 ORDERED = 'drink_0'  # the red one, wherever it stands: red is what the task orders
-COLOURS = ((0.80, 0.15, 0.12), (0.12, 0.45, 0.20), (0.90, 0.60, 0.10), (0.15, 0.30, 0.70),
-           (0.60, 0.20, 0.55))
+COLOURS = (
+    (0.80, 0.15, 0.12),
+    (0.12, 0.45, 0.20),
+    (0.90, 0.60, 0.10),
+    (0.15, 0.30, 0.70),
+    (0.60, 0.20, 0.55),
+)
 DEPTHS, SIDES = (0.05, 0.15), (-0.16, 0.10)  # m, in the fridge's frame, where drinks stand
 CLEAR = 0.115  # m between the middles of drinks, where nothing is crowded
 # m to each side of a drink's middle: no other's middle is there, before one that the arm can reach.
@@ -40,11 +46,13 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
         raise ValueError('seed is {}; allowed: 0 or more'.format(seed))
     kitchen = true_kitchen(seed)
     draft = drafted(kitchen, fresh_drinks(seed, kitchen))._replace(
-        localisation_error=localisation_error(seed))
+        localisation_error=localisation_error(seed)
+    )
     if not benign:
         draft = with_causes(draft, seed, lasting)
-    robot = RobotStart(posture(), encoder_errors=encoder_errors(seed),
-                       camera_error=camera_error(seed))
+    robot = RobotStart(
+        posture(), encoder_errors=encoder_errors(seed), camera_error=camera_error(seed)
+    )
     return composed(seed, draft, kitchen, robot)
 
 
@@ -60,10 +68,18 @@ def composed(seed: int, draft: KitchenDraft, kitchen: Kitchen, robot: RobotStart
     """
     palm = true_palm(seed)
     goal = Goal('in_hand', ORDERED, palm, PALM_SIZE[0] / 2)
-    robot = robot._replace(drive_error=draft.drive_error,
-                           localisation_error=draft.localisation_error)
-    return Scene(TASK, seed, (fridge(kitchen, draft.closing),) + draft.drinks + person(palm), goal,
-                 robot, disturbances=draft.disturbances, causes=draft.causes)
+    robot = robot._replace(
+        drive_error=draft.drive_error, localisation_error=draft.localisation_error
+    )
+    return Scene(
+        TASK,
+        seed,
+        (fridge(kitchen, draft.closing),) + draft.drinks + person(palm),
+        goal,
+        robot,
+        disturbances=draft.disturbances,
+        causes=draft.causes,
+    )
 
 
 def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
@@ -77,12 +93,17 @@ def fresh_drinks(seed: int, kitchen: Kitchen) -> Tuple[Body, ...]:
     for _ in range(100):
         x, y = generator.uniform(*DEPTHS), generator.uniform(*SIDES)
         if len(places) < 3 and all(
-                np.hypot(x - other[0], y - other[1]) > CLEAR for other in places):
+            np.hypot(x - other[0], y - other[1]) > CLEAR for other in places
+        ):
             places.append((float(x), float(y)))
     places.sort()
     in_reach = [place for place in places if is_in_reach(place, places)]
-    places.insert(0, places.pop(places.index(
-        in_reach[int(generator_for(seed, 'ordered').integers(len(in_reach)))])))
+    places.insert(
+        0,
+        places.pop(
+            places.index(in_reach[int(generator_for(seed, 'ordered').integers(len(in_reach)))])
+        ),
+    )
     return tuple(drink_at(seed, index, place, kitchen) for index, place in enumerate(places))
 
 
@@ -96,9 +117,14 @@ def drink_at(seed: int, index: int, place: Tuple[float, float], kitchen: Kitchen
     radius, height = drink_size(seed, index)
     spot = odom_from_pose(kitchen, place[0], place[1], 0.0)[:2, 3]
     floor = kitchen.shelves[kitchen.drinks_shelf]
-    return Body('drink_{}'.format(index), 'cylinder', (radius, radius, height),
-                (float(spot[0]), float(spot[1]), floor + height / 2 + 0.001), mass=DRINK_MASS,
-                colour=COLOURS[index % len(COLOURS)])
+    return Body(
+        'drink_{}'.format(index),
+        'cylinder',
+        (radius, radius, height),
+        (float(spot[0]), float(spot[1]), floor + height / 2 + 0.001),
+        mass=DRINK_MASS,
+        colour=COLOURS[index % len(COLOURS)],
+    )
 
 
 def posture() -> Tuple[Tuple[str, float], ...]:

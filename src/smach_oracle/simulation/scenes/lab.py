@@ -3,6 +3,7 @@
 What a person tidies in a lab, and when, is told in doc/protocol.md. A scene is made of the run, the
 hour, the trial's seed, and how the world was left. So a run can go on from any trial.
 """
+
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -57,8 +58,14 @@ class LabState(NamedTuple):
     def as_data(self) -> Dict[str, Any]:
         """Return it as plain data, for JSON."""
         usual = Body._field_defaults
-        things = [{name: value for name, value in thing._asdict().items()
-                   if name not in usual or value != usual[name]} for thing in self.things]
+        things = [
+            {
+                name: value
+                for name, value in thing._asdict().items()
+                if name not in usual or value != usual[name]
+            }
+            for thing in self.things
+        ]
         return dict(self._asdict(), things=things, joints=dict(self.joints))
 
 
@@ -67,11 +74,23 @@ def state_from(data: Mapping[str, Any]) -> LabState:
 
     :raises KeyError, TypeError or ValueError: where it is not one.
     """
-    things = tuple(Body(**{name: tuple(value) if isinstance(value, list) else value
-                           for name, value in thing.items()}) for thing in data['things'])
-    return LabState(float(data['began']), float(data['ended']), things,
-                    tuple((name, float(value)) for name, value in data['joints'].items()),
-                    _vector(data['base']), _vector(data['localisation']))
+    things = tuple(
+        Body(
+            **{
+                name: tuple(value) if isinstance(value, list) else value
+                for name, value in thing.items()
+            }
+        )
+        for thing in data['things']
+    )
+    return LabState(
+        float(data['began']),
+        float(data['ended']),
+        things,
+        tuple((name, float(value)) for name, value in data['joints'].items()),
+        _vector(data['base']),
+        _vector(data['localisation']),
+    )
 
 
 def _vector(values: Sequence[float]) -> Vector:
@@ -84,8 +103,14 @@ def begins_at(run: LabRun, seed: int, state: Optional[LabState]) -> float:
     return max((seed - run.seed) * run.slot_h, state.ended + TIDYING_H if state else 0.0)
 
 
-def lab_scene(task: str, run: LabRun, seed: int, state: Optional[LabState], benign: bool,
-              lasting: float = LASTING_SHARE) -> Scene:
+def lab_scene(
+    task: str,
+    run: LabRun,
+    seed: int,
+    state: Optional[LabState],
+    benign: bool,
+    lasting: float = LASTING_SHARE,
+) -> Scene:
     """Return what a trial finds.
 
     :param state: how the trial before left it. None means the run begins.
@@ -93,9 +118,11 @@ def lab_scene(task: str, run: LabRun, seed: int, state: Optional[LabState], beni
     :param lasting: the share of the causes that last, 0 to 1.
     """
     hour = begins_at(run, seed, state)
-    robot = RobotStart(encoder_errors=encoder_errors_of(
-        drifting(run.seed, 'encoder_errors', hour, len(JOINTS))), camera_error=camera_error_of(
-            drifting(run.seed, 'camera_error', hour, 6)), tip_wear=worn(run.seed, hour))
+    robot = RobotStart(
+        encoder_errors=encoder_errors_of(drifting(run.seed, 'encoder_errors', hour, len(JOINTS))),
+        camera_error=camera_error_of(drifting(run.seed, 'camera_error', hour, 6)),
+        tip_wear=worn(run.seed, hour),
+    )
     return _SCENES[task](_Trial(run, seed, hour, state, benign, lasting), robot)
 
 
@@ -117,13 +144,27 @@ class _Trial(NamedTuple):
 def _table(trial: _Trial, robot: RobotStart) -> Scene:
     draft = TabletopDraft(_nearest_first(_things_on_table(trial)))
     if not trial.benign:
-        draft = _lit(draft, trial, lambda generator: dazzling(
-            EYE_LOOKING, LOOKS_AT, np.array([generator.uniform(*tabletop_scene.NEAREST_X),
-                                             generator.uniform(*tabletop_scene.NEAREST_Y),
-                                             TABLE_TOP + 0.06]), generator))
+        draft = _lit(
+            draft,
+            trial,
+            lambda generator: dazzling(
+                EYE_LOOKING,
+                LOOKS_AT,
+                np.array(
+                    [
+                        generator.uniform(*tabletop_scene.NEAREST_X),
+                        generator.uniform(*tabletop_scene.NEAREST_Y),
+                        TABLE_TOP + 0.06,
+                    ]
+                ),
+                generator,
+            ),
+        )
         draft = with_table_causes(draft, trial.seed, trial.lasting, FROM_THE_HOUR)
-    robot = robot._replace(joints=_start_joints((('torso_lift_joint', TORSO),), trial.state),
-                           drive_error=_drive_error(robot))
+    robot = robot._replace(
+        joints=_start_joints((('torso_lift_joint', TORSO),), trial.state),
+        drive_error=_drive_error(robot),
+    )
     table = true_table(trial.run.seed, TABLE_TOP, tabletop_scene.TABLE_X, tabletop_scene.TABLE_SIZE)
     return tabletop_scene.composed(trial.seed, draft, table, robot)
 
@@ -135,8 +176,12 @@ def _things_on_table(trial: _Trial) -> Tuple[Body, ...]:
     stayed = [_upright(thing, TABLE_TOP) for thing in state.things]
     generator = generator_for(trial.seed, 'put_out')
     spots = [fresh[0].position[:2]] + [
-        (float(generator.uniform(*tabletop_scene.NEAREST_X)),
-         float(generator.uniform(*tabletop_scene.NEAREST_Y))) for _ in range(TRIES)]
+        (
+            float(generator.uniform(*tabletop_scene.NEAREST_X)),
+            float(generator.uniform(*tabletop_scene.NEAREST_Y)),
+        )
+        for _ in range(TRIES)
+    ]
     spot = _free(spots, stayed, tabletop_scene.CLEAR)
     if spot is None or len(stayed) < FEWEST - 1 or not _stand_apart(stayed):
         return fresh
@@ -158,15 +203,33 @@ def _kitchen(trial: _Trial, robot: RobotStart) -> Scene:
     draft = kitchen_scene.drafted(kitchen, _drinks_in_fridge(trial, kitchen))
     draft = draft._replace(
         drive_error=_drive_error(robot),
-        localisation_error=stays.localisation if stays else localisation_error(trial.seed))
+        localisation_error=stays.localisation if stays else localisation_error(trial.seed),
+    )
     if not trial.benign:
-        draft = _lit(draft, trial, lambda generator: dazzling(
-            EYE, INTO_FRIDGE, np.array(_on_shelf(
-                kitchen, (float(generator.uniform(*kitchen_scene.DEPTHS)),
-                          float(generator.uniform(*kitchen_scene.SIDES))), 0.06)), generator))
+        draft = _lit(
+            draft,
+            trial,
+            lambda generator: dazzling(
+                EYE,
+                INTO_FRIDGE,
+                np.array(
+                    _on_shelf(
+                        kitchen,
+                        (
+                            float(generator.uniform(*kitchen_scene.DEPTHS)),
+                            float(generator.uniform(*kitchen_scene.SIDES)),
+                        ),
+                        0.06,
+                    )
+                ),
+                generator,
+            ),
+        )
         draft = with_kitchen_causes(draft, trial.seed, trial.lasting, FROM_THE_HOUR)
-    robot = robot._replace(joints=_start_joints(kitchen_scene.posture(), state),
-                           base=stays.base if stays else robot.base)
+    robot = robot._replace(
+        joints=_start_joints(kitchen_scene.posture(), state),
+        base=stays.base if stays else robot.base,
+    )
     return kitchen_scene.composed(trial.seed, draft, kitchen, robot)
 
 
@@ -177,12 +240,20 @@ def _drinks_in_fridge(trial: _Trial, kitchen: Kitchen) -> Tuple[Body, ...]:
     floor = kitchen.shelves[kitchen.drinks_shelf]
     stayed = [_upright(drink, floor) for drink in state.things]
     generator = generator_for(trial.seed, 'put_out')
-    places = [(float(generator.uniform(*kitchen_scene.DEPTHS)),
-               float(generator.uniform(*kitchen_scene.SIDES))) for _ in range(TRIES)]
+    places = [
+        (
+            float(generator.uniform(*kitchen_scene.DEPTHS)),
+            float(generator.uniform(*kitchen_scene.SIDES)),
+        )
+        for _ in range(TRIES)
+    ]
     spots = [fresh[0].position[:2]] + [_on_shelf(kitchen, each, 0.0)[:2] for each in places]
     others = [_in_fridge(kitchen, drink.position) for drink in stayed]
-    spot = _free([each for each in spots if kitchen_scene.is_in_reach(
-        _in_fridge(kitchen, each), others)], stayed, kitchen_scene.CLEAR)
+    spot = _free(
+        [each for each in spots if kitchen_scene.is_in_reach(_in_fridge(kitchen, each), others)],
+        stayed,
+        kitchen_scene.CLEAR,
+    )
     if spot is None or len(stayed) < len(fresh) - 1 or not _stand_apart(stayed):
         return fresh
     return (fresh[0]._replace(position=(*spot, fresh[0].position[2])), *stayed)
@@ -196,25 +267,34 @@ def _on_shelf(kitchen: Kitchen, place: Tuple[float, float], lift: float) -> Vect
 
 def _in_fridge(kitchen: Kitchen, place: Sequence[float]) -> Tuple[float, float]:
     """Return a place (m) in the world, in the fridge's frame."""
-    x, y = apply(inverse(odom_from_pose(kitchen, 0.0, 0.0, 0.0)),
-                 np.array([place[0], place[1], 0.0]))[:2]
+    x, y = apply(
+        inverse(odom_from_pose(kitchen, 0.0, 0.0, 0.0)), np.array([place[0], place[1], 0.0])
+    )[:2]
     return float(x), float(y)
 
 
 _SCENES: Dict[str, Callable[[_Trial, RobotStart], Scene]] = {
-    tabletop_scene.TASK: _table, kitchen_scene.TASK: _kitchen
+    tabletop_scene.TASK: _table,
+    kitchen_scene.TASK: _kitchen,
 }
 
 
-def _lit(draft: Draft, trial: _Trial,
-         dazzle: Callable[[np.random.Generator], Values]) -> Draft:
+def _lit(draft: Draft, trial: _Trial, dazzle: Callable[[np.random.Generator], Values]) -> Draft:
     """Return the draft in the light of its hour."""
     for spell in spells(trial.run.seed, trial.hour, trial.hour + AHEAD_H, dazzle):
         begins = max(trial.hour, spell.begins)
-        times = (('delay', SECONDS * (begins - trial.hour)),
-                 ('duration', SECONDS * (spell.ends - begins)))
-        draft = caused(draft, spell.kind, _told(spell), Disturbance(
-            'dim' if spell.kind == 'dim_light' else spell.kind, 'start', spell.values + times))
+        times = (
+            ('delay', SECONDS * (begins - trial.hour)),
+            ('duration', SECONDS * (spell.ends - begins)),
+        )
+        draft = caused(
+            draft,
+            spell.kind,
+            _told(spell),
+            Disturbance(
+                'dim' if spell.kind == 'dim_light' else spell.kind, 'start', spell.values + times
+            ),
+        )
     return draft
 
 
@@ -237,12 +317,21 @@ def _upright(thing: Body, floor: float) -> Body:
     return thing._replace(position=(x, y, floor + thing.size[2] / 2 + 0.001), roll=0.0, pitch=0.0)
 
 
-def _free(spots: Sequence[Tuple[float, float]], things: Sequence[Body],
-          clear: float) -> Optional[Tuple[float, float]]:
+def _free(
+    spots: Sequence[Tuple[float, float]], things: Sequence[Body], clear: float
+) -> Optional[Tuple[float, float]]:
     """Return the first spot that is so far (m) from the middles of all things."""
-    return next((spot for spot in spots if all(
-        np.hypot(spot[0] - each.position[0], spot[1] - each.position[1]) > clear
-        for each in things)), None)
+    return next(
+        (
+            spot
+            for spot in spots
+            if all(
+                np.hypot(spot[0] - each.position[0], spot[1] - each.position[1]) > clear
+                for each in things
+            )
+        ),
+        None,
+    )
 
 
 def _stand_apart(things: Sequence[Body]) -> bool:
@@ -250,7 +339,9 @@ def _stand_apart(things: Sequence[Body]) -> bool:
     return all(
         np.hypot(one.position[0] - other.position[0], one.position[1] - other.position[1])
         > _slim(one) + _slim(other) - OVERLAP
-        for number, one in enumerate(things) for other in things[number + 1:])
+        for number, one in enumerate(things)
+        for other in things[number + 1 :]
+    )
 
 
 def _slim(thing: Body) -> float:
@@ -260,5 +351,6 @@ def _slim(thing: Body) -> float:
 
 def _unused(things: List[Body]) -> str:
     names = [each.name for each in things]
-    return next(name for name in map('object_{}'.format, range(len(things) + 1))
-                if name not in names)
+    return next(
+        name for name in map('object_{}'.format, range(len(things) + 1)) if name not in names
+    )

@@ -4,6 +4,7 @@ A run is a robot that goes on for hours in one world. All this is a function of 
 of the hour, so that a run can go on from any hour. Hour 0 is the beginning of a day of work.
 The page doc/protocol.md says why it is so.
 """
+
 from typing import Callable, List, NamedTuple, Tuple
 
 import numpy as np
@@ -35,19 +36,22 @@ class Spell(NamedTuple):
     values: Values  # of the disturbance that it is
 
 
-def spells(seed: int, begins: float, ends: float,
-           dazzle: Callable[[np.random.Generator], Values]) -> List[Spell]:
+def spells(
+    seed: int, begins: float, ends: float, dazzle: Callable[[np.random.Generator], Values]
+) -> List[Spell]:
     """Return the spells that have a part in some hours of a run.
 
     :param dazzle: draws the values of a glare, its duration excepted.
     """
-    found = [spell for day in range(int(begins // DAY_H), int(ends // DAY_H) + 1)
-             for spell in _of_a_day(seed, day, dazzle)]
+    found = [
+        spell
+        for day in range(int(begins // DAY_H), int(ends // DAY_H) + 1)
+        for spell in _of_a_day(seed, day, dazzle)
+    ]
     return [spell for spell in found if spell.begins < ends and spell.ends > begins]
 
 
-def _of_a_day(seed: int, day: int,
-              dazzle: Callable[[np.random.Generator], Values]) -> List[Spell]:
+def _of_a_day(seed: int, day: int, dazzle: Callable[[np.random.Generator], Values]) -> List[Spell]:
     morning, found = day * DAY_H, []
     for number, window in enumerate(SUN_LOW):
         generator = generator_for(seed, 'sun:{}:{}'.format(day, number))
@@ -58,8 +62,14 @@ def _of_a_day(seed: int, day: int,
     generator = generator_for(seed, 'clouds:{}'.format(day))
     for begins in np.sort(generator.uniform(0.0, DAY_H, int(generator.poisson(CLOUDS)))):
         ends = float(begins) + cloud_minutes(generator) / 60
-        found.append(Spell('dim_light', morning + float(begins), morning + min(ends, DAY_H), (
-            ('brightness', float(generator.uniform(*BRIGHTNESS))),)))
+        found.append(
+            Spell(
+                'dim_light',
+                morning + float(begins),
+                morning + min(ends, DAY_H),
+                (('brightness', float(generator.uniform(*BRIGHTNESS))),),
+            )
+        )
     return found
 
 
@@ -71,7 +81,8 @@ def drifting(seed: int, what: str, hour: float, count: int) -> np.ndarray:
     knot, part = divmod(hour / DRIFT_H, 1.0)
     before, after = (
         generator_for(seed, '{}:{}'.format(what, int(knot) + later)).normal(0.0, 1.0, count)
-        for later in range(2))
+        for later in range(2)
+    )
     turn = part * np.pi / 2
     return np.clip(np.cos(turn) * before + np.sin(turn) * after, -MOST, MOST)
 

@@ -1,4 +1,5 @@
 """The contents of a trial's world: plain data, drawn from the trial's seed."""
+
 from typing import NamedTuple, Optional, Tuple
 
 Vector = Tuple[float, float, float]

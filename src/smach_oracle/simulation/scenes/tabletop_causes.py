@@ -2,6 +2,7 @@
 
 Neither the executive nor the subsystems learn of them.
 """
+
 import functools
 from typing import Callable, Collection, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -38,9 +39,15 @@ LOOKS_AT = np.array([0.65, 0.0, 0.80])  # m, the middle of its image then
 # why, and why so often: doc/protocol.md
 AMOUNT = 0.40  # chance that a trial has a cause
 KINDS_OF = {
-    LASTING: {'crowded': 0.25, 'glare': 0.25, 'goal_occupied': 0.20, 'dim_light': 0.10,
-              'slippery_object': 0.10, 'edge_of_reach': 0.10},
-    PASSING: {'arm_in_view': 0.45, 'object_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10}
+    LASTING: {
+        'crowded': 0.25,
+        'glare': 0.25,
+        'goal_occupied': 0.20,
+        'dim_light': 0.10,
+        'slippery_object': 0.10,
+        'edge_of_reach': 0.10,
+    },
+    PASSING: {'arm_in_view': 0.45, 'object_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10},
 }
 
 
@@ -52,8 +59,9 @@ class TabletopDraft(NamedTuple):
     causes: Tuple[SceneCause, ...] = ()
 
 
-def with_causes(draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE,
-                without: Collection[str] = ()) -> TabletopDraft:
+def with_causes(
+    draft: TabletopDraft, seed: int, lasting: float = LASTING_SHARE, without: Collection[str] = ()
+) -> TabletopDraft:
     """A scene with the causes that its seed has for it: mostly none, seldom two.
 
     :param lasting: the share of the causes that last, 0 to 1.
@@ -76,9 +84,11 @@ def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Option
     chain = _left_arm()
     for _ in range(60):
         top = np.array(thing.position) + [0.0, 0.0, thing.size[2] / 2]
-        point = top + generator.uniform(0.2, 0.45) * (EYE - top) + [
-            0.0, generator.uniform(-0.06, 0.02), 0.0
-        ]
+        point = (
+            top
+            + generator.uniform(0.2, 0.45) * (EYE - top)
+            + [0.0, generator.uniform(-0.06, 0.02), 0.0]
+        )
         angles = generator.uniform((-1.5, -0.2, -1.6), (1.5, 0.6, -0.2))
         pose = from_rpy(point, *angles)
         q = chain.inverse(pose, np.array([0.6, 0.2, 1.2, -1.6, 0.0, -0.8, 0.0]), generator)
@@ -86,38 +96,55 @@ def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Option
             turned = chain.nearest_turn(q, np.zeros(len(q)))
             values = tuple(zip(ARM_JOINTS['left'], (float(each) for each in turned)))
             return caused(
-                draft, 'arm_in_view',
+                draft,
+                'arm_in_view',
                 'the left arm is pushed over the table, its hand {:.0f} cm above it'.format(
-                    100 * (point[2] - TABLE_TOP)), Disturbance('arm', 'look_at', values),
-                until=tuple('arm:' + name for name in ARM_JOINTS['left'][:4]))
+                    100 * (point[2] - TABLE_TOP)
+                ),
+                Disturbance('arm', 'look_at', values),
+                until=tuple('arm:' + name for name in ARM_JOINTS['left'][:4]),
+            )
     return None
 
 
 @functools.lru_cache(maxsize=1)
 def _left_arm() -> JointChain:
-    return JointChain.from_urdf(pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'],
-                                {'torso_lift_joint': TORSO})
+    return JointChain.from_urdf(
+        pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'], {'torso_lift_joint': TORSO}
+    )
 
 
 def _glare(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
     """The low sun falls through a window, and something shiny throws it into the lens."""
     minutes = float(generator.uniform(30.0, 90.0))
-    return _dazzled(draft, generator, 'glare', 60 * minutes,
-                    'the low sun dazzles the camera for {:.0f} minutes'.format(minutes))
+    return _dazzled(
+        draft,
+        generator,
+        'glare',
+        60 * minutes,
+        'the low sun dazzles the camera for {:.0f} minutes'.format(minutes),
+    )
 
 
 def _reflex(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
     """Something shiny that moves throws light into the lens."""
     seconds = passing_seconds(generator)
-    return _dazzled(draft, generator, 'reflex', seconds,
-                    'a reflection dazzles the camera for {:.1f} s'.format(seconds))
+    return _dazzled(
+        draft,
+        generator,
+        'reflex',
+        seconds,
+        'a reflection dazzles the camera for {:.1f} s'.format(seconds),
+    )
 
 
-def _dazzled(draft: TabletopDraft, generator: np.random.Generator, kind: str, seconds: float,
-             text: str) -> TabletopDraft:
+def _dazzled(
+    draft: TabletopDraft, generator: np.random.Generator, kind: str, seconds: float, text: str
+) -> TabletopDraft:
     values = dazzling(EYE_LOOKING, LOOKS_AT, np.array(draft.things[TARGET].position), generator)
-    return caused(draft, kind, text, Disturbance('glare', 'look_at',
-                                                 values + (('duration', seconds),)))
+    return caused(
+        draft, kind, text, Disturbance('glare', 'look_at', values + (('duration', seconds),))
+    )
 
 
 def _dim_light(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -125,7 +152,8 @@ def _dim_light(draft: TabletopDraft, generator: np.random.Generator) -> Tabletop
     brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
     values = (('brightness', brightness), ('duration', 60 * minutes))
     text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
-        100 * brightness, minutes)
+        100 * brightness, minutes
+    )
     return caused(draft, 'dim_light', text, Disturbance('dim', 'look_at', values))
 
 
@@ -134,7 +162,8 @@ def _shadow(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDra
     brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
     values = (('brightness', brightness), ('duration', seconds))
     text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
-        seconds, 100 * brightness)
+        seconds, 100 * brightness
+    )
     return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values))
 
 
@@ -148,12 +177,21 @@ def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> Optional[T
     far = radius_of(thing) + radius_of(other) + gap
     behind = np.arctan2(thing.position[1], thing.position[0])
     ways = [float(behind + generator.uniform(-1.5, 1.5)) for _ in range(WAYS)]
-    moved = max((_moved_to(other, thing.position[0] + far * np.cos(way),
-                           thing.position[1] + far * np.sin(way)) for way in ways),
-                key=lambda each: min(0.0, _room_of(each, draft.things[1:])))
-    return caused(_with_moved(draft, moved), 'crowded',
-                  'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap),
-                  until=(thing.name, other.name))
+    moved = max(
+        (
+            _moved_to(
+                other, thing.position[0] + far * np.cos(way), thing.position[1] + far * np.sin(way)
+            )
+            for way in ways
+        ),
+        key=lambda each: min(0.0, _room_of(each, draft.things[1:])),
+    )
+    return caused(
+        _with_moved(draft, moved),
+        'crowded',
+        'another thing stands {:.1f} cm beside the nearest one'.format(100 * gap),
+        until=(thing.name, other.name),
+    )
 
 
 def _slippery_object(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -161,9 +199,12 @@ def _slippery_object(draft: TabletopDraft, generator: np.random.Generator) -> Ta
     mass = float(generator.uniform(0.4, 0.7))
     thing = draft.things[TARGET]._replace(friction=friction, mass=mass)
     return caused(
-        draft._replace(things=(thing,) + draft.things[1:]), 'slippery_object',
+        draft._replace(things=(thing,) + draft.things[1:]),
+        'slippery_object',
         'the nearest thing is slippery and heavy: friction {:.2f}, {:.2f} kg'.format(
-            friction, mass))
+            friction, mass
+        ),
+    )
 
 
 def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -171,9 +212,18 @@ def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Table
     thing = draft.things[TARGET]
 
     def room(way: Tuple[float, float]) -> float:
-        return min([ROOM] + [float(np.hypot(other.position[0] - thing.position[0] - way[0],
-                                            other.position[1] - thing.position[1] - way[1]))
-                             for other in draft.things[1:]])
+        return min(
+            [ROOM]
+            + [
+                float(
+                    np.hypot(
+                        other.position[0] - thing.position[0] - way[0],
+                        other.position[1] - thing.position[1] - way[1],
+                    )
+                )
+                for other in draft.things[1:]
+            ]
+        )
 
     ways = []
     for _ in range(WAYS):
@@ -182,10 +232,13 @@ def _object_moved(draft: TabletopDraft, generator: np.random.Generator) -> Table
         ways.append((far * float(np.cos(heading)), far * float(np.sin(heading))))
     dx, dy = max(ways, key=room)
     return caused(
-        draft, 'object_moved',
+        draft,
+        'object_moved',
         'somebody moves the nearest thing by {:.0f} cm, once it has been seen'.format(
-            100 * float(np.hypot(dx, dy))),
-        Disturbance('nudge:' + thing.name, 'see', (('dx', dx), ('dy', dy), ('duration', 0.8))))
+            100 * float(np.hypot(dx, dy))
+        ),
+        Disturbance('nudge:' + thing.name, 'see', (('dx', dx), ('dy', dy), ('duration', 0.8))),
+    )
 
 
 def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
@@ -195,19 +248,35 @@ def _goal_occupied(draft: TabletopDraft, generator: np.random.Generator) -> Opti
         return None
     headings = [float(generator.uniform(-np.pi, np.pi)) for _ in range(WAYS)]
     distances = [float(generator.uniform(0.07, 0.11)) for _ in range(2)]
-    pairs = [[_moved_to(other, GOAL[0] + away * np.cos(side), GOAL[1] + away * np.sin(side))
-              for other, away, side in zip(spare[-2:], distances, (heading, heading + np.pi))]
-             for heading in headings]
+    pairs = [
+        [
+            _moved_to(other, GOAL[0] + away * np.cos(side), GOAL[1] + away * np.sin(side))
+            for other, away, side in zip(spare[-2:], distances, (heading, heading + np.pi))
+        ]
+        for heading in headings
+    ]
     staying = [each for each in draft.things if each not in spare[-2:]]
-    moved = next((pair for pair in pairs if all(
-        _room_of(each, staying) > 0 and _away(each) > _away(draft.things[TARGET])
-        for each in pair)), None)
+    moved = next(
+        (
+            pair
+            for pair in pairs
+            if all(
+                _room_of(each, staying) > 0 and _away(each) > _away(draft.things[TARGET])
+                for each in pair
+            )
+        ),
+        None,
+    )
     if moved is None:
         return None
-    return caused(_with_moved(draft, *moved), 'goal_occupied',
-                  'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
-                      *(100 * away for away in distances)),
-                  until=tuple(each.name for each in moved))
+    return caused(
+        _with_moved(draft, *moved),
+        'goal_occupied',
+        'things stand {:.0f} and {:.0f} cm beside the place for the object'.format(
+            *(100 * away for away in distances)
+        ),
+        until=tuple(each.name for each in moved),
+    )
 
 
 def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
@@ -215,18 +284,24 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
     thing = draft.things[TARGET]
     spot = (float(generator.uniform(0.50, 0.60)), float(generator.uniform(0.34, 0.50)))
     moved = thing._replace(position=(spot[0], spot[1], thing.position[2]))
-    others = tuple(other for other in draft.things[1:]
-                   if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
-                   and np.hypot(*other.position[:2]) > np.hypot(*spot) + 0.04)
-    return caused(draft._replace(things=(moved,) + others), 'edge_of_reach',
-                  'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]),
-                  until=(thing.name,))
+    others = tuple(
+        other
+        for other in draft.things[1:]
+        if np.hypot(other.position[0] - spot[0], other.position[1] - spot[1]) > 0.12
+        and np.hypot(*other.position[:2]) > np.hypot(*spot) + 0.04
+    )
+    return caused(
+        draft._replace(things=(moved,) + others),
+        'edge_of_reach',
+        'the nearest thing stands {:.0f} cm to the left'.format(100 * spot[1]),
+        until=(thing.name,),
+    )
 
 
 def _spare_things(draft: TabletopDraft) -> Tuple[Body, ...]:
     """Return the things that no cause needs in place, without the nearest one."""
     needed = {name for cause in draft.causes for name in cause.until}
-    return tuple(each for each in draft.things[TARGET + 1:] if each.name not in needed)
+    return tuple(each for each in draft.things[TARGET + 1 :] if each.name not in needed)
 
 
 def _moved_to(thing: Body, x: float, y: float) -> Body:
@@ -240,10 +315,20 @@ def _away(thing: Body) -> float:
 
 def _room_of(thing: Body, others: Sequence[Body]) -> float:
     """m from the outline of a thing to the next one of others. Below 0 they overlap."""
-    return min([np.inf] + [
-        float(np.hypot(thing.position[0] - other.position[0],
-                       thing.position[1] - other.position[1])) - radius_of(thing) - radius_of(other)
-        for other in others if other.name != thing.name])
+    return min(
+        [np.inf]
+        + [
+            float(
+                np.hypot(
+                    thing.position[0] - other.position[0], thing.position[1] - other.position[1]
+                )
+            )
+            - radius_of(thing)
+            - radius_of(other)
+            for other in others
+            if other.name != thing.name
+        ]
+    )
 
 
 def _with_moved(draft: TabletopDraft, *moved: Body) -> TabletopDraft:
@@ -261,9 +346,15 @@ def radius_of(thing: Body) -> float:
 
 Maker = Callable[[TabletopDraft, np.random.Generator], Optional[TabletopDraft]]
 MAKERS: Dict[str, Maker] = {
-    'arm_in_view': _arm_in_view, 'glare': _glare, 'reflex': _reflex, 'dim_light': _dim_light,
-    'shadow': _shadow, 'crowded': _crowded, 'slippery_object': _slippery_object,
-    'object_moved': _object_moved, 'goal_occupied': _goal_occupied,
-    'edge_of_reach': _edge_of_reach
+    'arm_in_view': _arm_in_view,
+    'glare': _glare,
+    'reflex': _reflex,
+    'dim_light': _dim_light,
+    'shadow': _shadow,
+    'crowded': _crowded,
+    'slippery_object': _slippery_object,
+    'object_moved': _object_moved,
+    'goal_occupied': _goal_occupied,
+    'edge_of_reach': _edge_of_reach,
 }
 KINDS: List[str] = sorted(MAKERS)

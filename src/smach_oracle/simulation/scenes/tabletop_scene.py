@@ -1,4 +1,5 @@
 """The world of the first use case (paper, VI-B): a table and things, drawn from the seed."""
+
 from typing import List, Sequence, Tuple
 
 import numpy as np
@@ -26,8 +27,16 @@ SPOTS = 60  # that are tried for them
 DENSITY = (100.0, 1100.0)  # kg/m^3: from nearly empty to full of soup
 # coefficient, median and spread of its logarithm, and its limits: what is greased, and rubber
 FRICTION, FRICTION_SPREAD, FRICTIONS = 0.3, 0.6, (0.08, 1.0)
-COLOURS = ((0.80, 0.16, 0.14), (0.14, 0.35, 0.75), (0.16, 0.55, 0.25), (0.90, 0.75, 0.15),
-           (0.55, 0.20, 0.60), (0.92, 0.92, 0.90), (0.10, 0.55, 0.60), (0.92, 0.48, 0.12))
+COLOURS = (
+    (0.80, 0.16, 0.14),
+    (0.14, 0.35, 0.75),
+    (0.16, 0.55, 0.25),
+    (0.90, 0.75, 0.15),
+    (0.55, 0.20, 0.60),
+    (0.92, 0.92, 0.90),
+    (0.10, 0.55, 0.60),
+    (0.92, 0.48, 0.12),
+)
 WOOD = (0.58, 0.42, 0.27)
 
 
@@ -41,8 +50,12 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     draft = TabletopDraft(fresh_things(seed))
     if not benign:
         draft = with_causes(draft, seed, lasting)
-    robot = RobotStart((('torso_lift_joint', TORSO),), encoder_errors=encoder_errors(seed),
-                       camera_error=camera_error(seed), drive_error=STEADY)
+    robot = RobotStart(
+        (('torso_lift_joint', TORSO),),
+        encoder_errors=encoder_errors(seed),
+        camera_error=camera_error(seed),
+        drive_error=STEADY,
+    )
     return composed(seed, draft, true_table(seed, TABLE_TOP, TABLE_X, TABLE_SIZE), robot)
 
 
@@ -58,9 +71,13 @@ def fresh_things(seed: int) -> Tuple[Body, ...]:
     for number in range(1, SPOTS + 1):
         if len(things) == wanted:
             break
-        drawn = another(generator_for(seed, 'clutter:{}'.format(number)),
-                        _thing(generator, 'object_{}'.format(len(things)), OTHERS_X, OTHERS_Y,
-                               colours[len(things)]), TABLE_TOP)
+        drawn = another(
+            generator_for(seed, 'clutter:{}'.format(number)),
+            _thing(
+                generator, 'object_{}'.format(len(things)), OTHERS_X, OTHERS_Y, colours[len(things)]
+            ),
+            TABLE_TOP,
+        )
         if _has_room(drawn, things):
             things.append(drawn)
     return tuple(things)
@@ -70,15 +87,24 @@ def composed(seed: int, draft: TabletopDraft, table: TrueTable, robot: RobotStar
     """Return the scene of a draft. Its things stand on the table as it is."""
     target = min(draft.things, key=lambda thing: float(np.hypot(*thing.position[:2])))
     goal = Goal('stands_at', target.name, (*GOAL, table.height + target.size[2] / 2), TOLERANCE)
-    return Scene(TASK, seed, tuple(_table(table) + _standing_on(table, draft.things)), goal, robot,
-                 CameraQuality(), draft.disturbances, draft.causes)
+    return Scene(
+        TASK,
+        seed,
+        tuple(_table(table) + _standing_on(table, draft.things)),
+        goal,
+        robot,
+        CameraQuality(),
+        draft.disturbances,
+        draft.causes,
+    )
 
 
 def _standing_on(table: TrueTable, things: Sequence[Body]) -> List[Body]:
     """Things that stand on a table of TABLE_TOP, on another."""
     lift = table.height - TABLE_TOP
-    return [each._replace(position=(*each.position[:2], each.position[2] + lift))
-            for each in things]
+    return [
+        each._replace(position=(*each.position[:2], each.position[2] + lift)) for each in things
+    ]
 
 
 def _table(table: TrueTable) -> List[Body]:
@@ -86,9 +112,14 @@ def _table(table: TrueTable) -> List[Body]:
     top = Body('table', 'box', table.size, (table.x, 0.0, table.height - thick / 2), colour=WOOD)
     tall = table.height - thick
     legs = [
-        Body('leg_{}'.format(2 * i + j), 'box', (0.06, 0.06, tall),
-             (table.x + x * (deep / 2 - 0.06), y * (wide / 2 - 0.06), tall / 2),
-             colour=(0.35, 0.25, 0.17)) for i, x in enumerate((-1, 1))
+        Body(
+            'leg_{}'.format(2 * i + j),
+            'box',
+            (0.06, 0.06, tall),
+            (table.x + x * (deep / 2 - 0.06), y * (wide / 2 - 0.06), tall / 2),
+            colour=(0.35, 0.25, 0.17),
+        )
+        for i, x in enumerate((-1, 1))
         for j, y in enumerate((-1, 1))
     ]
     return [top] + legs
@@ -99,24 +130,43 @@ def _has_room(thing: Body, things: Sequence[Body]) -> bool:
     place, target = np.array(thing.position[:2]), np.array(things[0].position[:2])
     apart = min(
         np.hypot(*(place - each.position[:2])) - radius_of(thing) - radius_of(each)
-        for each in things)
-    return bool(np.hypot(*place) > np.hypot(*target) + 0.05 and apart > GAP
-                and np.hypot(*(place - GOAL)) - radius_of(thing) > FREE_GOAL)
+        for each in things
+    )
+    return bool(
+        np.hypot(*place) > np.hypot(*target) + 0.05
+        and apart > GAP
+        and np.hypot(*(place - GOAL)) - radius_of(thing) > FREE_GOAL
+    )
 
 
-def _thing(generator: np.random.Generator, name: str, deep: Tuple[float, float],
-           wide: Tuple[float, float], colour: Tuple[float, float, float]) -> Body:
+def _thing(
+    generator: np.random.Generator,
+    name: str,
+    deep: Tuple[float, float],
+    wide: Tuple[float, float],
+    colour: Tuple[float, float, float],
+) -> Body:
     """Draw a can or a carton at x and y (m) between limits."""
     x, y = float(generator.uniform(*deep)), float(generator.uniform(*wide))
     tall = float(generator.uniform(0.10, 0.16))
     half = float(generator.uniform(0.024, 0.036))
     density = float(generator.uniform(*DENSITY))
     friction = float(np.clip(generator.lognormal(np.log(FRICTION), FRICTION_SPREAD), *FRICTIONS))
-    thing = Body(name, 'cylinder', (half, half, tall), (x, y, TABLE_TOP + tall / 2 + 0.001),
-                 mass=density * np.pi * half ** 2 * tall, friction=friction, colour=colour)
+    thing = Body(
+        name,
+        'cylinder',
+        (half, half, tall),
+        (x, y, TABLE_TOP + tall / 2 + 0.001),
+        mass=density * np.pi * half**2 * tall,
+        friction=friction,
+        colour=colour,
+    )
     if generator.random() < 0.55:
         return thing
     thick = float(generator.uniform(0.6, 1.0)) * half
-    return thing._replace(shape='box', size=(2 * half, 2 * thick, tall),
-                          mass=density * 4 * half * thick * tall,
-                          yaw=float(generator.uniform(-1.5, 1.5)))
+    return thing._replace(
+        shape='box',
+        size=(2 * half, 2 * thick, tall),
+        mass=density * 4 * half * thick * tall,
+        yaw=float(generator.uniform(-1.5, 1.5)),
+    )

@@ -1,4 +1,5 @@
 """The tasks that the world has scenes for."""
+
 from typing import Callable, Dict
 
 from . import kitchen_scene, tabletop_scene
@@ -6,7 +7,8 @@ from .cause_draws import LASTING_SHARE
 from .scene import Scene
 
 SCENES: Dict[str, Callable[[int, bool, float], Scene]] = {
-    tabletop_scene.TASK: tabletop_scene.draw, kitchen_scene.TASK: kitchen_scene.draw
+    tabletop_scene.TASK: tabletop_scene.draw,
+    kitchen_scene.TASK: kitchen_scene.draw,
 }
 TASKS = tuple(SCENES)
 

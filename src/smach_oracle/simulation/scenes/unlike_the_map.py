@@ -3,6 +3,7 @@
 Someone has measured the kitchen with a tape, people move their furniture by a few centimetres, no
 two cans are of one size, and nobody holds a hand where it was held yesterday.
 """
+
 from typing import NamedTuple, Tuple
 
 import numpy as np
@@ -37,13 +38,16 @@ def true_kitchen(seed: int) -> Kitchen:
     """The kitchen as it is. The robot has Kitchen()."""
     drawn = _drawn(seed, 'true_kitchen', 6)
     mapped = Kitchen()
-    x, y, yaw = (float(value + sigma * each)
-                 for value, sigma, each in zip(mapped.place, PLACE, drawn))
+    x, y, yaw = (
+        float(value + sigma * each) for value, sigma, each in zip(mapped.place, PLACE, drawn)
+    )
     lift = SHELVES * float(drawn[3])
     return mapped._replace(
-        place=(x, y, yaw), shelves=tuple(each + lift for each in mapped.shelves),
+        place=(x, y, yaw),
+        shelves=tuple(each + lift for each in mapped.shelves),
         handle_inset=mapped.handle_inset + HANDLE * float(drawn[4]),
-        handle_stand_off=mapped.handle_stand_off + HANDLE * float(drawn[5]))
+        handle_stand_off=mapped.handle_stand_off + HANDLE * float(drawn[5]),
+    )
 
 
 def drink_size(seed: int, index: int) -> Tuple[float, float]:
@@ -60,9 +64,15 @@ def true_palm(seed: int) -> Vector:
 def true_table(seed: int, height: float, x: float, size: Vector) -> TrueTable:
     """A table about as high, far and large as that (m)."""
     drawn = _drawn(seed, 'true_table', 4)
-    return TrueTable(height + TABLE_HEIGHT * float(drawn[0]), x + TABLE_X * float(drawn[1]),
-                     (size[0] + TABLE_EXTENT * float(drawn[2]),
-                      size[1] + TABLE_EXTENT * float(drawn[3]), size[2]))
+    return TrueTable(
+        height + TABLE_HEIGHT * float(drawn[0]),
+        x + TABLE_X * float(drawn[1]),
+        (
+            size[0] + TABLE_EXTENT * float(drawn[2]),
+            size[1] + TABLE_EXTENT * float(drawn[3]),
+            size[2],
+        ),
+    )
 
 
 def localisation_error(seed: int) -> Vector:

@@ -1,4 +1,5 @@
 """States that end as the plan of the trial has it, for the scripts beside this file."""
+
 import threading
 import time
 
@@ -36,8 +37,11 @@ class Act(smach.State):
     """Ends as planned. Where it succeeds it writes its output keys."""
 
     def __init__(self, label, more_outcomes=(), input_keys=(), outputs=None):
-        super().__init__(['succeeded', 'aborted', 'preempted', *more_outcomes], list(input_keys),
-                         sorted(outputs or {}))
+        super().__init__(
+            ['succeeded', 'aborted', 'preempted', *more_outcomes],
+            list(input_keys),
+            sorted(outputs or {}),
+        )
         self.label = label
         self.outputs = outputs or {}
 

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 """A camera that sees one red pixel."""
+
 import base64
 
 import rospy
 from sensor_msgs.msg import CompressedImage
 
-PIXEL = ('iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVQIHWP4'
-         'z8AAAAMBAQBb2/lEAAAAAElFTkSuQmCC')
+PIXEL = (
+    'iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVQIHWP4z8AAAAMBAQBb2/lEAAAAAElFTkSuQmCC'
+)
 
 
 def main():

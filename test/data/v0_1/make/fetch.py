@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Fetch something: a flat machine. Each argument is the plan of one trial (acting.py)."""
+
 import rospy
 from acting import Act, begin, take
 from geometry_msgs.msg import PoseStamped
@@ -20,7 +21,8 @@ def build():
         'PICK': Act('PICK', ['dropped'], ['pose'], {'grasp': 'from above'}),
         'CARRY': Act('CARRY', input_keys=['grasp']),
         'PLACE': Act('PLACE', outputs={'place': [0.4, -0.2, 0.75]}),
-        'REPORT': Act('REPORT', input_keys=['place'], outputs={'report': 'written'})}
+        'REPORT': Act('REPORT', input_keys=['place'], outputs={'report': 'written'}),
+    }
     with machine:
         smach.StateMachine.add('LOOK', states['LOOK'], {'succeeded': 'PICK'})
         smach.StateMachine.add('PICK', states['PICK'], {'succeeded': 'CARRY', 'dropped': 'LOOK'})

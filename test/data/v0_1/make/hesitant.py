@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """An expert for REPORT: claims a question, gives it back, claims it again, chooses an interface."""
+
 import rospy
 
 from smach_oracle.expert.front_end import FrontEnd, wait_for_question

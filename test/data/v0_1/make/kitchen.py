@@ -3,6 +3,7 @@
 
 Each argument is the plan of one trial (acting.py).
 """
+
 import rospy
 from acting import Act, begin, take
 
@@ -40,8 +41,11 @@ def get():
 
 def clean():
     """Wipe the table, and listen for the bell meanwhile."""
-    both = smach.Concurrence(outcomes=OUTCOMES, default_outcome='aborted', outcome_map={
-        'succeeded': {'TABLE': 'succeeded', 'LISTEN': 'succeeded'}})
+    both = smach.Concurrence(
+        outcomes=OUTCOMES,
+        default_outcome='aborted',
+        outcome_map={'succeeded': {'TABLE': 'succeeded', 'LISTEN': 'succeeded'}},
+    )
     table = smach.StateMachine(outcomes=OUTCOMES)
     with table:
         smach.StateMachine.add('WIPE', Act('WIPE'))

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Record the trials: record.py FOLDER, with smach_oracle in the environment and port 21311 free."""
+
 import os
 import signal
 import subprocess
@@ -11,8 +12,13 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 SETTINGS = HERE.parent / 'settings'
 PORT = '21311'
-ENVIRONMENT = dict(os.environ, ROS_MASTER_URI='http://localhost:' + PORT, ROS_HOSTNAME='localhost',
-                   PYTHONUNBUFFERED='1', PYTHONDONTWRITEBYTECODE='1')
+ENVIRONMENT = dict(
+    os.environ,
+    ROS_MASTER_URI='http://localhost:' + PORT,
+    ROS_HOSTNAME='localhost',
+    PYTHONUNBUFFERED='1',
+    PYTHONDONTWRITEBYTECODE='1',
+)
 PACKAGE = """<package><name>my_robot</name><version>1.0.0</version><description>x</description>
 <maintainer email="me@robot.example">me</maintainer><license>BSD</license></package>
 """
@@ -37,8 +43,9 @@ SHARED = '_expert_query_server:=/expert_query_server/expert_query'
 @contextmanager
 def running(command, ready=None, **options):
     """A process, which is interrupted at the end. `ready`: the node to wait for."""
-    process = subprocess.Popen(command, env=ENVIRONMENT, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, **options)
+    process = subprocess.Popen(
+        command, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, **options
+    )
     try:
         while ready and ready not in nodes():
             time.sleep(0.2)
@@ -51,16 +58,30 @@ def running(command, ready=None, **options):
 
 def nodes():
     """The nodes that the master knows."""
-    found = subprocess.run(['rosnode', 'list'], env=ENVIRONMENT, stdout=subprocess.PIPE,
-                           stderr=subprocess.DEVNULL, check=False)
+    found = subprocess.run(
+        ['rosnode', 'list'],
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        check=False,
+    )
     return found.stdout.decode().split()
 
 
 def oracle_run(script, *arguments, config=None, options=()):
     """Return the command line. Bags lie where it runs."""
     given = ['--config', str(SETTINGS / config)] if config else []
-    return ['rosrun', 'smach_oracle', 'oracle_run', '--record', '.', *given, *options,
-            str(HERE / script), *arguments]
+    return [
+        'rosrun',
+        'smach_oracle',
+        'oracle_run',
+        '--record',
+        '.',
+        *given,
+        *options,
+        str(HERE / script),
+        *arguments,
+    ]
 
 
 def run(folder, *arguments, **options):
@@ -88,8 +109,12 @@ def lose(folder):
     last = sorted(folder.glob('*.bag'))[-1]
     shorter = last.with_name('filtered.bag')
     condition = "not hasattr(m, 'seq') or m.seq not in (4, 6)"
-    subprocess.run(['rosbag', 'filter', str(last), str(shorter), condition], env=ENVIRONMENT,
-                   stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(
+        ['rosbag', 'filter', str(last), str(shorter), condition],
+        env=ENVIRONMENT,
+        stdout=subprocess.DEVNULL,
+        check=True,
+    )
     shorter.replace(last)
 
 
@@ -108,16 +133,30 @@ def make_interface(folder):
     (package / 'by_hand.py').write_text((HERE / 'by_hand.py').read_text('utf-8'), 'utf-8')
     (package / 'by_hand.py').chmod(0o755)
     ENVIRONMENT['ROS_PACKAGE_PATH'] = os.pathsep.join(
-        [str(package.parent), ENVIRONMENT['ROS_PACKAGE_PATH']])
+        [str(package.parent), ENVIRONMENT['ROS_PACKAGE_PATH']]
+    )
 
 
 def record_with_experts(top):
     """The trials in which somebody answers. Parameters stay with the master from run to run."""
     # the experts need a few seconds to find a server of the robot's own
-    run(top / 'by_hand', 'fetch.py', BY_HAND, '_failure_cameras:=[/camera/compressed]',
-        '_oracle:={deadline_s: 8.0}', config='fetch.yaml')
-    run(top / 'by_hand', 'fetch.py', 'CARRY:stuck', SHARED, '_failure_cameras:=[]', '_oracle:={}',
-        config='fetch.yaml')
+    run(
+        top / 'by_hand',
+        'fetch.py',
+        BY_HAND,
+        '_failure_cameras:=[/camera/compressed]',
+        '_oracle:={deadline_s: 8.0}',
+        config='fetch.yaml',
+    )
+    run(
+        top / 'by_hand',
+        'fetch.py',
+        'CARRY:stuck',
+        SHARED,
+        '_failure_cameras:=[]',
+        '_oracle:={}',
+        config='fetch.yaml',
+    )
     # the second run goes on with the rates that the first one has left
     for words in (FETCH[:2], FETCH[2:]):
         run(top / 'fetch', 'fetch.py', *words, SHARED, UNSEEN, config='fetch.yaml')
@@ -126,8 +165,14 @@ def record_with_experts(top):
 
 def record_alone(top):
     """The trials in which nobody does."""
-    run(top / 'fetch_without_oracle', 'fetch.py', 'PICK:aborted', 'PLACE:none', UNSEEN,
-        options=['--without-oracle'])
+    run(
+        top / 'fetch_without_oracle',
+        'fetch.py',
+        'PICK:aborted',
+        'PLACE:none',
+        UNSEEN,
+        options=['--without-oracle'],
+    )
     stopped = top / 'stopped'
     stop(stopped, signal.SIGINT, 'program', 'WAIT:slow')
     stop(stopped, signal.SIGTERM, 'program', 'WAIT:slow')
@@ -143,12 +188,17 @@ def main():
     make_interface(top)
     trials = top / 'trials'
     server = ['rosrun', 'smach_oracle', 'expert_query_server', '__name:=expert_query_server']
-    expert = ['rosrun', 'smach_oracle', 'scripted_expert', '__name:=scripted_expert',
-              '_rules_file:={}'.format(SETTINGS / 'rules.yaml')]
+    expert = [
+        'rosrun',
+        'smach_oracle',
+        'scripted_expert',
+        '__name:=scripted_expert',
+        '_rules_file:={}'.format(SETTINGS / 'rules.yaml'),
+    ]
     with running(['roscore', '-p', PORT], '/rosout'):
-        with running(server, '/expert_query_server'), running(expert, '/scripted_expert'), \
-                running([str(HERE / 'hesitant.py')], '/hesitant'), \
-                running([str(HERE / 'camera.py')], '/camera'):
+        with running(server, '/expert_query_server'), running(expert, '/scripted_expert'), running(
+            [str(HERE / 'hesitant.py')], '/hesitant'
+        ), running([str(HERE / 'camera.py')], '/camera'):
             record_with_experts(trials)
         record_alone(trials)
     for name in ('by_hand', 'fetch_without_oracle', 'kitchen'):

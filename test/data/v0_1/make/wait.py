@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """A machine to be stopped from outside: wait.py node|program PLAN (acting.py)."""
+
 import rospy
 from acting import Act, begin
 

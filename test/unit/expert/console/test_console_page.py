@@ -1,6 +1,7 @@
 """The page as it is shipped: no markup made of text, nothing from elsewhere, everything there that
 it names.
 """
+
 import re
 from pathlib import Path
 
@@ -13,7 +14,8 @@ FILES = sorted(path for path in server.STATIC.rglob('*') if path.is_file())
 SCRIPTS = [path for path in FILES if path.suffix == '.js']
 MARKUP = re.compile(
     r'innerHTML|outerHTML|insertAdjacentHTML|document\.write|createContextualFragment|DOMParser'
-    r'|srcdoc|\beval\(|new Function|javascript:|setAttribute\(.on|Unsafe|parseFromString')
+    r'|srcdoc|\beval\(|new Function|javascript:|setAttribute\(.on|Unsafe|parseFromString'
+)
 
 
 def test_there_is_a_page():
@@ -51,6 +53,6 @@ def test_the_policy_allows_nothing_that_is_not_its_own():
 def test_the_build_installs_all_of_it():
     setup = Path(__file__).resolve().parents[4] / 'setup.py'
     patterns = re.findall(r"'(static/[^']+)'", setup.read_text(encoding='utf-8'))
-    assert {path
-            for pattern in patterns
-            for path in server.STATIC.parent.glob(pattern)} == set(FILES)
+    assert {path for pattern in patterns for path in server.STATIC.parent.glob(pattern)} == set(
+        FILES
+    )

@@ -1,6 +1,7 @@
 """The console's web server attacked over real connections: hosts, origins, cookies, forged
 requests, roles, floods.
 """
+
 import json
 import time
 
@@ -14,11 +15,16 @@ from smach_oracle.expert.console.web.access import ClientRateLimits
 
 
 class TestRequests(console_case.ConsoleCase):
-
     def test_every_answer_keeps_the_page_to_itself(self):
-        for path, host in (('/', None), ('/session', None), ('/nothing',
-                                                             None), ('/static/js/main.js', None),
-                           ('/static/nothing.js', None), ('/', 'evil.example'), ('/socket', None)):
+        for path, host in (
+            ('/', None),
+            ('/session', None),
+            ('/nothing', None),
+            ('/static/js/main.js', None),
+            ('/static/nothing.js', None),
+            ('/', 'evil.example'),
+            ('/socket', None),
+        ):
             answer = self.ask(path, Host=host)
             for name in handlers.HEADERS:
                 assert answer.headers.get(name), (path, name, answer.code)
@@ -35,9 +41,16 @@ class TestRequests(console_case.ConsoleCase):
             assert self.ask('/session', Origin=origin).code == 403
 
     def test_no_file_outside_of_the_page_is_served(self):
-        for path in ('/static/../server.py', '/static/%2e%2e/server.py', '/static/..%2fserver.py',
-                     '/../server.py', '/static//etc/passwd', '/static/%2fetc%2fpasswd',
-                     '/server.py', '/static/js/..%5c..%5cserver.py'):
+        for path in (
+            '/static/../server.py',
+            '/static/%2e%2e/server.py',
+            '/static/..%2fserver.py',
+            '/../server.py',
+            '/static//etc/passwd',
+            '/static/%2fetc%2fpasswd',
+            '/server.py',
+            '/static/js/..%5c..%5cserver.py',
+        ):
             assert self.ask(path).code in (403, 404), path
 
     def test_an_error_repeats_nothing_of_the_request(self):
@@ -58,12 +71,14 @@ class TestRequests(console_case.ConsoleCase):
         wanted = page_socket.MOST_OF_A_SESSION * files - 1
         assert sum(self.access.files.take('10.0.0.1') for _ in range(wanted)) == wanted
         self.access.requests = ClientRateLimits(rate=0.0, burst=0.0, for_all=5.0)
-        assert [self.ask(path).code
-                for path in ('/', '/static/css/page.css', '/session')] == [200, 200, 429]
+        assert [self.ask(path).code for path in ('/', '/static/css/page.css', '/session')] == [
+            200,
+            200,
+            429,
+        ]
 
 
 class TestSignIn(console_case.ConsoleCase):
-
     def test_the_cookie_is_for_this_page_s_requests_alone(self):
         cookie = self.ask('/session').headers['Set-Cookie']
         assert all(part in cookie for part in ('HttpOnly', 'SameSite=Strict', 'Path=/'))
@@ -81,10 +96,15 @@ class TestSignIn(console_case.ConsoleCase):
         cookie, info = self.begin()
         other, other_said = self.begin()
         body = json.dumps({'token': TOKENS['operator']})
-        for headers in ({}, {'X_Xsrf': ''}, {'X_Xsrf': 'wrong'}, {'X_Xsrf': other_said['xsrf']},
-                        {'X_Xsrf': info['xsrf'], 'Origin': None},
-                        {'X_Xsrf': info['xsrf'], 'Origin': 'http://evil.example'},
-                        {'X_Xsrf': info['xsrf'], 'Cookie': None}):
+        for headers in (
+            {},
+            {'X_Xsrf': ''},
+            {'X_Xsrf': 'wrong'},
+            {'X_Xsrf': other_said['xsrf']},
+            {'X_Xsrf': info['xsrf'], 'Origin': None},
+            {'X_Xsrf': info['xsrf'], 'Origin': 'http://evil.example'},
+            {'X_Xsrf': info['xsrf'], 'Cookie': None},
+        ):
             given = dict({'Cookie': cookie, 'Origin': self.origin}, **headers)
             assert self.ask('/session', 'POST', body, **given).code == 403, headers
         assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin).code == 403
@@ -92,40 +112,63 @@ class TestSignIn(console_case.ConsoleCase):
     def test_guessing_is_slowed_down_and_audited(self):
         cookie, info = self.begin()
         codes = [
-            self.ask('/session', 'POST', json.dumps({'token': 'guess'}), Cookie=cookie,
-                     Origin=self.origin, X_Xsrf=info['xsrf']).code for _ in range(7)
+            self.ask(
+                '/session',
+                'POST',
+                json.dumps({'token': 'guess'}),
+                Cookie=cookie,
+                Origin=self.origin,
+                X_Xsrf=info['xsrf'],
+            ).code
+            for _ in range(7)
         ]
         assert codes == [401] * 5 + [429] * 2
-        assert self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}),
-                        Cookie=cookie, Origin=self.origin,
-                        X_Xsrf=info['xsrf']).code == 200, 'the right one is let in'
+        assert (
+            self.ask(
+                '/session',
+                'POST',
+                json.dumps({'token': TOKENS['operator']}),
+                Cookie=cookie,
+                Origin=self.origin,
+                X_Xsrf=info['xsrf'],
+            ).code
+            == 200
+        ), 'the right one is let in'
         assert [record[:2] for record in self.audit.records] == [('sign_in', False)] * 7 + [
-            ('sign_in', True)]
+            ('sign_in', True)
+        ]
         assert 'guess' not in str(self.audit.records)
 
     def test_what_is_no_token_is_refused(self):
         cookie, info = self.begin()
         for body in ('', '{', '[]', '{"token": 1}', '{"token": null}'):
-            answer = self.ask('/session', 'POST', body, Cookie=cookie, Origin=self.origin,
-                              X_Xsrf=info['xsrf'])
+            answer = self.ask(
+                '/session', 'POST', body, Cookie=cookie, Origin=self.origin, X_Xsrf=info['xsrf']
+            )
             assert answer.code in (400, 429)
         assert not any(record[1] for record in self.audit.records)
 
     def test_a_forged_cookie_is_none(self):
         name, value = self.sign_in('viewer')[0].split('=', 1)
         parts = value.strip('"').split('|')
-        for forged in (value[:-3] + 'aaa', '["x","operator",""]', '|'.join(parts[:-1] + ['0' * 64]),
-                       ''):
+        for forged in (
+            value[:-3] + 'aaa',
+            '["x","operator",""]',
+            '|'.join(parts[:-1] + ['0' * 64]),
+            '',
+        ):
             assert self.begin(Cookie='{}={}'.format(name, forged))[1]['signed_in'] is False
 
     def test_signing_out_ends_it(self):
         cookie, info = self.sign_in('viewer')
-        answer = self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin,
-                          X_Xsrf=info['xsrf'])
+        answer = self.ask(
+            '/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=info['xsrf']
+        )
         assert json.loads(answer.body)['signed_in'] is False
         assert ('sign_out', True, 'viewer', '', None) in self.audit.records
-        assert self.begin(
-            Cookie=cookie)[1]['signed_in'] is False, 'a copy of its cookie is good for nothing'
+        assert self.begin(Cookie=cookie)[1]['signed_in'] is False, (
+            'a copy of its cookie is good for nothing'
+        )
 
     def test_who_has_not_signed_in_cannot_flood_what_is_known_of_ended_sessions(self):
         ended, info = self.sign_in('viewer')
@@ -133,8 +176,12 @@ class TestSignIn(console_case.ConsoleCase):
         shown, known = len(self.audit.records), len(self.access._ended)
         for _ in range(3):
             cookie, info = self.begin()
-            assert self.ask('/session', 'DELETE', Cookie=cookie, Origin=self.origin,
-                            X_Xsrf=info['xsrf']).code == 200
+            assert (
+                self.ask(
+                    '/session', 'DELETE', Cookie=cookie, Origin=self.origin, X_Xsrf=info['xsrf']
+                ).code
+                == 200
+            )
         assert (len(self.audit.records), len(self.access._ended)) == (shown, known)
 
     def test_sessions_whose_cookie_is_too_old_anyway_are_forgotten(self):
@@ -167,8 +214,11 @@ class TestSignIn(console_case.ConsoleCase):
         cookie, info = await self.signed('operator')
         pages = [await self.open_page(cookie, info) for _ in range(2)]
         other = await self.open_page(*await self.signed('operator'))
-        await self.http_client.fetch(self.get_url('/session'), method='DELETE', headers={
-            'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': info['xsrf']})
+        await self.http_client.fetch(
+            self.get_url('/session'),
+            method='DELETE',
+            headers={'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': info['xsrf']},
+        )
         for page in pages:
             while await page.read_message() is not None:
                 pass
@@ -178,7 +228,6 @@ class TestSignIn(console_case.ConsoleCase):
 
 
 class TestSocket(console_case.ConsoleCase):
-
     @tornado.testing.gen_test
     async def test_a_socket_needs_a_session_its_own_origin_and_host(self):
         cookie, _ = await self.signed('operator')
@@ -209,15 +258,19 @@ class TestSocket(console_case.ConsoleCase):
             assert not (await self.say(socket, do=command, question='q'))['ok']
         assert not (await self.say(socket, do='answer', question='q', kind='goto', name='x'))['ok']
         assert self.question_commands.done == []
-        assert [record[:3] for record in self.audit.records
-                if record[0] == 'answer'] == [('answer', False, 'viewer')]
+        assert [record[:3] for record in self.audit.records if record[0] == 'answer'] == [
+            ('answer', False, 'viewer')
+        ]
 
     @tornado.testing.gen_test
     async def test_an_operator_s_commands_are_carried_out_under_the_name_given(self):
         socket = await self.open_page(*await self.signed('operator'))
         reply = await self.say(socket, do='claim', question='q')
-        assert (reply['ok'], reply['message'],
-                self.question_commands.done) == (True, 'done', [('claim', 'ann', 'operator')])
+        assert (reply['ok'], reply['message'], self.question_commands.done) == (
+            True,
+            'done',
+            [('claim', 'ann', 'operator')],
+        )
         socket.close()
         await self.until(lambda: self.question_commands.left)
 
@@ -245,7 +298,7 @@ class TestSocket(console_case.ConsoleCase):
     @tornado.testing.gen_test
     async def test_a_slow_page_gets_the_newest_version_and_no_queue(self):
         socket = await self.open_page(*await self.signed('viewer'))
-        page, = self.pages.sockets
+        (page,) = self.pages.sockets
         page._writing = True
         for number in range(100):
             self.sections.put('robots', [number])
@@ -254,9 +307,9 @@ class TestSocket(console_case.ConsoleCase):
         self.pages.push()
         self.pages.push()
         first = json.loads(await socket.read_message())
-        assert first['sections'] == {
-            'robots': [99]
-        } and first['all'], 'what else a page knows from before is gone'
+        assert first['sections'] == {'robots': [99]} and first['all'], (
+            'what else a page knows from before is gone'
+        )
         self.sections.put('robots', None)
         await self.until(lambda: not page._writing)
         self.pages.push()
@@ -265,7 +318,6 @@ class TestSocket(console_case.ConsoleCase):
 
 
 class TestWithoutTokens(console_case.ConsoleCase):
-
     tokens = False
 
     def test_on_loopback_whoever_gets_there_is_at_home_but_not_a_page_elsewhere(self):
@@ -289,15 +341,22 @@ class TestPeople(console_case.ConsoleCase):
     async def test_who_has_said_no_name_looks_and_stops_and_does_nothing_else(self):
         socket, hello = await self.nameless()
         assert (hello['ok'], hello['message']) == (True, '')
-        for command in ({'do': 'claim'}, {'do': 'take_over'}, {'do': 'take_wheel'},
-                        {'do': 'answer', 'kind': 'goto', 'name': 'x'}):
+        for command in (
+            {'do': 'claim'},
+            {'do': 'take_over'},
+            {'do': 'take_wheel'},
+            {'do': 'answer', 'kind': 'goto', 'name': 'x'},
+        ):
             refused = await self.say(socket, 5, question='q', **command)
             assert (refused['ok'], refused['message']) == (False, page_socket.NAME_FIRST)
         assert self.question_commands.done == []
         for command in ('view', 'stop_hand', 'leave_wheel'):
             assert (await self.say(socket, 6, do=command, question='q'))['ok']
-        for command, ok in (('stop_machine', True), ('pause_machine', True),
-                            ('resume_machine', False)):
+        for command, ok in (
+            ('stop_machine', True),
+            ('pause_machine', True),
+            ('resume_machine', False),
+        ):
             assert (await self.say(socket, 7, do=command, robot='/r', path=''))['ok'] is ok
         assert [name for name, *_ in self.machine_hand.done] == ['stop_machine', 'pause_machine']
 

@@ -1,4 +1,5 @@
 """The console over TLS with a certificate of its own making, and what is no certificate."""
+
 import json
 import os
 import shutil
@@ -22,21 +23,44 @@ def path(name):
 
 
 def openssl(*arguments):
-    subprocess.run(['openssl', *arguments], check=True, stdout=subprocess.PIPE,
-                   stderr=subprocess.PIPE)
+    subprocess.run(
+        ['openssl', *arguments], check=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def make(name):
-    openssl('req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2', '-subj',
-            '/CN=robot', '-addext', 'subjectAltName=DNS:localhost,IP:127.0.0.1', '-keyout',
-            path(name + '.key'), '-out', path(name + '.pem'))
+    openssl(
+        'req',
+        '-x509',
+        '-newkey',
+        'rsa:2048',
+        '-nodes',
+        '-days',
+        '2',
+        '-subj',
+        '/CN=robot',
+        '-addext',
+        'subjectAltName=DNS:localhost,IP:127.0.0.1',
+        '-keyout',
+        path(name + '.key'),
+        '-out',
+        path(name + '.pem'),
+    )
 
 
 def setup_module():
     make('own')
     make('other')
-    openssl('rsa', '-aes128', '-passout', 'pass:secret', '-in', path('own.key'), '-out',
-            path('locked.key'))
+    openssl(
+        'rsa',
+        '-aes128',
+        '-passout',
+        'pass:secret',
+        '-in',
+        path('own.key'),
+        '-out',
+        path('locked.key'),
+    )
     with open(path('empty'), 'w', encoding='utf-8'):
         pass
 
@@ -46,7 +70,6 @@ def teardown_module():
 
 
 class TestEncrypted(console_case.ConsoleCase):
-
     certificate, private_key = path('own.pem'), path('own.key')
 
     def test_the_page_comes_encrypted_and_its_cookie_never_leaves_without(self):
@@ -81,15 +104,19 @@ def refusal(certificate, key):
     return str(error.value)
 
 
-@pytest.mark.parametrize('certificate, key, says',
-                         [('nothing.pem', 'own.key', "~certificate: '{}'"),
-                          ('own.pem', 'nothing.key', "~private_key: '{}'"),
-                          ('own.pem', '', "~private_key: '{}'"),
-                          ('own.pem', 'other.key', 'KEY_VALUES_MISMATCH'),
-                          ('own.key', 'own.pem', 'a certificate and the key'),
-                          ('empty', 'own.key', 'a certificate and the key'),
-                          ('own.pem', 'empty', 'a certificate and the key'),
-                          ('own.pem', 'locked.key', 'a key with a passphrase')])
+@pytest.mark.parametrize(
+    'certificate, key, says',
+    [
+        ('nothing.pem', 'own.key', "~certificate: '{}'"),
+        ('own.pem', 'nothing.key', "~private_key: '{}'"),
+        ('own.pem', '', "~private_key: '{}'"),
+        ('own.pem', 'other.key', 'KEY_VALUES_MISMATCH'),
+        ('own.key', 'own.pem', 'a certificate and the key'),
+        ('empty', 'own.key', 'a certificate and the key'),
+        ('own.pem', 'empty', 'a certificate and the key'),
+        ('own.pem', 'locked.key', 'a key with a passphrase'),
+    ],
+)
 def test_what_cannot_be_used_is_named(certificate, key, says):
     wrong = path(certificate if 'certificate' in says else key)
     assert says.format(wrong) in refusal(certificate, key)

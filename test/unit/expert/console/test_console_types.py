@@ -1,5 +1,6 @@
 """The shapes that the page declares are those that the server really sends and takes: TypeScript's
 compiler compares them, with nothing missing and nothing beyond."""
+
 import json
 import re
 import shutil
@@ -20,13 +21,28 @@ from smach_oracle.expert.console.trials.recorded_trials import RecordedTrials
 
 ROOT = Path(__file__).resolve().parents[4]
 SHAPES = server.STATIC / 'js' / 'server'
-SECTIONS = {'heard', 'onlookers', 'cameras', 'questions', 'servers', 'preconditions', 'images',
-            'robots', 'down', 'trials', 'bags', 'sensors', 'manipulation', 'interface_output',
-            'live', 'graph'}
-BEGINNING = '''import * as server from {};
+SECTIONS = {
+    'heard',
+    'onlookers',
+    'cameras',
+    'questions',
+    'servers',
+    'preconditions',
+    'images',
+    'robots',
+    'down',
+    'trials',
+    'bags',
+    'sensors',
+    'manipulation',
+    'interface_output',
+    'live',
+    'graph',
+}
+BEGINNING = """import * as server from {};
 export type Taken = {{ [Name in keyof server.Commands]:
   {{ [Argument in keyof server.Commands[Name]]-?: true }} }};
-'''
+"""
 TSC = shutil.which('tsc')
 
 
@@ -43,11 +59,19 @@ def compile_samples(folder, samples):
         shape = kind if kind == 'Taken' else 'server.' + kind
         text += 'export const sample{}: {} = {};\n'.format(number, shape, json.dumps(value))
     (folder / 'samples.ts').write_text(text)
-    (folder / 'tsconfig.json').write_text(json.dumps({
-        'extends': str(ROOT / 'jsconfig.json'), 'files': ['samples.ts'], 'include': [],
-        'compilerOptions': {'skipLibCheck': True, 'checkJs': False}}))
-    result = subprocess.run([TSC, '-p', str(folder)], stdout=subprocess.PIPE, timeout=240,
-                            check=False)
+    (folder / 'tsconfig.json').write_text(
+        json.dumps(
+            {
+                'extends': str(ROOT / 'jsconfig.json'),
+                'files': ['samples.ts'],
+                'include': [],
+                'compilerOptions': {'skipLibCheck': True, 'checkJs': False},
+            }
+        )
+    )
+    result = subprocess.run(
+        [TSC, '-p', str(folder)], stdout=subprocess.PIPE, timeout=240, check=False
+    )
     said = result.stdout.decode()
     lines = re.findall(r'^\S*samples\.ts\((\d+),', said, re.MULTILINE)
     return {int(line) - before for line in lines}, said
@@ -64,8 +88,12 @@ class WhatIsSent(console_case.ConsoleCase):
 
     def put_all(self):
         """Fill every section; a catalogue with bags."""
-        for put in (console_shapes.put_questions, console_shapes.put_machines,
-                    console_shapes.put_sensors, console_shapes.put_interfaces):
+        for put in (
+            console_shapes.put_questions,
+            console_shapes.put_machines,
+            console_shapes.put_sensors,
+            console_shapes.put_interfaces,
+        ):
             put(self.sections)
         return console_shapes.put_trials(self.sections, self.log, str(self.folder))
 
@@ -75,10 +103,16 @@ class WhatIsSent(console_case.ConsoleCase):
         cookie, said = await self.signed('teleoperator')
         found = [('Session', json.loads(answer.body)), ('Session', said)]
         socket = await self.connect(cookie)
-        for number, command in enumerate((
+        for number, command in enumerate(
+            (
                 {'do': 'hello', 'xsrf': said['xsrf'], 'expert': 'ann'},
-                {'do': 'watch', 'trial': 't'}, {'do': 'claim', 'question': 'q'},
-                {'do': 'take_wheel', 'question': 'q'}, {'do': 'look', 'at': 'trials'}), 1):
+                {'do': 'watch', 'trial': 't'},
+                {'do': 'claim', 'question': 'q'},
+                {'do': 'take_wheel', 'question': 'q'},
+                {'do': 'look', 'at': 'trials'},
+            ),
+            1,
+        ):
             await socket.write_message(json.dumps(dict(command, id=number)))
         pushing = tornado.ioloop.PeriodicCallback(self.pages.push, 20)
         pushing.start()
@@ -98,15 +132,25 @@ class WhatIsSent(console_case.ConsoleCase):
         number = self.sections.get('bags')['trials'][0]['number']
         recorded = RecordedTrials(catalogue, LayoutWorker(), ImageStore()).text(number)
         found += [('Marked', each) for each in console_shapes.marked()]
-        return found + console_shapes.sensor_facts() + [
-            ('RecordedTrial', json.loads(recorded)), ('Taken', taken()),
-            ('ModelHeader', console_shapes.model_header()),
-            ('TrialEvent', console_shapes.later_event())]
+        return (
+            found
+            + console_shapes.sensor_facts()
+            + [
+                ('RecordedTrial', json.loads(recorded)),
+                ('Taken', taken()),
+                ('ModelHeader', console_shapes.model_header()),
+                ('TrialEvent', console_shapes.later_event()),
+            ]
+        )
 
     def test_everything_that_is_sent_and_taken_has_its_declared_shape(self):
         samples = self.samples()
-        names = {name.split()[0] for _, value in samples for part in ('sections', 'lists')
-                 for name in value.get(part, {})}
+        names = {
+            name.split()[0]
+            for _, value in samples
+            for part in ('sections', 'lists')
+            for name in value.get(part, {})
+        }
         assert names == SECTIONS, 'all of them are looked at'
         assert compile_samples(self.folder, samples) == (set(), '')
 
@@ -116,6 +160,8 @@ class WhatIsSent(console_case.ConsoleCase):
 
     def test_what_is_missing_is_noticed(self):
         question = console_shapes.questions()[0]
-        lacking = [('Question', {key: value for key, value in question.items() if key != name})
-                   for name in question]
+        lacking = [
+            ('Question', {key: value for key, value in question.items() if key != name})
+            for name in question
+        ]
         assert compile_samples(self.folder, lacking)[0] == set(range(len(question)))

@@ -1,4 +1,5 @@
 """Output userdata is typed as JSON."""
+
 import pytest
 
 from smach_oracle.expert.terminal.prompts import JsonValidator, ValidationError

@@ -1,4 +1,5 @@
 """What is told of a robot after an answer."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -19,6 +20,7 @@ def make_robot(monkeypatch):
     def listener(name, topic, kind, take):
         robot.does = take
         return SimpleNamespace(stop=lambda: None)
+
     monkeypatch.setattr(next_steps, 'RobotTopic', listener)
     return robot
 
@@ -48,8 +50,9 @@ def test_a_robot_with_an_impossible_name_is_only_silent(name):
 def test_nothing_is_subscribed_to_before_the_master_is_there(monkeypatch):
     subscribed, online = [], []
     monkeypatch.setattr(rosgraph, 'is_master_online', lambda: bool(online))
-    monkeypatch.setattr(rospy, 'Subscriber',
-                        lambda *args, **kwargs: subscribed.append(args[0]) or FakeSubscriber())
+    monkeypatch.setattr(
+        rospy, 'Subscriber', lambda *args, **kwargs: subscribed.append(args[0]) or FakeSubscriber()
+    )
     steps, gone = NextSteps('/robot', 'trial'), NextSteps('/other', 'trial')
     gone.stop()
     assert stays(lambda: not subscribed, 0.7)
@@ -64,16 +67,28 @@ class FakeSubscriber:
 
 
 def test_the_way_to_the_next_state_is_told_and_no_more(robot):
-    steps = steps_after(robot, event(OracleEvent.QUERY_ANSWERED), event(OracleEvent.JUMP),
-                        event(OracleEvent.STATE_START), event(OracleEvent.STATE_START))
+    steps = steps_after(
+        robot,
+        event(OracleEvent.QUERY_ANSWERED),
+        event(OracleEvent.JUMP),
+        event(OracleEvent.STATE_START),
+        event(OracleEvent.STATE_START),
+    )
     assert kinds(steps) == [OracleEvent.JUMP, OracleEvent.STATE_START]
 
 
 def test_a_wait_for_health_before_the_next_state_is_told(robot):
-    steps = steps_after(robot, event(OracleEvent.HEALTH_WAIT_START),
-                        event(OracleEvent.HEALTH_WAIT_END), event(OracleEvent.STATE_START))
-    assert kinds(steps) == [OracleEvent.HEALTH_WAIT_START, OracleEvent.HEALTH_WAIT_END,
-                            OracleEvent.STATE_START]
+    steps = steps_after(
+        robot,
+        event(OracleEvent.HEALTH_WAIT_START),
+        event(OracleEvent.HEALTH_WAIT_END),
+        event(OracleEvent.STATE_START),
+    )
+    assert kinds(steps) == [
+        OracleEvent.HEALTH_WAIT_START,
+        OracleEvent.HEALTH_WAIT_END,
+        OracleEvent.STATE_START,
+    ]
 
 
 def test_other_trials_and_what_came_before_the_answer_are_not_told(robot):

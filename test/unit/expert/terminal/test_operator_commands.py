@@ -1,4 +1,5 @@
 """What an operator types to hold robots, with services that keep what they are asked."""
+
 import io
 
 import pytest
@@ -44,8 +45,9 @@ def told(line, *robots):
 
 def test_a_pause_goes_to_all_robots_and_says_what_each_answers(called):
     assert told('pause', '/hangs', '/robot') == [
-        ('  /hangs/oracle/pause does not answer', 'red'), ('  /robot: runs now: B in task',
-                                                           'green')]
+        ('  /hangs/oracle/pause does not answer', 'red'),
+        ('  /robot: runs now: B in task', 'green'),
+    ]
     assert [name for name, _ in called] == ['/hangs/oracle/pause', '/robot/oracle/pause']
     assert called[1][1].by == 'ann'
 
@@ -66,6 +68,7 @@ def test_a_stop_needs_no_master_and_what_lets_go_does(called):
         if not there:
             raise ServerGoneError('the master does not answer')
         return there
+
     there = ['/a', '/b']
     operator = OperatorCommands('ann', robots, FakeStopCalls())
     operator.look_up()
@@ -80,7 +83,7 @@ def test_a_stop_needs_no_master_and_what_lets_go_does(called):
     assert addresses['/a/oracle/pause'] == 'at /a' and addresses['/b/oracle/preempt'] == 'at /b'
     before = len(called)
     for line in ('resume /a', 'step /a', 'goto /a task PICK', 'status'):
-        (text, style), = operator.carry_out(line)
+        ((text, style),) = operator.carry_out(line)
         assert style == 'red' and 'the master does not answer' in text
     assert len(called) == before
     there = ['/a', '/b']
@@ -103,17 +106,27 @@ def test_a_stop_is_also_for_robots_that_a_new_master_does_not_know_yet(called):
 
 
 def test_what_lets_go_names_its_robot_where_there_are_several(called):
-    (text, style), = told('resume', '/a', '/b')
+    ((text, style),) = told('resume', '/a', '/b')
     assert (text, style) == ('resume: name one of /a, /b, or all, first', 'red') and not called
     told('resume /b', '/a', '/b')
     told('step all task/PICK', '/a', '/b')
     assert [(name, request.path) for name, request in called] == [
-        ('/b/oracle/resume', ''), ('/a/oracle/step', 'task/PICK'), ('/b/oracle/step', 'task/PICK')]
+        ('/b/oracle/resume', ''),
+        ('/a/oracle/step', 'task/PICK'),
+        ('/b/oracle/step', 'task/PICK'),
+    ]
 
 
 def test_every_command_asks_for_what_it_says(called):
-    for line in ('goto task PICK', 'goto task PICK repeat', 'break PICK_*', 'unbreak PICK_*',
-                 'autonomy PICK confirm', 'confirm', 'preempt'):
+    for line in (
+        'goto task PICK',
+        'goto task PICK repeat',
+        'break PICK_*',
+        'unbreak PICK_*',
+        'autonomy PICK confirm',
+        'confirm',
+        'preempt',
+    ):
         assert told(line, '/robot')[0][1] == 'green'
     (_, go), (_, again), (_, stop), (_, no_stop), (_, level) = called[:5]
     assert (go.path, go.state, go.confirm_repeats) == ('task', 'PICK', False)
@@ -121,14 +134,27 @@ def test_every_command_asks_for_what_it_says(called):
     assert (stop.pattern, stop.remove, no_stop.remove) == ('PICK_*', False, True)
     assert (level.pattern, level.level) == ('PICK', 'confirm')
     assert [name.rsplit('/', 1)[1] for name, _ in called] == [
-        'go_to', 'go_to', 'breakpoint', 'breakpoint', 'autonomy', 'confirm', 'preempt']
+        'go_to',
+        'go_to',
+        'breakpoint',
+        'breakpoint',
+        'autonomy',
+        'confirm',
+        'preempt',
+    ]
 
 
-@pytest.mark.parametrize('line, wrong', [
-    ('goto task', 'PATH STATE'), ('goto task PICK twice', 'confirms that states are repeated'),
-    ('break', 'PATTERN'), ('pause a b', 'hold at the next state')])
+@pytest.mark.parametrize(
+    'line, wrong',
+    [
+        ('goto task', 'PATH STATE'),
+        ('goto task PICK twice', 'confirms that states are repeated'),
+        ('break', 'PATTERN'),
+        ('pause a b', 'hold at the next state'),
+    ],
+)
 def test_what_is_no_whole_command_is_told(called, line, wrong):
-    (text, style), = told(line, '/robot')
+    ((text, style),) = told(line, '/robot')
     assert wrong in text and style == 'red' and not called
 
 
@@ -139,15 +165,32 @@ def test_other_lines_are_no_commands(called):
 
 
 def test_a_machine_that_waits_for_a_confirmation_shows_so():
-    lines = machine_lines('/robot', MachineControl(
-        path='task', running=True, paused=True, paused_by='eva',
-        active=[ActiveState('task', 'A', 'paused', True), ActiveState('task/B', 'C', '', False)],
-        breakpoints=['X'], autonomy_patterns=['A'], autonomy_levels=['confirm'],
-        jump_containers=['task/B'], jump_states=['D']))
+    lines = machine_lines(
+        '/robot',
+        MachineControl(
+            path='task',
+            running=True,
+            paused=True,
+            paused_by='eva',
+            active=[
+                ActiveState('task', 'A', 'paused', True),
+                ActiveState('task/B', 'C', '', False),
+            ],
+            breakpoints=['X'],
+            autonomy_patterns=['A'],
+            autonomy_levels=['confirm'],
+            jump_containers=['task/B'],
+            jump_states=['D'],
+        ),
+    )
     assert [text for text, _ in lines] == [
-        '  /robot task: paused by eva', '    task/A waits (paused, to be confirmed)',
-        '    task/B/C runs', '    breakpoint X', '    autonomy A confirm',
-        '    task/B is to go to D']
+        '  /robot task: paused by eva',
+        '    task/A waits (paused, to be confirmed)',
+        '    task/B/C runs',
+        '    breakpoint X',
+        '    autonomy A confirm',
+        '    task/B is to go to D',
+    ]
 
 
 @pytest.mark.parametrize('goals', [(), (goal('q1'),), (goal('q1'), goal('q2'))])
@@ -155,8 +198,13 @@ def test_the_terminal_takes_commands_whatever_it_shows(called, goals):
     front_end = FakeFrontEnd(*goals)
     console = Console(file=io.StringIO(), width=100)
     with typist(console.file.getvalue, 'pause' + ENTER + 'q' + ENTER, ()) as keys:
-        Terminal(front_end, console, Prompts(keys, DummyOutput()), FakeSteps,
-                 preconditions=FakeStatusListener,
-                 operator=OperatorCommands('ann', lambda: ['/robot'])).run()
+        Terminal(
+            front_end,
+            console,
+            Prompts(keys, DummyOutput()),
+            FakeSteps,
+            preconditions=FakeStatusListener,
+            operator=OperatorCommands('ann', lambda: ['/robot']),
+        ).run()
     assert '/robot: runs now: B in task' in console.file.getvalue()
     assert not front_end.decisions and len(called) == 1

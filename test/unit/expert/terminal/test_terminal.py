@@ -1,6 +1,7 @@
 """A conversation at the terminal, typed key by key into a pipe, with a front end that plays the
 rest of the world.
 """
+
 import io
 import json
 import math
@@ -43,8 +44,10 @@ class FakeFrontEnd:
         self.expert = 'ann'
         self.servers = ['/robot/expert_query']
         self.listed = [
-            ListedQuestion('/robot/expert_query', goal, OpenQuery.PENDING, '', time.monotonic(),
-                           math.inf) for goal in goals
+            ListedQuestion(
+                '/robot/expert_query', goal, OpenQuery.PENDING, '', time.monotonic(), math.inf
+            )
+            for goal in goals
         ]
         self.settled = {}
         self.decisions = []
@@ -105,7 +108,7 @@ class FakeSteps:
 
     events = [
         OracleEvent(kind=OracleEvent.JUMP, target='DETECT'),
-        OracleEvent(kind=OracleEvent.STATE_START, state='DETECT')
+        OracleEvent(kind=OracleEvent.STATE_START, state='DETECT'),
     ]
 
     def __init__(self, robot, trial_id):
@@ -127,11 +130,13 @@ class FakeStatusListener(PreconditionStatusListener):
     def __init__(self, robot, query_id):
         super().__init__('', query_id)
         looked = [
-            PreconditionCheck('PICK', 'view_is_clear', PreconditionCheck.DOES_NOT_HOLD,
-                              '\x1b[31mdark', 1.0),
-            PreconditionCheck('PICK', 'DETECT', PreconditionCheck.UNKNOWN,
-                              'only running it would tell', -1.0),
-            PreconditionCheck('PLACE', 'free', PreconditionCheck.HOLDS, 'yes', 65.0)
+            PreconditionCheck(
+                'PICK', 'view_is_clear', PreconditionCheck.DOES_NOT_HOLD, '\x1b[31mdark', 1.0
+            ),
+            PreconditionCheck(
+                'PICK', 'DETECT', PreconditionCheck.UNKNOWN, 'only running it would tell', -1.0
+            ),
+            PreconditionCheck('PLACE', 'free', PreconditionCheck.HOLDS, 'yes', 65.0),
         ]
         self.take(PreconditionChecks(query_id='another', checks=[]))
         if query_id == 'q1':
@@ -146,8 +151,13 @@ def converse(front_end, typed, *script, steps=FakeSteps):
     """Type all that into a terminal; what it has shown when it ends."""
     console = Console(file=io.StringIO(), width=100)
     with typist(console.file.getvalue, typed, script) as keys:
-        Terminal(front_end, console, Prompts(keys, DummyOutput()), steps,
-                 preconditions=FakeStatusListener).run()
+        Terminal(
+            front_end,
+            console,
+            Prompts(keys, DummyOutput()),
+            steps,
+            preconditions=FakeStatusListener,
+        ).run()
     return console.file.getvalue()
 
 
@@ -157,29 +167,40 @@ def test_how_the_preconditions_stand_now_is_told_on_request():
     assert '\x1b[31mdark' not in shown
     assert '? DETECT of PICK unknown: only running it would tell' in shown
     assert '✓ free of PLACE holds (1:05' in shown
-    assert 'The robot does not publish their status.' in converse(FakeFrontEnd(goal('q2')),
-                                                                  'p' + ENTER + 'q' + ENTER)
+    assert 'The robot does not publish their status.' in converse(
+        FakeFrontEnd(goal('q2')), 'p' + ENTER + 'q' + ENTER
+    )
 
 
 def test_an_answer_by_number_is_sent_with_its_reason_and_what_followed_is_told():
     front_end = FakeFrontEnd(goal())
     shown = converse(front_end, '1' + ENTER + 'seen on the camera' + ENTER + 'q' + ENTER)
-    decision, = front_end.decisions
-    assert (decision.kind, decision.state, decision.why) == (ExpertDecision.GOTO, 'DETECT',
-                                                             'seen on the camera')
+    (decision,) = front_end.decisions
+    assert (decision.kind, decision.state, decision.why) == (
+        ExpertDecision.GOTO,
+        'DETECT',
+        'seen on the camera',
+    )
     assert front_end.claims[0] == ('q1', False) and front_end.stopped
-    for part in (ASKS, '✓ The robot has your answer.', 'The machine goes to DETECT.',
-                 'DETECT runs.', WAITING):
+    for part in (
+        ASKS,
+        '✓ The robot has your answer.',
+        'The machine goes to DETECT.',
+        'DETECT runs.',
+        WAITING,
+    ):
         assert part in shown
 
 
 def test_superseding_asks_for_the_output_userdata_as_json():
     front_end = FakeFrontEnd(goal(output_keys=('grasped', 'grip', 'unused')))
     converse(front_end, ENTER.join(['s1', '{"name": "mug"}', '0.02', '', '', 'q', '']))
-    decision, = front_end.decisions
+    (decision,) = front_end.decisions
     assert (decision.kind, decision.outcome) == (ExpertDecision.SUPERSEDE, 'succeeded')
     assert {item.key: json.loads(bytes(item.value)) for item in decision.outputs} == {
-        'grasped': {'name': 'mug'}, 'grip': 0.02}
+        'grasped': {'name': 'mug'},
+        'grip': 0.02,
+    }
 
 
 def test_what_cannot_be_understood_or_is_refused_is_told_and_asked_again():
@@ -189,8 +210,9 @@ def test_what_cannot_be_understood_or_is_refused_is_told_and_asked_again():
     assert "'x' is no answer here" in shown
     assert 'PLACE cannot be entered now' in shown
     assert 'Refused: PICK_AND_PLACE has no state' in shown
-    assert [(decision.kind, decision.why)
-            for decision in front_end.decisions] == [(ExpertDecision.GIVE_UP, 'enough')]
+    assert [(decision.kind, decision.why) for decision in front_end.decisions] == [
+        (ExpertDecision.GIVE_UP, 'enough')
+    ]
 
 
 @pytest.mark.parametrize('key', [CTRL_C, CTRL_D])
@@ -220,8 +242,9 @@ def test_ctrl_c_after_an_answer_does_not_call_it_unsent():
 def test_a_question_that_cannot_be_claimed_yet_is_shown_once_and_claimed_later():
     front_end = FakeFrontEnd(goal())
     front_end.unreachable = 3
-    shown = converse(front_end, '',
-                     (lambda: not front_end.unreachable, ENTER.join(['1', '', 'q', ''])))
+    shown = converse(
+        front_end, '', (lambda: not front_end.unreachable, ENTER.join(['1', '', 'q', '']))
+    )
     assert shown.count('unable to contact master') == 1
     assert shown.count('/robot asks about PICK_AND_PLACE') == 1
     assert front_end.unreachable == 0 and len(front_end.decisions) == 1
@@ -250,9 +273,13 @@ def test_a_question_that_a_restarted_server_does_not_know_is_waited_for():
         front_end.settled.clear()
         front_end.hold('')
 
-    shown = converse(front_end, '', (ASKS, server_restarts),
-                     (lambda: len(front_end.claims) > 3, robot_asks_again),
-                     (ASKS, ENTER.join(['1', '', 'q', ''])))
+    shown = converse(
+        front_end,
+        '',
+        (ASKS, server_restarts),
+        (lambda: len(front_end.claims) > 3, robot_asks_again),
+        (ASKS, ENTER.join(['1', '', 'q', ''])),
+    )
     assert 'there is no question' not in shown and len(front_end.decisions) == 1
 
 
@@ -271,8 +298,12 @@ def test_a_robot_that_dies_is_waited_for_only_so_long(monkeypatch):
 def test_a_question_taken_over_by_another_is_told_and_can_be_taken_back():
     front_end = FakeFrontEnd(goal())
     taken = 'bob has taken this question over.'
-    shown = converse(front_end, '', (ASKS, lambda: front_end.hold('bob')),
-                     (taken, ENTER.join(['1', 't', '1', '', 'q', ''])))
+    shown = converse(
+        front_end,
+        '',
+        (ASKS, lambda: front_end.hold('bob')),
+        (taken, ENTER.join(['1', 't', '1', '', 'q', ''])),
+    )
     assert taken in shown
     assert 'bob works on this question; t takes it over.' in shown
     assert front_end.claims[-1] == ('q1', True) and len(front_end.decisions) == 1
@@ -369,9 +400,16 @@ def talk(typed, *script):
     front_end = WithAnInterface(goal(interfaces=(InterfaceOffer('assist', '/assist'),)))
     interface = FakeInterface(front_end)
     console = Console(file=io.StringIO(), width=100)
-    with typist(console.file.getvalue, ENTER.join(typed),
-                [(partial(awaited, front_end) if callable(awaited) else awaited,
-                  partial(then, front_end) if callable(then) else then)
-                 for awaited, then in script]) as keys:
+    with typist(
+        console.file.getvalue,
+        ENTER.join(typed),
+        [
+            (
+                partial(awaited, front_end) if callable(awaited) else awaited,
+                partial(then, front_end) if callable(then) else then,
+            )
+            for awaited, then in script
+        ],
+    ) as keys:
         Terminal(front_end, console, Prompts(keys, DummyOutput()), FakeSteps, interface).run()
     return front_end, interface, console.file.getvalue()

@@ -1,6 +1,7 @@
 """Keys for a terminal under test: typed when the screen shows what they answer to, and never waited
 for without end.
 """
+
 import contextlib
 import threading
 
@@ -23,8 +24,9 @@ def typist(shown, typed, script=()):
 
     def came(awaited):
         return wait_for(
-            lambda: over.is_set() or (awaited()
-                                      if callable(awaited) else awaited in shown()), PATIENCE_S)
+            lambda: over.is_set() or (awaited() if callable(awaited) else awaited in shown()),
+            PATIENCE_S,
+        )
 
     def work(keys):
         for awaited, then in script:

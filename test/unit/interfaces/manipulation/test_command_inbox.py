@@ -1,6 +1,7 @@
 """Commands that wait for the thread that carries them out: all that have come, in order, and never
 too many.
 """
+
 import threading
 import time
 

@@ -1,4 +1,5 @@
 """A dead-man's handle: held by commands that keep coming, by one operator at a time."""
+
 from smach_oracle.interfaces.manipulation.dead_man_switch import DeadManSwitch
 
 
@@ -44,8 +45,9 @@ def test_a_hand_that_pressed_when_it_was_dropped_must_let_go_first():
     handle = DeadManSwitch(0.1)
     handle.press('ann', 1.0)
     handle.drop(1.05)
-    assert 'let go' in handle.press('ann', 1.2) and 'let go' in handle.press(
-        'ann', 1.45), 'pressed all along'
+    assert 'let go' in handle.press('ann', 1.2) and 'let go' in handle.press('ann', 1.45), (
+        'pressed all along'
+    )
     assert handle.press('bob', 1.46) == '', 'another one may'
     handle.release('bob')
     handle.release('ann')
@@ -53,8 +55,9 @@ def test_a_hand_that_pressed_when_it_was_dropped_must_let_go_first():
     handle.drop(1.55)
     assert handle.press('ann', 1.9) == '', 'silence is letting go, too'
     handle.refuse('ann')
-    assert handle.holder(1.9) == '' and handle.press('ann',
-                                                     1.91) == '', 'refused for another reason'
+    assert handle.holder(1.9) == '' and handle.press('ann', 1.91) == '', (
+        'refused for another reason'
+    )
     handle.drop(5.0)
     assert handle.press('ann', 5.01) == '', 'nobody pressed it'
 
@@ -77,8 +80,9 @@ def test_without_a_watchdog_it_is_a_lease_that_commands_renew():
     handle.press('ann', 1.0)
     handle.press('ann', 3.0)
     assert handle.press('bob', 5.9) == 'ann drives; one at a time' and not handle.lapsed(5.9)
-    assert handle.lapsed(6.0) and handle.holder(
-        100.0) == 'ann', 'she was slow, and nobody has relieved her'
+    assert handle.lapsed(6.0) and handle.holder(100.0) == 'ann', (
+        'she was slow, and nobody has relieved her'
+    )
     assert handle.press('ann', 100.0) == '' and 'ann drives' in handle.press('bob', 101.0)
     assert handle.press('bob', 103.1) == '' and handle.holder(103.1) == 'bob'
     assert handle.press('ann', 104.0) == 'bob drives; one at a time'

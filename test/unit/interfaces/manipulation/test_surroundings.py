@@ -1,4 +1,5 @@
 """Maps of boxes that come over the wire: what is no box leaves the surroundings as they were."""
+
 import math
 from types import SimpleNamespace
 
@@ -20,25 +21,42 @@ def make_near():
     surroundings = Surroundings(robot, 0.3)
     told = []
     surroundings.watch_over(
-        SimpleNamespace(chain=JointChain.from_urdf(URDF, 'base', 'hand'), watch=told.append))
+        SimpleNamespace(chain=JointChain.from_urdf(URDF, 'base', 'hand'), watch=told.append)
+    )
 
     def near(message):
         surroundings.replace(message)
         surroundings.update()
         return [(round(each.distance, 3), each.between) for each in told[0]([0.0])]
+
     return near
 
 
 def boxes(
-    at=(1.2, 0.0, 0.0), turn=(0, 0, 0, 1), size=(0.1, 0.1, 0.1), frame='base', names=('box',)):
-    return CollisionBoxes(Header(frame_id=frame), 'map', list(names),
-                          [Pose(Point(*at), Quaternion(*turn))], [Vector3(*size)])
+    at=(1.2, 0.0, 0.0), turn=(0, 0, 0, 1), size=(0.1, 0.1, 0.1), frame='base', names=('box',)
+):
+    return CollisionBoxes(
+        Header(frame_id=frame),
+        'map',
+        list(names),
+        [Pose(Point(*at), Quaternion(*turn))],
+        [Vector3(*size)],
+    )
 
 
 @pytest.mark.parametrize(
-    'bad', [{'size': (math.nan, 0.1, 0.1)}, {'size': (0.1, 0.1, math.nan)},
-            {'size': (0.1, math.inf, 0.1)}, {'size': (0.1, 0.1, 0.0)}, {'at': (math.nan, 0, 0)},
-            {'turn': (0, 0, 0, 0)}, {'frame': 'moon'}, {'names': ()}])
+    'bad',
+    [
+        {'size': (math.nan, 0.1, 0.1)},
+        {'size': (0.1, 0.1, math.nan)},
+        {'size': (0.1, math.inf, 0.1)},
+        {'size': (0.1, 0.1, 0.0)},
+        {'at': (math.nan, 0, 0)},
+        {'turn': (0, 0, 0, 0)},
+        {'frame': 'moon'},
+        {'names': ()},
+    ],
+)
 def test_a_map_that_is_none_leaves_the_one_before(near, bad):
     assert near(boxes()) == [(0.1, 'hand and box')]
     assert near(boxes(**bad)) == [(0.1, 'hand and box')]

@@ -1,6 +1,7 @@
 """Velocities of a tool to velocities of joints: the direction holds, no limit is ever passed,
 nothing explodes.
 """
+
 import numpy as np
 import pytest
 
@@ -15,10 +16,15 @@ from smach_oracle.interfaces.manipulation.cartesian_drive import (
 PERIOD = 0.02
 READY = np.array([-0.4, 0.3, -1.2, -1.4, 0.3, -0.8, 0.2])
 # (axis, kind, lower, upper, length of the link before it): the joints of an arm such as the PR2's
-ARM = (('z', 'revolute', -2.2, 0.6, 0.0), ('y', 'revolute', -0.4, 1.3, 0.1),
-       ('x', 'revolute', -3.8, 0.7, 0.0), ('y', 'revolute', -2.2, -0.1, 0.4),
-       ('x', 'continuous', 0, 0, 0.0), ('y', 'revolute', -2.0, -0.1, 0.32), ('x', 'continuous', 0,
-                                                                             0, 0.0))
+ARM = (
+    ('z', 'revolute', -2.2, 0.6, 0.0),
+    ('y', 'revolute', -0.4, 1.3, 0.1),
+    ('x', 'revolute', -3.8, 0.7, 0.0),
+    ('y', 'revolute', -2.2, -0.1, 0.4),
+    ('x', 'continuous', 0, 0, 0.0),
+    ('y', 'revolute', -2.0, -0.1, 0.32),
+    ('x', 'continuous', 0, 0, 0.0),
+)
 
 
 def urdf():
@@ -28,12 +34,22 @@ def urdf():
         'link="l{n}"/>'
         '<origin xyz="{x} 0 0"/><axis xyz="{axis}"/>'
         '<limit lower="{low}" upper="{high}" velocity="3" effort="1"/></joint>'.format(
-            n=n, kind=kind, parent='l{}'.format(n - 1) if n else 'base', x=length, axis=axes[axis],
-            low=low, high=high) for n, (axis, kind, low, high, length) in enumerate(ARM))
+            n=n,
+            kind=kind,
+            parent='l{}'.format(n - 1) if n else 'base',
+            x=length,
+            axis=axes[axis],
+            low=low,
+            high=high,
+        )
+        for n, (axis, kind, low, high, length) in enumerate(ARM)
+    )
     return (
         '<robot name="arm"><link name="base"/>{}<link name="tool"/><joint name="tip" type="fixed">'
         '<parent link="l6"/><child link="tool"/><origin xyz="0.18 0 0"/></joint></robot>'.format(
-            joints))
+            joints
+        )
+    )
 
 
 @pytest.fixture(scope='module')
@@ -63,8 +79,12 @@ def test_a_held_command_moves_the_tool_as_far_as_it_says_and_nowhere_else(arm, a
     assert step.limit == '' and step.speed == pytest.approx(1.0, abs=1e-6)
     assert end[:3, 3] - begin[:3, 3] == pytest.approx(twist[:3] * 0.5, abs=1e-3)
     turned = end[:3, :3] @ begin[:3, :3].T
-    angles = np.array(
-        [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]) / 2
+    angles = (
+        np.array(
+            [turned[2, 1] - turned[1, 2], turned[0, 2] - turned[2, 0], turned[1, 0] - turned[0, 1]]
+        )
+        / 2
+    )
     assert angles == pytest.approx(twist[3:] * 0.5, abs=2e-3)
 
 
@@ -73,8 +93,10 @@ def test_a_command_that_is_too_fast_is_slowed_and_keeps_its_direction(arm):
     step = CartesianDrive(arm).step(READY, twist, PERIOD)
     assert np.linalg.norm(step.twist[:3]) <= 0.25 + 1e-9
     assert along(step.twist, twist) == pytest.approx(1.0, abs=1e-9)
-    assert step.speed == pytest.approx(0.25 / np.linalg.norm(twist),
-                                       rel=1e-6) and 'speed' in step.limit
+    assert (
+        step.speed == pytest.approx(0.25 / np.linalg.norm(twist), rel=1e-6)
+        and 'speed' in step.limit
+    )
 
 
 def test_joints_that_would_be_too_fast_slow_the_whole_hand(arm):
@@ -82,8 +104,9 @@ def test_joints_that_would_be_too_fast_slow_the_whole_hand(arm):
     twist = np.array([0.1, 0.1, 0.0, 0.0, 0.3, 0.0])
     step = CartesianDrive(arm, slow).step(READY, twist, PERIOD)
     assert np.abs(step.velocities).max() == pytest.approx(0.06, abs=1e-9)
-    assert along(step.twist, twist) == pytest.approx(
-        1.0, abs=1e-9) and step.limit.startswith('speed limit of j')
+    assert along(step.twist, twist) == pytest.approx(1.0, abs=1e-9) and step.limit.startswith(
+        'speed limit of j'
+    )
 
 
 def test_no_joint_passes_its_limits_whatever_is_commanded(arm):
@@ -107,14 +130,17 @@ def test_a_joint_at_its_limit_is_named_and_spares_the_rest_of_the_way(arm):
 
 def test_near_a_singularity_joint_speeds_stay_bounded_where_plain_least_squares_explode(arm):
     stretched = np.array([0.0, 0.3, -1.2, -0.13, 0.0, -0.8, 0.0])
-    values, worst = np.linalg.svd(arm.jacobian(stretched))[1], np.linalg.svd(
-        arm.jacobian(stretched))[0][:, -1]
+    values, worst = (
+        np.linalg.svd(arm.jacobian(stretched))[1],
+        np.linalg.svd(arm.jacobian(stretched))[0][:, -1],
+    )
     assert values[-1] < 0.03
     twist = worst * 0.1
     plain = np.linalg.pinv(arm.jacobian(stretched)) @ twist
     for sign in (1, -1):
-        damped = CartesianDrive(arm,
-                                DriveLimits(joint_share=1e3)).step(stretched, sign * twist, PERIOD)
+        damped = CartesianDrive(arm, DriveLimits(joint_share=1e3)).step(
+            stretched, sign * twist, PERIOD
+        )
         assert np.linalg.norm(damped.velocities) < 0.4 * np.linalg.norm(plain)
         assert damped.limit == 'singular posture' and damped.speed < 0.5
 
@@ -130,8 +156,9 @@ def test_the_tool_stays_in_its_workspace(arm):
     steps = run(drive, READY, np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0]), 50)
     assert arm.forward(steps[-1].joints)[0, 3] == pytest.approx(edge, abs=1e-3)
     assert steps[-1].limit == 'end of the workspace in x'
-    assert drive.step(steps[-1].joints, np.array([-0.1, 0, 0, 0, 0, 0]),
-                      PERIOD).speed == pytest.approx(1.0)
+    assert drive.step(
+        steps[-1].joints, np.array([-0.1, 0, 0, 0, 0, 0]), PERIOD
+    ).speed == pytest.approx(1.0)
 
 
 def wall(arm, x, touchable):
@@ -140,7 +167,8 @@ def wall(arm, x, touchable):
 
 @pytest.mark.parametrize('touchable, comes_to', [(False, 0.01), (True, 0.0)])
 def test_it_slows_before_what_is_near_and_stops_before_what_must_not_be_touched(
-        arm, touchable, comes_to):
+    arm, touchable, comes_to
+):
     surface = arm.forward(READY)[0, 3] + 0.1
     drive = CartesianDrive(arm, near=wall(arm, surface, touchable))
     steps = run(drive, READY, np.array([0.2, 0.0, 0.05, 0.0, 0.0, 0.0]), 150 if touchable else 400)
@@ -154,9 +182,9 @@ def test_it_slows_before_what_is_near_and_stops_before_what_must_not_be_touched(
 
 def test_it_leaves_what_is_near_at_full_speed(arm):
     surface = arm.forward(READY)[0, 3] + 0.005
-    step = CartesianDrive(arm, near=wall(arm, surface, False)).step(READY,
-                                                                    np.array([-0.2, 0, 0, 0, 0, 0]),
-                                                                    PERIOD)
+    step = CartesianDrive(arm, near=wall(arm, surface, False)).step(
+        READY, np.array([-0.2, 0, 0, 0, 0, 0]), PERIOD
+    )
     assert step.speed == pytest.approx(1.0) and step.clearance == pytest.approx(0.005)
 
 
@@ -165,14 +193,18 @@ def test_no_command_no_motion(arm):
     assert (step.joints == READY).all() and not step.velocities.any()
 
 
-@pytest.mark.parametrize('joints, twist, period, says',
-                         [(READY, [np.nan, 0, 0, 0, 0, 0], PERIOD, 'twist'),
-                          (READY, [0, 0, np.inf, 0, 0, 0], PERIOD, 'twist'),
-                          (READY, [0, 0, 0], PERIOD, 'twist'),
-                          (READY * np.nan, np.zeros(6), PERIOD, 'joints'),
-                          (READY[:3], np.zeros(6), PERIOD, 'joints'),
-                          (READY, np.zeros(6), 0.0, 'period'),
-                          (READY, np.zeros(6), np.nan, 'period')])
+@pytest.mark.parametrize(
+    'joints, twist, period, says',
+    [
+        (READY, [np.nan, 0, 0, 0, 0, 0], PERIOD, 'twist'),
+        (READY, [0, 0, np.inf, 0, 0, 0], PERIOD, 'twist'),
+        (READY, [0, 0, 0], PERIOD, 'twist'),
+        (READY * np.nan, np.zeros(6), PERIOD, 'joints'),
+        (READY[:3], np.zeros(6), PERIOD, 'joints'),
+        (READY, np.zeros(6), 0.0, 'period'),
+        (READY, np.zeros(6), np.nan, 'period'),
+    ],
+)
 def test_what_is_not_finite_or_has_the_wrong_shape_is_refused(arm, joints, twist, period, says):
     with pytest.raises(ValueError, match=says):
         CartesianDrive(arm).step(joints, twist, period)

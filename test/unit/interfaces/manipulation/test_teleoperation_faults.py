@@ -1,4 +1,5 @@
 """What goes wrong while a hand is driven leaves nothing moving; no master."""
+
 import threading
 from types import SimpleNamespace
 
@@ -16,9 +17,21 @@ from smach_oracle.interfaces.manipulation.settings import NO_SNAPSHOT, Teleopera
 from smach_oracle.msg import SharedAutonomyGoal, TeleopCommand
 
 SETTINGS = TeleoperationSettings(
-    arms={}, base='base', limits=DriveLimits(), states={}, arm_keys=[], success=['succeeded'],
-    rate_hz=50.0, watchdog_s=60.0, lease_s=60.0, lead=0.1, gripper_effort=10.0, lock_step=False,
-    snapshot=NO_SNAPSHOT, clearance=False)
+    arms={},
+    base='base',
+    limits=DriveLimits(),
+    states={},
+    arm_keys=[],
+    success=['succeeded'],
+    rate_hz=50.0,
+    watchdog_s=60.0,
+    lease_s=60.0,
+    lead=0.1,
+    gripper_effort=10.0,
+    lock_step=False,
+    snapshot=NO_SNAPSHOT,
+    clearance=False,
+)
 
 
 class FakeArm:
@@ -80,8 +93,11 @@ def make_interface(monkeypatch):
     monkeypatch.setattr(rospy, 'logerr_throttle', lambda *_: None)
     publisher = SimpleNamespace(publish=made.states.append)
     monkeypatch.setattr(rospy, 'Publisher', lambda *_, **__: publisher)
-    monkeypatch.setattr(rospy, 'Subscriber', lambda topic, kind, callback, **__: setattr(
-        made, topic.strip('~'), callback))
+    monkeypatch.setattr(
+        rospy,
+        'Subscriber',
+        lambda topic, kind, callback, **__: setattr(made, topic.strip('~'), callback),
+    )
     monkeypatch.setattr(teleoperation_server, 'InterfaceGoal', FakeGoal)
     monkeypatch.setattr(teleoperation_server, 'FinishServices', lambda *_: None)
     before = threading.enumerate()
@@ -95,8 +111,11 @@ def drive(interface, seq):
     """Command the left hand as ann. Returns the first state in which it moves or is refused."""
     seen = len(interface.states)
     interface.command(TeleopCommand(operator='ann', arm='left', dead_man=True, seq=seq))
-    return wait_for(lambda: next((state for state in interface.states[seen:]
-                                  if state.moving or state.refused), None))
+    return wait_for(
+        lambda: next(
+            (state for state in interface.states[seen:] if state.moving or state.refused), None
+        )
+    )
 
 
 def test_hand_and_grippers_stand_after_an_error_until_the_next_command(interface):

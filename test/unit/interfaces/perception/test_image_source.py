@@ -1,4 +1,5 @@
 """Images on request: a snapshot service that hangs, or says no."""
+
 import pytest
 
 from smach_oracle.interfaces.perception import image_source
@@ -18,6 +19,7 @@ def test_a_snapshot_that_hangs_is_waited_for_only_so_long(source, monkeypatch):
     def hang(name, kind, request, limit_s):
         limits.append((name, request.camera, limit_s))
         raise ServerGoneError(name + ' does not answer')
+
     monkeypatch.setattr(image_source, 'call_service', hang)
     with pytest.raises(ImageSourceError, match='/world/snapshot does not answer'):
         source._snap(1.5)
@@ -25,7 +27,8 @@ def test_a_snapshot_that_hangs_is_waited_for_only_so_long(source, monkeypatch):
 
 
 def test_a_snapshot_that_is_refused_says_why(source, monkeypatch):
-    monkeypatch.setattr(image_source, 'call_service',
-                        lambda *_: SnapshotResponse(False, 'frozen', None))
+    monkeypatch.setattr(
+        image_source, 'call_service', lambda *_: SnapshotResponse(False, 'frozen', None)
+    )
     with pytest.raises(ImageSourceError, match='/world/snapshot: frozen'):
         source._snap(1.5)

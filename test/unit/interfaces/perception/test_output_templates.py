@@ -1,6 +1,7 @@
 """What accepting a marked object hands over: a template that cannot be used is refused by its
 place.
 """
+
 import pytest
 
 from smach_oracle.interfaces.perception.output_templates import templates_from
@@ -15,4 +16,5 @@ def test_what_no_marking_gives_is_named(ingredient):
 
 def test_a_template_is_taken_as_it_is():
     assert templates_from({'DETECT': {'outputs': {'drink': 'object'}}}) == {
-        'DETECT': ('succeeded', {'drink': 'object'})}
+        'DETECT': ('succeeded', {'drink': 'object'})
+    }

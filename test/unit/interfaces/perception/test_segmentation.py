@@ -1,6 +1,7 @@
 """What a person draws on a frame becomes an object: masks against true pixels, centres against
 places, refusals.
 """
+
 import contextlib
 import time
 
@@ -31,10 +32,12 @@ def shown(bodies, seed=0, noise=1.0, colour_noise=6.0):
 
 def region_around(pixels, jitter=(6, 6, 6, 6)):
     rows, columns = np.nonzero(pixels)
-    return rectangle(columns.min() - jitter[0],
-                     rows.min() - jitter[1],
-                     np.ptp(columns) + jitter[0] + jitter[2],
-                     np.ptp(rows) + jitter[1] + jitter[3])
+    return rectangle(
+        columns.min() - jitter[0],
+        rows.min() - jitter[1],
+        np.ptp(columns) + jitter[0] + jitter[2],
+        np.ptp(rows) + jitter[1] + jitter[3],
+    )
 
 
 def overlap(mask, truth):
@@ -58,8 +61,9 @@ def test_a_drawn_rectangle_gives_the_object(noise, colour_noise):
         overlaps.append(overlap(found.mask, whose == 1))
         errors.append(np.linalg.norm(found.box.centre - bodies[1].position))
     assert np.median(overlaps) > 0.97
-    assert np.mean(
-        np.array(overlaps) > 0.8) >= 0.8, 'something of the colour of the table may be lost'
+    assert np.mean(np.array(overlaps) > 0.8) >= 0.8, (
+        'something of the colour of the table may be lost'
+    )
     assert np.median(errors) < 0.01
 
 
@@ -100,8 +104,15 @@ def test_a_polygon_is_a_region_too():
     image, whose = shown([TABLE, CAN])
     left, top = region_around(whose == 1)[0]
     right, bottom = region_around(whose == 1)[2]
-    corners = np.array([[left, top], [right, top], [right + 10, (top + bottom) / 2],
-                        [right, bottom], [left, bottom]])
+    corners = np.array(
+        [
+            [left, top],
+            [right, top],
+            [right + 10, (top + bottom) / 2],
+            [right, bottom],
+            [left, bottom],
+        ]
+    )
     assert overlap(segment(image, corners).mask, whose == 1) > 0.95
 
 
@@ -121,20 +132,29 @@ def test_a_region_as_large_as_the_image_does_not_keep_a_person_waiting():
     assert time.process_time() - begun_s < 0.6, 'twice what it should take, for a busy machine'
 
 
-@pytest.mark.parametrize('region, text', [(rectangle(700, 10, 50, 50), 'outside the image'),
-                                          (rectangle(10, -90, 50, 50), 'outside the image'),
-                                          (rectangle(100, 100, 1, 80), 'too small'),
-                                          (np.zeros((2, 2)), '3 corners'),
-                                          (np.zeros((4, 3)), '3 corners'),
-                                          (np.full((4, 2), np.nan), 'finite')])
+@pytest.mark.parametrize(
+    'region, text',
+    [
+        (rectangle(700, 10, 50, 50), 'outside the image'),
+        (rectangle(10, -90, 50, 50), 'outside the image'),
+        (rectangle(100, 100, 1, 80), 'too small'),
+        (np.zeros((2, 2)), '3 corners'),
+        (np.zeros((4, 3)), '3 corners'),
+        (np.full((4, 2), np.nan), 'finite'),
+    ],
+)
 def test_a_region_that_is_none_is_refused(region, text):
     assert text in str(refusal(shown([TABLE, CAN])[0], region))
 
 
-@pytest.mark.parametrize('stroke, text',
-                         [(Stroke(True, np.zeros((0, 2))), 'a stroke needs'),
-                          (Stroke(True, np.array([[np.inf, 1.0]])), 'a stroke needs'),
-                          (Stroke(True, np.array([[1.0, 1.0]]), -3.0), 'width of -3.0')])
+@pytest.mark.parametrize(
+    'stroke, text',
+    [
+        (Stroke(True, np.zeros((0, 2))), 'a stroke needs'),
+        (Stroke(True, np.array([[np.inf, 1.0]])), 'a stroke needs'),
+        (Stroke(True, np.array([[1.0, 1.0]]), -3.0), 'width of -3.0'),
+    ],
+)
 def test_a_stroke_that_is_none_is_refused(stroke, text):
     assert text in str(refusal(shown([TABLE, CAN])[0], rectangle(300, 200, 80, 80), [stroke]))
 
@@ -143,7 +163,8 @@ def test_a_mask_that_collapses_is_said_with_what_may_help():
     image, whose = shown([TABLE, CAN])
     rubbed_out = Stroke(False, np.argwhere(whose == 1)[:1, ::-1].astype(float), 400.0)
     assert 'draw a stroke on the object' in str(
-        refusal(image, region_around(whose == 1), [rubbed_out]))
+        refusal(image, region_around(whose == 1), [rubbed_out])
+    )
 
 
 def test_too_little_depth_is_said_and_the_mask_is_shown():
@@ -155,8 +176,10 @@ def test_too_little_depth_is_said_and_the_mask_is_shown():
 
 
 def test_the_scene_around_has_the_surface_and_the_other_things():
-    others = [CAN._replace(position=(0.68, -0.2, 0.78), colour=(0.8, 0.8, 0.1)),
-              CAN._replace(position=(0.75, 0.062, 0.78), colour=(0.8, 0.2, 0.1))]
+    others = [
+        CAN._replace(position=(0.68, -0.2, 0.78), colour=(0.8, 0.8, 0.1)),
+        CAN._replace(position=(0.75, 0.062, 0.78), colour=(0.8, 0.2, 0.1)),
+    ]
     image, whose = shown([TABLE, CAN] + others)
     found = scene_of(image, segment(image, region_around(whose == 1)))
     assert abs(found.surface.centre[2] - 0.72) < 0.005

@@ -1,4 +1,5 @@
 """After a damaged store was accepted, what its lost moments may have told is in doubt."""
+
 import os
 import shutil
 import signal
@@ -43,6 +44,7 @@ def byte_wrong(part):
             old = log.read(1)
             log.seek(-1, os.SEEK_CUR)
             log.write(bytes([old[0] ^ 0x55]))
+
     return damage
 
 
@@ -50,6 +52,7 @@ def cut(part):
     def damage(killed):
         frames = os.path.getsize(log_of(killed)) // FRAME
         os.truncate(log_of(killed), 32 + FRAME * int(frames * part))
+
     return damage
 
 
@@ -58,12 +61,24 @@ def head_wrong(killed):
         log.write(b'x' * 16)
 
 
-DAMAGES = {'log gone': log_gone, 'log and mark gone': log_and_mark_gone,
-           'log empty': log_of_nothing, 'head wrong': head_wrong,
-           'cut 1/4': cut(0.25), 'cut 1/2': cut(0.5), 'cut 3/4': cut(0.75),
-           'byte 1/8': byte_wrong(0.12), 'byte 1/2': byte_wrong(0.5), 'byte 7/8': byte_wrong(0.88)}
-WAYS = {'recover': {}, 'default': {'on_resume': 'ask'}, 'state': {'on_resume': 'state:LOOK'},
-        'goto': {}}
+DAMAGES = {
+    'log gone': log_gone,
+    'log and mark gone': log_and_mark_gone,
+    'log empty': log_of_nothing,
+    'head wrong': head_wrong,
+    'cut 1/4': cut(0.25),
+    'cut 1/2': cut(0.5),
+    'cut 3/4': cut(0.75),
+    'byte 1/8': byte_wrong(0.12),
+    'byte 1/2': byte_wrong(0.5),
+    'byte 7/8': byte_wrong(0.88),
+}
+WAYS = {
+    'recover': {},
+    'default': {'on_resume': 'ask'},
+    'state': {'on_resume': 'state:LOOK'},
+    'goto': {},
+}
 
 
 def accept(killed, way='recover'):

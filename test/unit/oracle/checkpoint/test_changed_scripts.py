@@ -1,4 +1,5 @@
 """A machine that was killed goes on in a script whose states have other names or places."""
+
 import contextlib
 import io
 import json
@@ -15,13 +16,20 @@ from smach_oracle.store.state_command import main
 from smach_oracle.store.store_file import StoreFile
 
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
-MAP = {'A': 'START', 'KITCHEN': 'GALLEY', 'KITCHEN/LOOK': 'GALLEY/SEE', 'BOTH/LEFT': 'BOTH/PORT',
-       'BOTH/LAST': 'BOTH/END', 'Z': 'Y'}
+MAP = {
+    'A': 'START',
+    'KITCHEN': 'GALLEY',
+    'KITCHEN/LOOK': 'GALLEY/SEE',
+    'BOTH/LEFT': 'BOTH/PORT',
+    'BOTH/LAST': 'BOTH/END',
+    'Z': 'Y',
+}
 OUTCOMES = ['succeeded', 'aborted']
 
 
 def task(**names):
     """A builder of a task, some of whose labels are others. What the states note stays."""
+
     def build(diary, points):
         def name(label):
             return names.get(label, label)
@@ -36,8 +44,13 @@ def task(**names):
                 machine.add(name(second), noted(second), ENDS)
             return machine
 
-        both = smach.Concurrence(OUTCOMES, 'aborted', ['done'], ['done'], outcome_map={
-            'succeeded': {name('LEFT'): 'succeeded', name('LAST'): 'succeeded'}})
+        both = smach.Concurrence(
+            OUTCOMES,
+            'aborted',
+            ['done'],
+            ['done'],
+            outcome_map={'succeeded': {name('LEFT'): 'succeeded', name('LAST'): 'succeeded'}},
+        )
         with both:
             both.add(name('LEFT'), noted('LEFT'))
             both.add(name('LAST'), pair('M1', 'M2'))
@@ -49,6 +62,7 @@ def task(**names):
             machine.add('BOTH', both, {'succeeded': name('Z')})
             machine.add(name('Z'), noted('Z'), ENDS)
         return machine
+
     return build
 
 
@@ -154,8 +168,13 @@ def test_what_has_moved_out_of_a_container_goes_on_there(folder):
 
 
 def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
-    before, after = both_scripts(folder, flat_before, nested_after, resume_map={
-        'B': 'IN/B', 'C': 'IN/C'}, states={'IN/C': {'on_retry': 'never'}})
+    before, after = both_scripts(
+        folder,
+        flat_before,
+        nested_after,
+        resume_map={'B': 'IN/B', 'C': 'IN/C'},
+        states={'IN/C': {'on_retry': 'never'}},
+    )
     killed_while_it_runs(folder, before, 'C')
     after.run()
     assert after.diary.count('begins')['C'] == 1
@@ -179,21 +198,30 @@ def test_an_earlier_moment_of_before_can_still_be_gone_back_to(folder):
     before.run(kill_at=40)
     after.run(kill_at=4)
     store = StoreFile(after.store, read_only=True)
-    first = next(each for each in store.moments(1)
-                 if each.kind == 'STATE_START' and each.label == 'PICK')
+    first = next(
+        each for each in store.moments(1) if each.kind == 'STATE_START' and each.label == 'PICK'
+    )
     told = after.run(resume_from=first.number)
     assert told['outcome'] == 'succeeded'
     assert after.diary.count('begins')['LOOK'] == 1
     assert after.diary.count('begins')['PICK'] >= 2
 
 
-@pytest.mark.parametrize('names, why', [
-    ({'NOWHERE': 'Y'}, "resume_map.NOWHERE: 'NOWHERE' is not allowed; allowed: a state of the "
-                       'machine that was stopped: A, BOTH'),
-    ({'A': 'NOWHERE'}, "resume_map.A: 'NOWHERE' is not allowed; allowed: a state of the machine: "
-                       'BOTH'),
-    ({'KITCHEN/A': 'Y'}, "resume_map.KITCHEN/A: 'KITCHEN/A'"),
-])
+@pytest.mark.parametrize(
+    'names, why',
+    [
+        (
+            {'NOWHERE': 'Y'},
+            "resume_map.NOWHERE: 'NOWHERE' is not allowed; allowed: a state of the "
+            'machine that was stopped: A, BOTH',
+        ),
+        (
+            {'A': 'NOWHERE'},
+            "resume_map.A: 'NOWHERE' is not allowed; allowed: a state of the machine: BOTH",
+        ),
+        ({'KITCHEN/A': 'Y'}, "resume_map.KITCHEN/A: 'KITCHEN/A'"),
+    ],
+)
 def test_a_label_that_is_not_there_is_named_before_anything_moves(folder, names, why):
     before, after = both_scripts(folder, BEFORE, RENAMED)
     before.run(kill_at=12)
@@ -234,8 +262,15 @@ def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
 
     class Noting(Expert):
         def ask(self, question, cancelled, progress):
-            noted.write_text(json.dumps([question.failed_state, question.reason + question.text,
-                                         question.userdata['done']]))
+            noted.write_text(
+                json.dumps(
+                    [
+                        question.failed_state,
+                        question.reason + question.text,
+                        question.userdata['done'],
+                    ]
+                )
+            )
 
         def run_interface(self, offer, question, cancelled, progress):
             return None
@@ -245,25 +280,40 @@ def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
     state, text, done = json.loads(noted.read_text())
     assert (state, done) == ('D', ['A', 'B', 'C'])
     assert re.search(r'the program was stopped \d+ s ago', text)
-    for change in ('container IN is new', 'state B is gone', 'state C is gone', 'state IN is new',
-                   'state A: succeeded led to B, and leads to IN'):
+    for change in (
+        'container IN is new',
+        'state B is gone',
+        'state C is gone',
+        'state IN is new',
+        'state A: succeeded led to B, and leads to IN',
+    ):
         assert change in text
 
 
-@pytest.mark.parametrize('names, unknown', [
-    ({'A': 'Z', 'KITCHEN/LOOK': 'KITCHEN/PICK'}, []),
-    ({'A': 'Zz', 'KITCHEN/LOK': 'KITCHEN/PICK'}, ['KITCHEN/LOK', 'Zz']),
-])
+@pytest.mark.parametrize(
+    'names, unknown',
+    [
+        ({'A': 'Z', 'KITCHEN/LOOK': 'KITCHEN/PICK'}, []),
+        ({'A': 'Zz', 'KITCHEN/LOK': 'KITCHEN/PICK'}, ['KITCHEN/LOK', 'Zz']),
+    ],
+)
 def test_in_the_same_script_a_map_is_of_no_effect_and_unknown_names_are_named(
-        folder, names, unknown):
+    folder, names, unknown
+):
     before, after = both_scripts(folder, BEFORE, BEFORE, resume_map=names)
     before.run(kill_at=14)
     told = after.run()
     assert told['outcome'] == 'succeeded'
     log = told['log']
     named = [text for text in log if 'resume_map' in text]
-    assert [re.search("names '(.*)', which is not a state of the machine, and was not one "
-                      'before; there are A, BOTH', text).group(1) for text in named] == unknown
+    assert [
+        re.search(
+            "names '(.*)', which is not a state of the machine, and was not one "
+            'before; there are A, BOTH',
+            text,
+        ).group(1)
+        for text in named
+    ] == unknown
     goes_on = next(index for index, text in enumerate(log) if ' goes on; its program' in text)
     assert all(log.index(text) < goes_on for text in named)
 

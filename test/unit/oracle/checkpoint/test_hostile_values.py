@@ -1,4 +1,5 @@
 """Whatever a value does as it is looked at, it is left out and named, and the rest is stored."""
+
 import threading
 import time
 
@@ -24,8 +25,12 @@ from smach_oracle.store.codecs import Codecs, NotReadable, NotStorable
 from smach_oracle.store.stopped_trial import StoppedTrial, chosen_trial
 from smach_oracle.store.store_file import StoreFile
 
-QUICK = {'deadline': None, 'derandomize': True, 'database': None,
-         'suppress_health_check': list(HealthCheck)}
+QUICK = {
+    'deadline': None,
+    'derandomize': True,
+    'database': None,
+    'suppress_health_check': list(HealthCheck),
+}
 
 
 def machine_of(tmp_path, steps, **more):
@@ -33,12 +38,26 @@ def machine_of(tmp_path, steps, **more):
     machine = smach.StateMachine(['ok', 'aborted'])
     with machine:
         for number, step in enumerate(steps):
-            smach.StateMachine.add('S{}'.format(number), smach.CBState(
-                step, outcomes=['ok'], input_keys=['odd', 'good'], output_keys=['odd', 'good']),
-                {'ok': 'S{}'.format(number + 1) if number + 1 < len(steps) else 'ok'})
-    OracleContainer.wrap(machine, name='TOP', settings=dict({
-        'checkpoint': str(tmp_path / 'robot.db'), 'checkpoint_synchronous': 'OFF',
-        'checkpoint_wait_s': 60, 'on_resume': 'recover'}, **more))
+            smach.StateMachine.add(
+                'S{}'.format(number),
+                smach.CBState(
+                    step, outcomes=['ok'], input_keys=['odd', 'good'], output_keys=['odd', 'good']
+                ),
+                {'ok': 'S{}'.format(number + 1) if number + 1 < len(steps) else 'ok'},
+            )
+    OracleContainer.wrap(
+        machine,
+        name='TOP',
+        settings=dict(
+            {
+                'checkpoint': str(tmp_path / 'robot.db'),
+                'checkpoint_synchronous': 'OFF',
+                'checkpoint_wait_s': 60,
+                'on_resume': 'recover',
+            },
+            **more,
+        ),
+    )
     return machine
 
 
@@ -47,6 +66,7 @@ def writes(value, good=None):
         userdata.odd = value
         userdata.good = good
         return 'ok'
+
     return step
 
 
@@ -58,8 +78,9 @@ def stored_keys(tmp_path):
     """The userdata of the trial that was stopped, as `oracle_state show` has it."""
     store = StoreFile(str(tmp_path / 'robot.db'), read_only=True)
     try:
-        return {key: text for _, key, text in StoppedTrial(
-            store, chosen_trial(store, None)).userdata()}
+        return {
+            key: text for _, key, text in StoppedTrial(store, chosen_trial(store, None)).userdata()
+        }
     finally:
         store.close()
 
@@ -90,8 +111,9 @@ def test_a_machine_stores_all_that_stands_beside_a_value(tmp_path_factory, value
     log = []
     for level in ('info', 'warn', 'debug', 'err'):
         setattr(smach, 'log' + level, lambda text, level=level: log.append((level, text)))
-    machine = machine_of(tmp_path, [writes(value, 'kept'), lambda userdata: 'ok', stopped],
-                         deep_copy_keys=['odd'])
+    machine = machine_of(
+        tmp_path, [writes(value, 'kept'), lambda userdata: 'ok', stopped], deep_copy_keys=['odd']
+    )
     with pytest.raises(KeyboardInterrupt):
         machine.execute()
     keys = stored_keys(tmp_path)
@@ -103,35 +125,44 @@ def test_a_machine_stores_all_that_stands_beside_a_value(tmp_path_factory, value
         assert names and 'TOP/S0' in names[0], 'and with the state that wrote it'
 
 
-@pytest.mark.parametrize('value, words', [
-    (HalfSet('cup'), ('hostile_values.HalfSet', 'grasp is not set')),
-    (HalfSet, ('builtins.type', 'no codec')),
-    (OfList(), ('hostile_values.OfList', 'other data')),
-    (Pair(1, HalfSet('cup')), ('hostile_values.Pair', 'grasp')),
-    (type('Odd', (OfList,), {'__reduce__': raising(Rude)})(), ('Odd', 'by its name')),
-    (holding_itself(), ('builtins.list', 'holds itself')),
-    (open, ('builtins.', 'no codec')),
-], ids=range(7))
+@pytest.mark.parametrize(
+    'value, words',
+    [
+        (HalfSet('cup'), ('hostile_values.HalfSet', 'grasp is not set')),
+        (HalfSet, ('builtins.type', 'no codec')),
+        (OfList(), ('hostile_values.OfList', 'other data')),
+        (Pair(1, HalfSet('cup')), ('hostile_values.Pair', 'grasp')),
+        (type('Odd', (OfList,), {'__reduce__': raising(Rude)})(), ('Odd', 'by its name')),
+        (holding_itself(), ('builtins.list', 'holds itself')),
+        (open, ('builtins.', 'no codec')),
+    ],
+    ids=range(7),
+)
 def test_a_value_that_cannot_be_stored_is_named_once(tmp_path, log, value, words):
     machine = machine_of(tmp_path, [writes(value)] * 4)
     assert machine.execute() == 'ok'
-    said, = named(log)
+    (said,) = named(log)
     assert said.startswith("TOP: userdata key 'odd' (")
     assert 'of TOP/S0 cannot be stored' in said
     assert all(word in said for word in words)
     assert not [text for level, text in log if level == 'err']
 
 
-@pytest.mark.parametrize('value, names', [(with_more(), 'extra'), (SlottedMore('cup'), 'note')],
-                         ids=range(2))
+@pytest.mark.parametrize(
+    'value, names', [(with_more(), 'extra'), (SlottedMore('cup'), 'note')], ids=range(2)
+)
 def test_attributes_that_are_no_fields_are_named(tmp_path, log, value, names):
     setattr(value, names, 1)
     machine = machine_of(tmp_path, [writes(value), lambda userdata: 'ok', stopped])
     with pytest.raises(KeyboardInterrupt):
         machine.execute()
-    said, = named(log)
-    assert "'odd' (hostile_values.{}) of TOP/S0 is stored without its attributes {},".format(
-        type(value).__name__, names) in said
+    (said,) = named(log)
+    assert (
+        "'odd' (hostile_values.{}) of TOP/S0 is stored without its attributes {},".format(
+            type(value).__name__, names
+        )
+        in said
+    )
     assert '"name":"cup"' in stored_keys(tmp_path)['odd']
 
 
@@ -145,8 +176,10 @@ def test_a_property_that_was_cached_is_no_loss(tmp_path, log):
 def test_a_value_that_goes_up_is_named_once_also_as_a_list(tmp_path, log):
     inner = smach.StateMachine(['ok'], [], ['odd'])
     with inner:
-        smach.StateMachine.add('IN', smach.CBState(writes([HalfSet('cup')]), outcomes=['ok'],
-                                                   output_keys=['odd', 'good']))
+        smach.StateMachine.add(
+            'IN',
+            smach.CBState(writes([HalfSet('cup')]), outcomes=['ok'], output_keys=['odd', 'good']),
+        )
     machine = smach.StateMachine(['ok'])
     with machine:
         smach.StateMachine.add('BELOW', inner)

@@ -1,4 +1,5 @@
 """States may have run that are not stored, or under another name: a person is asked first."""
+
 import contextlib
 
 import pytest
@@ -32,8 +33,9 @@ def breaking(diary, points):
     with machine:
         for label, following in zip(LABELS, [*LABELS[1:], 'succeeded']):
             kind = Breaks if label == 'LOOK' else Noted
-            smach.StateMachine.add(label, kind(label, diary, points),
-                                   dict(ENDS, succeeded=following))
+            smach.StateMachine.add(
+                label, kind(label, diary, points), dict(ENDS, succeeded=following)
+            )
     return machine
 
 
@@ -44,8 +46,11 @@ def broken(folder, **settings):
 
 def first_moment_of_look(killed):
     with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
-        return next(each.number for each in store.moments(1)
-                    if (each.kind, each.label) == ('STATE_START', 'LOOK'))
+        return next(
+            each.number
+            for each in store.moments(1)
+            if (each.kind, each.label) == ('STATE_START', 'LOOK')
+        )
 
 
 WAYS = {
@@ -60,7 +65,8 @@ WAYS = {
 @pytest.mark.parametrize('guarded_before', [NEVER, {'states': {}}], ids=['guarded', 'since'])
 @pytest.mark.parametrize('way', sorted(WAYS))
 def test_after_a_fault_of_the_store_nothing_moves_until_somebody_answers(
-        tmp_path, way, guarded_before):
+    tmp_path, way, guarded_before
+):
     killed = broken(tmp_path / 'killed', **guarded_before)
     more = WAYS[way](killed)
     begun = killed.diary.count('begins')
@@ -95,8 +101,9 @@ def test_a_fault_before_the_first_state_is_asked_about_as_well(tmp_path, monkeyp
 
 def test_a_state_of_a_changed_script_is_asked_about_before_the_machine_goes_there(tmp_path):
     killed_in(tmp_path / 'killed', chain(*LABELS), 'CARRY', **NEVER)
-    after = KilledMachine(tmp_path / 'killed', chain('LOOK', 'TEA', 'CARRY'),
-                          states={'TEA': {'on_retry': 'never'}})
+    after = KilledMachine(
+        tmp_path / 'killed', chain('LOOK', 'TEA', 'CARRY'), states={'TEA': {'on_retry': 'never'}}
+    )
     for _ in range(2):
         assert after.run(on_resume='state:LOOK')['ended_by'] == 'kept'
     assert after.diary.count('begins')['LOOK'] == after.diary.count('begins')['POUR'] == 1

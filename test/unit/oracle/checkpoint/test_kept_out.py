@@ -1,4 +1,5 @@
 """What is kept out of a store."""
+
 from killed_machines import Diary, KilledMachine, Noted
 
 import smach
@@ -28,14 +29,20 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
         smach.StateMachine.add('A', Opens(), {'succeeded': 'AGAIN'}, remapping={'file': 'other'})
         smach.StateMachine.add('AGAIN', Opens(), {'succeeded': 'IN'}, remapping={'file': 'other'})
         smach.StateMachine.add('IN', inner, {'succeeded': 'succeeded'})
-    OracleContainer.wrap(machine, name='TOP', settings={
-        'checkpoint': str(tmp_path / 'robot.db')}).execute()
-    named = [text.split(' cannot be stored')[0] for level, text in log
-             if level == 'warn' and 'cannot be stored' in text]
+    OracleContainer.wrap(
+        machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')}
+    ).execute()
+    named = [
+        text.split(' cannot be stored')[0]
+        for level, text in log
+        if level == 'warn' and 'cannot be stored' in text
+    ]
     kind = '(_io.TextIOWrapper)'
-    assert named == ["TOP: userdata key 'mine' {} of the script".format(kind),
-                     "TOP: userdata key 'other' {} of TOP/A".format(kind),
-                     "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind)]
+    assert named == [
+        "TOP: userdata key 'mine' {} of the script".format(kind),
+        "TOP: userdata key 'other' {} of TOP/A".format(kind),
+        "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind),
+    ]
 
 
 class Looks(smach.State):
@@ -46,8 +53,12 @@ class Looks(smach.State):
         self._diary = diary
 
     def execute(self, userdata):
-        self._diary.write('finds', ','.join(
-            key for key in ('file', 'mine', 'cup') if userdata._ud._data.get(key) is not None))
+        self._diary.write(
+            'finds',
+            ','.join(
+                key for key in ('file', 'mine', 'cup') if userdata._ud._data.get(key) is not None
+            ),
+        )
         return 'succeeded'
 
 
@@ -76,12 +87,20 @@ def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
 
 def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     def iterated(items):
-        iterator = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=items,
-                                  it_label='item', exhausted_outcome='succeeded')
+        iterator = smach.Iterator(
+            ['succeeded', 'aborted'],
+            ['done'],
+            ['done'],
+            it=items,
+            it_label='item',
+            exhausted_outcome='succeeded',
+        )
         with iterator:
             smach.Iterator.set_contained_state(
-                'I', Noted('I', Diary(str(tmp_path / 'diary')), lambda: None,
-                           keys=('done', 'item')), loop_outcomes=['succeeded'])
+                'I',
+                Noted('I', Diary(str(tmp_path / 'diary')), lambda: None, keys=('done', 'item')),
+                loop_outcomes=['succeeded'],
+            )
         return iterator
 
     machine = smach.StateMachine(['succeeded', 'aborted'])
@@ -89,8 +108,9 @@ def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     with machine:
         smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'ONCE'})
         smach.StateMachine.add('ONCE', iterated(iter([1, 2])), ENDS)
-    OracleContainer.wrap(machine, name='TOP', settings={
-        'checkpoint': str(tmp_path / 'robot.db')}).execute()
+    OracleContainer.wrap(
+        machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')}
+    ).execute()
     named = [text for level, text in log if level == 'warn' and 'begins again' in text]
     assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
 
@@ -102,9 +122,10 @@ def test_a_value_that_goes_up_through_containers_is_named_once(tmp_path, log):
     machine = smach.StateMachine(['succeeded'], [], ['given'])
     with machine:
         smach.StateMachine.add('IN', inner, remapping={'file': 'given'})
-    OracleContainer.wrap(machine, name='TOP', settings={
-        'checkpoint': str(tmp_path / 'robot.db')}).execute()
-    named, = [text for level, text in log if 'cannot be stored' in text]
+    OracleContainer.wrap(
+        machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')}
+    ).execute()
+    (named,) = [text for level, text in log if 'cannot be stored' in text]
     assert named.startswith("TOP/IN: userdata key 'file' (_io.TextIOWrapper) of TOP/IN/OPEN")
 
 
@@ -122,5 +143,5 @@ def test_a_key_that_is_said_to_be_missing_is_not_named_again(tmp_path):
     killed.run(kill_at=4)
     told = killed.run()
     assert told['outcome'] == 'succeeded'
-    of_mine, = [text for text in told['log'] if "key 'mine'" in text]
+    (of_mine,) = [text for text in told['log'] if "key 'mine'" in text]
     assert 'has the value that the script gives it' in of_mine

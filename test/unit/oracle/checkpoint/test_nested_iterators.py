@@ -1,4 +1,5 @@
 """Iterators in Iterators that were killed go on with the items of all of them."""
+
 import itertools
 
 import pytest
@@ -32,8 +33,14 @@ def three_deep(diary, points):
     state = Told(diary, points)
     for number in (2, 1, 0):
         inputs = ['done', *LABELS[:number]]
-        iterator = smach.Iterator(OUTCOMES, inputs, ['done'], it=range(2), it_label=LABELS[number],
-                                  exhausted_outcome='succeeded')
+        iterator = smach.Iterator(
+            OUTCOMES,
+            inputs,
+            ['done'],
+            it=range(2),
+            it_label=LABELS[number],
+            exhausted_outcome='succeeded',
+        )
         with iterator:
             smach.Iterator.set_contained_state('I', state, loop_outcomes=['succeeded'])
         state = iterator

@@ -1,4 +1,5 @@
 """A state that is not repeated by itself is not, on whatever way a stored trial goes on."""
+
 import contextlib
 import io
 import random
@@ -39,6 +40,7 @@ class Sends(Expert):
 
 def chain(*labels, failing=''):
     """A machine of these states in this order; `failing` does not come to a good end."""
+
     def build(diary, points):
         machine = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
         machine.userdata.done = []
@@ -47,14 +49,18 @@ def chain(*labels, failing=''):
                 # POUR pours, whatever it is called
                 name = 'POUR' if label == 'TEA' else label
                 smach.StateMachine.add(
-                    label, Noted(name, diary, points, failures=99 * (label == failing)),
-                    dict(ENDS, succeeded=following))
+                    label,
+                    Noted(name, diary, points, failures=99 * (label == failing)),
+                    dict(ENDS, succeeded=following),
+                )
         return machine
+
     return build
 
 
 def nested(*labels):
     """The same in a container, before a last state."""
+
     def build(diary, points):
         machine = smach.StateMachine(['succeeded', 'aborted'])
         machine.userdata.done = []
@@ -62,6 +68,7 @@ def nested(*labels):
             smach.StateMachine.add('KITCHEN', chain(*labels)(diary, points), {'succeeded': 'LAST'})
             smach.StateMachine.add('LAST', Noted('LAST', diary, points), ENDS)
         return machine
+
     return build
 
 
@@ -102,6 +109,7 @@ def by_goto(label):
     def work(killed):
         oracle_state(killed, 'goto', label)
         return {}
+
     return work
 
 
@@ -127,14 +135,19 @@ WAYS_DOWN = {
 }
 
 
-@pytest.mark.parametrize('expert, guarded_before', [
-    (None, NEVER), (ByHand(), NEVER), (None, NO_GUARD)], ids=[
-        'nobody', 'by hand', 'guarded since'])
-@pytest.mark.parametrize('build, way, state', [
-    *[(FLAT, way, state) for way in WAYS for state in ('POUR', 'CARRY')],
-    *[(NESTED, way, state) for way in WAYS_DOWN for state in ('POUR', 'CARRY', 'LAST')]])
-def test_it_is_not_done_twice_without_a_person(tmp_path, build, way, state, expert,
-                                               guarded_before):
+@pytest.mark.parametrize(
+    'expert, guarded_before',
+    [(None, NEVER), (ByHand(), NEVER), (None, NO_GUARD)],
+    ids=['nobody', 'by hand', 'guarded since'],
+)
+@pytest.mark.parametrize(
+    'build, way, state',
+    [
+        *[(FLAT, way, state) for way in WAYS for state in ('POUR', 'CARRY')],
+        *[(NESTED, way, state) for way in WAYS_DOWN for state in ('POUR', 'CARRY', 'LAST')],
+    ],
+)
+def test_it_is_not_done_twice_without_a_person(tmp_path, build, way, state, expert, guarded_before):
     killed = killed_in(tmp_path / 'killed', build, state, **guarded_before)
     ways = WAYS if build is FLAT else WAYS_DOWN
     more = ways[way](killed)
@@ -146,15 +159,23 @@ def test_it_is_not_done_twice_without_a_person(tmp_path, build, way, state, expe
 
 @pytest.mark.parametrize('expert', [None, ByHand()], ids=['nobody', 'by hand'])
 @pytest.mark.parametrize('state', ['POUR', 'CARRY'])
-@pytest.mark.parametrize('after, names', [
-    (chain('LOOK', 'TEA', 'CARRY'), {'POUR': 'TEA'}),
-    (chain('LOOK', 'POUR', 'DRIVE'), {'CARRY': 'POUR'}),
-    (nested('LOOK', 'POUR', 'CARRY'), {'LOOK': 'KITCHEN/LOOK', 'POUR': 'KITCHEN/POUR',
-                                       'CARRY': 'KITCHEN/CARRY'}),
-    (chain('POUR', 'LOOK', 'CARRY'), {'CARRY': 'LOOK'}),
-])
-@pytest.mark.parametrize('more', [{}, {'on_resume': 'state:LOOK'}, {'moment': 'LOOK'}],
-                         ids=['recover', 'to LOOK', 'from LOOK'])
+@pytest.mark.parametrize(
+    'after, names',
+    [
+        (chain('LOOK', 'TEA', 'CARRY'), {'POUR': 'TEA'}),
+        (chain('LOOK', 'POUR', 'DRIVE'), {'CARRY': 'POUR'}),
+        (
+            nested('LOOK', 'POUR', 'CARRY'),
+            {'LOOK': 'KITCHEN/LOOK', 'POUR': 'KITCHEN/POUR', 'CARRY': 'KITCHEN/CARRY'},
+        ),
+        (chain('POUR', 'LOOK', 'CARRY'), {'CARRY': 'LOOK'}),
+    ],
+)
+@pytest.mark.parametrize(
+    'more',
+    [{}, {'on_resume': 'state:LOOK'}, {'moment': 'LOOK'}],
+    ids=['recover', 'to LOOK', 'from LOOK'],
+)
 def test_it_is_not_done_twice_under_another_name(tmp_path, after, names, state, expert, more):
     before = killed_in(tmp_path / 'killed', FLAT, state, **NEVER)
     more = dict(more)
@@ -163,8 +184,9 @@ def test_it_is_not_done_twice_under_another_name(tmp_path, after, names, state, 
     elif 'KITCHEN/LOOK' in names.values() and more:
         more = {'on_resume': 'state:KITCHEN/LOOK'}
     label = names.get('POUR', 'POUR').rpartition('/')[2]
-    goes_on = KilledMachine(tmp_path / 'killed', after, resume_map=names,
-                            states={label: {'on_retry': 'never'}})
+    goes_on = KilledMachine(
+        tmp_path / 'killed', after, resume_map=names, states={label: {'on_retry': 'never'}}
+    )
     told = goes_on.run(kill_at=6, expert=expert, **more)
     if told is None:
         goes_on.run(expert=expert)
@@ -182,8 +204,9 @@ def test_it_is_not_done_twice_where_the_map_leads_from_what_was_next_to_it(tmp_p
         before = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
         oracle_state(before, 'goto', 'CARRY')
     assert 'TOP/CARRY was next' in oracle_state(before)
-    after = KilledMachine(tmp_path / 'killed', chain('LOOK', 'POUR'), resume_map={'CARRY': 'POUR'},
-                          **NEVER)
+    after = KilledMachine(
+        tmp_path / 'killed', chain('LOOK', 'POUR'), resume_map={'CARRY': 'POUR'}, **NEVER
+    )
     after.run()
     assert after.diary.count('begins')['POUR'] == 1
 
@@ -228,13 +251,15 @@ def test_a_person_at_a_terminal_has_it_repeated_and_the_log_says_so(tmp_path, bu
 def test_it_is_said_that_a_person_will_be_asked(tmp_path):
     killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
     assert oracle_state(killed, 'goto', 'LOOK') == (
-        'it will go on at LOOK; a person is asked before it repeats POUR\n')
+        'it will go on at LOOK; a person is asked before it repeats POUR\n'
+    )
     told = killed.run(expert=ByHand())
     assert told['outcome'] == 'succeeded'
 
 
-@pytest.mark.parametrize('more', [
-    {'on_resume': 'state:POUR'}, {'on_resume': 'state:LOOK'}, {'moment': 'LOOK'}])
+@pytest.mark.parametrize(
+    'more', [{'on_resume': 'state:POUR'}, {'on_resume': 'state:LOOK'}, {'moment': 'LOOK'}]
+)
 def test_the_option_repeat_has_it_repeated_once(tmp_path, more):
     killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
     if 'moment' in more:
@@ -256,7 +281,7 @@ def test_the_trial_is_kept_where_nobody_says_whether_it_may_be_repeated(tmp_path
 def test_a_state_to_be_repeated_that_is_not_there_is_named(tmp_path):
     killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
     told = killed.run(resume_repeat=['POURR'], on_resume='state:LOOK')
-    assert "resume_repeat" in told['error'] and 'POURR' in told['error']
+    assert 'resume_repeat' in told['error'] and 'POURR' in told['error']
     assert "no state 'POURR'" in oracle_state(killed, 'goto', 'LOOK', '--repeat', 'POURR')
 
 
@@ -266,9 +291,23 @@ def test_of_a_tree_nothing_is_done_twice_whatever_kills_it_and_wherever_it_is_se
     chance = random.Random('never twice {}'.format(seed))
     killed = KilledMachine(make(tmp_path / 'killed'), tree, on_retry='never')
     told = killed.run(kill_at=chance.randint(6, 90), expert=ByHand())
-    states = [path for path in (
-        'A', 'XY', 'XY/X', 'XY/Y', 'BOTH', 'BOTH/LEFT', 'BOTH/RIGHT/M2', 'PLAIN', 'PLAIN/I',
-        'NESTED', 'NESTED/JK/K', 'B')]
+    states = [
+        path
+        for path in (
+            'A',
+            'XY',
+            'XY/X',
+            'XY/Y',
+            'BOTH',
+            'BOTH/LEFT',
+            'BOTH/RIGHT/M2',
+            'PLAIN',
+            'PLAIN/I',
+            'NESTED',
+            'NESTED/JK/K',
+            'B',
+        )
+    ]
     for _ in range(8):
         if told is not None:
             break
@@ -276,8 +315,11 @@ def test_of_a_tree_nothing_is_done_twice_whatever_kills_it_and_wherever_it_is_se
         if way == 'goto':
             oracle_state(killed, 'goto', chance.choice(states))
         elif way == 'from':
-            more = {'resume_from': chance.choice([
-                each.number for each in StoreFile(killed.store, read_only=True).moments(1)])}
+            more = {
+                'resume_from': chance.choice(
+                    [each.number for each in StoreFile(killed.store, read_only=True).moments(1)]
+                )
+            }
         elif way == 'state':
             more = {'on_resume': 'state:' + chance.choice(states)}
         else:

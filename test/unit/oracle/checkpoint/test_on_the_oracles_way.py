@@ -1,4 +1,5 @@
 """Killed as the oracle checks and achieves preconditions and tries again, a machine goes on."""
+
 import pytest
 from killed_machines import KilledMachine, Noted
 from killed_trees import make
@@ -36,8 +37,7 @@ class Kitchen:
         inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
         with inner:
             smach.StateMachine.add('LOOK', Noted('LOOK', diary, points), {'succeeded': 'PICK'})
-            smach.StateMachine.add('PICK', OnceFailing('PICK', diary, points),
-                                   {'succeeded': 'PUT'})
+            smach.StateMachine.add('PICK', OnceFailing('PICK', diary, points), {'succeeded': 'PUT'})
             smach.StateMachine.add('PUT', Noted('PUT', diary, points), ENDS)
             smach.StateMachine.add('OPEN', Noted('OPEN', diary, points), {'succeeded': 'PICK'})
         machine = smach.StateMachine(['succeeded', 'aborted'])
@@ -45,14 +45,17 @@ class Kitchen:
         with machine:
             smach.StateMachine.add('KITCHEN', inner, ENDS)
         self.preconditions[:] = [
-            'OPEN' if self._opens == 'label' else {'check': is_open, 'achieve': 'OPEN'}, is_clear]
+            'OPEN' if self._opens == 'label' else {'check': is_open, 'achieve': 'OPEN'},
+            is_clear,
+        ]
         return machine
 
 
 def kitchen(folder, opens):
     build = Kitchen(opens)
-    return KilledMachine(make(folder), build, states={'PICK': {
-        'preconditions': build.preconditions}})
+    return KilledMachine(
+        make(folder), build, states={'PICK': {'preconditions': build.preconditions}}
+    )
 
 
 @pytest.mark.parametrize('opens', ['label', 'pair'])

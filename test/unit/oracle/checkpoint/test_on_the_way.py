@@ -1,4 +1,5 @@
 """A machine that is killed on its way to a state in a container below still comes to that state."""
+
 import pytest
 from killed_machines import KilledMachine, Noted
 
@@ -9,6 +10,7 @@ ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
 
 def deep(diary, points):
     """A, then P and Q two machines down, then R one machine down."""
+
     def machine():
         return smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
 

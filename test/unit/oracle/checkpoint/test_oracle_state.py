@@ -1,4 +1,5 @@
 """The command oracle_state, on the store of a machine that was killed."""
+
 import contextlib
 import os
 import signal
@@ -131,8 +132,10 @@ def test_an_earlier_moment_is_shown(killed, capsys):
     assert 'TOP done = []' in told(capsys, killed.store, 'show', '--at', first.split()[0])
 
 
-@pytest.mark.parametrize('more, why', [
-    ((), 'there is no moment 99'), (('--trial', '1'), 'there is no moment 99 of trial 1')])
+@pytest.mark.parametrize(
+    'more, why',
+    [((), 'there is no moment 99'), (('--trial', '1'), 'there is no moment 99 of trial 1')],
+)
 def test_a_moment_that_is_not_there_is_named(killed, capsys, more, why):
     assert why in refused(capsys, killed.store, 'show', '--at', '99', *more)
 
@@ -142,8 +145,9 @@ def test_a_moment_of_a_trial_before_is_shown(killed, capsys):
     killed.run()
     assert 'trial 2 of TOP' in told(capsys, killed.store, 'show')
     assert 'trial 1 of TOP' in told(capsys, killed.store, 'show', '--at', '2')
-    assert 'no moment 2 of trial 2' in refused(capsys, killed.store, 'show', '--at', '2',
-                                               '--trial', '2')
+    assert 'no moment 2 of trial 2' in refused(
+        capsys, killed.store, 'show', '--at', '2', '--trial', '2'
+    )
 
 
 def test_what_is_in_a_state_is_shown_while_that_is_under_way(killed, capsys):
@@ -152,14 +156,16 @@ def test_what_is_in_a_state_is_shown_while_that_is_under_way(killed, capsys):
     assert 'TOP/XY/X was under way' not in told(capsys, killed.store, 'show')
     killed.run()
     assert 'Where it stood\n  TOP had ended with succeeded\n\n' in told(
-        capsys, killed.store, 'show')
+        capsys, killed.store, 'show'
+    )
 
 
 def test_of_each_branch_the_state_under_way_is_listed(tmp_path, capsys):
     machine = KilledMachine(tmp_path, side_by_side)
     assert machine.run() is None
-    assert ('stopped: TOP/BOTH/LEFT/L was under way, TOP/BOTH/RIGHT was under way\n'
-            in told(capsys, machine.store))
+    assert 'stopped: TOP/BOTH/LEFT/L was under way, TOP/BOTH/RIGHT was under way\n' in told(
+        capsys, machine.store
+    )
 
 
 class EndsAtTwo(smach.State):
@@ -175,8 +181,9 @@ class EndsAtTwo(smach.State):
 
 
 def iterated(diary, points):
-    loop = smach.Iterator(['succeeded'], [], [], it=[1, 2, 3], it_label='item',
-                          exhausted_outcome='succeeded')
+    loop = smach.Iterator(
+        ['succeeded'], [], [], it=[1, 2, 3], it_label='item', exhausted_outcome='succeeded'
+    )
     with loop:
         smach.Iterator.set_contained_state('ONE', EndsAtTwo(), loop_outcomes=['succeeded'])
     return around('LOOP', loop, {'succeeded': 'succeeded'})
@@ -230,13 +237,19 @@ def test_what_a_process_holds_is_not_changed(killed, capsys, change):
     assert told(capsys, killed.store, 'log') == ''
 
 
-@pytest.mark.parametrize('change, why', [
-    (['goto', 'NOWHERE'], "there is no state 'NOWHERE'; there are A, XY, XY/X, XY/Y"),
-    (['edit', 'done=cup'], "'cup' is no JSON"),
-    (['edit', 'done'], 'KEY=JSON is wanted'),
-    (['edit', 'done=1', '--container', 'TOP/ZZ'], "no container 'TOP/ZZ'; there are TOP, TOP/XY"),
-    (['drop', '--trial', '9'], 'there is no trial 9'),
-])
+@pytest.mark.parametrize(
+    'change, why',
+    [
+        (['goto', 'NOWHERE'], "there is no state 'NOWHERE'; there are A, XY, XY/X, XY/Y"),
+        (['edit', 'done=cup'], "'cup' is no JSON"),
+        (['edit', 'done'], 'KEY=JSON is wanted'),
+        (
+            ['edit', 'done=1', '--container', 'TOP/ZZ'],
+            "no container 'TOP/ZZ'; there are TOP, TOP/XY",
+        ),
+        (['drop', '--trial', '9'], 'there is no trial 9'),
+    ],
+)
 def test_a_wrong_change_is_refused_with_what_is_allowed(killed, capsys, change, why):
     assert why in refused(capsys, killed.store, *change)
     assert told(capsys, killed.store, 'log') == ''
@@ -254,8 +267,11 @@ EVERY = [[], ['show'], ['moments'], ['log'], ['edit', 'done=[]'], ['goto', 'A'],
 def test_what_cannot_be_opened_is_told_in_one_line(tmp_path, capsys, command):
     notes = tmp_path / 'notes.txt'
     notes.write_text('These are my notes, and no store of a machine. ' * 20)
-    for path, why in ((tmp_path / 'none' / 'robot.db', 'there is no such store'),
-                      (tmp_path, 'unable to open'), (notes, 'is damaged, or no store')):
+    for path, why in (
+        (tmp_path / 'none' / 'robot.db', 'there is no such store'),
+        (tmp_path, 'unable to open'),
+        (notes, 'is damaged, or no store'),
+    ):
         said = refused(capsys, path, *command)
         assert said.count('\n') == 1 and why in said and str(path) in said
 
@@ -301,6 +317,5 @@ def test_looking_for_a_store_makes_none(tmp_path, capsys):
 def test_a_key_that_is_new_is_said_to_be(killed, capsys):
     assert told(capsys, killed.store, 'edit', 'done=["A"]') == 'done is changed\n'
     assert told(capsys, killed.store, 'edit', 'file=1') == 'file is changed\n'
-    assert told(capsys, killed.store, 'edit', 'don=["A"]') == (
-        'don is new: TOP had done, file\n')
+    assert told(capsys, killed.store, 'edit', 'don=["A"]') == ('don is new: TOP had done, file\n')
     assert told(capsys, killed.store, 'edit', 'don=["B"]') == 'don is changed\n'

@@ -1,4 +1,5 @@
 """A machine that an operator had paused is paused where it is resumed."""
+
 import os
 import signal
 
@@ -18,23 +19,31 @@ def build(diary, points):
     machine.userdata.done = []
     with machine:
         for label, following in (('A', 'B'), ('B', 'C'), ('C', 'succeeded')):
-            smach.StateMachine.add(label, Noted(label, diary, points), dict(ENDS,
-                                                                            succeeded=following))
+            smach.StateMachine.add(
+                label, Noted(label, diary, points), dict(ENDS, succeeded=following)
+            )
     return machine
 
 
 def settings_of(killed, **more):
-    return {'checkpoint': killed.store, 'checkpoint_synchronous': 'OFF', 'on_resume': 'recover',
-            'checkpoint_wait_s': 60, **more}
+    return {
+        'checkpoint': killed.store,
+        'checkpoint_synchronous': 'OFF',
+        'on_resume': 'recover',
+        'checkpoint_wait_s': 60,
+        **more,
+    }
 
 
 def held(killed):
-    return Held(build(Diary(killed.diary._path), Points(0)), name='TOP',
-                settings=settings_of(killed))
+    return Held(
+        build(Diary(killed.diary._path), Points(0)), name='TOP', settings=settings_of(killed)
+    )
 
 
 def killed_after(killed, *commands):
     """Kill the machine in A, after these commands of an operator."""
+
     def work():
         diary = Diary(killed.diary._path)
 
@@ -49,12 +58,19 @@ def killed_after(killed, *commands):
         script._states['A'] = Commanded('A', diary, Points(0))
         machine = Held(script, name='TOP', settings=settings_of(killed))
         machine.machine.execute()
+
     assert in_a_process(work) is None
 
 
-@pytest.mark.parametrize('commands, is_paused', [
-    (['pause'], True), (['pause', 'resume'], False), (['pause', 'resume', 'pause'], True),
-    ([], False)])
+@pytest.mark.parametrize(
+    'commands, is_paused',
+    [
+        (['pause'], True),
+        (['pause', 'resume'], False),
+        (['pause', 'resume', 'pause'], True),
+        ([], False),
+    ],
+)
 def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, commands, is_paused):
     killed = KilledMachine(make(tmp_path / 'killed'), build)
     killed_after(killed, *commands)
@@ -67,6 +83,7 @@ def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, commands, is_paused
                 assert not killed.diary.count('begins')
                 machine.hand.resume()
             return machine.end()
+
     assert in_a_process(work) == 'succeeded'
     assert killed.diary.count('begins') == {'A': 1, 'B': 1, 'C': 1}  # what is killed writes none
 
@@ -78,10 +95,14 @@ def test_killed_again_and_gone_back_it_is_still_paused(tmp_path):
 
     def waits(**more):
         def work():
-            machine = Held(build(Diary(killed.diary._path), Points(0)), name='TOP',
-                           settings=settings_of(killed, **more)).begin()
+            machine = Held(
+                build(Diary(killed.diary._path), Points(0)),
+                name='TOP',
+                settings=settings_of(killed, **more),
+            ).begin()
             machine.waits_before('TOP/A')
             os.kill(os.getpid(), signal.SIGKILL)
+
         return in_a_process(work)
 
     assert waits() is None

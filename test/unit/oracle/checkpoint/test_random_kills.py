@@ -1,4 +1,5 @@
 """Programs killed at random instants go on as they should; more in benchmarks/killed.py."""
+
 import pytest
 from random_kills.killing import kill_many
 

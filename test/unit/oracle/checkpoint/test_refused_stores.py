@@ -1,4 +1,5 @@
 """A store that cannot be used: what a program that wraps its machine itself gets."""
+
 import os
 
 import pytest

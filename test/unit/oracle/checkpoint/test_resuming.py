@@ -1,4 +1,5 @@
 """A machine that was killed goes on where it stood."""
+
 import os
 import re
 
@@ -25,7 +26,8 @@ def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_ag
         assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, again)
         assert all(begun[name] <= 2 for name in begun), point
         assert [name for name in told['done'] if name not in ('LEFT', 'M1', 'M2')] == [
-            name for name in ALL if name not in ('LEFT', 'M1', 'M2')], point
+            name for name in ALL if name not in ('LEFT', 'M1', 'M2')
+        ], point
 
 
 def test_killed_again_and_again_it_comes_to_its_end(tmp_path):
@@ -65,8 +67,11 @@ def test_a_failure_is_stored_once_it_is_counted(tmp_path, point, is_stored):
     of_b = [name for name, _, state in told['events'] if state == 'B']
     rates = {state: row for _, state, *row in told['rates']}
     # in each process the state fails once
-    assert (of_b[:2], rates['B']) == ((['CONTAINER_START', 'TRANSITION'], [1, 2]) if is_stored
-                                      else (['CONTAINER_START', 'FAILURE'], [1, 1]))
+    assert (of_b[:2], rates['B']) == (
+        (['CONTAINER_START', 'TRANSITION'], [1, 2])
+        if is_stored
+        else (['CONTAINER_START', 'FAILURE'], [1, 1])
+    )
 
 
 def test_a_trial_that_has_told_its_end_is_not_resumed(tmp_path):
@@ -126,7 +131,11 @@ def test_the_state_in_doubt_is_a_failure_of_its_own_kind(tmp_path):
     killed.run(kill_at=4)
     events = killed.run()['events']
     assert [name for name, _, state in events if state == 'A'][:4] == [
-        'CONTAINER_START', 'FAILURE', 'TRANSITION', 'DECISION']
+        'CONTAINER_START',
+        'FAILURE',
+        'TRANSITION',
+        'DECISION',
+    ]
 
 
 def test_a_state_that_is_never_repeated_is_not(tmp_path):
@@ -180,14 +189,20 @@ def test_a_state_that_is_not_there_is_named(tmp_path):
 
 
 def test_the_log_says_in_which_state_it_goes_on(tmp_path):
-    for build, name, goes_on in ((flat, 'B', ['B']), (tree, 'Y', ['XY', 'Y']),
-                                 (tree, 'I1', ['PLAIN'])):
+    for build, name, goes_on in (
+        (flat, 'B', ['B']),
+        (tree, 'Y', ['XY', 'Y']),
+        (tree, 'I1', ['PLAIN']),
+    ):
         killed = killed_in(make(tmp_path / 'killed'), build, name)
         log = killed.run()['log']
-        assert any(re.match('TOP: trial .* goes on; its program was stopped [0-9]+ s ago', text)
-                   for text in log)
-        said = [re.match("State machine going on in state '(.*)' with userdata: ", text)
-                for text in log]
+        assert any(
+            re.match('TOP: trial .* goes on; its program was stopped [0-9]+ s ago', text)
+            for text in log
+        )
+        said = [
+            re.match("State machine going on in state '(.*)' with userdata: ", text) for text in log
+        ]
         assert [each.group(1) for each in said if each] == goes_on
         begins = [text for text in log if 'starting in initial state' in text]
         if not os.environ.get('SMACH_UPSTREAM'):  # its engine says so before it can be put right
@@ -240,11 +255,13 @@ def test_it_goes_on_from_an_earlier_moment(tmp_path):
     first = next(each for each in before if each.label == 'B' and each.kind == 'STATE_START')
     told = killed.run(resume_from=first.number)
     assert told['done'] == ['A', 'B', 'C']
-    assert any(' goes on from moment {}; its program was'.format(first.number) in line
-               for line in told['log'])
+    assert any(
+        ' goes on from moment {}; its program was'.format(first.number) in line
+        for line in told['log']
+    )
     assert killed.diary.count('begins')['A'] == 1
     after = moments_of(killed)
-    assert after[:len(before)] == before  # those behind it stay
+    assert after[: len(before)] == before  # those behind it stay
     assert after[len(before)].after == first.number
     assert min(seq for _, seq, _ in told['events']) > max(each.seq for each in before)
 

@@ -1,4 +1,5 @@
 """A resumed machine that is held before it goes on, and sent elsewhere by an operator."""
+
 from held_machines import Held
 from killed_machines import Diary, KilledMachine, Noted, Points, in_a_process
 from killed_trees import ENDS, make
@@ -17,15 +18,23 @@ def first_and_all(build):
             smach.StateMachine.add('FIRST', Noted('FIRST', diary, points), {'succeeded': 'ALL'})
             smach.StateMachine.add('ALL', build(diary, points), ENDS)
         return top
+
     return machine
 
 
 def iterator(diary, points):
-    items = smach.Iterator(['succeeded', 'aborted'], ['done'], ['done'], it=range(3),
-                           it_label='item', exhausted_outcome='succeeded')
+    items = smach.Iterator(
+        ['succeeded', 'aborted'],
+        ['done'],
+        ['done'],
+        it=range(3),
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with items:
-        smach.Iterator.set_contained_state('I', Noted('I', diary, points, keys=('done', 'item')),
-                                           loop_outcomes=['succeeded'])
+        smach.Iterator.set_contained_state(
+            'I', Noted('I', diary, points, keys=('done', 'item')), loop_outcomes=['succeeded']
+        )
     return items
 
 
@@ -39,19 +48,32 @@ def nested(diary, points):
 
 def sent_to_the_first(killed, build):
     """What a resumed machine does that waits before ALL, is sent to FIRST, and goes to the end."""
+
     def work():
         machine = first_and_all(build)(Diary(killed.diary._path), Points(0))
-        held = Held(machine, name='TOP', settings={
-            'checkpoint': killed.store, 'checkpoint_synchronous': 'OFF', 'on_resume': 'recover',
-            'checkpoint_wait_s': 60, 'states': HELD})
+        held = Held(
+            machine,
+            name='TOP',
+            settings={
+                'checkpoint': killed.store,
+                'checkpoint_synchronous': 'OFF',
+                'on_resume': 'recover',
+                'checkpoint_wait_s': 60,
+                'states': HELD,
+            },
+        )
         with held.begin():
             held.waits_before('TOP/ALL')
             held.hand.go_to('TOP', 'FIRST')
             held.waits_before('TOP/ALL')
             held.hand.confirm()
             outcome = held.end()
-        return {'outcome': outcome, 'done': machine.userdata.done,
-                'failures': [event.state for event in held.of(EventKind.FAILURE)]}
+        return {
+            'outcome': outcome,
+            'done': machine.userdata.done,
+            'failures': [event.state for event in held.of(EventKind.FAILURE)],
+        }
+
     return in_a_process(work)
 
 

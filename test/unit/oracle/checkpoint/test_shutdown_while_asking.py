@@ -1,4 +1,5 @@
 """A shutdown while a question is open: the trial goes on later, and the question is open again."""
+
 import json
 import threading
 
@@ -42,6 +43,7 @@ class Task:
         def noting(diary, points):
             self._machines[:] = [build(diary, points)]
             return self._machines[0]
+
         return noting
 
     def _go_down(self, question, cancelled):
@@ -60,8 +62,15 @@ class Task:
         return self.killed.run(expert=Answers(self._asked, self._go_down), **settings)
 
     def goes_on(self, **settings):
-        return self.killed.run(expert=Answers(self._asked, lambda question, cancelled: Answer(
-            AnswerKind.GOTO, state=question.failed_state, by='Ann')), **settings)
+        return self.killed.run(
+            expert=Answers(
+                self._asked,
+                lambda question, cancelled: Answer(
+                    AnswerKind.GOTO, state=question.failed_state, by='Ann'
+                ),
+            ),
+            **settings,
+        )
 
     def questions(self):
         return [json.loads(line) for line in self._asked.read_text().splitlines()]
@@ -130,8 +139,12 @@ def test_no_state_that_follows_by_its_author_begins(tmp_path, how):
         inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
         with inner:
             inner.add('FAILS', Noted('FAILS', diary, points, failures=1), ENDS)
-        return around('IN', inner, {'succeeded': 'succeeded', 'aborted': 'HOME'},
-                      HOME=Noted('HOME', diary, points))
+        return around(
+            'IN',
+            inner,
+            {'succeeded': 'succeeded', 'aborted': 'HOME'},
+            HOME=Noted('HOME', diary, points),
+        )
 
     task = Task(tmp_path, build, how, author_recoveries='override')
     assert task.goes_down()['ended_by'] == 'shutdown'
@@ -144,14 +157,22 @@ def test_no_state_that_follows_by_its_author_begins(tmp_path, how):
 @pytest.mark.parametrize('how', ['check', 'guard'])
 def test_a_branch_that_runs_beside_the_question_is_in_doubt(tmp_path, how):
     def build(diary, points):
-        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', ['done'], ['done'],
-                                 outcome_map={'succeeded': {'ASKS': 'succeeded',
-                                                            'RUNS': 'succeeded'}})
+        both = smach.Concurrence(
+            ['succeeded', 'aborted'],
+            'aborted',
+            ['done'],
+            ['done'],
+            outcome_map={'succeeded': {'ASKS': 'succeeded', 'RUNS': 'succeeded'}},
+        )
         with both:
             both.add('ASKS', Noted('ASKS', diary, points, failures=1))
             both.add('RUNS', Waits(diary))
-        return around('BOTH', both, {'succeeded': 'succeeded', 'aborted': 'HOME'},
-                      HOME=Noted('HOME', diary, points))
+        return around(
+            'BOTH',
+            both,
+            {'succeeded': 'succeeded', 'aborted': 'HOME'},
+            HOME=Noted('HOME', diary, points),
+        )
 
     task = Task(tmp_path, build, how)
     assert task.goes_down()['ended_by'] == 'shutdown'
@@ -180,8 +201,9 @@ def test_a_question_about_a_state_that_still_runs_is_open_again(tmp_path):
             machine.add('LONG', FailsThenRuns(diary), {'aborted': 'aborted'})
         return machine
 
-    task = Task(tmp_path, build, 'guard', max_recoveries=3, still_running_s=0.05,
-                still_running_factor=1)
+    task = Task(
+        tmp_path, build, 'guard', max_recoveries=3, still_running_s=0.05, still_running_factor=1
+    )
     told = task.goes_down()
     assert (told['outcome'], told['ended_by']) == (None, 'shutdown')
     assert task.killed.diary.count('begins') == {'WAITS': 1}

@@ -1,4 +1,5 @@
 """A machine whose store cannot be written goes on, says so, and stores all once it can."""
+
 import os
 import resource
 import shutil
@@ -59,8 +60,11 @@ def warned_of(log):
 
 
 def wrapped(machine, store, **settings):
-    return OracleContainer.wrap(machine, name='TOP', settings=dict(
-        {'checkpoint': store, 'on_resume': 'recover'}, **settings))
+    return OracleContainer.wrap(
+        machine,
+        name='TOP',
+        settings=dict({'checkpoint': store, 'on_resume': 'recover'}, **settings),
+    )
 
 
 def test_a_store_that_may_not_grow_is_caught_up_with(tmp_path):
@@ -94,19 +98,26 @@ def test_a_store_that_may_not_grow_is_caught_up_with(tmp_path):
 @pytest.mark.parametrize('fault', ['full', 'read_only'])
 def test_on_a_disk_of_its_own(tmp_path, fault):
     """A tmpfs of 400 kB: filled up and freed again; mounted read-only."""
-    shell = ('mount -t tmpfs -o size=400k none {0} && cd {0} && {1} {2}/disk_program.py {3}'.format(
-        tmp_path, sys.executable, SUPPORT, fault))
+    shell = 'mount -t tmpfs -o size=400k none {0} && cd {0} && {1} {2}/disk_program.py {3}'.format(
+        tmp_path, sys.executable, SUPPORT, fault
+    )
     path = os.pathsep.join([SUPPORT, os.path.join(HERE, '../../../rostest')] + sys.path)
-    told = subprocess.run(['unshare', '-rm', 'sh', '-c', shell], env=dict(
-        os.environ, PYTHONPATH=path), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        timeout=120).stdout.decode()
+    told = subprocess.run(
+        ['unshare', '-rm', 'sh', '-c', shell],
+        env=dict(os.environ, PYTHONPATH=path),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=120,
+    ).stdout.decode()
     assert told.strip().splitlines()[-1:] == ['AS IT SHOULD BE'], told
 
 
 def test_one_that_turns_read_only_is_said_once_and_the_machine_goes_on(tmp_path, monkeypatch, log):
     opened = []
-    monkeypatch.setattr('smach_oracle.oracle.checkpoint.trial_store.StoreFile', lambda *given: (
-        opened.append(StoreFile(*given)) or opened[-1]))
+    monkeypatch.setattr(
+        'smach_oracle.oracle.checkpoint.trial_store.StoreFile',
+        lambda *given: opened.append(StoreFile(*given)) or opened[-1],
+    )
 
     def shut():
         opened[0]._db.execute('PRAGMA query_only = ON')
@@ -134,10 +145,11 @@ def test_a_slow_disk_is_waited_for_and_holds_all(tmp_path, monkeypatch, log):
     machine = wrapped(machine_of([nothing] * 4), slow, checkpoint_wait_s=0.001)
     assert machine.execute() == 'succeeded'
     assert 'took more than 0.001 s' in [text for level, text in log if level == 'warn'][0]
-    trial, = StoreFile(slow).trials()
+    (trial,) = StoreFile(slow).trials()
     assert trial.outcome == 'succeeded'
-    kinds = [[(each.kind, each.label) for each in StoreFile(path).moments(1)]
-             for path in (store, slow)]
+    kinds = [
+        [(each.kind, each.label) for each in StoreFile(path).moments(1)] for path in (store, slow)
+    ]
     assert kinds[0] == kinds[1]
 
 
@@ -177,7 +189,7 @@ def test_a_clock_that_jumps_changes_nothing(tmp_path, monkeypatch, jump_s):
         assert told['events'][0][0] == 'RESUMED'
         assert told['done'] == ['A', 'B']
         assert Diary(str(folder / 'diary')).count('begins')['A'] <= 1 + (point < 8)
-        trial, = StoreFile(killed.store).trials()
+        (trial,) = StoreFile(killed.store).trials()
         assert trial.outcome == 'succeeded'
 
 
@@ -189,7 +201,8 @@ def test_one_stopped_by_ctrl_c_goes_on(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         wrapped(machine_of([nothing, stop, nothing]), store).execute()
     ran = []
-    resumed = wrapped(machine_of([
-        lambda: ran.append('A'), lambda: ran.append('B'), nothing]), store)
+    resumed = wrapped(
+        machine_of([lambda: ran.append('A'), lambda: ran.append('B'), nothing]), store
+    )
     assert resumed.execute() == 'succeeded'
     assert ran == ['B']

@@ -1,4 +1,5 @@
 """A person does by hand what the program was stopped at: SUPERSEDE of whatever is in doubt."""
+
 import json
 
 import pytest
@@ -20,8 +21,9 @@ class ByHand(Expert):
 
     def ask(self, question, cancelled, progress):
         with self._path.open('a') as stream:
-            stream.write(json.dumps('{}/{}'.format(question.container_path,
-                                                   question.failed_state)) + '\n')
+            stream.write(
+                json.dumps('{}/{}'.format(question.container_path, question.failed_state)) + '\n'
+            )
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')
 
 
@@ -45,11 +47,18 @@ def failing_tree(diary, points):
 
 
 @pytest.mark.parametrize('on_resume', ['ask', 'recover'])
-@pytest.mark.parametrize('build, settings', [
-    (tree, {}), (failing_tree, {'max_recoveries': 0}), (tree, {'on_retry': 'never'}),
-    (failing_tree, {'on_retry': 'confirm'})])
+@pytest.mark.parametrize(
+    'build, settings',
+    [
+        (tree, {}),
+        (failing_tree, {'max_recoveries': 0}),
+        (tree, {'on_retry': 'never'}),
+        (failing_tree, {'on_retry': 'confirm'}),
+    ],
+)
 def test_killed_anywhere_what_is_superseded_ends_the_trial_well_and_does_not_run_again(
-        tmp_path, build, settings, on_resume):
+    tmp_path, build, settings, on_resume
+):
     for point in range(3, points_of(tmp_path, tree), 4):
         killed = KilledMachine(make(tmp_path / 'killed'), build, on_resume=on_resume, **settings)
         if killed.run(kill_at=point, expert=ByHand(tmp_path / 'before')) is not None:
@@ -97,20 +106,30 @@ def test_a_failure_that_was_asked_about_is_taken_back_once(tmp_path):
 
 def test_a_state_that_had_not_begun_is_not_done_by_the_oracle_once_a_person_has_done_it(tmp_path):
     """Killed before POUR. A person pours. CARRY keeps failing, and the step back is asked about."""
+
     def pouring(diary, points):
         machine = smach.StateMachine(['succeeded', 'aborted'])
         machine.userdata.done = []
         with machine:
-            for label, following, failures in (('LOOK', 'POUR', 0), ('POUR', 'CARRY', 0),
-                                               ('CARRY', 'succeeded', 9)):
-                smach.StateMachine.add(label, Noted(label, diary, points, failures),
-                                       dict(ENDS, succeeded=following))
+            for label, following, failures in (
+                ('LOOK', 'POUR', 0),
+                ('POUR', 'CARRY', 0),
+                ('CARRY', 'succeeded', 9),
+            ):
+                smach.StateMachine.add(
+                    label, Noted(label, diary, points, failures), dict(ENDS, succeeded=following)
+                )
         return machine
 
     point, path = 0, tmp_path / 'killed' / 'asked'
     while not asked(path) or asked(path)[0] != 'TOP/POUR':
-        killed = KilledMachine(make(tmp_path / 'killed'), pouring, on_resume='ask', prior=0.5,
-                               states={'POUR': {'on_retry': 'confirm'}})
+        killed = KilledMachine(
+            make(tmp_path / 'killed'),
+            pouring,
+            on_resume='ask',
+            prior=0.5,
+            states={'POUR': {'on_retry': 'confirm'}},
+        )
         point += 1
         killed.run(kill_at=point)
         if not killed.diary.count('begins')['POUR']:

@@ -1,4 +1,5 @@
 """Nobody says how a stored trial goes on: it is kept, and asked about again."""
+
 import contextlib
 import io
 import json
@@ -31,9 +32,18 @@ class Answers(Expert):
     def ask(self, question, cancelled, progress):
         self._number += 1
         with self._path.open('a') as stream:
-            stream.write(json.dumps([question.question_id, question.container_path,
-                                     question.failed_state, question.reason,
-                                     question.fallback]) + '\n')
+            stream.write(
+                json.dumps(
+                    [
+                        question.question_id,
+                        question.container_path,
+                        question.failed_state,
+                        question.reason,
+                        question.fallback,
+                    ]
+                )
+                + '\n'
+            )
         return self._give(question, self._number)
 
     def run_interface(self, offer, question, cancelled, progress):
@@ -131,12 +141,15 @@ def test_whatever_is_to_happen_without_an_answer_nothing_moves(tmp_path, give, o
     told = killed.run(expert=expert)
     assert (told['outcome'], told['ended_by']) == (None, 'kept')
     assert killed.diary.count('begins') == begun
-    said, = [text for text in told['log'] if 'nobody has said' in text]
-    for part in ('The next start asks again', '`oracle_run --resume`',
-                 '`oracle_state {} drop`'.format(killed.store)):
+    (said,) = [text for text in told['log'] if 'nobody has said' in text]
+    for part in (
+        'The next start asks again',
+        '`oracle_run --resume`',
+        '`oracle_state {} drop`'.format(killed.store),
+    ):
         assert part in said
     if give is not None:
-        (_, _, _, reason, fallback), = questions(tmp_path / 'asked')
+        ((_, _, _, reason, fallback),) = questions(tmp_path / 'asked')
         assert 'the program was stopped' in reason
         assert fallback == 'stop, and keep the trial for the next start'
 
@@ -191,13 +204,16 @@ class Meets(smach.State):
 
 def meeting(folder):
     def build(diary, points):
-        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', outcome_map={
-            'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
+        both = smach.Concurrence(
+            ['succeeded', 'aborted'],
+            'aborted',
+            outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
+        )
         with both:
             both.add('LEFT', Meets('LEFT', diary, folder))
             both.add('RIGHT', Meets('RIGHT', diary, folder))
-        return around('BOTH', both, {'succeeded': 'C', 'aborted': 'C'},
-                      C=Noted('C', diary, points))
+        return around('BOTH', both, {'succeeded': 'C', 'aborted': 'C'}, C=Noted('C', diary, points))
+
     return build
 
 
@@ -233,8 +249,15 @@ def test_in_one_process_a_kept_trial_goes_on_and_a_dropped_one_leaves_nothing(tm
         killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
         for point in (30, 34, 46):
             killed.run(kill_at=point)
-        machine = OracleContainer.wrap(tree(killed.diary, lambda: None), name='TOP', settings={
-            'checkpoint': killed.store, 'on_resume': 'ask', 'checkpoint_synchronous': 'OFF'})
+        machine = OracleContainer.wrap(
+            tree(killed.diary, lambda: None),
+            name='TOP',
+            settings={
+                'checkpoint': killed.store,
+                'on_resume': 'ask',
+                'checkpoint_synchronous': 'OFF',
+            },
+        )
         assert machine.execute() is None
         assert not machine.preempt_requested()
         if drops:
@@ -248,8 +271,13 @@ def test_in_one_process_a_kept_trial_goes_on_and_a_dropped_one_leaves_nothing(tm
 
 def test_a_failure_of_a_concurrence_whose_branches_had_ended_is_asked_about(tmp_path):
     def both(diary, points):
-        inner = smach.Concurrence(['succeeded', 'aborted'], 'aborted', ['done'], ['done'],
-                                  outcome_map={'succeeded': {'LEFT': 'aborted'}})
+        inner = smach.Concurrence(
+            ['succeeded', 'aborted'],
+            'aborted',
+            ['done'],
+            ['done'],
+            outcome_map={'succeeded': {'LEFT': 'aborted'}},
+        )
         with inner:
             inner.add('LEFT', Noted('LEFT', diary, points))
             inner.add('RIGHT', Noted('RIGHT', diary, points))

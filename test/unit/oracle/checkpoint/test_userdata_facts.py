@@ -1,14 +1,22 @@
 """Userdata of which only what has changed is stored."""
+
 import pytest
 
 from smach_oracle.oracle.checkpoint.storable import CODECS
 from smach_oracle.oracle.checkpoint.userdata_facts import UserdataFacts
 
 
-@pytest.mark.parametrize('before, after', [
-    # of bytes that nothing else holds, what marshal writes is what it writes of a bytearray
-    (lambda: [bytes(2)], lambda: [bytearray(2)]), (lambda: [1], lambda: [1.0]),
-    (lambda: [1], lambda: [True]), (lambda: [[1]], lambda: [(1,)]), (lambda: [''], lambda: [None])])
+@pytest.mark.parametrize(
+    'before, after',
+    [
+        # of bytes that nothing else holds, what marshal writes is what it writes of a bytearray
+        (lambda: [bytes(2)], lambda: [bytearray(2)]),
+        (lambda: [1], lambda: [1.0]),
+        (lambda: [1], lambda: [True]),
+        (lambda: [[1]], lambda: [(1,)]),
+        (lambda: [''], lambda: [None]),
+    ],
+)
 def test_data_that_look_alike_are_told_apart(before, after):
     facts = UserdataFacts(CODECS, 'TOP', lambda kept: None)
     assert len(list(facts.changed({'x': before()}, None))) == 1

@@ -1,4 +1,5 @@
 """The PR2's model: derived once, mended, the same body however many links it is cut into."""
+
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -24,25 +25,40 @@ def client():
 
 
 def load(client, path):
-    body = pybullet.loadURDF(str(path), useFixedBase=True,
-                             flags=pybullet.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client)
-    infos = [pybullet.getJointInfo(body, k, physicsClientId=client)
-             for k in range(pybullet.getNumJoints(body, physicsClientId=client))]
-    return body, {info[1].decode(): info
-                  for info in infos}, {info[12].decode(): info[0]
-                                       for info in infos}
+    body = pybullet.loadURDF(
+        str(path),
+        useFixedBase=True,
+        flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+        physicsClientId=client,
+    )
+    infos = [
+        pybullet.getJointInfo(body, k, physicsClientId=client)
+        for k in range(pybullet.getNumJoints(body, physicsClientId=client))
+    ]
+    return (
+        body,
+        {info[1].decode(): info for info in infos},
+        {info[12].decode(): info[0] for info in infos},
+    )
 
 
 def mass(client, body):
-    return sum(pybullet.getDynamicsInfo(body, k, physicsClientId=client)[0]
-               for k in range(-1, pybullet.getNumJoints(body, physicsClientId=client)))
+    return sum(
+        pybullet.getDynamicsInfo(body, k, physicsClientId=client)[0]
+        for k in range(-1, pybullet.getNumJoints(body, physicsClientId=client))
+    )
 
 
 def test_two_processes_that_derive_it_at_once_both_get_it(tmp_path, monkeypatch):
     monkeypatch.setenv('XDG_CACHE_HOME', str(tmp_path))
     asked = [
-        subprocess.Popen([sys.executable, '-c', ASK], stdout=subprocess.PIPE,
-                         stderr=subprocess.PIPE, universal_newlines=True) for _ in range(2)
+        subprocess.Popen(
+            [sys.executable, '-c', ASK],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            universal_newlines=True,
+        )
+        for _ in range(2)
     ]
     told = [process.communicate(timeout=60) for process in asked]
     assert [process.returncode for process in asked] == [0, 0], told[0][1]
@@ -69,6 +85,7 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 def test_a_missing_package_is_named(monkeypatch):
     def missing(name):
         raise metadata.PackageNotFoundError(name)
+
     monkeypatch.setattr(pr2_model.metadata, 'distribution', missing)
     with pytest.raises(ModelError, match='cmeel is not installed'):
         pr2_files()
@@ -81,9 +98,11 @@ def test_every_triangle_has_its_normal():
         triangles = np.frombuffer(mesh.read_bytes()[84:], pr2_model.TRIANGLE)
         corners = triangles['corners'].astype(float)
         area = np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-        assert np.allclose(np.linalg.norm(triangles['normal'][area > 1e-10], axis=1), 1,
-                           atol=1e-3), mesh.name
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        assert np.allclose(
+            np.linalg.norm(triangles['normal'][area > 1e-10], axis=1), 1, atol=1e-3
+        ), mesh.name
 
 
 def test_every_file_that_it_names_is_there_and_every_link_has_a_mass():
@@ -99,25 +118,29 @@ def test_links_made_one_are_where_they_were_and_as_heavy(client):
     generator = np.random.default_rng(1)
     for name, info in joints.items():
         if info[2] != pybullet.JOINT_FIXED:
-            position = generator.uniform(
-                *info[8:10]) if info[8] < info[9] else generator.uniform(-3, 3)
+            position = (
+                generator.uniform(*info[8:10]) if info[8] < info[9] else generator.uniform(-3, 3)
+            )
             pybullet.resetJointState(whole, info[0], position, physicsClientId=client)
-            pybullet.resetJointState(merged, merged_joints[name][0], position,
-                                     physicsClientId=client)
+            pybullet.resetJointState(
+                merged, merged_joints[name][0], position, physicsClientId=client
+            )
     frames = fixed_frames(ElementTree.parse(str(files.urdf)).getroot())
     for name, number in links.items():
         holder, holder_from_link = frames[name]
         poses = [
-            pose_of(*pybullet.getLinkState(body, k, computeForwardKinematics=True,
-                                           physicsClientId=client)[4:6])
+            pose_of(
+                *pybullet.getLinkState(
+                    body, k, computeForwardKinematics=True, physicsClientId=client
+                )[4:6]
+            )
             for body, k in ((whole, number), (merged, merged_links[holder]))
         ]
         assert np.allclose(poses[0], poses[1] @ holder_from_link, atol=1e-5), name
     # 1 kg for each joint of the base
     assert mass(client, merged) == pytest.approx(mass(client, whole) + 3, abs=0.01)
     assert set(BASE_JOINTS) | {
-        name
-        for name, info in joints.items() if info[2] != pybullet.JOINT_FIXED
+        name for name, info in joints.items() if info[2] != pybullet.JOINT_FIXED
     } == set(merged_joints)
 
 
@@ -127,9 +150,17 @@ def test_the_sum_of_the_jaws_is_the_gap_between_the_tips(client):
         for finger in 'lr':
             number = joints['r_gripper_{}_finger_joint'.format(finger)][0]
             pybullet.resetJointState(body, number, each, physicsClientId=client)
-        gap = min(point[8] for point in pybullet.getClosestPoints(
-            body, body, 0.2, links['r_gripper_l_finger_link'], links['r_gripper_r_finger_link'],
-            physicsClientId=client))
+        gap = min(
+            point[8]
+            for point in pybullet.getClosestPoints(
+                body,
+                body,
+                0.2,
+                links['r_gripper_l_finger_link'],
+                links['r_gripper_r_finger_link'],
+                physicsClientId=client,
+            )
+        )
         assert gap == pytest.approx(2 * each, abs=2e-4)
 
 

@@ -1,4 +1,5 @@
 """Poses of goals: what lies too far away is refused, however far."""
+
 import warnings
 
 import pytest
@@ -18,6 +19,8 @@ def test_a_point_too_far_away_is_refused_without_a_warning(far):
     message = PointStamped(Header(frame_id='base_footprint'), Point(far, 0.0, 0.0))
     with warnings.catch_warnings():
         warnings.simplefilter('error')
-        with pytest.raises(SkillError, match=r'target: \({:.6g}, 0, 0\) m is more than'.format(
-                far).replace('+', r'\+')):
+        with pytest.raises(
+            SkillError,
+            match=r'target: \({:.6g}, 0, 0\) m is more than'.format(far).replace('+', r'\+'),
+        ):
             point_in_base(message, UnusedRobot(), 'target')

@@ -1,6 +1,7 @@
 """Pick, place and arms aside on the simulated PR2, held against the physical truth; and goals that
 cannot be.
 """
+
 import math
 
 import numpy as np
@@ -57,9 +58,11 @@ class Bench:
         self.skills = Manipulation(SkillContext(self.robot, installed_model()))
 
     def map(self):
-        goal = BuildCollisionMapGoal(pose(
-            0.85, 0.0, 0.72), [pose(*CAN.position), pose(*CARTON.position)],
-                                     [CAN_SIZE, Vector3(*CARTON.size)])
+        goal = BuildCollisionMapGoal(
+            pose(0.85, 0.0, 0.72),
+            [pose(*CAN.position), pose(*CARTON.position)],
+            [CAN_SIZE, Vector3(*CARTON.size)],
+        )
         goal.table.pose.orientation = Quaternion(0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
         return self.skills.build_collision_map(goal, say)
 
@@ -111,12 +114,11 @@ def test_a_place_goal_that_is_sent_again_succeeds_where_its_object_is_seen_and_o
 def test_what_cannot_be_put_down_there_stays_in_the_hand_and_the_reason_is_told(bench):
     made = bench.map()
     grasp = bench.pick(made.map_id)
-    for place, text in ((pose(2.5, 0.0,
-                              0.79), 'there is nothing to stand on at x 2.50.* beyond its edge'),
-                        (pose(1.1, 0.55,
-                              0.79), 'no way to put the object down at x 1.10.*out of reach'),
-                        (pose(*CARTON.position),
-                         'no free spot within 2 cm of x 0.75.*: object 1 stands there')):
+    for place, text in (
+        (pose(2.5, 0.0, 0.79), 'there is nothing to stand on at x 2.50.* beyond its edge'),
+        (pose(1.1, 0.55, 0.79), 'no way to put the object down at x 1.10.*out of reach'),
+        (pose(*CARTON.position), 'no free spot within 2 cm of x 0.75.*: object 1 stands there'),
+    ):
         with pytest.raises(SkillError, match=text):
             bench.skills.place(placing('right', place, grasp, made.map_id), say)
         assert bench.world.holding('can') == 'right'
@@ -183,8 +185,9 @@ def test_the_other_arm_is_moved_out_of_the_view():
 
 
 def test_an_arm_that_is_held_is_noticed(bench, monkeypatch):
-    bench.robot.follow(ARM_JOINTS['left'], np.array([[0.3, 0.0, 1.2, -1.4, 0.0, -0.8, 0.0]]),
-                       np.array([2.0]))
+    bench.robot.follow(
+        ARM_JOINTS['left'], np.array([[0.3, 0.0, 1.2, -1.4, 0.0, -0.8, 0.0]]), np.array([2.0])
+    )
     monkeypatch.setattr(DirectRobot, 'follow', lambda *_: None)
     with pytest.raises(SkillError, match='the left arm is not at the side'):
         bench.skills.move_arms_aside(MoveArmsAsideGoal(['left']), say)
@@ -199,7 +202,8 @@ def test_nothing_in_the_hand_is_felt(bench):
     assert is_aside(bench.robot.joints(), 'right')
     with pytest.raises(SkillError, match='the right hand holds nothing'):
         bench.skills.place(
-            placing('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say)
+            placing('right', pose(0.6, -0.35, 0.79), pose(0.6, 0, 0.8), made.map_id), say
+        )
 
 
 def test_what_somebody_has_taken_away_is_not_reached_for(bench):
@@ -207,8 +211,7 @@ def test_what_somebody_has_taken_away_is_not_reached_for(bench):
     bench.robot.look_at((0.65, 0.0, 0.75))
     before = bench.robot.joints()
     with pytest.raises(SkillError, match='no longer where it was seen'):
-        bench.skills.pick(
-            picking('right', pose(0.62, -0.20, 0.78), CAN_SIZE, made.map_id), say)
+        bench.skills.pick(picking('right', pose(0.62, -0.20, 0.78), CAN_SIZE, made.map_id), say)
     after = bench.robot.joints()
     assert all(abs(after[name] - before[name]) < 0.01 for name in ARM_JOINTS['right'])
 
@@ -247,14 +250,16 @@ def test_what_a_hand_held_in_another_trial_does_not_count(bench):
     made, before = bench.map(), bench.world.periods
     with pytest.raises(SkillError, match='too wide for the gripper'):
         bench.skills.pick(
-            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say
+        )
     fresh = bench.world.periods - before
     bench.skills.hands.forget('right')
     bench.world.reset(bench.world.scene)
     before = bench.world.periods
     with pytest.raises(SkillError, match='too wide for the gripper'):
         bench.skills.pick(
-            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say)
+            picking('right', pose(*CAN.position), Vector3(0.2, 0.2, 0.1), made.map_id), say
+        )
     assert bench.world.periods - before == fresh  # as in a process that has run no trial before
 
 
@@ -285,27 +290,41 @@ def test_without_a_map_pick_makes_its_own_of_what_the_camera_sees(bench):
 
 def test_a_head_that_is_told_looks_there(bench):
     bench.skills.point_head(
-        PointHeadGoal(PointStamped(Header(frame_id='base_link'), Point(0.7, -0.2, 0.7))), say)
+        PointHeadGoal(PointStamped(Header(frame_id='base_link'), Point(0.7, -0.2, 0.7))), say
+    )
     camera = bench.robot.see().base_from_camera
     way = np.array([0.7, -0.2, 0.751]) - camera[:3, 3]
     assert np.dot(way / np.linalg.norm(way), camera[:3, 2]) > 0.999
 
 
-BAD = [('an unknown arm', "unknown arm 'third'; allowed: left, right", dict(arm='third')),
-       ('NaN', 'object: .*not finite', dict(object=pose(math.nan, 0.0, 0.8))),
-       ('a quaternion of no length', 'object: quaternion .* is no rotation',
-        dict(object=pose(0.6, 0.0, 0.8, w=0.0))),
-       ('a quaternion beyond measure', 'object: .*no rotation',
-        dict(object=pose(0.6, 0.0, 0.8, w=1e200))),
-       ('a wrong frame', "object: frame 'moon'; allowed: base_footprint, base_link, odom_combined",
-        dict(object=pose(0.6, 0.0, 0.8, frame='moon'))),
-       ('an unknown map', "no collision map 'x'", dict(map_id='x')),
-       ('no size', 'object: its size is .*each must be above 0',
-        dict(size=Vector3(0.05, 0.0, 0.1))),
-       ('a huge size', 'object: its size is .*at most 1', dict(size=Vector3(0.05, 3.0, 0.1))),
-       ('out of reach', 'none of .* grasps can be done: .*out of reach',
-        dict(object=pose(2.5, 0.0, 0.8))),
-       ('too wide', 'too wide for the gripper from every side', dict(size=Vector3(0.2, 0.2, 0.1)))]
+BAD = [
+    ('an unknown arm', "unknown arm 'third'; allowed: left, right", dict(arm='third')),
+    ('NaN', 'object: .*not finite', dict(object=pose(math.nan, 0.0, 0.8))),
+    (
+        'a quaternion of no length',
+        'object: quaternion .* is no rotation',
+        dict(object=pose(0.6, 0.0, 0.8, w=0.0)),
+    ),
+    (
+        'a quaternion beyond measure',
+        'object: .*no rotation',
+        dict(object=pose(0.6, 0.0, 0.8, w=1e200)),
+    ),
+    (
+        'a wrong frame',
+        "object: frame 'moon'; allowed: base_footprint, base_link, odom_combined",
+        dict(object=pose(0.6, 0.0, 0.8, frame='moon')),
+    ),
+    ('an unknown map', "no collision map 'x'", dict(map_id='x')),
+    ('no size', 'object: its size is .*each must be above 0', dict(size=Vector3(0.05, 0.0, 0.1))),
+    ('a huge size', 'object: its size is .*at most 1', dict(size=Vector3(0.05, 3.0, 0.1))),
+    (
+        'out of reach',
+        'none of .* grasps can be done: .*out of reach',
+        dict(object=pose(2.5, 0.0, 0.8)),
+    ),
+    ('too wide', 'too wide for the gripper from every side', dict(size=Vector3(0.2, 0.2, 0.1))),
+]
 
 
 @pytest.fixture(name='still', scope='module')
@@ -316,8 +335,9 @@ def _still():
     bench.world.close()
 
 
-@pytest.mark.parametrize('text, change', [(text, change) for _, text, change in BAD],
-                         ids=[name for name, _, _ in BAD])
+@pytest.mark.parametrize(
+    'text, change', [(text, change) for _, text, change in BAD], ids=[name for name, _, _ in BAD]
+)
 def test_goals_that_cannot_be_are_refused_and_say_why(still, text, change):
     goal = picking('right', pose(*CAN.position), CAN_SIZE, still.map_id)
     for name, value in change.items():
@@ -325,8 +345,12 @@ def test_goals_that_cannot_be_are_refused_and_say_why(still, text, change):
     before = still.robot.joints()
     with pytest.raises(SkillError, match=text):
         still.skills.pick(goal, say)
-    assert np.abs(np.array(list(still.robot.joints().values())) -
-                  np.array(list(before.values()))).max() < 0.01
+    assert (
+        np.abs(
+            np.array(list(still.robot.joints().values())) - np.array(list(before.values()))
+        ).max()
+        < 0.01
+    )
 
 
 def test_a_map_has_its_id_from_all_that_is_in_it(still):
@@ -341,22 +365,27 @@ def test_other_goals_that_cannot_be(still):
         still.skills.move_arms_aside(MoveArmsAsideGoal(['both']), say)
     with pytest.raises(SkillError, match='target: the point is not finite'):
         still.skills.point_head(
-            PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(math.inf, 0, 0))), say)
+            PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(math.inf, 0, 0))), say
+        )
     with pytest.raises((SkillError, RobotError)):
         still.skills.point_head(
-            PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(-1.0, 0.0, 1.3))), say)
+            PointHeadGoal(PointStamped(Header(frame_id=BASE), Point(-1.0, 0.0, 1.3))), say
+        )
     with pytest.raises(SkillError, match='1 objects but 0 sizes'):
         still.skills.build_collision_map(
-            BuildCollisionMapGoal(pose(0.8, 0, 0.7), [pose(0.6, 0, 0.8)], []), say)
+            BuildCollisionMapGoal(pose(0.8, 0, 0.7), [pose(0.6, 0, 0.8)], []), say
+        )
     with pytest.raises(SkillError, match="table: frame 'moon'"):
         still.skills.build_collision_map(
-            BuildCollisionMapGoal(pose(0.8, 0, 0.7, frame='moon'), [], []), say)
+            BuildCollisionMapGoal(pose(0.8, 0, 0.7, frame='moon'), [], []), say
+        )
 
 
 def test_a_large_square_thing_is_taken_by_its_sides_and_not_by_its_corners():
     straight = math.atan2(0.19, 0.65)  # from the right shoulder
-    box = UprightBox(np.array([0.6, 0.0, 0.78]), np.array([0.068, 0.067, 0.12]),
-                     straight + math.pi / 4)
+    box = UprightBox(
+        np.array([0.6, 0.0, 0.78]), np.array([0.068, 0.067, 0.12]), straight + math.pi / 4
+    )
     off = (yaw_of(grasps(box, 'right')[0]) - box.yaw + math.pi / 4) % (math.pi / 2) - math.pi / 4
     assert abs(off) < math.radians(21)
     small = UprightBox(box.centre, np.array([0.055, 0.054, 0.12]), box.yaw)

@@ -1,4 +1,5 @@
 """The parameters of the simulated PR2's perception and manipulation: a wrong one is named."""
+
 import pytest
 import rospy
 
@@ -9,13 +10,25 @@ from smach_oracle.pr2.nodes.perception_node import kitchen_at, snapshot_service
 @pytest.fixture
 def parameter(monkeypatch):
     """Set the one parameter that there is."""
+
     def give(value):
         monkeypatch.setattr(rospy, 'get_param', lambda name, default: value)
+
     return give
 
 
-@pytest.mark.parametrize('value', [['fridge.yaml'], 5, True, {'widht': 1.0}, {5: 1, 'widht': 2},
-                                   {'drinks_shelf': float('inf')}, 'nowhere.yaml'])
+@pytest.mark.parametrize(
+    'value',
+    [
+        ['fridge.yaml'],
+        5,
+        True,
+        {'widht': 1.0},
+        {5: 1, 'widht': 2},
+        {'drinks_shelf': float('inf')},
+        'nowhere.yaml',
+    ],
+)
 def test_a_kitchen_that_is_none_is_refused_by_its_name(parameter, value):
     parameter(value)
     with pytest.raises(ValueError, match='kitchen: '):

@@ -1,4 +1,5 @@
 """Whether a thing is gone comes from depth alone, from frames whose truth is known to the pixel."""
+
 import numpy as np
 import pytest
 from pr2_world import TABLE

@@ -1,6 +1,7 @@
 """Detection of a drink in a refrigerator: its door, its shelf, what stands there, and a map that is
 not quite right.
 """
+
 import numpy as np
 import pytest
 from ray_camera import camera_at, see
@@ -20,8 +21,14 @@ FLOOR = Body('floor', 'box', (3.0, 4.0, 0.02), (2.0, 0.0, -0.01), colour=(0.6, 0
 
 def fridge(door_degrees):
     return [
-        Body('fridge', 'box', tuple(2 * box.half), tuple(box.centre), yaw=box.yaw,
-             colour=(0.9, 0.9, 0.93))
+        Body(
+            'fridge',
+            'box',
+            tuple(2 * box.half),
+            tuple(box.centre),
+            yaw=box.yaw,
+            colour=(0.9, 0.9, 0.93),
+        )
         for box in fridge_boxes(KITCHEN, FRIDGE, np.radians(door_degrees))
     ]
 
@@ -35,8 +42,12 @@ def drink(x, y, radius=0.031, height=0.12, colour=(0.8, 0.2, 0.1)):
 
 def image_of(bodies, door=90.0, seed=0, noise=1.0, target=None):
     target = look_point(KITCHEN, FRIDGE) if target is None else target
-    return see([FLOOR] + fridge(door) + list(bodies), camera_at((0.05, 0.03, 1.45), target),
-               np.random.default_rng(seed), noise).image
+    return see(
+        [FLOOR] + fridge(door) + list(bodies),
+        camera_at((0.05, 0.03, 1.45), target),
+        np.random.default_rng(seed),
+        noise,
+    ).image
 
 
 def reason(image):
@@ -50,8 +61,9 @@ def reason(image):
 def test_the_foremost_drink_is_found_though_the_map_is_wrong_by_centimetres(door, noise):
     errors = []
     for seed in range(3):
-        believed = FRIDGE @ from_rpy(np.r_[np.random.default_rng(seed).normal(0, 0.025, 2), 0.0],
-                                     yaw=0.03)
+        believed = FRIDGE @ from_rpy(
+            np.r_[np.random.default_rng(seed).normal(0, 0.025, 2), 0.0], yaw=0.03
+        )
         front, behind = drink(0.08, -0.1), drink(0.2, 0.05, colour=(0.1, 0.5, 0.8))
         found = find_drink(image_of([behind, front], door, seed, noise), KITCHEN, believed)
         errors.append(np.linalg.norm(found.centre - front.position))
@@ -71,7 +83,8 @@ def test_an_empty_shelf_is_said_to_be_empty():
 
 def test_a_camera_that_looks_elsewhere_is_the_reason():
     assert 'the camera does not look into' in reason(
-        image_of([drink(0.08, 0.0)], target=(0.5, 1.5, 0.8)))
+        image_of([drink(0.08, 0.0)], target=(0.5, 1.5, 0.8))
+    )
 
 
 def test_what_has_not_the_size_of_a_drink_is_none():
@@ -84,14 +97,16 @@ def test_drinks_that_touch_are_not_taken_for_one():
     assert 'touch' in text
     third = drink(0.12, 0.17)
     found = find_drink(image_of([drink(0.1, -0.031), drink(0.1, 0.031), third]), KITCHEN, FRIDGE)
-    assert np.linalg.norm(found.centre -
-                          third.position) < 0.01, 'another that stands free is as good'
+    assert np.linalg.norm(found.centre - third.position) < 0.01, (
+        'another that stands free is as good'
+    )
 
 
 def test_missing_depth_is_the_reason():
     image = image_of([drink(0.08, 0.0)])
     assert 'depth is missing for 100%' in reason(
-        image._replace(depth=np.full_like(image.depth, np.nan)))
+        image._replace(depth=np.full_like(image.depth, np.nan))
+    )
 
 
 def test_the_drink_of_the_colour_is_found_and_no_other():
@@ -100,8 +115,10 @@ def test_the_drink_of_the_colour_is_found_and_no_other():
     for each, colour in ((red, 'red'), (green, 'green')):
         found = find_drink(image, KITCHEN, FRIDGE, colour=colour)
         assert np.allclose(found.centre, each.position, atol=0.015)
-    for colour, words in (('blue', 'no blue drink: there are 2 things on the shelf: red, green'),
-                          ('pink', "colour is 'pink'; allowed: blue, ")):
+    for colour, words in (
+        ('blue', 'no blue drink: there are 2 things on the shelf: red, green'),
+        ('pink', "colour is 'pink'; allowed: blue, "),
+    ):
         with pytest.raises(NotSeen) as error:
             find_drink(image, KITCHEN, FRIDGE, colour=colour)
         assert words in str(error.value)
@@ -124,8 +141,16 @@ def test_a_drink_that_glare_hides_in_part_is_not_measured():
 
 
 def test_colours_have_the_names_that_people_use():
-    named = {'red': (0.80, 0.15, 0.12), 'green': (0.12, 0.45, 0.20), 'orange': (0.90, 0.60, 0.10),
-             'blue': (0.15, 0.30, 0.70), 'purple': (0.60, 0.20, 0.55), 'yellow': (0.90, 0.75, 0.15),
-             'turquoise': (0.10, 0.55, 0.60), 'grey': (0.92, 0.92, 0.90), '': (0.05, 0.01, 0.0)}
+    named = {
+        'red': (0.80, 0.15, 0.12),
+        'green': (0.12, 0.45, 0.20),
+        'orange': (0.90, 0.60, 0.10),
+        'blue': (0.15, 0.30, 0.70),
+        'purple': (0.60, 0.20, 0.55),
+        'yellow': (0.90, 0.75, 0.15),
+        'turquoise': (0.10, 0.55, 0.60),
+        'grey': (0.92, 0.92, 0.90),
+        '': (0.05, 0.01, 0.0),
+    }
     for name, colour in named.items():
         assert name_of(255 * np.array(colour)) == name

@@ -1,6 +1,7 @@
 """Detection of drinks in what the simulated PR2's camera sees of its refrigerator, against the
 physical truth.
 """
+
 import numpy as np
 import pytest
 
@@ -30,17 +31,23 @@ def seen(world, seed, degrees, **sensor):
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, np.radians(degrees)),))
     world.reset(
         scene._replace(
-            bodies=(fridge,) + scene.bodies[1:], camera=scene.camera._replace(**sensor),
-            robot=scene.robot._replace(base=IN_THE_FRIDGE,
-                                       joints=scene.robot.joints +
-                                       (('torso_lift_joint', TORSO_HEIGHT),))))
+            bodies=(fridge,) + scene.bodies[1:],
+            camera=scene.camera._replace(**sensor),
+            robot=scene.robot._replace(
+                base=IN_THE_FRIDGE,
+                joints=scene.robot.joints + (('torso_lift_joint', TORSO_HEIGHT),),
+            ),
+        )
+    )
     robot = DirectRobot(world)
     believed = base_from_fridge(Kitchen(), robot.odom_from_base())
     robot.look_at(look_point(Kitchen(), believed))
     found = find_drink(robot.see(), Kitchen(), believed)
     base = inverse(world.true_base())
-    errors = {name: float(np.linalg.norm(found.centre - (base @ world.body_pose(name))[:3, 3]))
-              for name in world.movable()}
+    errors = {
+        name: float(np.linalg.norm(found.centre - (base @ world.body_pose(name))[:3, 3]))
+        for name in world.movable()
+    }
     nearest = min(errors, key=errors.__getitem__)
     size = np.array(world.body(nearest).size) * [2, 2, 1]
     return errors[nearest], float(np.abs(found.size - size).max())

@@ -1,6 +1,7 @@
 """Detection and segmentation on what the simulated PR2's camera sees, against the physical
 truth.
 """
+
 import numpy as np
 import pytest
 from pr2_world import TABLE, TOP, look, places, thing
@@ -18,9 +19,19 @@ from smach_oracle.simulation.scenes.scene import Body
 
 # the right hand in front of the camera, over the table
 IN_VIEW = tuple(
-    zip(('r_shoulder_pan_joint', 'r_shoulder_lift_joint', 'r_upper_arm_roll_joint',
-         'r_elbow_flex_joint', 'r_forearm_roll_joint', 'r_wrist_flex_joint', 'r_wrist_roll_joint'),
-        (0.25, 0.5, -0.3, -1.3, 0.0, -0.5, 0.0)))
+    zip(
+        (
+            'r_shoulder_pan_joint',
+            'r_shoulder_lift_joint',
+            'r_upper_arm_roll_joint',
+            'r_elbow_flex_joint',
+            'r_forearm_roll_joint',
+            'r_wrist_flex_joint',
+            'r_wrist_roll_joint',
+        ),
+        (0.25, 0.5, -0.3, -1.3, 0.0, -0.5, 0.0),
+    )
+)
 # the right arm drawn back from a place at which the camera looks: it sees the shoulder
 DRAWN_BACK = (0.443, 0.812, -0.506, -1.476, 2.165, -1.277, -2.158)
 MIRRORED = (-1, 1, -1, 1, -1, 1, -1)
@@ -43,8 +54,13 @@ def scenes(count, things=3):
     """Seeds with their bodies."""
     for seed in range(count):
         generator = np.random.default_rng(seed)
-        yield seed, [thing(generator, 'thing_{}'.format(k), *place)
-                     for k, place in enumerate(places(generator, things))]
+        yield (
+            seed,
+            [
+                thing(generator, 'thing_{}'.format(k), *place)
+                for k, place in enumerate(places(generator, things))
+            ],
+        )
 
 
 def errors_of(boxes, seen, bodies):
@@ -67,10 +83,8 @@ def test_fifteen_scenes_are_measured_to_a_centimetre(world, links):
         rows, columns = np.nonzero(truth)
         cut = segment(
             CameraImage(*seen.image),
-            rectangle(columns.min() - 7,
-                      rows.min() - 5,
-                      np.ptp(columns) + 12,
-                      np.ptp(rows) + 13))
+            rectangle(columns.min() - 7, rows.min() - 5, np.ptp(columns) + 12, np.ptp(rows) + 13),
+        )
         overlaps.append((cut.mask & truth).sum() / (cut.mask | truth).sum())
         marked += errors_of([cut.box], seen, bodies[:1])
     assert np.median(errors) < 0.007
@@ -85,7 +99,8 @@ def test_four_times_the_noise_costs_millimetres_or_is_a_failure_with_a_reason(wo
         seen = look(world, [TABLE] + bodies, seed, noise=4.0)
         try:
             errors += errors_of(
-                find_tabletop(seen.image, limbs=limbs_of(links, seen.joints)).objects, seen, bodies)
+                find_tabletop(seen.image, limbs=limbs_of(links, seen.joints)).objects, seen, bodies
+            )
         except NotSeen as err:
             reasons.append(str(err))
     assert all(reasons)
@@ -94,8 +109,9 @@ def test_four_times_the_noise_costs_millimetres_or_is_a_failure_with_a_reason(wo
 
 
 def brick(y):
-    return Body('brick', 'box', (0.05, 0.05, 0.12), (0.82, y, TOP + 0.06), mass=0.3,
-                colour=(0.2, 0.7, 0.2))
+    return Body(
+        'brick', 'box', (0.05, 0.05, 0.12), (0.82, y, TOP + 0.06), mass=0.3, colour=(0.2, 0.7, 0.2)
+    )
 
 
 def test_the_robot_knows_its_own_arm_when_it_sees_it(world, links):
@@ -111,8 +127,10 @@ def test_the_robot_knows_its_own_arm_when_it_sees_it(world, links):
 @pytest.mark.parametrize('arm', ['right', 'left'])
 def test_its_own_shoulder_is_nothing_in_the_way(world, links, arm):
     signs = MIRRORED if arm == 'left' else np.ones(7)
-    posture = [(arm[0] + name[1:], sign * angle)
-               for (name, _), sign, angle in zip(IN_VIEW, signs, DRAWN_BACK)]
+    posture = [
+        (arm[0] + name[1:], sign * angle)
+        for (name, _), sign, angle in zip(IN_VIEW, signs, DRAWN_BACK)
+    ]
     place = (PLACE[0], PLACE[1] * signs[0], PLACE[2])
     seen = look(world, [TABLE], joints=[('torso_lift_joint', 0.22), *posture], at=place)
 

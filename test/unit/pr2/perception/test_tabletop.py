@@ -1,4 +1,5 @@
 """Detection of what stands on a table, from frames whose truth is known to the pixel."""
+
 import re
 
 import numpy as np
@@ -24,8 +25,9 @@ def image_of(bodies, seed=0, noise=1.0, camera=CAMERA):
 
 
 def can(x, y, radius=0.03, colour=(0.1, 0.3, 0.8), height=0.12):
-    return Body('can', 'cylinder', (radius, radius, height), (x, y, 0.72 + height / 2),
-                colour=colour)
+    return Body(
+        'can', 'cylinder', (radius, radius, height), (x, y, 0.72 + height / 2), colour=colour
+    )
 
 
 def reason(image, **given):
@@ -45,8 +47,11 @@ def test_centres_and_sizes_are_right_to_millimetres(noise, limit):
         for body in bodies:
             box = min(found.objects, key=lambda each: np.linalg.norm(each.centre - body.position))
             errors.append(np.linalg.norm(box.centre - body.position))
-            assert np.allclose(np.r_[sorted(box.size[:2])[::-1], box.size[2]], extents(body),
-                               atol=0.01 + noise * 0.005)
+            assert np.allclose(
+                np.r_[sorted(box.size[:2])[::-1], box.size[2]],
+                extents(body),
+                atol=0.01 + noise * 0.005,
+            )
     assert np.median(errors) < limit
     assert max(errors) < 0.02
 
@@ -56,8 +61,9 @@ def test_objects_come_nearest_first_and_the_table_is_where_it_is():
     assert [round(float(box.centre[0]), 1) for box in found.objects] == [0.6, 0.8, 0.9]
     assert abs(found.table.centre[2] - 0.72) < 0.005
     assert found.table.size[2] == 0
-    assert np.allclose(sorted(found.table.size[:2]), [0.7, 1.2],
-                       atol=0.05), 'as far as it is in view'
+    assert np.allclose(sorted(found.table.size[:2]), [0.7, 1.2], atol=0.05), (
+        'as far as it is in view'
+    )
 
 
 def test_where_the_image_cuts_off_a_nearer_part_of_the_table_it_says_where_to_look():
@@ -69,8 +75,9 @@ def test_where_the_image_cuts_off_a_nearer_part_of_the_table_it_says_where_to_lo
 
 
 def test_the_box_turns_with_the_object():
-    brick = Body('brick', 'box', (0.075, 0.04, 0.1), (0.75, 0.0, 0.77), yaw=0.7,
-                 colour=(0.8, 0.2, 0.2))
+    brick = Body(
+        'brick', 'box', (0.075, 0.04, 0.1), (0.75, 0.0, 0.77), yaw=0.7, colour=(0.8, 0.2, 0.2)
+    )
     box = find_tabletop(image_of([TABLE, brick])).objects[0]
     assert abs(box.yaw - 0.7) < 0.1
     assert box.size[0] > box.size[1]
@@ -81,13 +88,15 @@ def test_the_same_frame_is_always_understood_the_same_way():
     one, other = find_tabletop(image), find_tabletop(image)
     assert all(
         np.array_equal(a.centre, b.centre) and a.yaw == b.yaw
-        for a, b in zip(one.objects, other.objects))
+        for a, b in zip(one.objects, other.objects)
+    )
 
 
 def test_an_empty_table_is_said_to_be_empty():
     assert 'nothing on the table' in reason(image_of([TABLE]))
     assert 'nothing on the table that stands higher than 15 cm' in reason(
-        image_of([TABLE, can(0.7, 0.0)]), min_height=0.15)
+        image_of([TABLE, can(0.7, 0.0)]), min_height=0.15
+    )
 
 
 def test_no_table_is_said_and_so_is_missing_depth():
@@ -97,7 +106,8 @@ def test_no_table_is_said_and_so_is_missing_depth():
     lost[np.random.default_rng(1).random(lost.shape) < 0.99] = np.nan
     assert 'depth is missing for 99% of the image' in reason(image._replace(depth=lost))
     assert 'depth is missing for 100% of the image' in reason(
-        image._replace(depth=np.full_like(lost, np.nan)))
+        image._replace(depth=np.full_like(lost, np.nan))
+    )
 
 
 def test_half_the_depth_is_enough():
@@ -107,15 +117,16 @@ def test_half_the_depth_is_enough():
 
 
 @pytest.mark.parametrize('gap', [0.0, 0.01])
-@pytest.mark.parametrize('colours', [((0.1, 0.3, 0.8), (0.1, 0.3, 0.8)),
-                                     ((0.8, 0.2, 0.1), (0.2, 0.7, 0.2))])
+@pytest.mark.parametrize(
+    'colours', [((0.1, 0.3, 0.8), (0.1, 0.3, 0.8)), ((0.8, 0.2, 0.1), (0.2, 0.7, 0.2))]
+)
 def test_neighbours_that_merge_are_not_taken_for_one_object(gap, colours):
     for seed, angle in enumerate((0.3, 1.2, 2.0)):
         distance = 0.06 + gap
         beside = (0.7 + distance * np.cos(angle), distance * np.sin(angle))
         image = image_of(
-            [TABLE, can(0.7, 0.0, colour=colours[0]),
-             can(*beside, colour=colours[1])], seed)
+            [TABLE, can(0.7, 0.0, colour=colours[0]), can(*beside, colour=colours[1])], seed
+        )
         try:
             assert len(find_tabletop(image).objects) == 2, 'told apart'
         except NotSeen as err:
@@ -123,21 +134,27 @@ def test_neighbours_that_merge_are_not_taken_for_one_object(gap, colours):
 
 
 def test_boxes_side_by_side_are_told_by_their_colours():
-    bricks = [Body('brick', 'box', (0.05, 0.05, 0.1), (0.7, y, 0.77), colour=colour)
-              for y, colour in ((0.0, (0.8, 0.2, 0.2)), (0.05, (0.2, 0.3, 0.8)))]
+    bricks = [
+        Body('brick', 'box', (0.05, 0.05, 0.1), (0.7, y, 0.77), colour=colour)
+        for y, colour in ((0.0, (0.8, 0.2, 0.2)), (0.05, (0.2, 0.3, 0.8)))
+    ]
     found = find_tabletop(image_of([TABLE] + bricks)).objects
     for box, y in zip(sorted(found, key=lambda each: each.centre[1]), (0.0, 0.05)):
         assert np.allclose(box.centre[:2], (0.7, y), atol=0.008)
 
 
 def test_three_things_in_a_row_are_told_by_their_colours():
-    row = [can(0.70 + 0.02 * k, 0.062 * k, colour=colour)
-           for k, colour in enumerate(((0.16, 0.55, 0.25), (0.25, 0.8, 0.7), (0.14, 0.35, 0.75)))]
+    row = [
+        can(0.70 + 0.02 * k, 0.062 * k, colour=colour)
+        for k, colour in enumerate(((0.16, 0.55, 0.25), (0.25, 0.8, 0.7), (0.14, 0.35, 0.75)))
+    ]
     for seed in range(3):
         found = find_tabletop(image_of([TABLE] + row, seed))
         assert len(found.objects) == 3
-        assert all(np.linalg.norm(box.centre - body.position) < 0.012
-                   for box, body in zip(found.objects, row))
+        assert all(
+            np.linalg.norm(box.centre - body.position) < 0.012
+            for box, body in zip(found.objects, row)
+        )
 
 
 def test_nearest_counts_from_where_one_says():
@@ -153,8 +170,10 @@ def test_what_was_seen_first_is_found_again_though_another_thing_is_nearer_by_no
     found = find_tabletop(image_of(swapped, 1), like=seen)
     assert np.allclose(found.objects[0].centre, (0.8, 0.2, 0.78), atol=0.01)
     assert len(found.objects) == 2
-    assert re.match('what was seen first, blue and .* x 12 cm, is not among the 1 things on the '
-                    'table: red$', reason(image_of([TABLE, swapped[2]]), like=seen))
+    assert re.match(
+        'what was seen first, blue and .* x 12 cm, is not among the 1 things on the table: red$',
+        reason(image_of([TABLE, swapped[2]]), like=seen),
+    )
 
 
 def test_its_colour_parts_it_from_what_it_touches():
@@ -184,11 +203,13 @@ def test_what_is_cut_off_says_where_to_look():
 
 def test_what_is_too_large_for_the_gripper_is_said_with_its_size():
     drum = Body('drum', 'cylinder', (0.07, 0.07, 0.1), (0.7, 0.0, 0.77))
-    assert re.search('too large for the gripper, 1[34] x 1[34] x 10 cm',
-                     reason(image_of([TABLE, drum])))
+    assert re.search(
+        'too large for the gripper, 1[34] x 1[34] x 10 cm', reason(image_of([TABLE, drum]))
+    )
     behind = drum._replace(position=(0.95, 0.2, 0.77))
-    assert len(find_tabletop(image_of([TABLE, can(0.65, 0.0),
-                                       behind])).objects) == 2, 'only the nearest must fit'
+    assert len(find_tabletop(image_of([TABLE, can(0.65, 0.0), behind])).objects) == 2, (
+        'only the nearest must fit'
+    )
 
 
 def test_an_arm_that_is_not_known_of_is_no_object():
@@ -210,17 +231,21 @@ def test_the_robot_takes_its_own_arm_out_of_what_it_sees():
 
 def test_what_an_arm_hides_in_part_is_not_measured():
     text = reason(image_of([TABLE, can(0.78, -0.03), arm_body()]), limbs=[ARM])
-    assert text in ('the right arm hides part of the nearest object',
-                    'there is nothing on the table that stands '
-                    'higher than 2 cm; the right arm covers {}'.format(
-                        text.rpartition('covers ')[2]))
+    assert text in (
+        'the right arm hides part of the nearest object',
+        'there is nothing on the table that stands '
+        'higher than 2 cm; the right arm covers {}'.format(text.rpartition('covers ')[2]),
+    )
 
 
 def test_what_the_edge_of_the_image_cuts_off_is_not_measured():
     body = can(0.78, 0.0)
     cameras = (camera_at((0.05, 0.03, 1.38), (0.75, y, 0.75)) for y in np.arange(0.3, 1.0, 0.01))
-    aside = next(camera for camera in cameras
-                 if pixels_of([body.position], INTRINSICS, camera)[0, 0] > WIDTH - 8)
+    aside = next(
+        camera
+        for camera in cameras
+        if pixels_of([body.position], INTRINSICS, camera)[0, 0] > WIDTH - 8
+    )
     assert 'cut off by the edge' in reason(image_of([TABLE, body], camera=aside))
 
 

@@ -1,4 +1,5 @@
 """Collision checks, ways and their timing, for the right arm of the PR2."""
+
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,8 +24,10 @@ def in_front(space: CollisionWorld, seed: int) -> np.ndarray:
     """Joint positions free of collision, the hand over the table."""
     generator = np.random.default_rng(seed)
     for _ in range(60):
-        pose = from_rpy((generator.uniform(0.5, 0.7), generator.uniform(-0.3, 0.1), 0.85),
-                        yaw=generator.uniform(-0.8, 0.8))
+        pose = from_rpy(
+            (generator.uniform(0.5, 0.7), generator.uniform(-0.3, 0.1), 0.85),
+            yaw=generator.uniform(-0.8, 0.8),
+        )
         q = space.chain.inverse(pose, READY['right'], generator)
         if q is not None and space.is_free(q):
             return q
@@ -67,18 +70,20 @@ def test_the_budget_is_kept_and_named():
         goal = in_front(space, 2)
         before = space.checks
         with pytest.raises(
-                PlanningError,
-                match='no way around the obstacles was found within 40 collision checks'):
+            PlanningError, match='no way around the obstacles was found within 40 collision checks'
+        ):
             plan(space, ASIDE['right'], goal, 1, budget=40)
         assert space.checks - before < 400
 
 
 def test_a_goal_in_collision_says_what_touches_what():
     with right_arm(clutter(1)) as space:
-        goal = space.chain.inverse(from_rpy((0.7, 0.0, 0.70)), READY['right'],
-                                   np.random.default_rng(1))
-        with pytest.raises(PlanningError,
-                           match='the goal is in collision: .*r_gripper.* touches table'):
+        goal = space.chain.inverse(
+            from_rpy((0.7, 0.0, 0.70)), READY['right'], np.random.default_rng(1)
+        )
+        with pytest.raises(
+            PlanningError, match='the goal is in collision: .*r_gripper.* touches table'
+        ):
             plan(space, ASIDE['right'], goal, 1)
 
 
@@ -95,8 +100,9 @@ def test_an_arm_that_touches_something_steps_out_of_it():
 
 def test_a_straight_way_keeps_the_tool_on_its_line_and_heading():
     with right_arm({}) as space:
-        start = space.chain.inverse(from_rpy((0.5, -0.2, 0.9)), READY['right'],
-                                    np.random.default_rng(1))
+        start = space.chain.inverse(
+            from_rpy((0.5, -0.2, 0.9)), READY['right'], np.random.default_rng(1)
+        )
         way = straight(space, start, from_rpy((0.65, -0.2, 0.9)))
         tools = [space.chain.forward(q) for q in way]
         assert max(np.abs(tool[1:3, 3] - [-0.2, 0.9]).max() for tool in tools) < 0.003
@@ -126,8 +132,9 @@ def test_timing_keeps_the_limits_of_speed_and_acceleration():
 
 def test_what_the_hand_holds_is_part_of_it():
     with right_arm({}) as space:
-        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'],
-                                np.random.default_rng(1))
+        q = space.chain.inverse(
+            from_rpy((0.6, -0.2, 0.9)), READY['right'], np.random.default_rng(1)
+        )
         space.add_box('below', box(0.6, -0.2, 0.70, 0.05, 0.05, 0.02))
         assert space.is_free(q)
         space.attach((0.03, 0.03, 0.19), np.eye(4))
@@ -140,8 +147,9 @@ def test_what_the_hand_holds_is_part_of_it():
 
 def test_distance_is_that_to_the_nearest_thing():
     with right_arm({}) as space:
-        q = space.chain.inverse(from_rpy((0.6, -0.2, 0.9)), READY['right'],
-                                np.random.default_rng(1))
+        q = space.chain.inverse(
+            from_rpy((0.6, -0.2, 0.9)), READY['right'], np.random.default_rng(1)
+        )
         assert space.distance(q, reach=0.02) == 0.02
         tip = space.chain.forward(q)[:3, 3]
         space.add_box('ahead', box(tip[0] + 0.1, tip[1], tip[2], 0.04, 0.3, 0.3))
@@ -151,11 +159,13 @@ def test_distance_is_that_to_the_nearest_thing():
 
 
 def test_the_other_arm_is_in_the_way():
-    crossed = dict(REST, l_shoulder_pan_joint=0.0, l_upper_arm_roll_joint=0.0,
-                   l_elbow_flex_joint=-0.3)
+    crossed = dict(
+        REST, l_shoulder_pan_joint=0.0, l_upper_arm_roll_joint=0.0, l_elbow_flex_joint=-0.3
+    )
     with CollisionWorld(model(), 'right', crossed) as space:
-        q = space.chain.inverse(from_rpy((0.6, 0.12, 0.95), yaw=0.8), READY['right'],
-                                np.random.default_rng(2))
+        q = space.chain.inverse(
+            from_rpy((0.6, 0.12, 0.95), yaw=0.8), READY['right'], np.random.default_rng(2)
+        )
         touched = space.why_not(q) if q is not None else ''
     with CollisionWorld(model(), 'right', REST) as space:
         assert q is not None and space.is_free(q)
@@ -181,13 +191,18 @@ def test_what_cannot_be_built_leaves_no_physics_client_behind(monkeypatch):
         pass
     before = clients()  # that of the robot that waits to be lent again among them
     with pytest.raises(ValueError):
-        Arm(SkillContext(robot, model()), 'right',
-            {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])}, 1)
+        Arm(
+            SkillContext(robot, model()),
+            'right',
+            {'bad': box(0.5, 0.0, 0.5)._replace(half=['wide'])},
+            1,
+        )
     with right_arm({}) as space:
         assert clients() == before and space.names() == []
 
     def broken(*_, **__):
         raise pybullet.error('Cannot load URDF file.')
+
     monkeypatch.setattr(pybullet, 'loadURDF', broken)
     with pytest.raises(SkillError, match='robot description: Cannot load'):
         Arm(SkillContext(robot, model()), 'left', {}, 1)
@@ -202,7 +217,8 @@ def test_an_arm_whose_encoder_reads_beyond_a_stop_is_sent_within_its_limits():
     robot = SimpleNamespace(
         joints=lambda: dict(REST, **dict(zip(ARM_JOINTS['right'], beyond))),
         follow=lambda joints, positions, times: sent.append(positions),
-        spend=lambda what, work: None)
+        spend=lambda what, work: None,
+    )
     with Arm(SkillContext(robot, model()), 'right', {}, 1) as arm:
         goal = np.array(ASIDE['right']) + [0.5, 0, 0, 0, 0, 0, 0]
         goal[flex] = arm.chain.lower[flex]

@@ -1,4 +1,5 @@
 """The robot of collision checks is loaded once and lent again; an answer shows nothing of that."""
+
 import numpy as np
 import pybullet
 import pytest
@@ -18,6 +19,7 @@ def loads(monkeypatch):
     def counted(self, of, arm):
         made.append(arm)
         load(self, of, arm)
+
     monkeypatch.setattr(collision_body.CollisionBody, '__init__', counted)
     monkeypatch.setattr(collision, '_POOL', BodyPool())
     yield made
@@ -38,8 +40,10 @@ def answers(seed, arm='right'):
         for _ in range(150):
             q = np.clip(q + generator.normal(0.0, 0.1, 7), lower, upper)
             free = space.is_free(q)
-            touching = sorted((point[3], point[4], point[8])
-                              for point in pybullet.getContactPoints(physicsClientId=space._client))
+            touching = sorted(
+                (point[3], point[4], point[8])
+                for point in pybullet.getContactPoints(physicsClientId=space._client)
+            )
             found.append((free, touching))
     return found
 
@@ -87,8 +91,9 @@ def test_contacts_of_before_are_forgotten(loads, monkeypatch):
 
 
 def test_side_by_side_each_has_a_client_of_its_own(loads):
-    with CollisionWorld(model(), 'right', REST) as one, CollisionWorld(model(), 'right',
-                                                                       REST) as other:
+    with CollisionWorld(model(), 'right', REST) as one, CollisionWorld(
+        model(), 'right', REST
+    ) as other:
         assert one._client != other._client
         one.add_box('thing', next(iter(clutter(1).values())))
         assert other.names() == []

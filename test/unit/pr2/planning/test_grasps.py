@@ -1,4 +1,5 @@
 """Which grasps come first, and where things are put down: flat on faces, with room around."""
+
 import numpy as np
 import pytest
 

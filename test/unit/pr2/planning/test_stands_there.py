@@ -1,4 +1,5 @@
 """Whether what was put down is seen to stand at its place, beside what stands there anyway."""
+
 import numpy as np
 from ray_camera import camera_at, see
 from worlds import CAN, TABLE
@@ -14,8 +15,9 @@ LOW = CAN._replace(name='low', position=(0.6, -0.35, 0.75), size=(0.031, 0.031, 
 
 
 def stands(*bodies, others=()):
-    image = see((TABLE,) + bodies, camera_at((0.09, 0.02, 1.44), PLACE),
-                np.random.default_rng(1), noise=0.0).image
+    image = see(
+        (TABLE,) + bodies, camera_at((0.09, 0.02, 1.44), PLACE), np.random.default_rng(1), noise=0.0
+    ).image
     return stands_there(image, PLACE, HELD, others)
 
 
@@ -33,7 +35,12 @@ def test_what_is_not_as_high_as_the_object_does_not_stand():
 
 def test_what_leans_does_not_stand():
     """A can that leans by 20 degrees, as slices."""
-    slices = [CAN._replace(name='slice {}'.format(k), size=(0.031, 0.031, 0.02),
-                           position=(0.6, -0.37 + 0.36 * 0.02 * k, PLACE[2] - 0.05 + 0.02 * k))
-              for k in range(6)]
+    slices = [
+        CAN._replace(
+            name='slice {}'.format(k),
+            size=(0.031, 0.031, 0.02),
+            position=(0.6, -0.37 + 0.36 * 0.02 * k, PLACE[2] - 0.05 + 0.02 * k),
+        )
+        for k in range(6)
+    ]
     assert not stands(*slices)

@@ -1,4 +1,5 @@
 """Bags over a limit go, and never one that is open, written, held or unanswered."""
+
 import fcntl
 import os
 import time
@@ -45,7 +46,7 @@ def record(folder, name, days, tell=None, ends=True):
     for event in told:
         recorder(event)
     assert recorder.close(60.0)
-    bag, = set(folder.glob('*.bag')) - before
+    (bag,) = set(folder.glob('*.bag')) - before
     age(bag, days)
     return bag
 
@@ -75,8 +76,9 @@ def test_what_is_older_goes_after_it_was_named(folder, capsys, monkeypatch):
     old, new = record(folder, 'old', OLD), record(folder, 'new', NEW)
     said_before = []
     unlink = os.unlink
-    monkeypatch.setattr(os, 'unlink', lambda path: (
-        said_before.append(capsys.readouterr().out), unlink(path)))
+    monkeypatch.setattr(
+        os, 'unlink', lambda path: (said_before.append(capsys.readouterr().out), unlink(path))
+    )
     assert main([str(folder), '--delete'] + ONE_MONTH) == 0
     assert not old.exists() and new.exists()
     assert 'removes {}'.format(old) in said_before[0]
@@ -103,6 +105,7 @@ def test_what_remains_is_counted_as_before(folder):
 
 # -- never
 
+
 def test_never_a_trial_that_has_not_ended(folder, capsys):
     bag = record(folder, 'stopped', OLD, ends=False)
     assert stays(folder, bag, capsys, 'trial stopped has not ended')
@@ -116,8 +119,11 @@ def test_never_a_trial_whose_question_is_open(folder, capsys):
 
 
 def test_an_answered_question_is_none(folder):
-    told = [(EventKind.QUERY_OPENED, {'query_id': 'q'}),
-            (EventKind.QUERY_EXPIRED, {'query_id': 'q'}), (EventKind.TRIAL_END, {})]
+    told = [
+        (EventKind.QUERY_OPENED, {'query_id': 'q'}),
+        (EventKind.QUERY_EXPIRED, {'query_id': 'q'}),
+        (EventKind.TRIAL_END, {}),
+    ]
     bag = record(folder, 'asked', OLD, told, ends=False)
     assert main([str(folder), '--delete'] + ONE_MONTH) == 0 and not bag.exists()
 
@@ -129,7 +135,7 @@ def test_never_one_that_is_being_written(folder):
     deadline = time.monotonic() + 30
     while not list(folder.glob('*.active')):
         assert time.monotonic() < deadline
-    active, = folder.glob('*.active')
+    (active,) = folder.glob('*.active')
     age(active, OLD)
     assert main([str(folder), '--delete'] + ONE_MONTH) == 0
     assert list(folder.iterdir()) == [active]
@@ -195,11 +201,16 @@ def test_one_that_has_changed_since_it_was_looked_at_stays(folder):
 
 # -- the recorder
 
+
 def test_a_recorder_prunes_when_a_bag_is_closed_and_says_so_before(folder):
     old = record(folder, 'old', OLD)
     said = []
-    recorder = TrialRecorder(str(folder), say=lambda text: said.append((text, old.exists())),
-                             warn=quiet, keep=Limits(days=30))
+    recorder = TrialRecorder(
+        str(folder),
+        say=lambda text: said.append((text, old.exists())),
+        warn=quiet,
+        keep=Limits(days=30),
+    )
     FakeMachine(recorder).run(4, 'new')
     deadline = time.monotonic() + 60
     while old.exists():
@@ -235,5 +246,7 @@ def test_an_amount_that_is_not_a_number_above_0_is_told(folder, capsys, days):
     with pytest.raises(SystemExit) as caught:
         main([str(folder), '--keep-days', days])
     assert caught.value.code == 2
-    assert '--keep-days: {} is not allowed; allowed: a number above 0'.format(
-        days) in capsys.readouterr().err
+    assert (
+        '--keep-days: {} is not allowed; allowed: a number above 0'.format(days)
+        in capsys.readouterr().err
+    )

@@ -1,4 +1,5 @@
 """What keeps a pruner from its work at the end of each trial is said once."""
+
 import os
 
 import pytest
@@ -25,6 +26,7 @@ def test_a_bag_that_cannot_be_removed_is_named_once(tmp_path, monkeypatch):
 
     def refused(path):
         raise PermissionError(13, 'Permission denied', path)
+
     monkeypatch.setattr(os, 'unlink', refused)
     for _ in range(3):
         pruner.prune()

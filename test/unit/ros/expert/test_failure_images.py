@@ -1,6 +1,7 @@
 """What cameras saw at a failure: the newest frame of each that is still heard, and nothing from
 long before.
 """
+
 import threading
 from types import SimpleNamespace
 
@@ -18,6 +19,7 @@ from smach_oracle.ros.expert.failure_images import OLDEST_S, FailureCameras
 @pytest.fixture(name='clock')
 def make_clock(monkeypatch):
     """A clock to be set, a publisher that keeps what is published; no master."""
+
     class Clock:
         now_s = 100.0
         sent = []
@@ -33,8 +35,10 @@ def make_clock(monkeypatch):
 
     def subscriber(topic, kind, keep, callback_args, **_):
         clock.heard[topic] = lambda data: keep(
-            CompressedImage(format='jpeg', data=data), callback_args)
+            CompressedImage(format='jpeg', data=data), callback_args
+        )
         return SimpleNamespace(unregister=lambda: None)
+
     monkeypatch.setattr(rosgraph, 'Master', lambda name: master)
     monkeypatch.setattr(rospy, 'Subscriber', subscriber)
     monkeypatch.setattr(rospy, 'get_name', lambda: '/robot')
@@ -60,9 +64,12 @@ def test_a_camera_that_fell_silent_long_before_is_left_out(clock):
     clock.heard['/alive'](b'new')
     cameras.publish_for(make_question('q7'))
     assert wait_for(lambda: clock.sent)
-    told, = clock.sent
-    assert (told.query_id, told.topics, [image.data
-                                         for image in told.images]) == ('q7', ['/alive'], [b'new'])
+    (told,) = clock.sent
+    assert (told.query_id, told.topics, [image.data for image in told.images]) == (
+        'q7',
+        ['/alive'],
+        [b'new'],
+    )
 
 
 def test_where_no_camera_is_heard_nothing_is_told(clock):

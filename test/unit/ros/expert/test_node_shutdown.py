@@ -1,4 +1,5 @@
 """A node that goes down while a question is open logs no error and no warning about it."""
+
 import threading
 
 import pytest

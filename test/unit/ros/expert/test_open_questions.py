@@ -1,6 +1,7 @@
 """Who may settle what, when, and what everybody else is told: the questions of open questions under
 a clock of our own.
 """
+
 import math
 import re
 import tracemalloc
@@ -27,8 +28,12 @@ from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.userdata_codec import encode
 from smach_oracle.srv import ClaimQueryRequest
 
-CLAIM, RENEW, RELEASE, TAKE_OVER = (ClaimQueryRequest.CLAIM, ClaimQueryRequest.RENEW,
-                                    ClaimQueryRequest.RELEASE, ClaimQueryRequest.TAKE_OVER)
+CLAIM, RENEW, RELEASE, TAKE_OVER = (
+    ClaimQueryRequest.CLAIM,
+    ClaimQueryRequest.RENEW,
+    ClaimQueryRequest.RELEASE,
+    ClaimQueryRequest.TAKE_OVER,
+)
 
 CLAIM_SRV = Path(__file__).resolve().parents[4] / 'srv' / 'ClaimQuery.srv'
 
@@ -65,8 +70,7 @@ def supersede(outcome='succeeded', by='ann', **fields):
 
 def status_of(questions, query_id='q1'):
     return {
-        entry.query.query_id: (entry.status, entry.claimed_by)
-        for entry in questions.listing()
+        entry.query.query_id: (entry.status, entry.claimed_by) for entry in questions.listing()
     }.get(query_id)
 
 
@@ -76,10 +80,18 @@ def test_questions_wait_side_by_side_oldest_first(questions, clock):
     questions.open(goal('q1', deadline_s=4.0))
     clock.now_s += 1.0
     second, first = questions.listing()[1], questions.listing()[0]
-    assert (first.query.query_id, first.age, first.remaining, first.lease_remaining) == ('q2', 2.5,
-                                                                                         -1, -1)
-    assert (second.query.query_id, second.age, second.remaining,
-            second.status) == ('q1', 1.0, 3.0, OpenQuery.PENDING)
+    assert (first.query.query_id, first.age, first.remaining, first.lease_remaining) == (
+        'q2',
+        2.5,
+        -1,
+        -1,
+    )
+    assert (second.query.query_id, second.age, second.remaining, second.status) == (
+        'q1',
+        1.0,
+        3.0,
+        OpenQuery.PENDING,
+    )
 
 
 def test_the_same_question_again_joins_the_open_one(questions, clock):
@@ -105,11 +117,15 @@ def test_a_question_that_was_taken_back_can_be_asked_again(questions):
     assert questions.answer('q1', goto()).ok
 
 
-@pytest.mark.parametrize('changes, text', [
-    ({'query_id': ''}, 'needs a query id'),
-    ({'deadline_s': -1.0}, 'deadline -1.0 is not allowed'),
-    ({'deadline_s': math.nan}, 'deadline nan is not allowed'),
-    ({'deadline_s': math.inf}, 'deadline inf is not allowed')])
+@pytest.mark.parametrize(
+    'changes, text',
+    [
+        ({'query_id': ''}, 'needs a query id'),
+        ({'deadline_s': -1.0}, 'deadline -1.0 is not allowed'),
+        ({'deadline_s': math.nan}, 'deadline nan is not allowed'),
+        ({'deadline_s': math.inf}, 'deadline inf is not allowed'),
+    ],
+)
 def test_a_question_without_sense_is_refused(questions, changes, text):
     with pytest.raises(QuestionRefusedError, match=text):
         questions.open(goal(**changes))
@@ -128,10 +144,13 @@ def test_the_answer_settles_and_the_asker_is_told(questions):
     questions.open(goal())
     questions.take_notices()
     assert questions.answer('q1', goto(why='the table was hidden')).ok
-    notice, = questions.take_notices()
+    (notice,) = questions.take_notices()
     assert notice.settled.status == ExpertQueryResult.ANSWERED
-    assert (notice.settled.decision.state, notice.settled.text,
-            notice.by) == ('DETECT', 'go to DETECT', 'ann')
+    assert (notice.settled.decision.state, notice.settled.text, notice.by) == (
+        'DETECT',
+        'go to DETECT',
+        'ann',
+    )
     assert questions.listing() == []
 
 
@@ -165,23 +184,34 @@ def test_answers_that_differ_in_their_outputs_alone_are_different(questions):
     assert not questions.answer('q1', supersede(outputs=[encode('grasped', 'cup')])).ok
 
 
-@pytest.mark.parametrize('decision, text', [
-    (goto('NOWHERE'), "no state 'NOWHERE' to go to; allowed: DETECT, PICK$"),
-    (goto('PLACE'),
-     'PLACE cannot be entered now: still running after an overrun; allowed: DETECT, PICK$'),
-    (supersede('done'), "no outcome 'done' to supersede it with; allowed: aborted, succeeded"),
-    (ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='done',
-                    by='ann'), "no outcome 'done' to give up with"),
-    (ExpertDecision(kind=ExpertDecision.INTERFACE, interface='joystick',
-                    by='ann'), "no interface 'joystick' is on offer for PICK; allowed: assist"),
-    (ExpertDecision(kind=9, by='ann'), 'decision kind 9 is unknown; allowed: GOTO'),
-    (goto(by=' '), '`by` is empty'),
-    (supersede(outputs=[encode('object', 1)]), 'no output keys object; allowed: grasped'),
-    (supersede(outputs=[encode('grasped', 1), encode('grasped', 2)]), 'come twice: grasped'),
-    (supersede(outputs=[UserdataItem('grasped', UserdataItem.JSON, '', '', b'{')]),
-     "'grasped' is not JSON"),
-    (supersede(outputs=[encode('grasped', object())]), r'\(a object\) was not sent'),
-])
+@pytest.mark.parametrize(
+    'decision, text',
+    [
+        (goto('NOWHERE'), "no state 'NOWHERE' to go to; allowed: DETECT, PICK$"),
+        (
+            goto('PLACE'),
+            'PLACE cannot be entered now: still running after an overrun; allowed: DETECT, PICK$',
+        ),
+        (supersede('done'), "no outcome 'done' to supersede it with; allowed: aborted, succeeded"),
+        (
+            ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='done', by='ann'),
+            "no outcome 'done' to give up with",
+        ),
+        (
+            ExpertDecision(kind=ExpertDecision.INTERFACE, interface='joystick', by='ann'),
+            "no interface 'joystick' is on offer for PICK; allowed: assist",
+        ),
+        (ExpertDecision(kind=9, by='ann'), 'decision kind 9 is unknown; allowed: GOTO'),
+        (goto(by=' '), '`by` is empty'),
+        (supersede(outputs=[encode('object', 1)]), 'no output keys object; allowed: grasped'),
+        (supersede(outputs=[encode('grasped', 1), encode('grasped', 2)]), 'come twice: grasped'),
+        (
+            supersede(outputs=[UserdataItem('grasped', UserdataItem.JSON, '', '', b'{')]),
+            "'grasped' is not JSON",
+        ),
+        (supersede(outputs=[encode('grasped', object())]), r'\(a object\) was not sent'),
+    ],
+)
 def test_an_answer_that_does_not_fit_is_refused_with_what_is_allowed(questions, decision, text):
     questions.open(goal())
     reply = questions.answer('q1', decision)
@@ -190,15 +220,18 @@ def test_an_answer_that_does_not_fit_is_refused_with_what_is_allowed(questions, 
     assert questions.answer('q1', goto()).ok, 'the question stays open'
 
 
-@pytest.mark.parametrize('decision', [
-    goto('DETECT'),
-    goto('PICK'),
-    supersede('aborted'),
-    supersede(outputs=[encode('grasped', Empty())]),
-    ExpertDecision(kind=ExpertDecision.GIVE_UP, by='ann'),
-    ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='ann'),
-    ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist', by='ann')
-])
+@pytest.mark.parametrize(
+    'decision',
+    [
+        goto('DETECT'),
+        goto('PICK'),
+        supersede('aborted'),
+        supersede(outputs=[encode('grasped', Empty())]),
+        ExpertDecision(kind=ExpertDecision.GIVE_UP, by='ann'),
+        ExpertDecision(kind=ExpertDecision.GIVE_UP, outcome='aborted', by='ann'),
+        ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist', by='ann'),
+    ],
+)
 def test_every_decision_that_was_offered_is_taken(questions, decision):
     questions.open(goal())
     assert questions.answer('q1', decision).ok
@@ -208,9 +241,12 @@ def test_a_claimed_question_is_listed_with_its_holder_and_lease(questions, clock
     questions.open(goal())
     assert questions.claim(CLAIM, 'q1', 'ann') == (True, 'claimed', 'ann')
     clock.now_s += 4.0
-    entry, = questions.listing()
-    assert (entry.status, entry.claimed_by, entry.lease_remaining) == (OpenQuery.CLAIMED, 'ann',
-                                                                       6.0)
+    (entry,) = questions.listing()
+    assert (entry.status, entry.claimed_by, entry.lease_remaining) == (
+        OpenQuery.CLAIMED,
+        'ann',
+        6.0,
+    )
 
 
 def test_a_second_claim_is_refused_and_names_the_holder(questions):
@@ -230,9 +266,11 @@ def test_a_claim_runs_out_unless_renewed(questions, clock):
     questions.take_notices()
     clock.now_s += 1.0
     assert status_of(questions) == (OpenQuery.PENDING, '')
-    notice, = questions.take_notices()
-    assert (notice.status, notice.by) == (ExpertQueryFeedback.PENDING,
-                                          'ann') and 'ran out' in notice.text
+    (notice,) = questions.take_notices()
+    assert (notice.status, notice.by) == (
+        ExpertQueryFeedback.PENDING,
+        'ann',
+    ) and 'ran out' in notice.text
     assert questions.claim(RENEW, 'q1', 'ann') == (False, 'the claim has run out; claim again', '')
     assert questions.claim(CLAIM, 'q1', 'bob').ok
 
@@ -262,17 +300,23 @@ def test_the_asker_is_told_of_claims_in_order(questions):
     questions.claim(TAKE_OVER, 'q1', 'bob')
     questions.claim(RELEASE, 'q1', 'bob')
     assert [(notice.status, notice.by, notice.text) for notice in questions.take_notices()] == [
-        (ExpertQueryFeedback.PENDING, '', ''), (ExpertQueryFeedback.CLAIMED, 'ann', 'claimed'),
+        (ExpertQueryFeedback.PENDING, '', ''),
+        (ExpertQueryFeedback.CLAIMED, 'ann', 'claimed'),
         (ExpertQueryFeedback.CLAIMED, 'bob', 'taken over from ann'),
-        (ExpertQueryFeedback.PENDING, 'bob', 'bob gave it back')]
+        (ExpertQueryFeedback.PENDING, 'bob', 'bob gave it back'),
+    ]
 
 
-@pytest.mark.parametrize('arguments, text',
-                         [((CLAIM, 'q1', ''), '`expert` is empty'),
-                          ((9, 'q1', 'ann'), 'action 9 is unknown; allowed'),
-                          ((CLAIM, 'q1', 'ann', -1.0), 'lease -1.0 is not allowed'),
-                          ((CLAIM, 'q1', 'ann', math.nan), 'lease nan'),
-                          ((CLAIM, 'q9', 'ann'), "there is no question 'q9' here")])
+@pytest.mark.parametrize(
+    'arguments, text',
+    [
+        ((CLAIM, 'q1', ''), '`expert` is empty'),
+        ((9, 'q1', 'ann'), 'action 9 is unknown; allowed'),
+        ((CLAIM, 'q1', 'ann', -1.0), 'lease -1.0 is not allowed'),
+        ((CLAIM, 'q1', 'ann', math.nan), 'lease nan'),
+        ((CLAIM, 'q9', 'ann'), "there is no question 'q9' here"),
+    ],
+)
 def test_a_claim_without_sense_is_refused(questions, arguments, text):
     questions.open(goal())
     reply = questions.claim(*arguments)
@@ -286,7 +330,7 @@ def test_nobody_answers_by_the_deadline(questions, clock):
     questions.take_notices()
     clock.now_s += 5.0
     questions.tick()
-    notice, = questions.take_notices()
+    (notice,) = questions.take_notices()
     assert notice.settled.status == ExpertQueryResult.EXPIRED
     reply = questions.answer('q1', goto())
     assert not reply.ok
@@ -294,7 +338,8 @@ def test_nobody_answers_by_the_deadline(questions, clock):
 
 
 def test_an_answer_a_moment_after_the_deadline_is_too_late_even_where_nobody_looked_at_the_clock(
-        questions, clock):
+    questions, clock
+):
     questions.open(goal(deadline_s=5.0))
     clock.now_s += 5.0
     assert not questions.answer('q1', goto()).ok
@@ -309,11 +354,13 @@ def test_without_a_deadline_a_question_waits(questions, clock):
 def test_a_question_taken_back_refuses_late_answers_with_the_reason(questions):
     questions.open(goal())
     questions.close('q1', 'the asker is gone')
-    assert [notice.settled.status for notice in questions.take_notices()
-            if notice.settled] == [ExpertQueryResult.CANCELLED]
+    assert [notice.settled.status for notice in questions.take_notices() if notice.settled] == [
+        ExpertQueryResult.CANCELLED
+    ]
     assert questions.answer('q1', goto()).message == 'the question is closed: the asker is gone'
-    assert questions.claim(CLAIM, 'q1',
-                           'ann').message == 'the question is closed: the asker is gone'
+    assert (
+        questions.claim(CLAIM, 'q1', 'ann').message == 'the question is closed: the asker is gone'
+    )
 
 
 def test_the_next_thing_due_is_the_earliest_lease_or_deadline(questions, clock):
@@ -370,8 +417,9 @@ def running(query_id='q1'):
 
 def test_a_running_interface_is_listed_and_takes_no_answers(questions):
     questions.open(goal())
-    questions.answer('q1',
-                     ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist', by='ann'))
+    questions.answer(
+        'q1', ExpertDecision(kind=ExpertDecision.INTERFACE, interface='assist', by='ann')
+    )
     assert questions.open(running()) is None
     assert status_of(questions) == (OpenQuery.INTERFACE_RUNNING, 'ann')
     assert not questions.claim(TAKE_OVER, 'q1', 'bob').ok

@@ -1,6 +1,7 @@
 """Preconditions are looked at while somebody listens; what raises or hangs is told, and nobody
 waits for it.
 """
+
 import sys
 import threading
 import time
@@ -78,8 +79,9 @@ def test_they_are_checked_again_and_again_until_the_question_is_over(watch):
     before = threading.enumerate()
     with watch.while_open(FakeQuestion(look)):
         assert wait_for(lambda: sent(watch))
-        assert [(each.state, each.name, each.result, each.text) for each in sent(watch)[0].checks
-                ] == [('PICK', 'free', PreconditionCheck.DOES_NOT_HOLD, 'not yet')]
+        assert [
+            (each.state, each.name, each.result, each.text) for each in sent(watch)[0].checks
+        ] == [('PICK', 'free', PreconditionCheck.DOES_NOT_HOLD, 'not yet')]
         assert sent(watch)[0].query_id == 'q1' and 0.0 <= sent(watch)[0].checks[0].age < 10.0
         found.append(holds())
         assert wait_for(lambda: sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)
@@ -108,9 +110,11 @@ def test_what_hangs_is_told_called_once_and_keeps_nobody_waiting(monkeypatch, wa
         """
         wanted = [PreconditionCheck.UNKNOWN, PreconditionCheck.HOLDS]
         return [
-            each.checks for each in sent(watch)[2:]
+            each.checks
+            for each in sent(watch)[2:]
             if [check.result for check in each.checks] == wanted
         ]
+
     with watch.while_open(FakeQuestion(look)):
         assert wait_for(told)
         door, _ = told()[-1]
@@ -144,13 +148,14 @@ def test_checks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatc
         never.wait()
 
     def all_left_out():
-        return {check.text
-                for check in sent(watch)[-1].checks
-                } == {'not checked: 32 checks have not come back'}
+        return {check.text for check in sent(watch)[-1].checks} == {
+            'not checked: 32 checks have not come back'
+        }
+
     for told in (lambda: sent(watch), all_left_out):
         look = FakeProbe(
-            **{'door_{}'.format(number): door
-               for number in range(precondition_watch.MOST_HANGING)})
+            **{'door_{}'.format(number): door for number in range(precondition_watch.MOST_HANGING)}
+        )
         with watch.while_open(FakeQuestion(look)):
             assert wait_for(told)
     assert wait_for(lambda: len(calls) >= precondition_watch.MOST_HANGING)
@@ -158,4 +163,5 @@ def test_checks_that_never_come_back_keep_so_many_threads_and_no_more(monkeypatc
     never.set()
     with watch.while_open(FakeQuestion(FakeProbe(free=holds))):
         assert wait_for(
-            lambda: sent(watch) and sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS)
+            lambda: sent(watch) and sent(watch)[-1].checks[0].result == PreconditionCheck.HOLDS
+        )

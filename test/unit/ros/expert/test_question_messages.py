@@ -1,6 +1,7 @@
 """A question gets onto the wire, whatever the robot's state has said and whatever its userdata
 holds.
 """
+
 import io
 
 import genpy
@@ -24,39 +25,51 @@ def over_the_wire(message):
 
 
 def test_a_text_that_utf_8_cannot_say_is_written_out():
-    question = make_question(text=HALF, tried=(HALF,), history=(Visit('PICK', HALF,
-                                                                      VisitResult.FAILURE),),
-                             userdata={HALF: 1})
+    question = make_question(
+        text=HALF,
+        tried=(HALF,),
+        history=(Visit('PICK', HALF, VisitResult.FAILURE),),
+        userdata={HALF: 1},
+    )
     goal = over_the_wire(to_goal(question, 'robot', NOW))
     written = 'no file caf\\udce9.png'
     assert isinstance(goal, ExpertQueryGoal)
     assert (goal.text, goal.tried, goal.history[0].outcome, goal.userdata[0].key) == (
-        written, [written], written, written)
+        written,
+        [written],
+        written,
+        written,
+    )
 
 
 def test_other_languages_arrive_as_they_are():
-    assert over_the_wire(to_goal(make_question(text='Tür klemmt: 門 ✗'), 'robot',
-                                 NOW)).text == 'Tür klemmt: 門 ✗'
+    assert (
+        over_the_wire(to_goal(make_question(text='Tür klemmt: 門 ✗'), 'robot', NOW)).text
+        == 'Tür klemmt: 門 ✗'
+    )
 
 
 def test_a_userdata_key_that_is_no_string_is_named_and_keeps_nothing_else_back():
     question = make_question(userdata={5: 'five', 'a': 1}, input_userdata={5: 'five', HALF: 1})
     items = {
-        item.key: item.encoding
-        for item in over_the_wire(to_goal(question, 'robot', NOW)).userdata
+        item.key: item.encoding for item in over_the_wire(to_goal(question, 'robot', NOW)).userdata
     }
     assert items == {'5': UserdataItem.UNSENT, 'a': UserdataItem.JSON}
     goal = over_the_wire(to_interface_goal(InterfaceOffer('assist', '/assist'), question))
     assert isinstance(goal, SharedAutonomyGoal) and len(goal.userdata) == 2
 
 
-@pytest.mark.parametrize('item, missing', [
-    (UserdataItem('object', UserdataItem.ROS_MESSAGE, '', '', b''), 'type of its ROS message'),
-    (UserdataItem('object', UserdataItem.ROS_MESSAGE, 'std_msgs/Empty', '', b''), 'md5'),
-    (UserdataItem('object', UserdataItem.JSON, '', '', b'1e999'), '1e999'),
-])
+@pytest.mark.parametrize(
+    'item, missing',
+    [
+        (UserdataItem('object', UserdataItem.ROS_MESSAGE, '', '', b''), 'type of its ROS message'),
+        (UserdataItem('object', UserdataItem.ROS_MESSAGE, 'std_msgs/Empty', '', b''), 'md5'),
+        (UserdataItem('object', UserdataItem.JSON, '', '', b'1e999'), '1e999'),
+    ],
+)
 def test_the_robot_refuses_outputs_that_it_cannot_read_and_says_what_is_missing(item, missing):
-    decision = ExpertDecision(kind=ExpertDecision.SUPERSEDE, outcome='done', outputs=[item],
-                              by='ann')
+    decision = ExpertDecision(
+        kind=ExpertDecision.SUPERSEDE, outcome='done', outputs=[item], by='ann'
+    )
     with pytest.raises(AnswerError, match='answer of ann cannot be used.*object.*' + missing):
         to_answer(decision)

@@ -1,4 +1,5 @@
 """The status of an action server goes on where simulated time is set back."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -43,8 +44,9 @@ def test_a_bag_that_is_played_is_named_once(monkeypatch):
     monkeypatch.setattr(quiet_action_server, 'LISTENS_AFTER_S', 0.0)
     monkeypatch.setattr(quiet_action_server, 'listens', lambda publisher, node: False)
     monkeypatch.setattr(quiet_action_server, 'sender_of', lambda message: '/player')
-    monkeypatch.setattr(quiet_action_server.rospy, 'logwarn',
-                        lambda *args: warnings.append(args[0] % args[1:]))
+    monkeypatch.setattr(
+        quiet_action_server.rospy, 'logwarn', lambda *args: warnings.append(args[0] % args[1:])
+    )
     server = QuietActionServer('/ask', ExpertQueryAction, pytest.fail, auto_start=False)
     server.result_pub = None
     for _ in range(3):

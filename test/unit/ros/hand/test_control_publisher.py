@@ -1,4 +1,5 @@
 """The status of what operators hold, published by a thread of its own."""
+
 import pytest
 import rospy
 from waiting import stays, wait_for
@@ -61,6 +62,13 @@ def test_all_that_is_set_is_in_the_message():
     held.set_autonomy('A', 'confirm')
     message = to_msg(held.status())
     assert (message.path, message.running, message.paused, message.paused_by) == (
-        'task', False, True, 'eva')
+        'task',
+        False,
+        True,
+        'eva',
+    )
     assert (message.breakpoints, message.autonomy_patterns, message.autonomy_levels) == (
-        ['A'], ['A'], ['confirm'])
+        ['A'],
+        ['A'],
+        ['confirm'],
+    )

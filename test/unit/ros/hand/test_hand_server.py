@@ -1,4 +1,5 @@
 """Which machines of a node a command means."""
+
 import threading
 
 import pytest
@@ -33,8 +34,9 @@ class Silent:
 @pytest.fixture
 def services(monkeypatch):
     offered = {}
-    monkeypatch.setattr(rospy, 'Service',
-                        lambda name, kind, handle: offered.__setitem__(name, handle))
+    monkeypatch.setattr(
+        rospy, 'Service', lambda name, kind, handle: offered.__setitem__(name, handle)
+    )
     monkeypatch.setattr(hand_server, 'ControlPublisher', Silent)
     monkeypatch.setattr(Silent, 'offered', offered, raising=False)
     monkeypatch.setattr(hand_server, 'ViewerCommands', Silent)
@@ -69,7 +71,9 @@ def test_a_path_means_one_machine_and_no_path_all(services):
     assert 'task_2 does not run' in response.message and is_paused(two)
     refused = pause(CommandMachineRequest(path='other'))
     assert (refused.ok, refused.message) == (
-        False, "there is no machine 'other' here; there are: task, task_2")
+        False,
+        "there is no machine 'other' here; there are: task, task_2",
+    )
 
 
 class Hanging(smach.StateMachine):
@@ -93,8 +97,9 @@ def test_a_machine_that_hangs_delays_no_other_one(services, monkeypatch):
     server.watch(machine('task'))
     preempt = services['~oracle/preempt']
     replies = []
-    asked = threading.Thread(target=lambda: replies.append(preempt(CommandMachineRequest())),
-                             daemon=True)
+    asked = threading.Thread(
+        target=lambda: replies.append(preempt(CommandMachineRequest())), daemon=True
+    )
     asked.start()
     asked.join(20)
     assert replies and replies[0].ok, 'the first one has held the other up'
@@ -111,7 +116,8 @@ def test_going_somewhere_needs_one_machine(services):
     go_to = services['~oracle/go_to']
     assert not go_to(SendMachineRequest(state='A')).ok
     assert go_to(SendMachineRequest(path='/task_2', state='A')).message == (
-        'task_2 does not run; it will begin in A')
+        'task_2 does not run; it will begin in A'
+    )
 
 
 def test_what_is_refused_and_what_is_forgotten(services):
@@ -123,7 +129,8 @@ def test_what_is_refused_and_what_is_forgotten(services):
     assert not stop(SetBreakpointRequest(pattern='A', remove=True)).ok
     server.forget(one)
     assert services['~oracle/resume'](CommandMachineRequest()).message == (
-        "there is no machine '' here; there are: none; the first has yet to run")
+        "there is no machine '' here; there are: none; the first has yet to run"
+    )
     assert not one.events.observers
 
 

@@ -1,4 +1,5 @@
 """What viewers want of machines that run, with machines that stand still in a state."""
+
 import threading
 
 import pytest
@@ -23,9 +24,11 @@ class Running:
         machine = smach.StateMachine(outcomes=['done', 'aborted'])
         with machine:
             for label, following in (('A', 'B'), ('B', 'C'), ('C', 'done')):
-                smach.StateMachine.add(label, smach.CBState(
-                    self.visit, cb_args=[label], outcomes=['ok'], input_keys=['x']),
-                    {'ok': following})
+                smach.StateMachine.add(
+                    label,
+                    smach.CBState(self.visit, cb_args=[label], outcomes=['ok'], input_keys=['x']),
+                    {'ok': following},
+                )
         machine.userdata.x = 0
         self.machine = OracleContainer.wrap(machine, settings=settings) if wrap else machine
         if wrap:
@@ -63,7 +66,7 @@ def test_a_machine_that_runs_is_sent_with_what_comes_with_the_command(viewers):
     assert set_initial_states(watch, ['C'], {'x': 7}, '/viewer')
     assert watch.jump_to is None and running.machine.get_initial_states() == ['C']
     assert running.end() == [('A', 0), ('C', 7)]
-    sent, = [event for event in running.events if event.kind is EventKind.SENT]
+    (sent,) = [event for event in running.events if event.kind is EventKind.SENT]
     assert (sent.target, sent.by) == ('C', '/viewer')
 
 
@@ -72,7 +75,8 @@ def test_where_it_cannot_go_nothing_is_set_and_a_warning_tells(viewers):
     assert set_initial_states(watch_of(running), ['A'], {'x': 7}, '/viewer') is False
     assert running.end() == [('A', 0), ('B', 0), ('C', 0)]
     assert [event.text for event in running.events if event.kind is EventKind.WARNING] == [
-        'is not sent to A as /viewer wants: going to A may repeat A: confirm that it may']
+        'is not sent to A as /viewer wants: going to A may repeat A: confirm that it may'
+    ]
 
 
 def test_a_command_that_a_client_repeats_is_one_wish(viewers):
@@ -100,11 +104,18 @@ def test_a_container_that_is_to_begin_in_a_guarded_state_asks_before_it_comes_ag
     poured, rounds = [], []
     kitchen = smach.StateMachine(outcomes=['done', 'aborted'])
     with kitchen:
-        smach.StateMachine.add('LOOK', smach.CBState(
-            lambda ud: 'ok' if len(rounds) == 0 else 'enough', outcomes=['ok', 'enough']),
-            {'ok': 'POUR', 'enough': 'done'})
-        smach.StateMachine.add('POUR', smach.CBState(
-            lambda ud: poured.append(1) or 'ok', outcomes=['ok']), {'ok': 'done'})
+        smach.StateMachine.add(
+            'LOOK',
+            smach.CBState(
+                lambda ud: 'ok' if len(rounds) == 0 else 'enough', outcomes=['ok', 'enough']
+            ),
+            {'ok': 'POUR', 'enough': 'done'},
+        )
+        smach.StateMachine.add(
+            'POUR',
+            smach.CBState(lambda ud: poured.append(1) or 'ok', outcomes=['ok']),
+            {'ok': 'done'},
+        )
 
     def wish(ud):
         rounds.append(1)
@@ -116,8 +127,11 @@ def test_a_container_that_is_to_begin_in_a_guarded_state_asks_before_it_comes_ag
     machine = smach.StateMachine(outcomes=['done', 'aborted'])
     with machine:
         smach.StateMachine.add('KITCHEN', kitchen, {'done': 'WISH'})
-        smach.StateMachine.add('WISH', smach.CBState(wish, outcomes=['again', 'ok']),
-                               {'again': 'KITCHEN', 'ok': 'done'})
+        smach.StateMachine.add(
+            'WISH',
+            smach.CBState(wish, outcomes=['again', 'ok']),
+            {'again': 'KITCHEN', 'ok': 'done'},
+        )
     OracleContainer.wrap(machine, settings={'states': {'POUR': {'on_retry': 'confirm'}}})
     assert machine.execute() == 'aborted'  # nobody is there to be asked
     assert poured == [1]
@@ -149,8 +163,16 @@ def test_upstream_s_servers_are_listened_to(viewers, monkeypatch):
     viewers.listen_for(running.machine)
     viewers.listen_for(running.machine)
     assert topics == ['/viewed/smach/container_init']
-    command = type('Command', (), {'path': '/SHOWN', 'initial_states': ['C'],
-                                   'local_data': 'gAN9cQAu', '_connection_header': {}})
+    command = type(
+        'Command',
+        (),
+        {
+            'path': '/SHOWN',
+            'initial_states': ['C'],
+            'local_data': 'gAN9cQAu',
+            '_connection_header': {},
+        },
+    )
     viewers._on_command(command, topics[0])
     command.path = '/OTHER'
     viewers._on_command(command, topics[0])

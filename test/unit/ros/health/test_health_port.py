@@ -1,4 +1,5 @@
 """The port that listens: what was never heard of, and what was heard too long ago."""
+
 import pytest
 import rospy
 from std_msgs.msg import Bool
@@ -47,7 +48,8 @@ def test_what_was_never_heard_of_is_well_and_warned_of_once(warnings):
     assert [port.why_unwell(), port.why_unwell()] == ['', '']
     assert warnings == [
         'healthy: topic /motors_on has not published yet, so its condition holds',
-        'healthy: diagnostics Power has not published yet, so its condition holds']
+        'healthy: diagnostics Power has not published yet, so its condition holds',
+    ]
 
 
 def test_a_machine_for_each_trial_warns_of_it_once_and_starts_one_timer(warnings, monkeypatch):
@@ -63,13 +65,18 @@ def test_with_a_largest_age_it_is_not_well(warnings):
     port = port_of(FakeTopics(), {'topic': '/motors_on', 'max_age_s': 5})
     assert port.why_unwell() == 'motors_on: not heard of yet'
     assert warnings == [
-        'healthy: topic /motors_on has not published yet, so its condition does not hold']
+        'healthy: topic /motors_on has not published yet, so its condition does not hold'
+    ]
 
 
 def test_all_that_is_wrong_is_named(warnings, now):
     topics = FakeTopics()
-    port = port_of(topics, {'topic': '/motors_on', 'name': 'motors', 'max_age_s': 5},
-                   {'diagnostics': 'Power'}, {'topic': '/other'})
+    port = port_of(
+        topics,
+        {'topic': '/motors_on', 'name': 'motors', 'max_age_s': 5},
+        {'diagnostics': 'Power'},
+        {'topic': '/other'},
+    )
     topics.message('/motors_on').put(Bool(False))
     topics.message('/other').put(Bool(True))
     topics.status('Power').put(Status(2, 'low voltage'))
@@ -112,8 +119,11 @@ def undecoded(definition, data):
     """A message of a type that is not installed here."""
     message = rospy.AnyMsg()
     message._buff = data
-    message._connection_header = {'type': 'away_msgs/Battery', 'md5sum': str(hash(definition)),
-                                  'message_definition': definition}
+    message._connection_header = {
+        'type': 'away_msgs/Battery',
+        'md5sum': str(hash(definition)),
+        'message_definition': definition,
+    }
     return message
 
 
@@ -126,8 +136,10 @@ def test_a_type_that_is_not_installed_is_read_by_its_definition(warnings):
     assert port.why_unwell() == ''
 
 
-@pytest.mark.parametrize('definition, data', [
-    ('nonsense', b''), ('', b'\1'), ('uint8[] cells\n', b'\2'), ('other_msgs/Cell cell\n', b'')])
+@pytest.mark.parametrize(
+    'definition, data',
+    [('nonsense', b''), ('', b'\1'), ('uint8[] cells\n', b'\2'), ('other_msgs/Cell cell\n', b'')],
+)
 def test_a_message_that_cannot_be_read_is_not_well(definition, data, warnings):
     topics = FakeTopics()
     topics.message('/battery').put(undecoded(definition, data))

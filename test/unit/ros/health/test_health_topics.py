@@ -1,4 +1,5 @@
 """How often topics that nobody advertises are looked for."""
+
 import pytest
 
 from smach_oracle.ros.health import health_topics
@@ -20,10 +21,13 @@ class Pauses:
         """Nothing is to be forgotten."""
 
 
-@pytest.mark.parametrize('added_at, pauses', [
-    (0, [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0, 10.0]),
-    (4, [0.5, 1.0, 2.0, 4.0, 0.5, 1.0, 2.0, 4.0]),
-])
+@pytest.mark.parametrize(
+    'added_at, pauses',
+    [
+        (0, [0.5, 1.0, 2.0, 4.0, 8.0, 10.0, 10.0, 10.0]),
+        (4, [0.5, 1.0, 2.0, 4.0, 0.5, 1.0, 2.0, 4.0]),
+    ],
+)
 def test_the_master_is_asked_less_and_less_often(monkeypatch, added_at, pauses):
     asked = []
     monkeypatch.setattr(health_topics, 'types_at_master', lambda: asked.append(True) or {})

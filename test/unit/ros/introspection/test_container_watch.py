@@ -1,4 +1,5 @@
 """Which containers are seen, under which paths, and what is reported of them."""
+
 import copy
 import gc
 import pickle
@@ -46,16 +47,20 @@ def seen():
 
 @pytest.fixture
 def tree(seen):
-    return ContainerTree(lambda watch, info, states, ud: seen.append(
-        (watch.paths[0], info, states)))
+    return ContainerTree(
+        lambda watch, info, states, ud: seen.append((watch.paths[0], info, states))
+    )
 
 
 def test_start_transitions_and_end_are_reported_in_order(tree, seen):
     machine = chain('A', 'B')
     tree.add_root('/R', machine)
     machine.execute()
-    assert seen == [('/R', 'START', ['A']), ('/R', 'TRANSITION', ['B']),
-                    ('/R', 'TERMINATION next', ['None'])]
+    assert seen == [
+        ('/R', 'START', ['A']),
+        ('/R', 'TRANSITION', ['B']),
+        ('/R', 'TERMINATION next', ['None']),
+    ]
 
 
 def test_nothing_is_reported_while_nobody_listens(seen):
@@ -71,8 +76,9 @@ def test_nothing_is_reported_while_nobody_listens(seen):
 
 
 def test_containers_of_every_kind_are_found_at_any_depth(tree):
-    iterator = smach.Iterator(outcomes=['next'], input_keys=[], output_keys=[], it=[1],
-                              exhausted_outcome='next')
+    iterator = smach.Iterator(
+        outcomes=['next'], input_keys=[], output_keys=[], it=[1], exhausted_outcome='next'
+    )
     with iterator:
         smach.Iterator.set_contained_state('BODY', chain('X'), loop_outcomes=['next'])
     concurrence = smach.Concurrence(outcomes=['next'], default_outcome='next')

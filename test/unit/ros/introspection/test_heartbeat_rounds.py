@@ -1,4 +1,5 @@
 """When each container is told of."""
+
 import pytest
 
 pytest.importorskip('rospy')
@@ -52,7 +53,8 @@ def test_a_newcomer_is_told_of_all_at_once_and_then_of_each_in_two_seconds():
     told = follow(rounds, 1.01 + 3 * HEARTBEAT_S, begin_s=1.01)
     assert [len(part) for _, part in told[:3]] == [LARGEST_PART, LARGEST_PART, 1]
     assert [now_s for now_s, _ in told[:3]] == pytest.approx(
-        [1.01, 1.01 + GREETING_STEP_S, 1.01 + 2 * GREETING_STEP_S])
+        [1.01, 1.01 + GREETING_STEP_S, 1.01 + 2 * GREETING_STEP_S]
+    )
     assert [path for _, part in told[:3] for path in part] == paths
     for path in paths:
         turns = [now_s for now_s, part in told if path in part]

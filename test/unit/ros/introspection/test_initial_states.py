@@ -1,4 +1,5 @@
 """What a command on the init topic may set."""
+
 import pytest
 
 import smach

@@ -2,6 +2,7 @@
 
 The file test/data/pinned/viewer.txt holds it, the same for each engine.
 """
+
 import pytest
 from pinned import held
 
@@ -36,13 +37,22 @@ def chain(**states):
 
 
 def tree():
-    both = smach.Concurrence(OUTCOMES, default_outcome='aborted',
-                             outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}})
+    both = smach.Concurrence(
+        OUTCOMES,
+        default_outcome='aborted',
+        outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
+    )
     with both:
         smach.Concurrence.add('LEFT', Fails())
         smach.Concurrence.add('RIGHT', chain(R=Fails(0)))
-    iterator = smach.Iterator(outcomes=OUTCOMES, input_keys=[], output_keys=[], it=[1, 2],
-                              it_label='item', exhausted_outcome='succeeded')
+    iterator = smach.Iterator(
+        outcomes=OUTCOMES,
+        input_keys=[],
+        output_keys=[],
+        it=[1, 2],
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
     with iterator:
         smach.Iterator.set_contained_state('EACH', Fails(), loop_outcomes=['succeeded'])
     return chain(LOOK=Fails(), ARM=chain(GRASP=Fails(), LIFT=Fails(0)), BOTH=both, ALL=iterator)
@@ -56,11 +66,16 @@ def shown(wrapped):
         # which of two threads has ended first is another time another one
         active = '' if watch.paths[0] == '/TOP/BOTH' else ' ' + '+'.join(states)
         statuses.append('{} {}{}'.format(watch.paths[0], info, active))
+
     containers = ContainerTree(note)  # it reports as long as it is held
     containers.add_root('/TOP', wrapped)
     assert wrapped.execute() == 'succeeded'
-    inside = iter(sorted((line for line in statuses if line.startswith('/TOP/BOTH')),
-                         key=lambda line: line.split()[0]))
+    inside = iter(
+        sorted(
+            (line for line in statuses if line.startswith('/TOP/BOTH')),
+            key=lambda line: line.split()[0],
+        )
+    )
     return [next(inside) if line.startswith('/TOP/BOTH') else line for line in statuses]
 
 

@@ -1,4 +1,5 @@
 """Userdata on the wire: what is written, what is read, what is refused."""
+
 import base64
 import pickle
 import threading
@@ -9,9 +10,18 @@ pytest.importorskip('rospy')
 from smach_oracle.ros.introspection import plain_pickle
 
 PLAIN = {
-    'number': 1, 'big': 2**100, 'real': 1.5, 'text': 'Käse', 'raw': b'\x00\xff', 'none': None,
-    'yes': True, 'list': [1, [2, {'a': (3, 4)}]], 'set': {1, 2}, 'frozen': frozenset([3]),
-    'complex': 1 + 2j, 'empty': b''
+    'number': 1,
+    'big': 2**100,
+    'real': 1.5,
+    'text': 'Käse',
+    'raw': b'\x00\xff',
+    'none': None,
+    'yes': True,
+    'list': [1, [2, {'a': (3, 4)}]],
+    'set': {1, 2},
+    'frozen': frozenset([3]),
+    'complex': 1 + 2j,
+    'empty': b'',
 }
 
 
@@ -44,8 +54,7 @@ def test_plain_data_comes_back_as_it_went():
 @pytest.mark.parametrize('protocol', range(pickle.HIGHEST_PROTOCOL + 1))
 def test_any_senders_protocol_is_read(protocol):
     readable = {
-        key: value
-        for key, value in PLAIN.items() if protocol >= 2 or key not in ('complex',)
+        key: value for key, value in PLAIN.items() if protocol >= 2 or key not in ('complex',)
     }
     assert plain_pickle.decode_userdata(encoded(readable, protocol)) == readable
 
@@ -60,10 +69,23 @@ def test_no_text_is_no_userdata():
     assert plain_pickle.decode_userdata('') == {}
 
 
-@pytest.mark.parametrize('value', [
-    {'x': Runs(eval, ('1 + 1',))}, {'x': Runs(print, ('alarm',))}, {'x': Custom()}, {'x': Custom},
-    {'x': threading.Lock}, {'x': Runs(getattr, ('text', 'upper'))}, {'x': Runs(bytes, (10 ** 12,))},
-    {'x': Runs(base64.b64encode, (b'x',))}, [1, 2], 'text', {1: 2}, Runs(dict, ())])
+@pytest.mark.parametrize(
+    'value',
+    [
+        {'x': Runs(eval, ('1 + 1',))},
+        {'x': Runs(print, ('alarm',))},
+        {'x': Custom()},
+        {'x': Custom},
+        {'x': threading.Lock},
+        {'x': Runs(getattr, ('text', 'upper'))},
+        {'x': Runs(bytes, (10**12,))},
+        {'x': Runs(base64.b64encode, (b'x',))},
+        [1, 2],
+        'text',
+        {1: 2},
+        Runs(dict, ()),
+    ],
+)
 def test_anything_but_a_plain_dict_is_refused(value, capsys):
     with pytest.raises(plain_pickle.RefusedDataError, match='local_data refused'):
         plain_pickle.decode_userdata(encoded(value))
@@ -73,6 +95,7 @@ def test_anything_but_a_plain_dict_is_refused(value, capsys):
 @pytest.mark.parametrize('codec', ['rot13', 'zip', 'idna'])
 def test_the_codec_call_of_protocol_2_makes_bytes_and_nothing_else(codec):
     import _codecs
+
     with pytest.raises(plain_pickle.RefusedDataError):
         plain_pickle.decode_userdata(encoded({'x': Runs(_codecs.encode, ('abc', codec))}))
 
@@ -92,7 +115,7 @@ def test_overlong_text_is_refused_unread(monkeypatch):
 def test_values_that_cannot_be_pickled_are_left_out_and_named():
     left_out = []
     deep = []
-    for _ in range(10 ** 5):
+    for _ in range(10**5):
         deep = [deep]
     data = {'good': 1, 'lock': threading.Lock(), 'function': lambda: 0, 'deep': deep}
     text = plain_pickle.encode_userdata(data, lambda key, err: left_out.append(key))
@@ -107,7 +130,8 @@ def test_whatever_a_class_raises_the_other_keys_are_written(error):
             raise error()
 
     left_out = []
-    text = plain_pickle.encode_userdata({'good': 1, 'bad': Raises()},
-                                        lambda key, err: left_out.append((key, type(err))))
+    text = plain_pickle.encode_userdata(
+        {'good': 1, 'bad': Raises()}, lambda key, err: left_out.append((key, type(err)))
+    )
     assert plain_pickle.decode_userdata(text) == {'good': 1}
     assert left_out == [('bad', error)]

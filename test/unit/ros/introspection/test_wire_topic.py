@@ -1,4 +1,5 @@
 """Messages in the form in which they are sent."""
+
 import io
 import struct
 
@@ -44,15 +45,16 @@ def test_subscribers_read_many_in_one_go_numbered_in_turn():
 
 
 def test_the_number_of_a_message_begins_again_after_the_last_one():
-    (frame,) = wire_topic._frames([serialised(status())], 2 ** 32 + 5)
+    (frame,) = wire_topic._frames([serialised(status())], 2**32 + 5)
     assert struct.unpack_from('<I', frame, 4) == (5,)
 
 
 @pytest.fixture
 def serialisations(monkeypatch):
     counted = []
-    monkeypatch.setattr(wire_topic, 'serialised',
-                        lambda message: counted.append(message) or serialised(message))
+    monkeypatch.setattr(
+        wire_topic, 'serialised', lambda message: counted.append(message) or serialised(message)
+    )
     return counted
 
 
@@ -72,16 +74,22 @@ def test_a_change_of_any_field_is_sent(place, serialisations):
     changed[place] = ['OTHER'] if isinstance(FIELDS[place], list) else 'OTHER'
     made = latest.make(STAMP, '/ROOT', *changed)
     (message,) = read(b''.join(wire_topic._frames([made], 1)))
-    assert [message.initial_states, message.active_states, message.local_data,
-            message.info] == changed
+    assert [
+        message.initial_states,
+        message.active_states,
+        message.local_data,
+        message.info,
+    ] == changed
     assert len(serialisations) == 2
 
 
 def test_containers_are_not_mixed_up():
     latest = LatestMessages(SmachContainerStatus)
     one, two = (latest.make(STAMP, path, *FIELDS) for path in ('/ONE', '/TWO'))
-    assert [message.path for message in read(b''.join(wire_topic._frames([one, two], 1)))
-            ] == ['/ONE', '/TWO']
+    assert [message.path for message in read(b''.join(wire_topic._frames([one, two], 1)))] == [
+        '/ONE',
+        '/TWO',
+    ]
 
 
 def test_what_is_gone_or_large_is_not_kept(serialisations):

@@ -1,4 +1,5 @@
 """Reading recorded bags, as the tests want to see them."""
+
 import glob
 import os
 from typing import Any, List

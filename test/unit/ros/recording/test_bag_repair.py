@@ -1,4 +1,5 @@
 """The bags of recorders that died, mended: what can be read is saved, and nothing else is lost."""
+
 import os
 import random
 import shutil
@@ -48,7 +49,7 @@ def test_cut_off_anywhere_a_bag_is_mended_to_its_whole_messages(tmp_path):
         os.truncate(str(path), cut)
         target, _ = mend(path)
         found = texts_in(target)
-        assert found == texts[:len(found)]
+        assert found == texts[: len(found)]
         with Reader(target) as reader:
             assert reader.message_count == len(found)
         lengths.add(len(found))
@@ -173,8 +174,9 @@ def test_a_file_whose_writer_was_killed_before_its_first_message_is_removed(tmp_
 
 def test_an_empty_file_is_removed_only_if_it_is_ours_and_not_just_made(tmp_path):
     names = [
-        '20150401T101112.345Z_old.bag.active', '20150401T101112.345Z_new.bag.active',
-        'theirs.bag.active'
+        '20150401T101112.345Z_old.bag.active',
+        '20150401T101112.345Z_new.bag.active',
+        'theirs.bag.active',
     ]
     for name in names:
         (tmp_path / name).touch()
@@ -196,8 +198,12 @@ def recorded_bag(path, chunks=12, events_per_chunk=20):
         borders.append(os.path.getsize(str(path)))
         for _ in range(events_per_chunk):
             event = Event(EventKind.STATE_START, 't', number, 100.0 + number, 'TOP', 'PICK_\u00e4')
-            writer.add('/robot/oracle/events', EVENT_TYPE, (100 + number, 0),
-                       pack_event(event, (100 + number, 0)))
+            writer.add(
+                '/robot/oracle/events',
+                EVENT_TYPE,
+                (100 + number, 0),
+                pack_event(event, (100 + number, 0)),
+            )
             number += 1
         writer.add('/talk', STRING, (100 + number, 5), string_data('text'), {'callerid': '/me'})
         writer.flush()
@@ -213,9 +219,8 @@ def damage(random_, data):
     if kind == 'cut':
         return data[:start], start, size
     length = 1 if kind == 'byte' else min(random_.choice([4, 50, 3000, 20000]), size - start)
-    new = bytes(length) if kind == 'zeros' else bytes(
-        random_.randrange(256) for _ in range(length))
-    return data[:start] + new + data[start + length:], start, start + length
+    new = bytes(length) if kind == 'zeros' else bytes(random_.randrange(256) for _ in range(length))
+    return data[:start] + new + data[start + length :], start, start + length
 
 
 @pytest.fixture(scope='module')
@@ -231,8 +236,12 @@ def test_whatever_is_damaged_the_events_of_all_other_chunks_are_saved(tmp_path, 
     data, borders = whole
     damaged, start, end = damage(random.Random(seed), data)
     (tmp_path / (NAME + '.active')).write_bytes(damaged)
-    intact = {number for chunk, (first, last) in enumerate(zip(borders, borders[1:]))
-              if last <= start or end <= first for number in range(chunk * 20, chunk * 20 + 20)}
+    intact = {
+        number
+        for chunk, (first, last) in enumerate(zip(borders, borders[1:]))
+        if last <= start or end <= first
+        for number in range(chunk * 20, chunk * 20 + 20)
+    }
     warnings = []
     mended = recover_folder(str(tmp_path), quiet, warnings.append)
     assert mended or not intact
@@ -241,9 +250,11 @@ def test_whatever_is_damaged_the_events_of_all_other_chunks_are_saved(tmp_path, 
         found = [event.seq for event in messages(path) if event._type.endswith('OracleEvent')]
         assert intact <= set(found) and len(found) <= 240  # a changed number may come twice
         with Reader(path) as reader:
-            read = [STORES.read(connection, raw)
-                    for connection, _, raw in reader.messages()
-                    if connection.topic.endswith('/oracle/events')]
+            read = [
+                STORES.read(connection, raw)
+                for connection, _, raw in reader.messages()
+                if connection.topic.endswith('/oracle/events')
+            ]
         assert len(read) == len(found)
 
 
@@ -254,7 +265,8 @@ def test_one_wrong_byte_in_the_first_chunks_header_loses_no_event(tmp_path):
     warnings = []
     assert recover_folder(str(tmp_path), quiet, warnings.append) == [str(tmp_path / NAME)]
     assert [event.seq for event in messages(str(tmp_path / NAME), '/robot/oracle/events')] == list(
-        range(240))
+        range(240)
+    )
     assert len(warnings) == 1 and 'among them 0 events' in warnings[0]
 
 
@@ -264,8 +276,10 @@ def test_the_log_tells_bytes_chunks_and_events_that_were_lost(tmp_path):
     overwrite(path, borders[3], bytes(borders[4] - borders[3]))
     warnings = []
     recover_folder(str(tmp_path), pytest.fail, warnings.append)
-    assert '{} bytes in at least 1 chunk, among them 20 events'.format(
-        borders[4] - borders[3]) in warnings[0]
+    assert (
+        '{} bytes in at least 1 chunk, among them 20 events'.format(borders[4] - borders[3])
+        in warnings[0]
+    )
 
 
 def test_where_the_events_lose_their_type_for_good_it_is_known_all_the_same(tmp_path):
@@ -275,7 +289,8 @@ def test_where_the_events_lose_their_type_for_good_it_is_known_all_the_same(tmp_
     recover_folder(str(tmp_path), quiet, quiet)
     with rosbag.Bag(str(tmp_path / NAME)) as bag:
         assert [item.message.seq for item in bag.read_messages('/oracle/events')] == list(
-            range(60, 80))
+            range(60, 80)
+        )
 
 
 def test_what_cannot_be_read_at_all_is_left_as_it_is(tmp_path):
@@ -351,6 +366,7 @@ def test_a_mender_that_dies_at_any_step_is_gone_on_from(tmp_path, monkeypatch, d
                 raise Killed
             steps.append(real)
             return real(*args)
+
         return run
 
     with monkeypatch.context() as patch:
@@ -371,6 +387,7 @@ def test_the_recorder_does_not_wait_for_a_large_bag_to_be_mended(tmp_path, monke
     def takes_long(*_):
         assert let_go.wait(20)
         mended.set()
+
     monkeypatch.setattr(trial_bags, 'recover_folder', takes_long)
     monkeypatch.setattr(trial_bags, 'MEND_WAIT_S', 0.05)
     recorder = TrialRecorder(str(tmp_path))

@@ -1,4 +1,5 @@
 """Bags that are readable by everyone, whatever happened while they were written."""
+
 import errno
 import fcntl
 import os
@@ -18,14 +19,18 @@ def test_rosbag_and_rosbags_read_the_same_messages_at_the_same_times(tmp_path):
     path = tmp_path / 'a.bag'
     write(path, ['one', 'two', 'drei'], chunks=2).close()
     with rosbag.Bag(str(path)) as bag:
-        by_rosbag = [(topic, message.data, stamp.to_nsec())
-                     for topic, message, stamp in bag.read_messages()]
+        by_rosbag = [
+            (topic, message.data, stamp.to_nsec()) for topic, message, stamp in bag.read_messages()
+        ]
     with Reader(path) as reader:
-        by_rosbags = [(item.topic, data[4:].decode(), stamp)
-                      for item, stamp, data in reader.messages()]
+        by_rosbags = [
+            (item.topic, data[4:].decode(), stamp) for item, stamp, data in reader.messages()
+        ]
     assert by_rosbag == by_rosbags
-    assert by_rosbag == [('/talk', text, (100 + number) * 10 ** 9 + 5)
-                         for number, text in enumerate(['one', 'two', 'drei'])]
+    assert by_rosbag == [
+        ('/talk', text, (100 + number) * 10**9 + 5)
+        for number, text in enumerate(['one', 'two', 'drei'])
+    ]
 
 
 def test_rosbag_info_tells_topics_types_and_counts(tmp_path):
@@ -36,7 +41,9 @@ def test_rosbag_info_tells_topics_types_and_counts(tmp_path):
     with rosbag.Bag(str(path)) as bag:
         topics = bag.get_type_and_topic_info().topics
         assert {name: (info.msg_type, info.message_count) for name, info in topics.items()} == {
-            '/talk': ('std_msgs/String', 10), '/other': ('std_msgs/String', 1)}
+            '/talk': ('std_msgs/String', 10),
+            '/other': ('std_msgs/String', 1),
+        }
         assert (bag.get_start_time(), bag.get_end_time()) == (100.000000005, 200.0)
 
 
@@ -48,7 +55,7 @@ def test_a_clock_that_jumps_back_leaves_a_readable_bag(tmp_path):
     writer.close()
     assert texts_in(path) == ['10', '30', '50']
     with Reader(path) as reader:
-        assert [stamp // 10 ** 9 for _, stamp, _ in reader.messages()] == [10, 30, 50]
+        assert [stamp // 10**9 for _, stamp, _ in reader.messages()] == [10, 30, 50]
 
 
 def test_an_empty_bag_can_be_opened(tmp_path):
@@ -94,7 +101,7 @@ def test_a_failing_write_is_cut_off_and_what_was_written_before_stays(tmp_path, 
     real = os.pwrite
 
     def half(fd, data, position):
-        real(fd, data[:len(data) // 2], position)
+        real(fd, data[: len(data) // 2], position)
         raise OSError(28, 'No space left on device')
 
     writer.add('/talk', STRING, (900, 0), string_data('lost'))

@@ -1,4 +1,5 @@
 """The fast way to serialise an event gives byte for byte what the message object gives."""
+
 import random
 
 import pytest
@@ -16,10 +17,23 @@ def random_event(rng):
         return rng.choice(TEXTS)
 
     return Event(
-        rng.choice(list(EventKind)), text(), rng.randrange(2**63), rng.uniform(0, 2e9), text(),
-        text(), text(), text(), rng.choice(list(FailureKind)), rng.randrange(4),
-        rng.choice([0.0, 0.75, float('nan')]), rng.choice([True, False]), text(), text(), text(),
-        rng.choice([None, {}, {'missing_keys': ['a', 'b'], 'userdata': 'keep'}, {'odd': {1, 2}}]))
+        rng.choice(list(EventKind)),
+        text(),
+        rng.randrange(2**63),
+        rng.uniform(0, 2e9),
+        text(),
+        text(),
+        text(),
+        text(),
+        rng.choice(list(FailureKind)),
+        rng.randrange(4),
+        rng.choice([0.0, 0.75, float('nan')]),
+        rng.choice([True, False]),
+        text(),
+        text(),
+        text(),
+        rng.choice([None, {}, {'missing_keys': ['a', 'b'], 'userdata': 'keep'}, {'odd': {1, 2}}]),
+    )
 
 
 def test_it_is_used():
@@ -33,7 +47,7 @@ def test_it_is_used():
 def test_every_event_is_packed_as_its_message_is():
     rng = random.Random(1)
     for _ in range(500):
-        event, stamp = random_event(rng), (rng.randrange(2 ** 32), rng.randrange(10 ** 9))
+        event, stamp = random_event(rng), (rng.randrange(2**32), rng.randrange(10**9))
         message = to_msg(event)
         message.header.stamp.secs, message.header.stamp.nsecs = stamp
         packed = recorder_packing.pack_event(event, stamp)
@@ -42,12 +56,15 @@ def test_every_event_is_packed_as_its_message_is():
 
 
 def test_another_definition_goes_through_the_message():
-    assert recorder_packing.choose_packing(
-        'of another release') is recorder_packing._pack_through_message
+    assert (
+        recorder_packing.choose_packing('of another release')
+        is recorder_packing._pack_through_message
+    )
 
 
 @pytest.mark.parametrize('field', ['state', 'outcome', 'target'])
 def test_what_is_no_text_is_recorded_as_text(field):
     event = Event(EventKind.TRANSITION, 't', 0, 1.0, 'TOP')._replace(**{field: 7})
-    assert getattr(OracleEvent().deserialize(recorder_packing.pack_event(event, (0, 0))),
-                   field) == '7'
+    assert (
+        getattr(OracleEvent().deserialize(recorder_packing.pack_event(event, (0, 0))), field) == '7'
+    )

@@ -1,4 +1,5 @@
 """Whatever a value does as it is looked at, it stops no topic and no bag."""
+
 import genpy
 import pytest
 from geometry_msgs.msg import Point, PointStamped
@@ -19,11 +20,17 @@ from smach_oracle.ros.stored.ros_codecs import offer_ros_codecs
 from smach_oracle.ros.userdata_codec import decode, encode, encode_all
 from smach_oracle.store.codecs import OFFERED, Codecs, NotStorable
 
-QUICK = {'deadline': None, 'derandomize': True, 'database': None,
-         'suppress_health_check': list(HealthCheck)}
+QUICK = {
+    'deadline': None,
+    'derandomize': True,
+    'database': None,
+    'suppress_health_check': list(HealthCheck),
+}
 wrong_messages = st.one_of(
-    st.builds(Point, values, values, values), st.builds(PointStamped, values, values),
-    st.builds(lambda value: [Point(), Point(1.0, value, 2.0)], values))
+    st.builds(Point, values, values, values),
+    st.builds(PointStamped, values, values),
+    st.builds(lambda value: [Point(), Point(1.0, value, 2.0)], values),
+)
 messages_and_values = st.one_of(values, wrong_messages)
 
 
@@ -39,10 +46,14 @@ def test_a_value_is_sent_or_named_as_unsent(value):
 
 
 def test_every_other_key_of_a_question_is_sent():
-    items = encode_all({'odd': Point(x='left'), 'good': 1, 7: type('Odd', (), {
-        '__str__': raising(Rude)})()})
+    items = encode_all(
+        {'odd': Point(x='left'), 'good': 1, 7: type('Odd', (), {'__str__': raising(Rude)})()}
+    )
     assert [(item.key, item.encoding) for item in items] == [
-        ('7', UserdataItem.UNSENT), ('good', UserdataItem.JSON), ('odd', UserdataItem.UNSENT)]
+        ('7', UserdataItem.UNSENT),
+        ('good', UserdataItem.JSON),
+        ('odd', UserdataItem.UNSENT),
+    ]
 
 
 @settings(max_examples=300, **QUICK)
@@ -70,8 +81,9 @@ def test_viewers_get_all_other_keys(value):
 @settings(max_examples=200, **QUICK)
 @given(values)
 def test_an_event_becomes_a_message_whatever_it_holds(value):
-    event = Event(EventKind.WARNING, 't', 0, 0.0, 'TOP', text=value, outcome=value,
-                  data={'odd': value})
+    event = Event(
+        EventKind.WARNING, 't', 0, 0.0, 'TOP', text=value, outcome=value, data={'odd': value}
+    )
     assert serialise(to_msg(event, genpy.Time()))
 
 
@@ -111,6 +123,7 @@ def test_a_failure_that_has_no_text_is_recovered_from_and_recorded(tmp_path):
     recorder.attach(wrapped)
     assert machine.execute() == 'ok'
     assert recorder.close(10.0)
-    failure, = [event for event in events(finished(tmp_path)[0])
-                if event.kind == EventKind.FAILURE]
+    (failure,) = [
+        event for event in events(finished(tmp_path)[0]) if event.kind == EventKind.FAILURE
+    ]
     assert failure.text.startswith('Unspeakable: ')

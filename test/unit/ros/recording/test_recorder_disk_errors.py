@@ -1,6 +1,7 @@
 """A disk that is full, gone or hung: the robot goes on, the operator is told, and what was lost is
 counted.
 """
+
 import multiprocessing
 import os
 import resource
@@ -28,8 +29,13 @@ class Watched:
     def __init__(self, folder, **settings):
         self.folder = str(folder)
         self.said, self.statuses = [], []
-        self.recorder = TrialRecorder(self.folder, warn=self.said.append, say=self.said.append,
-                                      on_status=self.statuses.append, **settings)
+        self.recorder = TrialRecorder(
+            self.folder,
+            warn=self.said.append,
+            say=self.said.append,
+            on_status=self.statuses.append,
+            **settings,
+        )
         self.source = EventSource(pytest.fail)
         self.recorder.attach(self.source)
         self.told = 0
@@ -50,14 +56,20 @@ class Watched:
 
     def wait_for(self, state):
         assert wait_for(lambda: any(status.state == state for status in self.statuses)), (
-            'the operator was never told {}'.format(state))
+            'the operator was never told {}'.format(state)
+        )
         self.statuses.clear()
 
     def wait_for_disk(self, trial_id, count):
         """Until so many events of the trial can be read from its file."""
+
         def written():
-            return sum(Path(path).read_bytes().count(TEXT.encode()) for path in active(self.folder)
-                       if trial_id in path)
+            return sum(
+                Path(path).read_bytes().count(TEXT.encode())
+                for path in active(self.folder)
+                if trial_id in path
+            )
+
         assert wait_for(lambda: written() >= count), 'the events never reach the disk'
 
     def close(self):
@@ -120,6 +132,7 @@ def in_child(work, *args):
 
 def test_the_robot_goes_on_when_files_may_not_grow(tmp_path):
     """EFBIG stands in for ENOSPC where nothing may be mounted."""
+
     def limited():
         def limit(size):
             resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
@@ -133,8 +146,9 @@ def test_the_robot_goes_on_when_files_may_not_grow(tmp_path):
 def small_disk(tmp_path):
     folder = tmp_path / 'disk'
     folder.mkdir()
-    mount = subprocess.run(['mount', '-t', 'tmpfs', '-o', 'size=400k', 'tmpfs',
-                            str(folder)], stderr=subprocess.PIPE)
+    mount = subprocess.run(
+        ['mount', '-t', 'tmpfs', '-o', 'size=400k', 'tmpfs', str(folder)], stderr=subprocess.PIPE
+    )
     if mount.returncode:
         pytest.skip('nothing may be mounted here: {}'.format(mount.stderr.decode().strip()))
     yield folder
@@ -167,8 +181,12 @@ def test_a_trial_goes_on_in_a_new_bag_when_the_disk_works_again(tmp_path, monkey
     watched.emit(EventKind.STATE_START, 20)
     watched.wait_for(RecorderState.DROPPING)
     monkeypatch.setattr(bag_writer.os, 'pwrite', real)
-    assert wait_for(lambda: watched.emit(EventKind.STATE_START)
-                    or len(active(tmp_path)) + len(finished(tmp_path)) == 2)
+    assert wait_for(
+        lambda: (
+            watched.emit(EventKind.STATE_START)
+            or len(active(tmp_path)) + len(finished(tmp_path)) == 2
+        )
+    )
     watched.emit(EventKind.TRIAL_END)
     watched.close()
     watched.check_that_nothing_is_unaccounted_for()
@@ -204,8 +222,12 @@ def test_a_vanished_folder_is_noticed_in_mid_trial(tmp_path):
     watched.start('vanished')
     watched.wait_for(RecorderState.RECORDING)
     shutil.rmtree(str(folder))
-    assert wait_for(lambda: watched.emit(EventKind.STATE_START) or any(
-        status.state == RecorderState.DROPPING for status in watched.statuses))
+    assert wait_for(
+        lambda: (
+            watched.emit(EventKind.STATE_START)
+            or any(status.state == RecorderState.DROPPING for status in watched.statuses)
+        )
+    )
     watched.close()
     watched.check_that_nothing_is_unaccounted_for()
 

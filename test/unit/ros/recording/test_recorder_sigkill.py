@@ -1,4 +1,5 @@
 """The process is killed at a random moment: at most the last second of its record is missing."""
+
 import mmap
 import multiprocessing
 import os
@@ -27,10 +28,13 @@ def record(folder, shared, events_per_trial, pause_s):
     recorder = TrialRecorder(folder)
     recorder.attach(source)
     began = time.time()
-    source.observers.append(lambda event: shared.__setitem__(
-        slice(0, PROGRESS.size),
-        PROGRESS.pack(int(event.trial_id), event.seq, event.wall_time, began)))
-    for trial in range(10 ** 9):
+    source.observers.append(
+        lambda event: shared.__setitem__(
+            slice(0, PROGRESS.size),
+            PROGRESS.pack(int(event.trial_id), event.seq, event.wall_time, began),
+        )
+    )
+    for trial in range(10**9):
         source.begin_trial(str(trial))
         source.emit(EventKind.TRIAL_START, 'TOP')
         for _ in range(events_per_trial):
@@ -44,7 +48,8 @@ def record_and_kill(folder, after_s, events_per_trial, pause_s):
     """Returns the last PROGRESS before the kill."""
     shared = mmap.mmap(-1, mmap.PAGESIZE)
     process = multiprocessing.get_context('fork').Process(
-        target=record, args=(str(folder), shared, events_per_trial, pause_s))
+        target=record, args=(str(folder), shared, events_per_trial, pause_s)
+    )
     process.start()
     assert wait_for(lambda: PROGRESS.unpack_from(shared)[2] or not process.is_alive())
     assert process.is_alive()
@@ -63,8 +68,9 @@ def mend_by_next_start(folder):
 def just_made(folder):
     """Files without a header, which a recorder leaves: another one may be just making them."""
     with os.scandir(str(folder)) as entries:
-        return sorted(entry.path for entry in entries
-                      if entry.name.endswith('.active') and is_empty(entry))
+        return sorted(
+            entry.path for entry in entries if entry.name.endswith('.active') and is_empty(entry)
+        )
 
 
 def is_empty(entry):
@@ -76,9 +82,11 @@ def is_empty(entry):
 
 def mend_by_rosbag_reindex(folder):
     for path in active(folder):
-        shutil.move(path, path[:-len('.active')])
-        subprocess.run(['rosbag', 'reindex', '-q', path[:-len('.active')]], check=True, timeout=100)
-        os.unlink(path[:-len('.bag.active')] + '.orig.bag')
+        shutil.move(path, path[: -len('.active')])
+        subprocess.run(
+            ['rosbag', 'reindex', '-q', path[: -len('.active')]], check=True, timeout=100
+        )
+        os.unlink(path[: -len('.bag.active')] + '.orig.bag')
 
 
 def check(folder, trial, seq, wall_time, began):
@@ -99,12 +107,15 @@ def check(folder, trial, seq, wall_time, began):
         assert by_trial[number][-1].kind == EventKind.TRIAL_END, 'an earlier trial is not whole'
 
 
-@pytest.mark.parametrize('mend, events_per_trial, pause_s, rounds', [
-    (mend_by_next_start, 10 ** 9, 0.0, 3),  # one trial at full speed
-    (mend_by_next_start, 10 ** 9, 0.003, 3),
-    (mend_by_next_start, 20, 0.001, 3),  # a trial every 20 ms
-    (mend_by_rosbag_reindex, 10 ** 9, 0.003, 2),
-])
+@pytest.mark.parametrize(
+    'mend, events_per_trial, pause_s, rounds',
+    [
+        (mend_by_next_start, 10**9, 0.0, 3),  # one trial at full speed
+        (mend_by_next_start, 10**9, 0.003, 3),
+        (mend_by_next_start, 20, 0.001, 3),  # a trial every 20 ms
+        (mend_by_rosbag_reindex, 10**9, 0.003, 2),
+    ],
+)
 def test_at_most_the_last_second_is_missing(tmp_path, mend, events_per_trial, pause_s, rounds):
     for number in range(rounds):
         folder = tmp_path / str(number)

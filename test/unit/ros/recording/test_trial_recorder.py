@@ -1,4 +1,5 @@
 """What a user finds in the folder of bags when nothing goes wrong with the disk."""
+
 import multiprocessing
 import os
 import re
@@ -57,15 +58,30 @@ def test_each_trial_has_a_bag_named_by_its_time_and_its_id(recorder, source, tmp
 def test_a_bag_holds_every_event_as_it_was_told(recorder, source, tmp_path):
     source.begin_trial('t')
     source.emit(EventKind.TRIAL_START, 'TOP', data={'initial': ['A'], 'recovers': False})
-    source.emit(EventKind.FAILURE, 'TOP/SUB', state='PICK', outcome='aborted', failure_kind=2,
-                failure_class=1, rate=0.25, continuous=True, text='caf\xe9 \u2713')
+    source.emit(
+        EventKind.FAILURE,
+        'TOP/SUB',
+        state='PICK',
+        outcome='aborted',
+        failure_kind=2,
+        failure_class=1,
+        rate=0.25,
+        continuous=True,
+        text='caf\xe9 \u2713',
+    )
     source.emit(EventKind.TRIAL_END, 'TOP', outcome='aborted')
     recorder.close(10.0)
     start, failure, end = events(finished(tmp_path)[0])
-    assert (start.kind, start.data) == (EventKind.TRIAL_START,
-                                        '{"initial": ["A"], "recovers": false}')
-    assert (failure.path, failure.state, failure.rate, failure.continuous) == ('TOP/SUB', 'PICK',
-                                                                               0.25, True)
+    assert (start.kind, start.data) == (
+        EventKind.TRIAL_START,
+        '{"initial": ["A"], "recovers": false}',
+    )
+    assert (failure.path, failure.state, failure.rate, failure.continuous) == (
+        'TOP/SUB',
+        'PICK',
+        0.25,
+        True,
+    )
     assert failure.text == 'caf\xe9 \u2713'
     assert (end.outcome, end.trial_id, end.seq) == ('aborted', 't', 2)
     assert abs(end.wall_time - time.time()) < 60
@@ -147,11 +163,13 @@ def test_closing_twice_is_closing_once_and_later_events_do_no_harm(recorder, sou
 
 
 def test_events_reach_the_disk_within_a_second_also_when_nothing_follows(
-        recorder, source, tmp_path):
+    recorder, source, tmp_path
+):
     trial(source, 'slow', end=False)
 
     def written():
         return any(b'/oracle/events' in Path(path).read_bytes() for path in active(tmp_path))
+
     assert wait_for(written, 5.0), '0.3 s on an idle machine'
 
 
@@ -178,8 +196,10 @@ def test_rates_are_recorded_at_the_start_and_at_the_end_of_a_trial(tmp_path, sou
     recorder.attach(source, {'~oracle/rates': rates})
     trial(source, 't')
     recorder.close(10.0)
-    assert [item.trial_id
-            for item in messages(finished(tmp_path)[0], '/oracle/rates')] == ['take 1', 'take 2']
+    assert [item.trial_id for item in messages(finished(tmp_path)[0], '/oracle/rates')] == [
+        'take 1',
+        'take 2',
+    ]
     assert taken == [threading.current_thread()] * 2
 
 
@@ -198,6 +218,7 @@ def test_what_keeps_failing_in_each_trial_is_said_once(tmp_path, source):
 
     def full(status):
         raise OSError('no room')
+
     recorder = TrialRecorder(str(tmp_path), warn=warnings.append, on_status=full)
     recorder.attach(source, {'~oracle/rates': lambda: 1 / 0})
     for number in range(3):
@@ -217,7 +238,8 @@ def test_the_last_words_of_a_bag_tell_what_was_lost(recorder, source, tmp_path):
 def test_a_forked_child_does_not_touch_its_parents_bag(recorder, source, tmp_path):
     trial(source, 't', steps=1, end=False)
     child = multiprocessing.get_context('fork').Process(
-        target=lambda: [source.emit(EventKind.STATE_START, 'TOP') for _ in range(5000)])
+        target=lambda: [source.emit(EventKind.STATE_START, 'TOP') for _ in range(5000)]
+    )
     child.start()
     child.join(30.0)
     assert child.exitcode == 0
@@ -266,8 +288,14 @@ def structure(path, *children):
     item = SmachContainerStructure(path=path, children=children)
     item.header.frame_id = 'any'
     kind = MessageType(item._type, item._md5sum, item._full_text)
-    return MessageItem('/robot/smach/container_structure', kind, serialise(item), Moment(None, 5.0),
-                       False, '/robot')
+    return MessageItem(
+        '/robot/smach/container_structure',
+        kind,
+        serialise(item),
+        Moment(None, 5.0),
+        False,
+        '/robot',
+    )
 
 
 def test_every_bag_knows_the_latest_structure_of_each_container(recorder, source, tmp_path):
@@ -278,14 +306,14 @@ def test_every_bag_knows_the_latest_structure_of_each_container(recorder, source
     recorder.close(10.0)
     for path in finished(tmp_path):
         found = {
-            item.path: item.children
-            for item in messages(path, '/robot/smach/container_structure')
+            item.path: item.children for item in messages(path, '/robot/smach/container_structure')
         }
         assert found == {'TOP': ['A', 'B'], 'TOP/SUB': ['X']}
 
 
-def test_while_late_messages_are_waited_for_the_end_is_on_the_disk(recorder, source, tmp_path,
-                                                                   monkeypatch):
+def test_while_late_messages_are_waited_for_the_end_is_on_the_disk(
+    recorder, source, tmp_path, monkeypatch
+):
     monkeypatch.setattr(recorder_bag, 'FLUSH_AFTER_S', 60.0)
     recorder._bags._late_s = 60.0  # as where topics are recorded, and longer
 
@@ -304,8 +332,10 @@ def test_while_late_messages_are_waited_for_the_end_is_on_the_disk(recorder, sou
     recorder.close(10.0)
     first, second = finished(tmp_path)
     topics = ('/talk', '/map', '/robot/smach/container_structure')
-    assert [[len(messages(path, topic)) for topic in topics]
-            for path in (first, second)] == [[1, 0, 0], [0, 1, 1]]
+    assert [[len(messages(path, topic)) for topic in topics] for path in (first, second)] == [
+        [1, 0, 0],
+        [0, 1, 1],
+    ]
 
 
 def test_other_topics_are_dropped_and_counted_before_an_event_is(tmp_path):
@@ -313,17 +343,22 @@ def test_other_topics_are_dropped_and_counted_before_an_event_is(tmp_path):
     accepted = [queue.put_message(message('x' * 6, Moment(None, 0.0))) for _ in range(4)]
     assert accepted == [True, True, False, False]
     assert queue.put_event('event', lambda: False)
-    assert [getattr(item, 'topic', item)
-            for item in queue.take(0.0)[0]] == ['/talk', '/talk', 'event']
+    assert [getattr(item, 'topic', item) for item in queue.take(0.0)[0]] == [
+        '/talk',
+        '/talk',
+        'event',
+    ]
 
 
 def test_a_bag_keeps_to_the_clock_with_which_it_began(tmp_path):
     how = (recorder_bag.DiskWatch(5.0), recorder_bag.SyncBudget())
     simulated = recorder_bag.TrialBag(str(tmp_path), 'sim', Moment((12, 5), 1e9), *how)
-    assert [simulated.stamp(Moment((13, 0), 2e9)),
-            simulated.stamp(Moment(None, 3e9))] == [(13, 0), (13, 0)]
+    assert [simulated.stamp(Moment((13, 0), 2e9)), simulated.stamp(Moment(None, 3e9))] == [
+        (13, 0),
+        (13, 0),
+    ]
     wall = recorder_bag.TrialBag(str(tmp_path), 'wall', Moment(None, 1e9), *how)
-    assert wall.stamp(Moment((13, 0), 1e9 + 0.5)) == (10 ** 9, 500_000_000)
+    assert wall.stamp(Moment((13, 0), 1e9 + 0.5)) == (10**9, 500_000_000)
     simulated.close()
     wall.close()
 
@@ -343,7 +378,8 @@ def test_a_waiting_machine_goes_on_when_the_recorder_is_closed():
     assert queue.put_event('first', lambda: True)
     results = []
     machine = threading.Thread(
-        target=lambda: results.append(queue.put_event('second', lambda: True)))
+        target=lambda: results.append(queue.put_event('second', lambda: True))
+    )
     machine.start()
     queue.close(0.0)
     machine.join(10.0)
@@ -351,7 +387,8 @@ def test_a_waiting_machine_goes_on_when_the_recorder_is_closed():
 
 
 def test_a_signal_handler_that_strikes_inside_the_queue_can_close_the_recorder(
-        recorder, source, tmp_path):
+    recorder, source, tmp_path
+):
     trial(source, 't', end=False)
     with recorder._queue._changed:
         assert recorder.close(10.0)
@@ -362,13 +399,14 @@ def record_until_told_to_stop(folder):
     source, recorder = EventSource(print), TrialRecorder(folder)
     recorder.attach(source)
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0 if recorder.close(20.0) else 3))
-    trial(source, 't', steps=10 ** 9)
+    trial(source, 't', steps=10**9)
 
 
 @pytest.mark.parametrize('after_s', [0.2, 0.35, 0.5, 0.65])
 def test_sigterm_at_full_speed_leaves_a_closed_bag(tmp_path, after_s):
-    child = multiprocessing.get_context('fork').Process(target=record_until_told_to_stop,
-                                                        args=(str(tmp_path),))
+    child = multiprocessing.get_context('fork').Process(
+        target=record_until_told_to_stop, args=(str(tmp_path),)
+    )
     child.start()
     assert wait_for(lambda: active(tmp_path))
     time.sleep(after_s)  # any moment will do: it is what this test is about

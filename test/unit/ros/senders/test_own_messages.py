@@ -1,4 +1,5 @@
 """A topic belongs to one of the nodes that publish on it: a bag may be played beside the robot."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -15,14 +16,17 @@ def of(node, **fields):
     return SimpleNamespace(_connection_header={'callerid': node}, **fields)
 
 
-@pytest.mark.parametrize('topic, nodes, owner', [
-    ('/task/oracle/events', ['/play_1', '/task'], '/task'),
-    ('/lab/task/oracle/events', ['/lab', '/lab/task', '/play_1'], '/lab/task'),
-    ('/task/oracle/events', ['/relay', '/play_1'], '/relay'),
-    ('/tasks/oracle/events', ['/relay', '/task'], '/relay'),
-    ('/task/oracle/events', ['/play_1'], '/play_1'),
-    ('/task/oracle/events', [], ''),
-])
+@pytest.mark.parametrize(
+    'topic, nodes, owner',
+    [
+        ('/task/oracle/events', ['/play_1', '/task'], '/task'),
+        ('/lab/task/oracle/events', ['/lab', '/lab/task', '/play_1'], '/lab/task'),
+        ('/task/oracle/events', ['/relay', '/play_1'], '/relay'),
+        ('/tasks/oracle/events', ['/relay', '/task'], '/relay'),
+        ('/task/oracle/events', ['/play_1'], '/play_1'),
+        ('/task/oracle/events', [], ''),
+    ],
+)
 def test_a_topic_belongs_to_the_node_after_which_it_is_named_or_that_was_first(topic, nodes, owner):
     assert owner_of(topic, nodes) == owner
 
@@ -37,7 +41,8 @@ def collected_warnings(monkeypatch):
 
 
 def test_messages_of_others_are_ignored_while_the_owner_is_there_and_named_once(
-        warnings, monkeypatch):
+    warnings, monkeypatch
+):
     nodes = ['/play_1', '/task']
     monkeypatch.setattr(own_messages, 'publishers_of', lambda topic: nodes)
     taken = []
@@ -48,15 +53,17 @@ def test_messages_of_others_are_ignored_while_the_owner_is_there_and_named_once(
     assert taken == ['/task', '', '/task', '']
     assert warnings == [
         '/play_1 publishes on topics of /task, such as /task/oracle/events: its messages are '
-        'ignored. A bag that is played beside the robot does that']
+        'ignored. A bag that is played beside the robot does that'
+    ]
     nodes.remove('/task')
     receive(of('/play_1'))
     assert taken[-1] == '/play_1', 'nobody else is there'
 
 
 def publisher_to(*nodes):
-    return SimpleNamespace(impl=SimpleNamespace(
-        connections=[SimpleNamespace(endpoint_id=node) for node in nodes]))
+    return SimpleNamespace(
+        impl=SimpleNamespace(connections=[SimpleNamespace(endpoint_id=node) for node in nodes])
+    )
 
 
 def test_a_node_listens_where_it_has_a_connection():
@@ -64,20 +71,34 @@ def test_a_node_listens_where_it_has_a_connection():
     assert not listens(SimpleNamespace(impl=None), '/b'), 'the topic is closed'
 
 
-@pytest.mark.parametrize('message, counts', [
-    (of('/asker', goal=1), True), (of('', goal=1), True), (of('/play_1', goal=1), False),
-    (of('/asker', id=''), True), (of('/play_1', id=''), False), (of('/gone', id='goal 7'), True),
-])
-def test_a_goal_counts_only_of_a_node_that_listens_for_its_result(message, counts, warnings,
-                                                                  monkeypatch):
+@pytest.mark.parametrize(
+    'message, counts',
+    [
+        (of('/asker', goal=1), True),
+        (of('', goal=1), True),
+        (of('/play_1', goal=1), False),
+        (of('/asker', id=''), True),
+        (of('/play_1', id=''), False),
+        (of('/gone', id='goal 7'), True),
+    ],
+)
+def test_a_goal_counts_only_of_a_node_that_listens_for_its_result(
+    message, counts, warnings, monkeypatch
+):
     taken = []
     for name in ('internal_goal_callback', 'internal_cancel_callback'):
-        monkeypatch.setattr(quiet_action_server.actionlib.ActionServer, name,
-                            lambda self, received: taken.append(received))
+        monkeypatch.setattr(
+            quiet_action_server.actionlib.ActionServer,
+            name,
+            lambda self, received: taken.append(received),
+        )
     monkeypatch.setattr(quiet_action_server, 'LISTENS_AFTER_S', 0.02)
     monkeypatch.setattr(quiet_action_server.rospy, 'resolve_name', str)
     server = QuietActionServer('/ask', ExpertQueryAction, print, auto_start=False)
     server.result_pub = publisher_to('/asker')
-    (server.internal_goal_callback if hasattr(message, 'goal')
-     else server.internal_cancel_callback)(message)
+    (
+        server.internal_goal_callback
+        if hasattr(message, 'goal')
+        else server.internal_cancel_callback
+    )(message)
     assert taken == [message] * counts and len(warnings) == (not counts)

@@ -1,4 +1,5 @@
 """ROS messages and numpy arrays in a store."""
+
 import json
 
 import numpy
@@ -50,14 +51,25 @@ def test_a_message_that_cannot_be_serialised_is_named():
 
 def test_times():
     assert again([rospy.Time(1, 2), rospy.Duration(-3, 4)]) == [
-        rospy.Time(1, 2), rospy.Duration(-3, 4)]
+        rospy.Time(1, 2),
+        rospy.Duration(-3, 4),
+    ]
 
 
-@pytest.mark.parametrize('array', [
-    numpy.arange(12.0).reshape(3, 4), numpy.zeros((0, 3), 'u1'), numpy.array(5),
-    numpy.asfortranarray(numpy.arange(6).reshape(2, 3)), numpy.arange(1000)[::3],
-    numpy.array([(1, 2.5)], [('a', 'i4'), ('b', '>f8')]), numpy.array(['2020-01-01'], 'M8[s]'),
-    numpy.array(['a', 'longer']), numpy.array([True, False])])
+@pytest.mark.parametrize(
+    'array',
+    [
+        numpy.arange(12.0).reshape(3, 4),
+        numpy.zeros((0, 3), 'u1'),
+        numpy.array(5),
+        numpy.asfortranarray(numpy.arange(6).reshape(2, 3)),
+        numpy.arange(1000)[::3],
+        numpy.array([(1, 2.5)], [('a', 'i4'), ('b', '>f8')]),
+        numpy.array(['2020-01-01'], 'M8[s]'),
+        numpy.array(['a', 'longer']),
+        numpy.array([True, False]),
+    ],
+)
 def test_an_array_is_the_same_again(array):
     found = again(array)
     assert found.dtype == array.dtype and found.shape == array.shape

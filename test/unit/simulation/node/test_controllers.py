@@ -1,4 +1,5 @@
 """What a controller does with goals that come and go, without a node."""
+
 import threading
 from types import SimpleNamespace
 from typing import Any, List
@@ -20,8 +21,11 @@ class Handle(ServerGoalHandle):
 
     def __init__(self, name: str) -> None:
         goal = GripperCommandActionGoal(goal_id=GoalID(id=name))
-        super().__init__(SimpleNamespace(goal=goal, status=GoalStatus(goal_id=goal.goal_id)),
-                         SimpleNamespace(lock=threading.RLock()), None)
+        super().__init__(
+            SimpleNamespace(goal=goal, status=GoalStatus(goal_id=goal.goal_id)),
+            SimpleNamespace(lock=threading.RLock()),
+            None,
+        )
         self.goal = goal
         self.ends: List[str] = []
 
@@ -58,7 +62,8 @@ class Step:
 @pytest.fixture(name='table')
 def _table():
     return MotionTable(
-        SimpleNamespace(step=lambda: None, happened=lambda *events: None, disturbed=False))
+        SimpleNamespace(step=lambda: None, happened=lambda *events: None, disturbed=False)
+    )
 
 
 @pytest.fixture(name='server')
@@ -69,15 +74,25 @@ def _server(table, monkeypatch):
     def make_server(name, spec, begin, cancel, **_):
         server.begin, server.cancel = begin, cancel
         return server
+
     monkeypatch.setattr(controllers.actionlib, 'ActionServer', make_server)
 
     def make(goal: Any) -> Step:
         if goal.command.position < 0:
             raise ValueError('no such gap')
         return Step()
+
     loop = SimpleNamespace(post=lambda call: call())
-    controllers.Controller('gripper', GripperCommandAction, 'right_gripper', loop, table, make,
-                           lambda motion, ending: None, lambda motion: None)
+    controllers.Controller(
+        'gripper',
+        GripperCommandAction,
+        'right_gripper',
+        loop,
+        table,
+        make,
+        lambda motion, ending: None,
+        lambda motion: None,
+    )
     return server
 
 

@@ -1,4 +1,5 @@
 """The world's node and a lab that goes on: its file, and what a trial's truth says about it."""
+
 import json
 
 import pytest
@@ -21,15 +22,29 @@ def test_a_lab_that_is_read_anew_goes_on_as_the_one_that_was_kept(tmp_path):
     told = kept.leave(world, TrialVerdict(True, ''), 36.0)
     world.close()
     assert told['hour'] == 0.0 and told['left']['ended'] == pytest.approx(0.01)
-    again = read_lab(settings(tmp_path, json.loads(json.dumps(
-        {'seed': 300, 'slot_h': 0.1, 'left': told['left']}))))
-    assert again.scene(301) == kept.scene(301) != read_lab(settings(
-        tmp_path, {'seed': 300, 'slot_h': 0.1, 'left': None})).scene(301)
+    again = read_lab(
+        settings(
+            tmp_path, json.loads(json.dumps({'seed': 300, 'slot_h': 0.1, 'left': told['left']}))
+        )
+    )
+    assert (
+        again.scene(301)
+        == kept.scene(301)
+        != read_lab(settings(tmp_path, {'seed': 300, 'slot_h': 0.1, 'left': None})).scene(301)
+    )
 
 
-@pytest.mark.parametrize('content', ['', '[]', {'seed': 1}, {'seed': -1, 'slot_h': 1, 'left': None},
-                                     {'seed': 1, 'slot_h': 0, 'left': None},
-                                     {'seed': 1, 'slot_h': 1, 'left': {'things': []}}])
+@pytest.mark.parametrize(
+    'content',
+    [
+        '',
+        '[]',
+        {'seed': 1},
+        {'seed': -1, 'slot_h': 1, 'left': None},
+        {'seed': 1, 'slot_h': 0, 'left': None},
+        {'seed': 1, 'slot_h': 1, 'left': {'things': []}},
+    ],
+)
 def test_a_file_that_is_none_is_refused_with_its_name(tmp_path, content):
     with pytest.raises(LabFileError, match='lab.json'):
         read_lab(settings(tmp_path, content))

@@ -1,4 +1,5 @@
 """A video of each trial, that costs no trial where it cannot be written, and tells what happens."""
+
 import cv2
 import numpy as np
 import pytest
@@ -17,8 +18,9 @@ HELD = round(HELD_S * FRAMES_S)  # images
 
 @pytest.fixture
 def film(tmp_path, monkeypatch):
-    monkeypatch.setattr(trial_film, 'portrait',
-                        lambda world, size: np.full((size[1], size[0], 3), world, np.uint8))
+    monkeypatch.setattr(
+        trial_film, 'portrait', lambda world, size: np.full((size[1], size[0], 3), world, np.uint8)
+    )
     return TrialFilm(tmp_path)
 
 
@@ -57,7 +59,10 @@ def test_each_trial_has_a_video_of_its_own_with_an_image_now_and_then(film, tmp_
         film.look(100)
     film.end()
     assert {path.name: len(images_of(path)) for path in tmp_path.iterdir()} == {
-        '5.mp4': 3, '6.mp4': 2, '5_2.mp4': 1}
+        '5.mp4': 3,
+        '6.mp4': 2,
+        '5_2.mp4': 1,
+    }
     assert images_of(tmp_path / '6.mp4')[0].shape == (FRAME[1], FRAME[0], 3)
 
 
@@ -77,9 +82,9 @@ def test_the_film_stands_still_for_a_failure_and_then_shows_the_next_state(told_
     shades = [100] * (2 + HELD) + [200] * (1 + HELD)
     for image, caption, shade in zip(images, captions, shades):
         assert image.shape == (FRAME[1] + HEIGHT, FRAME[0], 3)
-        assert image[:FRAME[1] - 20].mean() == pytest.approx(shade, abs=6)
+        assert image[: FRAME[1] - 20].mean() == pytest.approx(shade, abs=6)
         drawn = strip(caption, FRAME[0]).astype(int)
-        assert np.abs(image[FRAME[1]:] - drawn).mean() < 6
+        assert np.abs(image[FRAME[1] :] - drawn).mean() < 6
 
 
 def test_a_trial_does_not_begin_with_the_words_of_the_last_one(told_film, tmp_path):
@@ -89,7 +94,7 @@ def test_a_trial_does_not_begin_with_the_words_of_the_last_one(told_film, tmp_pa
         told_film.hear(event('TRIAL_END', outcome='aborted'))
     told_film.end()
     first = images_of(tmp_path / '6.mp4')[0]
-    assert np.abs(first[FRAME[1]:].astype(int) - strip(Caption(''), FRAME[0])).mean() < 6
+    assert np.abs(first[FRAME[1] :].astype(int) - strip(Caption(''), FRAME[0])).mean() < 6
 
 
 def test_what_is_told_before_the_first_image_is_not_lost_nor_waited_for(told_film, tmp_path):
@@ -97,21 +102,31 @@ def test_what_is_told_before_the_first_image_is_not_lost_nor_waited_for(told_fil
     told_film.hear(event('DECISION', text='going back to LOOK'))
     look(told_film, 1)
     told_film.end()
-    image, = images_of(tmp_path / '5.mp4')
+    (image,) = images_of(tmp_path / '5.mp4')
     drawn = strip(Caption('Oracle', 'going back to LOOK', BLUE), FRAME[0]).astype(int)
-    assert np.abs(image[FRAME[1]:] - drawn).mean() < 6
+    assert np.abs(image[FRAME[1] :] - drawn).mean() < 6
 
 
-@pytest.mark.parametrize('given, heading, detail', [
-    (event('STATE_START'), 'PICK', ''),
-    (event('FAILURE', outcome='aborted'), 'PICK failed', 'aborted'),
-    (event('FAILURE', text='Traceback:\n  line 1\nKeyError: no arm\n'), 'PICK failed',
-     'KeyError: no arm'),
-    (event('PRECONDITION_START', target='LOOK'), 'Oracle', 'LOOK, a precondition of PICK'),
-    (event('QUERY_ANSWERED', by='ann', outcome='goto', target='LOOK'), 'Answer of ann',
-     'go on with LOOK'),
-    (event('QUERY_ANSWERED', outcome='give_up'), 'Answer of an expert', 'give up'),
-    (event('TRIAL_END', text='stopped'), 'End of the trial', 'stopped')])
+@pytest.mark.parametrize(
+    'given, heading, detail',
+    [
+        (event('STATE_START'), 'PICK', ''),
+        (event('FAILURE', outcome='aborted'), 'PICK failed', 'aborted'),
+        (
+            event('FAILURE', text='Traceback:\n  line 1\nKeyError: no arm\n'),
+            'PICK failed',
+            'KeyError: no arm',
+        ),
+        (event('PRECONDITION_START', target='LOOK'), 'Oracle', 'LOOK, a precondition of PICK'),
+        (
+            event('QUERY_ANSWERED', by='ann', outcome='goto', target='LOOK'),
+            'Answer of ann',
+            'go on with LOOK',
+        ),
+        (event('QUERY_ANSWERED', outcome='give_up'), 'Answer of an expert', 'give up'),
+        (event('TRIAL_END', text='stopped'), 'End of the trial', 'stopped'),
+    ],
+)
 def test_the_words_of_a_caption(given, heading, detail):
     assert told(given).caption[:2] == (heading, detail)
 
@@ -120,8 +135,10 @@ def test_of_most_events_nothing_is_told():
     assert told(event('TRANSITION')) is None
 
 
-@pytest.mark.parametrize('detail, lines', [('', 0), ('short', 1), ('a few words ' * 8, 2),
-                                           ('a few words ' * 30, 2), ('é' * 500, 2)])
+@pytest.mark.parametrize(
+    'detail, lines',
+    [('', 0), ('short', 1), ('a few words ' * 8, 2), ('a few words ' * 30, 2), ('é' * 500, 2)],
+)
 def test_a_caption_fits_the_image_however_long_it_is(detail, lines):
     drawn = strip(Caption('PICK', detail), FRAME[0])
     assert drawn.shape == (HEIGHT, FRAME[0], 3)
@@ -130,8 +147,9 @@ def test_a_caption_fits_the_image_however_long_it_is(detail, lines):
     assert inked[:18].any() == (lines > 0) and inked[18:].any() == (lines > 1)
 
 
-def test_a_video_that_cannot_be_written_is_told_once_and_the_trial_goes_on(film, tmp_path,
-                                                                          monkeypatch):
+def test_a_video_that_cannot_be_written_is_told_once_and_the_trial_goes_on(
+    film, tmp_path, monkeypatch
+):
     told = []
     monkeypatch.setattr(trial_film.rospy, 'logerr', lambda *words: told.append(words))
     monkeypatch.setattr(trial_film, 'VideoFile', Unwritable)

@@ -1,4 +1,5 @@
 """The thread that owns the physics: it moves in lock-step, keeps the time, and answers."""
+
 import threading
 import time
 from typing import NamedTuple
@@ -70,8 +71,11 @@ def table(world):
 def test_motions_of_several_parts_go_on_together_and_end_each_in_its_time(world, table):
     log, ends = [], []
     for part, periods in (('torso', 2), ('base', 1)):
-        table.start(part, Moves(periods, part, log), lambda ending, part=part: ends.append(
-            (part, world.periods)))
+        table.start(
+            part,
+            Moves(periods, part, log),
+            lambda ending, part=part: ends.append((part, world.periods)),
+        )
     while table:
         table.tick()
     assert log == [('base', 0), ('torso', 0), ('base', 1), ('torso', 1), ('torso', 2)]
@@ -155,7 +159,7 @@ def test_while_nobody_commands_the_clock_goes_on_as_fast_as_it_is_set_to(running
     running.move(1)
     told = len(running.times)
     running.wait(lambda: len(running.times) > told + 3)
-    assert set(running.times[told + 1:]) == {running.times[-1]}
+    assert set(running.times[told + 1 :]) == {running.times[-1]}
 
 
 @pytest.mark.parametrize('running', [PACED], indirect=True)
@@ -171,6 +175,7 @@ def test_questions_are_answered_in_the_worlds_thread_and_errors_go_to_who_asked(
 
     def wrong():
         raise ValueError('wrong')
+
     with pytest.raises(ValueError, match='wrong'):
         running.loop.call(wrong)
     assert running.loop.call(lambda: 3) == 3
@@ -214,7 +219,8 @@ def test_an_idle_world_pauses_and_the_clock_without_pauses_is_its_time(running):
     at_rest = len(running.times)
     running.wait(lambda: len(running.times) > at_rest + 3)
     record, now = running.loop.call(
-        lambda: (running.clock.trial_record(), running.clock.now_ns / 1e9))
+        lambda: (running.clock.trial_record(), running.clock.now_ns / 1e9)
+    )
     assert len(record['pauses']) == 2, 'the second begins with the tick in which the motion ends'
     passed = now - record['clock_s'] - sum(length for _, length in record['pauses'])
     assert passed == pytest.approx(30 / 60, abs=0.01)
@@ -222,16 +228,28 @@ def test_an_idle_world_pauses_and_the_clock_without_pauses_is_its_time(running):
 
 def test_the_settings_of_a_world_without_limit_differ_from_those_of_a_paced_one():
     assert read_settings(lambda name, default: default).camera_rate == 0.0
-    assert read_settings(lambda name, default: 1
-                         if 'factor' in name else default).camera_rate == 2.0
+    assert (
+        read_settings(lambda name, default: 1 if 'factor' in name else default).camera_rate == 2.0
+    )
 
 
-@pytest.mark.parametrize('name, value', [('~task', 'dance'), ('~real_time_factor', -1),
-                                         ('~real_time_factor', 'fast'), ('~seed', -1),
-                                         ('~seed', 1.5), ('~benign', 'yes'), ('~truth_file', ''),
-                                         ('~state_rate', 0), ('~idle_speed', float('nan')),
-                                         ('~camera_rate', True), ('~camera_binning', 3),
-                                         ('~camera_binning', True)])
+@pytest.mark.parametrize(
+    'name, value',
+    [
+        ('~task', 'dance'),
+        ('~real_time_factor', -1),
+        ('~real_time_factor', 'fast'),
+        ('~seed', -1),
+        ('~seed', 1.5),
+        ('~benign', 'yes'),
+        ('~truth_file', ''),
+        ('~state_rate', 0),
+        ('~idle_speed', float('nan')),
+        ('~camera_rate', True),
+        ('~camera_binning', 3),
+        ('~camera_binning', True),
+    ],
+)
 def test_a_bad_parameter_is_named(name, value):
     with pytest.raises(SettingsError, match=name):
         read_settings(lambda asked, default: value if asked == name else default)

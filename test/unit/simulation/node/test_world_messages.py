@@ -1,6 +1,7 @@
 """What the world node tells: transforms as the physics has them, streams of targets, what an expert
 sees, the truth.
 """
+
 import json
 
 import numpy as np
@@ -30,15 +31,24 @@ from smach_oracle.simulation.scenes.scene import Body, Goal, RobotStart, Scene, 
 TABLE = Body('table', 'box', (0.6, 1.2, 0.04), (0.9, 0.0, 0.70))
 CAN = Body('can', 'cylinder', (0.03, 0.03, 0.12), (0.8, 0.0, 0.781), mass=0.3)
 WALL = Body('wall', 'box', (0.02, 0.2, 0.09), (0.72, 0.0, 0.766))
-FRIDGE = Body('fridge', 'urdf', (0.0, 0.0, 0.0), (3.0, 3.0, 0.0), urdf=fridge_urdf(Kitchen()),
-              joints=((DOOR_JOINT, 0.5),), joint_friction=((DOOR_JOINT, 3.0),))
+FRIDGE = Body(
+    'fridge',
+    'urdf',
+    (0.0, 0.0, 0.0),
+    (3.0, 3.0, 0.0),
+    urdf=fridge_urdf(Kitchen()),
+    joints=((DOOR_JOINT, 0.5),),
+    joint_friction=((DOOR_JOINT, 3.0),),
+)
 HEAD = RobotStart(
-    (('head_tilt_joint', 0.6), ('torso_lift_joint', 0.2), ('r_elbow_flex_joint', -1.2)))
+    (('head_tilt_joint', 0.6), ('torso_lift_joint', 0.2), ('r_elbow_flex_joint', -1.2))
+)
 
 
 def scene(*bodies):
-    return Scene('test', 7, bodies, Goal('stands_at', ''), HEAD,
-                 causes=(SceneCause('crowded', 'by much'),))
+    return Scene(
+        'test', 7, bodies, Goal('stands_at', ''), HEAD, causes=(SceneCause('crowded', 'by much'),)
+    )
 
 
 @pytest.fixture(scope='module')
@@ -52,8 +62,7 @@ def test_the_transforms_take_every_link_to_where_the_physics_has_it(world):
     tree = TransformTree(pr2_urdf().read_text(encoding='utf-8'), list(world.joints()))
     message = transforms(tree, world.joints(), world.odom_from_base(), Time(1))
     links = {
-        each.child_frame_id: (each.header.frame_id, each.transform)
-        for each in message.transforms
+        each.child_frame_id: (each.header.frame_id, each.transform) for each in message.transforms
     }
     assert sorted(set(world.joints())) == sorted(tree.names)
 
@@ -63,24 +72,34 @@ def test_the_transforms_take_every_link_to_where_the_physics_has_it(world):
         if link in links:
             parent, found = links[link]
             place, turn = found.translation, found.rotation
-            return base_from(parent) @ from_quaternion((place.x, place.y, place.z),
-                                                       (turn.x, turn.y, turn.z, turn.w))
+            return base_from(parent) @ from_quaternion(
+                (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
+            )
         fixed = next(each for each in tree.fixed if each.child == link)
         return base_from(fixed.parent) @ from_quaternion(fixed.position, fixed.turn)
 
-    for link in (*TOOL_FRAME.values(), CAMERA_FRAME, 'base_link', 'l_gripper_l_finger_tip_link',
-                 'laser_tilt_link'):
-        assert np.allclose(base_from(link),
-                           inverse(world.true_base()) @ world.link_pose(link), atol=2e-4), link
+    for link in (
+        *TOOL_FRAME.values(),
+        CAMERA_FRAME,
+        'base_link',
+        'l_gripper_l_finger_tip_link',
+        'laser_tilt_link',
+    ):
+        assert np.allclose(
+            base_from(link), inverse(world.true_base()) @ world.link_pose(link), atol=2e-4
+        ), link
 
 
 def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_its_own_axes():
     driving = World(
-        Scene('test', 7, (), Goal('stands_at', ''), RobotStart((), (0.5, -0.2, np.pi / 2))))
+        Scene('test', 7, (), Goal('stands_at', ''), RobotStart((), (0.5, -0.2, np.pi / 2)))
+    )
     driving.belief_error = from_rpy((0.1, 0.0, 0.0))
     for _ in range(30):  # forward, which is along y of the world, and turning
-        y, turn = driving.robot.target('base_y') + 0.3 / 60, driving.robot.target(
-            'base_theta') + 0.1 / 60
+        y, turn = (
+            driving.robot.target('base_y') + 0.3 / 60,
+            driving.robot.target('base_theta') + 0.1 / 60,
+        )
         driving.robot.set_target('base_y', y, 0.3, None)
         driving.robot.set_target('base_theta', turn, 0.1, None)
         driving.step()
@@ -99,12 +118,14 @@ def test_odometry_tells_where_the_robot_believes_to_stand_and_how_it_moves_in_it
 def test_camera_info_is_that_of_the_camera():
     info = camera_info(INTRINSICS, (480, 640, 3), Header(frame_id=CAMERA_FRAME))
     assert (info.width, info.height, len(info.D), len(info.R)) == (640, 480, 5, 9)
-    assert info.K == INTRINSICS.ravel().tolist(
-    ) and info.P[2] == info.K[2] and info.P[5] == info.K[4]
+    assert (
+        info.K == INTRINSICS.ravel().tolist() and info.P[2] == info.K[2] and info.P[5] == info.K[4]
+    )
 
 
 def test_a_target_of_a_stream_is_reached_at_the_end_of_its_period_and_what_is_too_fast_is_cut_off(
-        world):
+    world,
+):
     name = ARM_JOINTS['right'][0]
     start = world.robot.position(name)
     for target, periods in ((start + 0.02, 3), (start + 0.04, 3)):
@@ -141,8 +162,10 @@ def test_a_refrigerator_has_a_door_and_a_handle(world):
     fridge, door, handle = reveal(world, ['fridge', 'door', 'handle'], Time(1))
     assert door.angle == handle.angle == pytest.approx(0.5, abs=0.02)
     assert handle.size.z > 0.2 > handle.size.x and not fridge.movable
-    off = np.hypot(handle.pose.pose.position.x - door.pose.pose.position.x,
-                   handle.pose.pose.position.y - door.pose.pose.position.y)
+    off = np.hypot(
+        handle.pose.pose.position.x - door.pose.pose.position.x,
+        handle.pose.pose.position.y - door.pose.pose.position.y,
+    )
     assert 0.1 < off < 0.5
 
 
@@ -154,16 +177,27 @@ def test_what_is_not_there_is_named(world):
 def test_the_truth_is_a_line_for_each_trial(tmp_path):
     path = tmp_path / 'truth.jsonl'
     for seconds in (12.0, 14.0):
-        append_line(str(path),
-                    TrialTruth(scene(), 10.0).record(
-                        TrialVerdict(False, 'wrong', 'cup'), (Harm(DROPPED, 'can'),), seconds,
-                        {'physics': 0.5}, {'physics': 0.25}))
+        append_line(
+            str(path),
+            TrialTruth(scene(), 10.0).record(
+                TrialVerdict(False, 'wrong', 'cup'),
+                (Harm(DROPPED, 'can'),),
+                seconds,
+                {'physics': 0.5},
+                {'physics': 0.25},
+            ),
+        )
     lines = [json.loads(line) for line in path.read_text(encoding='utf-8').splitlines()]
     assert [line['sim_s'] for line in lines] == [2.0, 4.0]
-    assert lines[0]['causes'] == [{
-        'kind': 'crowded', 'text': 'by much', 'lasting': False, 'began_s': None, 'ended_s': None}]
+    assert lines[0]['causes'] == [
+        {'kind': 'crowded', 'text': 'by much', 'lasting': False, 'began_s': None, 'ended_s': None}
+    ]
     assert {key: lines[0][key] for key in ('seed', 'task', 'success', 'why')} == {
-        'seed': 7, 'task': 'test', 'success': False, 'why': 'wrong'}
+        'seed': 7,
+        'task': 'test',
+        'success': False,
+        'why': 'wrong',
+    }
     truth = read_truth(str(path))[7]
     assert truth.wrong_object == 'cup' and truth.damage == ((DROPPED, 'can'),)
     assert lines[0]['share']['physics'] > 0 and lines[0]['cpu_s'] == {'physics': 0.25}
@@ -194,5 +228,6 @@ def test_work_that_moves_the_robot_is_charged_from_its_begin_to_its_end_and_no_t
 def test_the_truth_tells_when_a_cause_was_there():
     truth = TrialTruth(scene(), 0.0)
     truth.happened([CauseSpan('crowded', 'by much', True, 0.0, 7.5)])
-    assert truth.record(TrialVerdict(True, ''), (), 9.0, {}, {})['causes'] == [{
-        'kind': 'crowded', 'text': 'by much', 'lasting': True, 'began_s': 0.0, 'ended_s': 7.5}]
+    assert truth.record(TrialVerdict(True, ''), (), 9.0, {}, {})['causes'] == [
+        {'kind': 'crowded', 'text': 'by much', 'lasting': True, 'began_s': 0.0, 'ended_s': 7.5}
+    ]

@@ -1,4 +1,5 @@
 """The head camera: what it measures is where things are, and its errors repeat."""
+
 import numpy as np
 import pytest
 from worlds import CAN, CARTON, TABLE, scene
@@ -56,12 +57,14 @@ def test_a_noise_free_view_puts_things_where_they_are():
     front = points[np.abs(points[:, 0] - 1.4) < 0.005]
     assert len(front) > 1000
     for axis, middle in ((1, 0.1), (2, 1.2)):
-        assert [front[:, axis].min(),
-                front[:, axis].max()] == pytest.approx([middle - 0.1, middle + 0.1], abs=2e-3)
+        assert [front[:, axis].min(), front[:, axis].max()] == pytest.approx(
+            [middle - 0.1, middle + 0.1], abs=2e-3
+        )
     rows, columns = np.nonzero(on_box)
     corners = pixels_of(np.array([[1.4, 0.2, 1.1], [1.4, 0.0, 1.1]]), INTRINSICS, pose)
-    assert [columns.min() - 0.5,
-            columns.max() + 0.5] == pytest.approx(sorted(corners[:, 0]), abs=0.6)
+    assert [columns.min() - 0.5, columns.max() + 0.5] == pytest.approx(
+        sorted(corners[:, 0]), abs=0.6
+    )
     assert rows.max() + 0.5 == pytest.approx(corners[0, 1], abs=0.6)
     world.close()
 
@@ -80,7 +83,8 @@ def test_a_frame_is_in_the_frame_of_the_base(world, robot):
     table = points[np.abs(points[..., 2] - 0.72) < 0.02]
     assert len(table) > 0.2 * WIDTH * HEIGHT and abs(np.median(table[:, 2]) - 0.72) < 2e-3
     assert apply(inverse(world.true_base()), world.link_pose(CAMERA_FRAME)[:3, 3]) == pytest.approx(
-        image.base_from_camera[:3, 3])
+        image.base_from_camera[:3, 3]
+    )
 
 
 def test_noise_repeats_with_the_trial_and_differs_between_frames(world):
@@ -88,23 +92,27 @@ def test_noise_repeats_with_the_trial_and_differs_between_frames(world):
         world.reset(scene())
         robot = DirectRobot(world)
         return [robot.see(), robot.see()]
+
     first, again = images(), images()
     for one, other in zip(first, again):
         assert np.array_equal(one.colour, other.colour) and np.array_equal(
-            one.depth, other.depth, equal_nan=True)
+            one.depth, other.depth, equal_nan=True
+        )
     assert not np.array_equal(first[0].colour, first[1].colour)
 
 
 def test_noise_is_as_large_as_it_is_said_to_be():
     depth, generator = np.full((200, 200), 1.0, np.float32), np.random.default_rng(0)
-    usual, none, fourfold = (noisy_depth(depth, CameraQuality(noise=noise), generator)
-                             for noise in (1.0, 0.0, 4.0))
+    usual, none, fourfold = (
+        noisy_depth(depth, CameraQuality(noise=noise), generator) for noise in (1.0, 0.0, 4.0)
+    )
     assert np.nanstd(usual) == pytest.approx(0.0012 + 0.0019 * 0.36, rel=0.1)
     assert np.nanstd(fourfold) > 3.5 * np.nanstd(usual) and np.nanstd(none) < 1e-6
     assert np.isnan(usual).mean() == pytest.approx(0.005, abs=0.002)
     assert np.isnan(noisy_depth(depth, CameraQuality(dropout=1.0), generator)).all()
-    colour = noisy_colour(np.full((200, 200, 3), 128, np.uint8), CameraQuality(colour_noise=6.0),
-                          generator)
+    colour = noisy_colour(
+        np.full((200, 200, 3), 128, np.uint8), CameraQuality(colour_noise=6.0), generator
+    )
     assert colour.std() == pytest.approx(6.0, abs=0.3)
 
 
@@ -124,8 +132,11 @@ def test_dim_light_costs_colour_more_than_depth(world):
         world.reset(scene(camera=CameraQuality(brightness=level), robot=BOWED))
         image = DirectRobot(world).see()
         shares.append(np.isnan(image.depth).mean())
-        grey = noisy_colour(np.full((200, 200, 3), 128, np.uint8), CameraQuality(brightness=level),
-                            np.random.default_rng(0))
+        grey = noisy_colour(
+            np.full((200, 200, 3), 128, np.uint8),
+            CameraQuality(brightness=level),
+            np.random.default_rng(0),
+        )
         noise.append(grey.std() / grey.mean())
     assert noise[1] > 5 * noise[0]
     assert shares[0] < shares[1] < shares[0] + 0.05
@@ -163,8 +174,10 @@ def test_a_binned_camera_sees_the_same_in_fewer_pixels(world):
     fours = whole.depth.reshape(HEIGHT // 2, 2, WIDTH // 2, 2).mean(axis=(1, 3))
     known = np.isfinite(fours) & np.isfinite(binned.depth)
     assert known.mean() > 0.5 and np.median(np.abs(fours - binned.depth)[known]) < 2e-3
-    points = [points_of(image.depth, image.intrinsics, image.base_from_camera)
-              for image in (whole, binned)]
+    points = [
+        points_of(image.depth, image.intrinsics, image.base_from_camera)
+        for image in (whole, binned)
+    ]
     ends = [np.nanpercentile(each.reshape(-1, 3), [5, 95], axis=0) for each in points]
     assert np.abs(ends[0] - ends[1]).max() < 0.02
     lost = [np.isnan(image.depth).mean() for image in images]

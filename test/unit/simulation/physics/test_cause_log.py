@@ -1,4 +1,5 @@
 """The world's own log of causes: when each began, and when it ended."""
+
 import numpy as np
 import pytest
 from worlds import scene
@@ -45,9 +46,15 @@ def test_light_is_logged_from_its_event_until_it_ends(world):
 def test_what_stands_in_the_way_is_there_from_the_start_until_it_is_moved(world):
     nudge = Disturbance('nudge:can', 'see', (('dx', 0.06),), 'object_moved')
     world.reset(
-        scene(disturbances=(nudge,),
-              causes=(SceneCause('crowded', 'close', ('can', 'carton'), True),
-                      SceneCause('slippery', 'wet'), SceneCause('object_moved', 'somebody'))))
+        scene(
+            disturbances=(nudge,),
+            causes=(
+                SceneCause('crowded', 'close', ('can', 'carton'), True),
+                SceneCause('slippery', 'wet'),
+                SceneCause('object_moved', 'somebody'),
+            ),
+        )
+    )
     pass_time(world, 600)
     assert spans(world)['crowded'][2:] == (True, 0.0, None)
     DirectRobot(world).see()
@@ -55,14 +62,18 @@ def test_what_stands_in_the_way_is_there_from_the_start_until_it_is_moved(world)
     found = spans(world)
     assert found['crowded'].ended_s == pytest.approx(10.5, abs=0.7)
     assert found['object_moved'].ended_s == pytest.approx(
-        found['object_moved'].began_s + 0.4, abs=0.05)
+        found['object_moved'].began_s + 0.4, abs=0.05
+    )
     assert found['slippery'][3:] == (0.0, None)
 
 
 def test_a_wrong_localisation_is_there_until_the_robot_is_told_where_it_stands(world):
     world.reset(
-        scene(robot=RobotStart(localisation_error=(0.08, 0.0, 0.0)),
-              causes=(SceneCause('base_misplaced', 'pushed', (LOCALISATION,), True),)))
+        scene(
+            robot=RobotStart(localisation_error=(0.08, 0.0, 0.0)),
+            causes=(SceneCause('base_misplaced', 'pushed', (LOCALISATION,), True),),
+        )
+    )
     pass_time(world, 600)
     assert spans(world)['base_misplaced'][3:] == (0.0, None)
     world.localise(world.true_base())
@@ -73,8 +84,10 @@ def test_a_wrong_localisation_is_there_until_the_robot_is_told_where_it_stands(w
 def test_an_arm_that_was_pushed_is_in_the_way_until_it_is_moved(world):
     push = Disturbance('arm', 'see', ((PAN, 0.9),), 'arm_in_view')
     world.reset(
-        scene(disturbances=(push,),
-              causes=(SceneCause('arm_in_view', 'in the way', ('arm:' + PAN,)),)))
+        scene(
+            disturbances=(push,), causes=(SceneCause('arm_in_view', 'in the way', ('arm:' + PAN,)),)
+        )
+    )
     robot = DirectRobot(world)
     robot.see()
     pass_time(world, 600)

@@ -1,4 +1,5 @@
 """What happens to a world in the course of a trial: once, when its event comes, and no earlier."""
+
 import numpy as np
 import pytest
 from worlds import scene
@@ -13,8 +14,10 @@ from smach_oracle.simulation.scenes.kitchen_scene import draw as draw_kitchen
 from smach_oracle.simulation.scenes.scene import Body, Disturbance, Near
 
 IN_VIEW = {
-    'l_shoulder_pan_joint': 0.0, 'l_shoulder_lift_joint': 0.35, 'l_upper_arm_roll_joint': 0.8,
-    'l_elbow_flex_joint': -1.2
+    'l_shoulder_pan_joint': 0.0,
+    'l_shoulder_lift_joint': 0.35,
+    'l_upper_arm_roll_joint': 0.8,
+    'l_elbow_flex_joint': -1.2,
 }
 LOOK = (0.72, -0.05, 0.75)
 
@@ -110,8 +113,11 @@ def test_a_door_swings_to_its_angle_and_is_then_left_to_itself(world):
     ajar = fridge._replace(joints=((DOOR_JOINT, 1.8),))
     swing = Disturbance('swing:fridge', 'torso', (('angle', 0.7), ('duration', 1.0)))
     world.reset(
-        kitchen._replace(bodies=tuple(ajar if body is fridge else body for body in kitchen.bodies),
-                         disturbances=(swing,)))
+        kitchen._replace(
+            bodies=tuple(ajar if body is fridge else body for body in kitchen.bodies),
+            disturbances=(swing,),
+        )
+    )
     assert world.body_joint('fridge', DOOR_JOINT) == pytest.approx(1.8, abs=0.02)
     robot = DirectRobot(world)
     robot.torso(0.2)
@@ -137,8 +143,9 @@ def test_an_event_that_is_not_near_enough_is_not_counted(world):
 
 
 def test_a_drive_sets_off_when_what_its_beginning_has_set_off_is_over(world):
-    nudge = Disturbance('nudge:can', 'depart', (('dx', 0.05), ('duration', 1.0)),
-                        near=Near((-0.5, 0.0, 0.0), 0.1))
+    nudge = Disturbance(
+        'nudge:can', 'depart', (('dx', 0.05), ('duration', 1.0)), near=Near((-0.5, 0.0, 0.0), 0.1)
+    )
     world.reset(scene(disturbances=(nudge,)))
     robot, before = DirectRobot(world), world.body_pose('can')[0, 3]
     robot.drive(from_rpy((-0.2, 0.0, 0.0)))

@@ -1,4 +1,5 @@
 """A door that falls shut: from where it is left, unless that is past its stop."""
+
 import numpy as np
 import pytest
 

@@ -1,4 +1,5 @@
 """Damage in the real physics: what falls over, is dropped or pushed off is told, nothing else."""
+
 import pybullet
 import pytest
 from worlds import CAN, CARTON, GOAL, TABLE, Hand, scene
@@ -29,8 +30,11 @@ def number_of(world, name):
 
 def put(world, name, position, turn=(0.0, 0.0, 0.0)):
     pybullet.resetBasePositionAndOrientation(
-        number_of(world, name), position, pybullet.getQuaternionFromEuler(turn),
-        physicsClientId=world.client)
+        number_of(world, name),
+        position,
+        pybullet.getQuaternionFromEuler(turn),
+        physicsClientId=world.client,
+    )
 
 
 def topple(world, name):
@@ -105,6 +109,7 @@ def test_to_look_changes_nothing(world):
             world.harm.tick = lambda _: None
         topple(world, 'carton')
         return world.body_pose('carton').tobytes()
+
     assert course(True) == course(False)
 
 
@@ -127,5 +132,9 @@ def test_what_stood_at_the_goal_before_is_no_wrong_object(world):
 
 def test_a_truth_line_counts_and_names_what_came_to_harm():
     found = (Harm(KNOCKED_OVER, 'a'), Harm(DROPPED, 'b'), Harm(KNOCKED_OVER, 'c'))
-    assert harm_record(found) == {'count': 3, 'knocked_over': ['a', 'c'], 'dropped': ['b'],
-                                  'pushed_off': []}
+    assert harm_record(found) == {
+        'count': 3,
+        'knocked_over': ['a', 'c'],
+        'dropped': ['b'],
+        'pushed_off': [],
+    }

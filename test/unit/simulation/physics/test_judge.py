@@ -1,4 +1,5 @@
 """The judge: he knows success from what only looks like it."""
+
 import re
 
 import pybullet
@@ -31,12 +32,15 @@ def test_what_stands_at_its_goal_is_a_success(world):
     assert found.success and found.why.startswith('can stands at its goal')
 
 
-@pytest.mark.parametrize('can, why', [
-    (CAN._replace(position=(0.80, -0.20, 0.78)), '10.0 cm from the goal'),
-    (CAN._replace(position=(0.70, -0.20, 0.755), roll=1.5708), 'does not stand upright'),
-    (CAN._replace(position=(0.70, -0.20, 2.3)), 'is not at rest.*too high.*stands on nothing'),
-    (CAN._replace(position=(0.70, -1.20, 0.06)), '72 cm too low'),
-])
+@pytest.mark.parametrize(
+    'can, why',
+    [
+        (CAN._replace(position=(0.80, -0.20, 0.78)), '10.0 cm from the goal'),
+        (CAN._replace(position=(0.70, -0.20, 0.755), roll=1.5708), 'does not stand upright'),
+        (CAN._replace(position=(0.70, -0.20, 2.3)), 'is not at rest.*too high.*stands on nothing'),
+        (CAN._replace(position=(0.70, -1.20, 0.06)), '72 cm too low'),
+    ],
+)
 def test_what_is_no_success_has_its_reason(world, can, why):
     found = verdict(world, TABLE, can)
     assert not found.success
@@ -49,8 +53,9 @@ def test_any_body_that_was_carried_will_do_where_the_goal_names_none(world):
     world.reset(scene(TABLE, elsewhere, goal=goal))
     assert not judge(world, goal).success
     number = next(index for index in range(20) if world.seen_as(index) == 'can')
-    pybullet.resetBasePositionAndOrientation(number, CAN.position, (0.0, 0.0, 0.0, 1.0),
-                                             physicsClientId=world.client)
+    pybullet.resetBasePositionAndOrientation(
+        number, CAN.position, (0.0, 0.0, 0.0, 1.0), physicsClientId=world.client
+    )
     world.step(60)
     assert judge(world, goal).success
     assert not verdict(world, TABLE, goal=goal).success

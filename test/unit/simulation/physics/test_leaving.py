@@ -1,4 +1,5 @@
 """How a trial leaves a lab: what stays, and what a person puts back or sets right."""
+
 import numpy as np
 import pybullet
 import pytest
@@ -19,8 +20,9 @@ def world():
 def put(world, name, position, roll=0.0):
     """Put a body somewhere, and let it come to rest."""
     turn = pybullet.getQuaternionFromEuler([roll, 0.0, 0.0])
-    pybullet.resetBasePositionAndOrientation(world._find(name).number, position, turn,
-                                             physicsClientId=world.client)
+    pybullet.resetBasePositionAndOrientation(
+        world._find(name).number, position, turn, physicsClientId=world.client
+    )
     world.step(60)
 
 

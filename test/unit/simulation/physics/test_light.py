@@ -1,4 +1,5 @@
 """Light that spoils the camera's images: for a time, and in a place."""
+
 import numpy as np
 import pytest
 from worlds import CAN, scene
@@ -34,16 +35,24 @@ def glare(world, **more):
     """One that hides the can from where the head looks at the table; it begins after an image."""
     looking(world)
     camera = world.link_pose(CAMERA_FRAME)
-    values = dict(dazzling(camera[:3, 3], camera[:3, 3] + camera[:3, 2], np.array(CAN.position),
-                           np.random.default_rng(1)), radius=0.15, duration=30.0, **more)
+    values = dict(
+        dazzling(
+            camera[:3, 3],
+            camera[:3, 3] + camera[:3, 2],
+            np.array(CAN.position),
+            np.random.default_rng(1),
+        ),
+        radius=0.15,
+        duration=30.0,
+        **more,
+    )
     return Disturbance('glare', 'see', tuple(values.items()))
 
 
 def at_can(world, image):
     """Colour and depth about the middle of the can, (n, 3) and (n,)."""
     camera_from_world = inverse(world.link_pose(CAMERA_FRAME))
-    column, row, _ = pixels_of(np.array([CAN.position]), INTRINSICS,
-                               inverse(camera_from_world))[0]
+    column, row, _ = pixels_of(np.array([CAN.position]), INTRINSICS, inverse(camera_from_world))[0]
     rows, columns = (slice(int(each) - 8, int(each) + 9) for each in (row, column))
     return image.colour[rows, columns].reshape(-1, 3), image.depth[rows, columns].ravel()
 
@@ -91,6 +100,7 @@ def test_a_shadow_passes_by_itself_and_a_cloud_stays(world):
         found = [robot.see().colour.mean() for _ in range(2)]
         pass_time(world, 5 * 60)
         return found + [robot.see().colour.mean()]
+
     lit, dark, after = light(4.0)
     assert dark < 0.4 * lit and after > 0.9 * lit
     lit, dark, after = light(300.0)

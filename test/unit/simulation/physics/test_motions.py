@@ -1,4 +1,5 @@
 """What the controllers do: arrive, stall, or stop and say why."""
+
 import math
 
 import numpy as np
@@ -39,8 +40,9 @@ def arm(world):
 
 def test_a_trajectory_is_followed_through_its_points(world, robot):
     start = arm(world)
-    points = start + np.array([[0.3, 0.2, 0.1, 0.4, -0.5, -0.3, 0.5],
-                               [0.1, 0.4, 0.3, 0.2, -0.2, -0.1, 1.0]])
+    points = start + np.array(
+        [[0.3, 0.2, 0.1, 0.4, -0.5, -0.3, 0.5], [0.1, 0.4, 0.3, 0.2, -0.2, -0.1, 1.0]]
+    )
     motion, seen, begun = Trajectory(RIGHT, points, np.array([1.0, 2.0])), [], world.time
     while motion.tick(world) is None:
         world.step()
@@ -55,13 +57,15 @@ def test_a_trajectory_is_followed_through_its_points(world, robot):
 
 def test_velocities_make_it_smooth(world, robot):
     start, way = arm(world), 0.6
-    motion, seen = Trajectory([RIGHT[0]], np.array([[start[0] + way]]), np.array([2.0]),
-                              np.array([[0.0]])), []
+    motion, seen = (
+        Trajectory([RIGHT[0]], np.array([[start[0] + way]]), np.array([2.0]), np.array([[0.0]])),
+        [],
+    )
     while motion.tick(world) is None:
         world.step()
         seen.append(arm(world)[0] - start[0])
     share = np.arange(1, 121) / 120
-    assert np.abs(np.array(seen[:120]) - way * share ** 2 * (3 - 2 * share)).max() < 5e-3
+    assert np.abs(np.array(seen[:120]) - way * share**2 * (3 - 2 * share)).max() < 5e-3
 
 
 def test_a_continuous_joint_goes_the_short_way(world, robot):
@@ -76,20 +80,29 @@ def test_a_first_point_at_time_zero_is_where_it_is(world, robot):
     assert np.abs(arm(world) - start - 0.1).max() < 5e-3
 
 
-@pytest.mark.parametrize('joints, positions, times, text', [
-    ([], [[]], [1.0], 'at least one'),
-    ([RIGHT[0], RIGHT[0]], [[-1.0, -1.0]], [1.0], 'none twice'),
-    ([RIGHT[0]], [[-1.0, 0.0]], [1.0], 'do not fit to 1 joints'),
-    ([RIGHT[0]], [[-1.0], [-1.1]], [1.0, 1.0], 'not increasing'),
-    ([RIGHT[0]], [[math.nan]], [1.0], 'not finite'),
-    (['r_elbow_joint'], [[0.0]], [1.0], "no controller for joint 'r_elbow_joint'"),
-    (['r_gripper_l_finger_joint'], [[0.0]], [1.0], 'no controller'),
-    (['base_x'], [[0.0]], [1.0], 'no controller'),
-    ([RIGHT[3]], [[0.5]], [9.0], 'r_elbow_flex_joint cannot be at 0.5; allowed: -2.321 to 0'),
-    ([RIGHT[3]], [[-0.1]], [0.1], 'r_elbow_flex_joint would go 1.4 in 0.1 s; its limit is 3.3/s'),
-])
-def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, positions, times,
-                                                         text):
+@pytest.mark.parametrize(
+    'joints, positions, times, text',
+    [
+        ([], [[]], [1.0], 'at least one'),
+        ([RIGHT[0], RIGHT[0]], [[-1.0, -1.0]], [1.0], 'none twice'),
+        ([RIGHT[0]], [[-1.0, 0.0]], [1.0], 'do not fit to 1 joints'),
+        ([RIGHT[0]], [[-1.0], [-1.1]], [1.0, 1.0], 'not increasing'),
+        ([RIGHT[0]], [[math.nan]], [1.0], 'not finite'),
+        (['r_elbow_joint'], [[0.0]], [1.0], "no controller for joint 'r_elbow_joint'"),
+        (['r_gripper_l_finger_joint'], [[0.0]], [1.0], 'no controller'),
+        (['base_x'], [[0.0]], [1.0], 'no controller'),
+        ([RIGHT[3]], [[0.5]], [9.0], 'r_elbow_flex_joint cannot be at 0.5; allowed: -2.321 to 0'),
+        (
+            [RIGHT[3]],
+            [[-0.1]],
+            [0.1],
+            'r_elbow_flex_joint would go 1.4 in 0.1 s; its limit is 3.3/s',
+        ),
+    ],
+)
+def test_a_trajectory_that_cannot_be_followed_is_refused(
+    robot, world, joints, positions, times, text
+):
     before, time = arm(world), world.time
     with pytest.raises(RobotError, match=text):
         robot.follow(joints, np.array(positions), np.array(times))
@@ -97,8 +110,9 @@ def test_a_trajectory_that_cannot_be_followed_is_refused(robot, world, joints, p
 
 
 def test_a_trajectory_that_would_pass_a_point_too_fast_is_refused(world, robot):
-    motion = Trajectory(RIGHT[:1], np.array([[-1.0], [-1.1]]), np.array([2.0, 4.0]),
-                        np.array([[1e300], [0.0]]))
+    motion = Trajectory(
+        RIGHT[:1], np.array([[-1.0], [-1.1]]), np.array([2.0, 4.0]), np.array([[1e300], [0.0]])
+    )
     assert 'r_shoulder_pan_joint would pass a point at 1e+300/s' in motion.refusal(world)
 
 
@@ -109,8 +123,8 @@ def test_an_arm_that_meets_a_wall_stops_and_says_so(world):
     robot, into = DirectRobot(world), arm(world)
     into[0] = -1.6
     with pytest.raises(
-            RobotError,
-            match=r'r_\w+ is \d.\d\d off its path after \d.\d s: something is in its way'):
+        RobotError, match=r'r_\w+ is \d.\d\d off its path after \d.\d s: something is in its way'
+    ):
         robot.follow(RIGHT, into[None], np.array([3.0]))
     assert 'robot' in {contact.other for contact in world.contacts('wall')}
     assert arm(world)[0] > -1.3
@@ -140,8 +154,9 @@ def test_a_hand_that_closes_again_does_not_loosen_what_it_holds(world):
     tool = world.tool_pose('right')
     aside = CAN._replace(position=tuple((tool @ [0.0, 0.002, 0.0, 1.0])[:3]), mass=0.0)
     world.reset(scene(aside, robot=AHEAD))
-    assert DirectRobot(world).gripper('right', 0.0,
-                                      15.0).stalled and world.holding('can') == 'right'
+    assert (
+        DirectRobot(world).gripper('right', 0.0, 15.0).stalled and world.holding('can') == 'right'
+    )
     again, forces = GripperMotion('right', 0.0, 15.0), []
     while again.tick(world) is None:
         world.step()
@@ -157,9 +172,15 @@ def test_a_gripper_that_does_not_come_to_rest_ends_all_the_same(world, robot, mo
     assert state.stalled and not state.reached and world.time - begun < 10.1
 
 
-@pytest.mark.parametrize('arguments, text', [
-    (('middle', 0.0), "'middle'; allowed: left, right"), (('left', -0.01), 'allowed: 0 to 0.09 m'),
-    (('left', math.nan), 'nan m'), (('left', 0.0, 0.0), '0.0 N')])
+@pytest.mark.parametrize(
+    'arguments, text',
+    [
+        (('middle', 0.0), "'middle'; allowed: left, right"),
+        (('left', -0.01), 'allowed: 0 to 0.09 m'),
+        (('left', math.nan), 'nan m'),
+        (('left', 0.0, 0.0), '0.0 N'),
+    ],
+)
 def test_a_gripper_refuses_what_cannot_be(robot, arguments, text):
     with pytest.raises(RobotError, match=text):
         robot.gripper(*arguments)
@@ -184,8 +205,14 @@ def test_the_camera_looks_at_the_point(world, robot, point):
     assert depth > 0 and abs(column - INTRINSICS[0, 2]) < 3 and abs(row - INTRINSICS[1, 2]) < 3
 
 
-@pytest.mark.parametrize('point, text', [((1.0, 0.0, 4.0), 'head_tilt_joint cannot be at'),
-                                         ((0.5, math.nan, 1.0), 'finite'), ((0.5, 1.0), 'three')])
+@pytest.mark.parametrize(
+    'point, text',
+    [
+        ((1.0, 0.0, 4.0), 'head_tilt_joint cannot be at'),
+        ((0.5, math.nan, 1.0), 'finite'),
+        ((0.5, 1.0), 'three'),
+    ],
+)
 def test_the_head_refuses_where_it_cannot_look(robot, point, text):
     with pytest.raises(RobotError, match=text):
         robot.look_at(point)

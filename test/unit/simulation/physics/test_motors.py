@@ -1,4 +1,5 @@
 """The robot's motors: as strong as a PR2's, and with arms to carry that springs balance."""
+
 import numpy as np
 import pybullet
 import pytest
@@ -25,9 +26,14 @@ def pushed(world, link, force, periods):
     for _ in range(periods):
         for _ in range(SUBSTEPS):
             where = world.link_pose(link)[:3, 3]
-            pybullet.applyExternalForce(world.robot.index, world.robot.links[link], force,
-                                        where.tolist(), pybullet.WORLD_FRAME,
-                                        physicsClientId=world.client)
+            pybullet.applyExternalForce(
+                world.robot.index,
+                world.robot.links[link],
+                force,
+                where.tolist(),
+                pybullet.WORLD_FRAME,
+                physicsClientId=world.client,
+            )
             pybullet.stepSimulation(physicsClientId=world.client)
     return float(np.linalg.norm(world.link_pose(link)[:3, 3] - before))
 

@@ -1,4 +1,5 @@
 """Time that passes in a world which nobody commands."""
+
 import pytest
 
 from smach_oracle.simulation.physics.passing import pass_time, stands_still
@@ -14,9 +15,18 @@ def make():
 
     def build(*disturbances, position=CAN.position):
         worlds.append(
-            World(Scene('none', 1, (CAN._replace(position=position),), Goal('stands_at', ''),
-                        disturbances=disturbances)))
+            World(
+                Scene(
+                    'none',
+                    1,
+                    (CAN._replace(position=position),),
+                    Goal('stands_at', ''),
+                    disturbances=disturbances,
+                )
+            )
+        )
         return worlds[-1]
+
     yield build
     for world in worlds:
         world.close()
@@ -29,6 +39,7 @@ def counted(world):
     def stepped(count=1):
         steps.append(count)
         step(count)
+
     world.step = stepped
     return steps
 
@@ -82,5 +93,6 @@ def test_no_leap_while_the_robot_is_moved(make):
     def tick():
         left[0] -= 1
         world.step()
+
     pass_time(world, 6000, tick, moving=lambda: left[0] > 0)
     assert len(steps) in range(100, 110)

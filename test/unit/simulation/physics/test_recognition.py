@@ -1,4 +1,5 @@
 """What a person recognises in an image: what is visible there, by outlines that err, no more."""
+
 import numpy as np
 import pytest
 from worlds import CAN, CARTON, TABLE, scene
@@ -80,8 +81,9 @@ def test_the_same_image_is_outlined_the_same_and_another_one_otherwise(world):
 def test_an_outline_errs_by_a_few_pixels():
     shown = np.zeros((480, 640), bool)
     shown[200:300, 300:360] = True
-    errors = [(drawn(shown, np.random.default_rng(seed)) ^ shown).sum() / 320
-              for seed in range(10)]  # by the length of the edge
+    errors = [
+        (drawn(shown, np.random.default_rng(seed)) ^ shown).sum() / 320 for seed in range(10)
+    ]  # by the length of the edge
     assert 0.7 < np.mean(errors) < 4.0, 'pixels'
 
 

@@ -1,4 +1,5 @@
 """What the robot believes of itself, and is not quite so: encoders, camera, localisation."""
+
 import numpy as np
 import pytest
 from worlds import empty, scene
@@ -30,7 +31,8 @@ def test_an_arm_goes_by_its_encoders_and_its_hand_ends_elsewhere(world):
         robot.follow(ARM_JOINTS['right'], goal, np.array([4.0]))
         world.step(30)
         assert [robot.joints()[name] for name in ARM_JOINTS['right']] == pytest.approx(
-            goal[0], abs=2e-3)
+            goal[0], abs=2e-3
+        )
         ends.append(world.tool_pose('right')[:3, 3])
     # about half a metre from the shoulder's axis
     assert 0.003 < np.linalg.norm(ends[1] - ends[0]) < 0.009
@@ -72,11 +74,15 @@ def test_a_wrong_localisation_stays_over_drives_until_it_is_put_right(world):
     assert apply(world.true_base(), np.zeros(3)) == pytest.approx([0.0, 0.3, 0.0], abs=3e-3)
 
 
-@pytest.mark.parametrize('start, text', [
-    (RobotStart(encoder_errors=(('r_wing_joint', 0.1),)), "no joint 'r_wing_joint'"),
-    (RobotStart(encoder_errors=((PAN, float('nan')),)), 'robot.encoder_errors is'),
-    (RobotStart(localisation_error=(float('inf'), 0.0, 0.0)), 'robot.localisation_error is'),
-    (RobotStart(camera_error=(0.0,) * 5 + (float('nan'),)), 'robot.camera_error is')])
+@pytest.mark.parametrize(
+    'start, text',
+    [
+        (RobotStart(encoder_errors=(('r_wing_joint', 0.1),)), "no joint 'r_wing_joint'"),
+        (RobotStart(encoder_errors=((PAN, float('nan')),)), 'robot.encoder_errors is'),
+        (RobotStart(localisation_error=(float('inf'), 0.0, 0.0)), 'robot.localisation_error is'),
+        (RobotStart(camera_error=(0.0,) * 5 + (float('nan'),)), 'robot.camera_error is'),
+    ],
+)
 def test_errors_that_cannot_be_are_refused(world, start, text):
     with pytest.raises(SceneBuildError, match=text):
         world.reset(empty(robot=start))

@@ -1,6 +1,7 @@
 """The world: it repeats to the bit, stands still, holds what is held, and refuses nonsense by
 name.
 """
+
 import math
 
 import numpy as np
@@ -30,8 +31,12 @@ def state(world):
 
 def eventful(world):
     """A bit of everything; the states on the way."""
-    world.reset(scene(robot=RobotStart(drive_error=(0.02, 0.02, 0.01)),
-                      disturbances=(Disturbance('nudge:carton', 'look_at', (('dx', 0.03),)),)))
+    world.reset(
+        scene(
+            robot=RobotStart(drive_error=(0.02, 0.02, 0.01)),
+            disturbances=(Disturbance('nudge:carton', 'look_at', (('dx', 0.03),)),),
+        )
+    )
     robot = DirectRobot(world)
     robot.look_at((0.7, 0.0, 0.75))
     states = [state(world)]
@@ -70,8 +75,12 @@ def test_things_stand_still_from_the_start(world):
 
 def test_the_robot_stands_as_the_scene_says_and_holds_itself(world):
     world.reset(
-        empty(robot=RobotStart((('torso_lift_joint', 0.1),
-                                ('r_elbow_flex_joint', -1.0)), (1.0, -0.5, 0.3))))
+        empty(
+            robot=RobotStart(
+                (('torso_lift_joint', 0.1), ('r_elbow_flex_joint', -1.0)), (1.0, -0.5, 0.3)
+            )
+        )
+    )
     world.step(60)
     assert world.joints()['torso_lift_joint'] == pytest.approx(0.1, abs=1e-3)
     assert world.joints()['r_elbow_flex_joint'] == pytest.approx(-1.0, abs=2e-3)
@@ -109,8 +118,9 @@ def test_each_drive_errs_anew_and_the_same_way_for_the_same_trial(world):
             assert np.abs(world.odom_from_base() - goal).max() < 5e-3  # it believes to be there
             misses.append(world.true_base()[:2, 3] - goal[:2, 3])
     assert np.array_equal(misses[:2], misses[2:])
-    assert 0.005 < np.linalg.norm(misses[0]) < 0.25 and np.linalg.norm(misses[1] -
-                                                                       misses[0]) > 0.005
+    assert (
+        0.005 < np.linalg.norm(misses[0]) < 0.25 and np.linalg.norm(misses[1] - misses[0]) > 0.005
+    )
 
 
 def test_a_short_drive_keeps_most_of_the_error_that_there_was(world):
@@ -120,8 +130,11 @@ def test_a_short_drive_keeps_most_of_the_error_that_there_was(world):
     before = world.belief_error.copy()
     robot.drive(from_rpy((0.98, 0, 0)))
     after = world.belief_error
-    assert 0.0 < np.linalg.norm(
-        after[:2, 3] - before[:2, 3]) < 0.04 * 3 * 0.05 + 0.04 * np.linalg.norm(before[:2, 3])
+    assert (
+        0.0
+        < np.linalg.norm(after[:2, 3] - before[:2, 3])
+        < 0.04 * 3 * 0.05 + 0.04 * np.linalg.norm(before[:2, 3])
+    )
     assert np.linalg.norm(before[:2, 3]) > 0.01
 
 
@@ -133,40 +146,68 @@ def test_clients_are_given_back(world):
     assert len(numbers) <= 2
 
 
-@pytest.mark.parametrize('wrong, text', [
-    (scene(TABLE, TABLE), "'table'.*taken"),
-    (scene(TABLE._replace(name='robot')), "'robot'"),
-    (scene(CAN._replace(shape='sphere')),
-     "'can': shape is 'sphere'; allowed: bottle, box, cup, cylinder, round, urdf"),
-    (scene(CAN._replace(size=(0.03, 0.03, 0.0))), "'can': size"),
-    (scene(CAN._replace(mass=math.nan)), "'can': mass nan"),
-    (scene(CAN._replace(position=(0.0, math.inf, 0.0))), "'can': position"),
-    (scene(CAN._replace(shape='urdf', urdf='<robot')), "'can': its urdf cannot be read"),
-    (scene(
-        CAN._replace(shape='urdf', urdf='<robot name="a"><link name="b"/></robot>',
-                     joints=(('hinge', 0.0),))), "'can': no joint 'hinge'"),
-    (scene(CAN._replace(shape='urdf',
-                        joints=(('hinge', math.nan),))), "'can': joint 'hinge' is given nan"),
-    (scene()._replace(goal=scene().goal._replace(body='cup')), "'cup'.*can, carton"),
-    (scene(camera=CameraQuality(dropout=1.5)), 'dropout'),
-    (scene(robot=RobotStart((('r_elbow_joint', 0.0),))), "no joint 'r_elbow_joint'"),
-    (scene(robot=RobotStart((('r_elbow_flex_joint', 1.0),))),
-     'r_elbow_flex_joint .* at 1; allowed: -2.321 to 0'),
-    (scene(disturbances=(Disturbance('earthquake', 'see'),)),
-     "'earthquake': unknown kind; allowed: arm, dim"),
-    (scene(disturbances=(Disturbance('dim', 'lunch'),)),
-     "'dim': unknown event 'lunch'; allowed: start, follow"),
-    (scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, math.inf), 1.0)),)),
-     'near is .*allowed: a place of finite m'),
-    (scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, 0.0), 0.0)),)),
-     'within more than 0 m'),
-    (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
-    (scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
-     "no joint 'l_elbow_joint'"),
-    (scene(disturbances=(Disturbance('arm', 'see', (('torso_lift_joint', 0.1),)),)),
-     'joints of arms .*allowed: those of one'),
-    (scene(disturbances=(Disturbance('glare', 'see', (('radius', -1.0),)),)), 'radius is -1'),
-])
+@pytest.mark.parametrize(
+    'wrong, text',
+    [
+        (scene(TABLE, TABLE), "'table'.*taken"),
+        (scene(TABLE._replace(name='robot')), "'robot'"),
+        (
+            scene(CAN._replace(shape='sphere')),
+            "'can': shape is 'sphere'; allowed: bottle, box, cup, cylinder, round, urdf",
+        ),
+        (scene(CAN._replace(size=(0.03, 0.03, 0.0))), "'can': size"),
+        (scene(CAN._replace(mass=math.nan)), "'can': mass nan"),
+        (scene(CAN._replace(position=(0.0, math.inf, 0.0))), "'can': position"),
+        (scene(CAN._replace(shape='urdf', urdf='<robot')), "'can': its urdf cannot be read"),
+        (
+            scene(
+                CAN._replace(
+                    shape='urdf',
+                    urdf='<robot name="a"><link name="b"/></robot>',
+                    joints=(('hinge', 0.0),),
+                )
+            ),
+            "'can': no joint 'hinge'",
+        ),
+        (
+            scene(CAN._replace(shape='urdf', joints=(('hinge', math.nan),))),
+            "'can': joint 'hinge' is given nan",
+        ),
+        (scene()._replace(goal=scene().goal._replace(body='cup')), "'cup'.*can, carton"),
+        (scene(camera=CameraQuality(dropout=1.5)), 'dropout'),
+        (scene(robot=RobotStart((('r_elbow_joint', 0.0),))), "no joint 'r_elbow_joint'"),
+        (
+            scene(robot=RobotStart((('r_elbow_flex_joint', 1.0),))),
+            'r_elbow_flex_joint .* at 1; allowed: -2.321 to 0',
+        ),
+        (
+            scene(disturbances=(Disturbance('earthquake', 'see'),)),
+            "'earthquake': unknown kind; allowed: arm, dim",
+        ),
+        (
+            scene(disturbances=(Disturbance('dim', 'lunch'),)),
+            "'dim': unknown event 'lunch'; allowed: start, follow",
+        ),
+        (
+            scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, math.inf), 1.0)),)),
+            'near is .*allowed: a place of finite m',
+        ),
+        (
+            scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, 0.0), 0.0)),)),
+            'within more than 0 m',
+        ),
+        (scene(disturbances=(Disturbance('nudge:cup', 'see'),)), "no body 'cup'"),
+        (
+            scene(disturbances=(Disturbance('arm', 'see', (('l_elbow_joint', 0.0),)),)),
+            "no joint 'l_elbow_joint'",
+        ),
+        (
+            scene(disturbances=(Disturbance('arm', 'see', (('torso_lift_joint', 0.1),)),)),
+            'joints of arms .*allowed: those of one',
+        ),
+        (scene(disturbances=(Disturbance('glare', 'see', (('radius', -1.0),)),)), 'radius is -1'),
+    ],
+)
 def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wrong, text):
     world.reset(scene())
     with pytest.raises(SceneBuildError, match=text):
@@ -177,21 +218,18 @@ def test_a_scene_that_cannot_be_is_refused_by_name_and_the_world_stays(world, wr
 
 def test_unknown_names_and_values_are_refused_with_those_that_are_allowed(world):
     world.reset(scene())
-    for call, text in ((lambda: world.body_pose('cup'),
-                        "no body 'cup'.*can"), (lambda: world.body_joint('can', 'lid'),
-                                                "no joint 'lid' in 'can'"),
-                       (lambda: world.body_pose('can', 'lid'),
-                        "no link 'lid' in 'can'"), (lambda: world.link_pose('nose'),
-                                                    "no link 'nose'.*base_link"),
-                       (lambda: world.gap('middle'),
-                        "'middle'; allowed: left, right"), (lambda: world.set_target('nose', 0.0),
-                                                            "no joint 'nose'"),
-                       (lambda: world.set_target('r_elbow_flex_joint', math.nan),
-                        'cannot be at nan'),
-                       (lambda: world.set_target('r_elbow_flex_joint', -1.0, math.inf),
-                        'velocity is inf'), (lambda: world.set_gripper('left', math.nan, 5.0),
-                                             'gap nan'),
-                       (lambda: world.set_gripper('left', 0.0, -5.0), '-5.0 N')):
+    for call, text in (
+        (lambda: world.body_pose('cup'), "no body 'cup'.*can"),
+        (lambda: world.body_joint('can', 'lid'), "no joint 'lid' in 'can'"),
+        (lambda: world.body_pose('can', 'lid'), "no link 'lid' in 'can'"),
+        (lambda: world.link_pose('nose'), "no link 'nose'.*base_link"),
+        (lambda: world.gap('middle'), "'middle'; allowed: left, right"),
+        (lambda: world.set_target('nose', 0.0), "no joint 'nose'"),
+        (lambda: world.set_target('r_elbow_flex_joint', math.nan), 'cannot be at nan'),
+        (lambda: world.set_target('r_elbow_flex_joint', -1.0, math.inf), 'velocity is inf'),
+        (lambda: world.set_gripper('left', math.nan, 5.0), 'gap nan'),
+        (lambda: world.set_gripper('left', 0.0, -5.0), '-5.0 N'),
+    ):
         with pytest.raises(ValueError, match=text):
             call()
 

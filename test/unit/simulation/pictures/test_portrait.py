@@ -1,4 +1,5 @@
 """Pictures for people: the robot hides nothing that they are about, and they change nothing."""
+
 import math
 
 import numpy as np
@@ -33,21 +34,29 @@ def kitchen(base):
     """An open refrigerator, and the robot where it stands."""
     scene = draw(1, benign=True)
     fridge = scene.bodies[0]._replace(joints=((DOOR_JOINT, math.radians(100)),))
-    return scene._replace(bodies=(fridge,) + scene.bodies[1:],
-                          robot=scene.robot._replace(base=base))
+    return scene._replace(
+        bodies=(fridge,) + scene.bodies[1:], robot=scene.robot._replace(base=base)
+    )
 
 
 def pixels(world, base, viewpoint, name):
     """How many of them show a body."""
     world.reset(kitchen(base))
     bodies = rendered(world, SIZE, viewpoint).bodies
-    return sum(int((bodies == index).sum()) for index in np.unique(bodies[bodies >= 0])
-               if world.seen_as(int(index)) == name)
+    return sum(
+        int((bodies == index).sum())
+        for index in np.unique(bodies[bodies >= 0])
+        if world.seen_as(int(index)) == name
+    )
 
 
-@pytest.mark.parametrize('base, viewpoint, names', [
-    (HANDING_OVER, AT_PERSON, ['palm', 'person_head', 'person_chest']),
-    (AT_SHELF, AT_FRIDGE, ['palm', 'person_head', 'person_chest', ORDERED])])
+@pytest.mark.parametrize(
+    'base, viewpoint, names',
+    [
+        (HANDING_OVER, AT_PERSON, ['palm', 'person_head', 'person_chest']),
+        (AT_SHELF, AT_FRIDGE, ['palm', 'person_head', 'person_chest', ORDERED]),
+    ],
+)
 def test_the_robot_does_not_hide_the_person_nor_the_drink(world, base, viewpoint, names):
     for name in names:
         most = pixels(world, ASIDE, viewpoint, name)

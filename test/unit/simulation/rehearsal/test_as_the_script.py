@@ -1,4 +1,5 @@
 """A rehearsal tries as the script's states do, when one is tried again and when it starts over."""
+
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import Point, PointStamped, PoseStamped, Vector3
@@ -23,8 +24,11 @@ from smach_oracle.simulation.rehearsal.pick_and_place import PickAndPlaceRehears
 from smach_oracle.tasks import drink_retrieval, pick_and_place
 
 CUT_OFF = PointStamped(Header(frame_id='odom_combined'), Point(0.5, 0.4, 0.8))
-SEEN = {'objects': [PoseStamped()], 'sizes': [Vector3(0.06, 0.06, 0.12)],
-        'colours': [ColorRGBA(0.8, 0.1, 0.1, 1.0)]}
+SEEN = {
+    'objects': [PoseStamped()],
+    'sizes': [Vector3(0.06, 0.06, 0.12)],
+    'colours': [ColorRGBA(0.8, 0.1, 0.1, 1.0)],
+}
 
 
 class Answers:
@@ -81,17 +85,22 @@ def test_at_the_table_looks_and_picks_vary_as_the_scripts_do(world, userdata, be
             wanted = pick_and_place.detect_goal(userdata, DetectTabletopGoal())
             well = tried(trial.states[2][1])
             assert looks.goals[-1] == wanted
-            result = seen if well else DetectTabletopResult(
-                look_at=CUT_OFF if each is cut else PointStamped())
+            result = (
+                seen
+                if well
+                else DetectTabletopResult(look_at=CUT_OFF if each is cut else PointStamped())
+            )
             pick_and_place.detected(
-                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, result)
+                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, result
+            )
         trial.skills.pick = Answers(NotSeen('no'), PickResult(), PickResult(), NotSeen('no'))
         for _ in range(4):
             wanted = pick_and_place.pick_goal(userdata, PickGoal())
             well = tried(trial.states[4][1])
             assert trial.skills.pick.goals[-1] == wanted
             pick_and_place.picked(
-                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, PickResult())
+                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, PickResult()
+            )
     pose, place = trial_place(trial), pick_and_place.place_pose()
     assert pose == place
 
@@ -122,6 +131,7 @@ def test_in_the_kitchen_looks_places_and_picks_vary_as_the_scripts_do(world):
             well = tried(trial.states[4][1])
             assert looks.goals[-1] == wanted
             drink_retrieval.detected(
-                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, None)
+                userdata, GoalStatus.SUCCEEDED if well else GoalStatus.ABORTED, None
+            )
         for _ in range(3):
             assert trial.pick_goal() == drink_retrieval.pick_goal(userdata, PickGoal())

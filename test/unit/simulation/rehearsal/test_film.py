@@ -1,4 +1,5 @@
 """A video of the robot is a file that other programs can show."""
+
 import cv2
 import numpy as np
 import pytest
@@ -27,13 +28,17 @@ def test_wrong_arguments_are_named(argv, capsys):
 
 @pytest.mark.parametrize(
     'argv, words',
-    [(['robot'], 'robot: what kind of file? Its name may end in .png, .jpg, .jpeg'),
-     (['robot.gif'], 'robot.gif: what kind of file?'),
-     (['robot.png', '--video', 'robot'], 'robot: what kind of file? Its name may end in .mp4'),
-     (['nowhere/robot.png'], 'there is no folder'),
-     (['robot.png', '--video', 'nowhere/robot.mp4'], 'nowhere/robot.mp4: there is no folder')])
+    [
+        (['robot'], 'robot: what kind of file? Its name may end in .png, .jpg, .jpeg'),
+        (['robot.gif'], 'robot.gif: what kind of file?'),
+        (['robot.png', '--video', 'robot'], 'robot: what kind of file? Its name may end in .mp4'),
+        (['nowhere/robot.png'], 'there is no folder'),
+        (['robot.png', '--video', 'nowhere/robot.mp4'], 'nowhere/robot.mp4: there is no folder'),
+    ],
+)
 def test_a_file_that_cannot_be_written_is_told_before_anything_is_filmed(
-        argv, words, tmp_path, monkeypatch, capsys):
+    argv, words, tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(film, 'film', lambda *args: pytest.fail('filmed'))
     with pytest.raises(SystemExit) as caught:
@@ -42,9 +47,13 @@ def test_a_file_that_cannot_be_written_is_told_before_anything_is_filmed(
     assert words in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('failed, reason, words',
-                         [('', '', 'seed 5: nothing was held for 2 s'),
-                          ('PICK', 'out of reach', 'seed 5: PICK failed: out of reach')])
+@pytest.mark.parametrize(
+    'failed, reason, words',
+    [
+        ('', '', 'seed 5: nothing was held for 2 s'),
+        ('PICK', 'out of reach', 'seed 5: PICK failed: out of reach'),
+    ],
+)
 def test_why_there_is_no_picture_is_told(failed, reason, words, monkeypatch, tmp_path, capsys):
     class Empty:
         def __init__(self, *args):
@@ -52,10 +61,12 @@ def test_why_there_is_no_picture_is_told(failed, reason, words, monkeypatch, tmp
 
         def close(self):
             pass
+
     monkeypatch.setattr(film, 'FilmedWorld', Empty)
     monkeypatch.setattr(film, 'rehearse', lambda scene, world, steps: film_result(failed, reason))
-    monkeypatch.setitem(TASKS, 'pick_and_place',
-                        TASKS['pick_and_place']._replace(draw=lambda seed, benign: None))
+    monkeypatch.setitem(
+        TASKS, 'pick_and_place', TASKS['pick_and_place']._replace(draw=lambda seed, benign: None)
+    )
     assert main([str(tmp_path / 'robot.png'), '--seed', '5']) == 1
     assert words in capsys.readouterr().err
 

@@ -3,6 +3,7 @@
 The script's states run in the world, with the code behind the real robot's actions. When a cause
 came is read from the world's own log.
 """
+
 import numpy as np
 import pytest
 
@@ -26,8 +27,11 @@ def world():
 
 def scene_with(monkeypatch, seed, *kinds):
     """The scene of a seed with these causes, and no other."""
-    monkeypatch.setattr(kitchen_causes, 'drawn_kinds', lambda *_: iter(
-        [(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]))
+    monkeypatch.setattr(
+        kitchen_causes,
+        'drawn_kinds',
+        lambda *_: iter([(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]),
+    )
     return kitchen_scene.draw(seed)
 
 
@@ -65,8 +69,9 @@ def began(world, kind):
 
 @pytest.mark.parametrize('misplaced', [(), ('base_misplaced',)])
 @pytest.mark.parametrize('seed', SEEDS)
-def test_the_door_swings_back_when_the_robot_is_about_to_drive_in(monkeypatch, world, seed,
-                                                                  misplaced):
+def test_the_door_swings_back_when_the_robot_is_about_to_drive_in(
+    monkeypatch, world, seed, misplaced
+):
     scene = scene_with(monkeypatch, seed, 'door_swings_back', *misplaced)
     begins, _ = tried(world, scene, 'MOVE_IN')
     assert began(world, 'door_swings_back') == pytest.approx(begins['MOVE_IN'], abs=0.1)

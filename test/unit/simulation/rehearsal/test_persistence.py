@@ -1,4 +1,5 @@
 """How far plain tries get: retries, restarts, and whether the cause was still there by the log."""
+
 import pytest
 from worlds import CAN, CARTON, TABLE, scene
 
@@ -23,6 +24,7 @@ def world():
 
 def task_that(fails, calls, seconds=1.0):
     """A task of two states, the second of which fails when `fails` says so of its number."""
+
     class Task:
         def __init__(self, world):
             self.states = [('FIRST', lambda: self._do('FIRST')), ('SECOND', self._second)]
@@ -40,14 +42,19 @@ def task_that(fails, calls, seconds=1.0):
             self._tries += 1
             if fails(self._tries):
                 raise SkillError('no')
+
     return Task
 
 
 def shadow(seconds):
     """A scene with a shadow from its start on, for so long."""
-    return scene(TABLE, CAN, CARTON,
-                 disturbances=(Disturbance('dim', 'start', (('duration', seconds),), 'shadow'),),
-                 causes=(SceneCause('shadow', 'somebody'),))
+    return scene(
+        TABLE,
+        CAN,
+        CARTON,
+        disturbances=(Disturbance('dim', 'start', (('duration', seconds),), 'shadow'),),
+        causes=(SceneCause('shadow', 'somebody'),),
+    )
 
 
 def test_a_retry_comes_before_a_restart(world):
@@ -85,18 +92,28 @@ def test_scenes_have_the_one_cause_and_come_in_the_order_of_their_seeds():
     def draw(seed):
         kinds = ['shadow'] if seed % 3 == 0 else ['shadow', 'glare'] if seed % 3 == 1 else []
         return scene(seed=seed, causes=tuple(SceneCause(kind, '') for kind in kinds))
+
     assert [each.seed for each in scenes_of(draw, 'shadow', 3, range(100))] == [0, 3, 6]
 
 
-@pytest.mark.parametrize('ended, expected', [
-    ({'no failure': 9, 'failed': 1}, 'robust'), ({'retry': 9, 'restart': 1}, 'robust'),
-    ({'retry': 5, 'restart': 5}, 'mixed'), ({'restart': 9, 'retry': 1}, 'futile'),
-    ({'false success': 5, 'no failure': 5}, 'futile')
-])
+@pytest.mark.parametrize(
+    'ended, expected',
+    [
+        ({'no failure': 9, 'failed': 1}, 'robust'),
+        ({'retry': 9, 'restart': 1}, 'robust'),
+        ({'retry': 5, 'restart': 5}, 'mixed'),
+        ({'restart': 9, 'retry': 1}, 'futile'),
+        ({'false success': 5, 'no failure': 5}, 'futile'),
+    ],
+)
 def test_a_kind_is_labelled_by_what_plain_retries_do(ended, expected):
-    made = {'no failure': ('', '', True), 'retry': ('S', 'retry', True),
-            'restart': ('S', 'restart', True), 'failed': ('S', '', False),
-            'false success': ('', '', False)}
+    made = {
+        'no failure': ('', '', True),
+        'retry': ('S', 'retry', True),
+        'restart': ('S', 'restart', True),
+        'failed': ('S', '', False),
+        'false success': ('', '', False),
+    }
     courses = []
     for how, count in ended.items():
         failed, cured, success = made[how]

@@ -1,6 +1,7 @@
 """Whole tasks watched by physics: of all that stands around, the robot touches what it takes, and
 nothing else.
 """
+
 import numpy as np
 import pytest
 
@@ -24,15 +25,18 @@ class WatchedWorld(World):
         for _ in range(count):
             super().step(1)
             self.touched |= {
-                contact.other
-                for contact in self.contacts('robot') if contact.force > 0
+                contact.other for contact in self.contacts('robot') if contact.force > 0
             }
 
 
-@pytest.mark.parametrize('task, draw, seed, expected',
-                         [(PickAndPlaceRehearsal, tabletop_scene.draw, 4, {'object_0'}),
-                          (PickAndPlaceRehearsal, tabletop_scene.draw, 9, {'object_0'}),
-                          (DrinkRetrievalRehearsal, kitchen_scene.draw, 3, {'fridge', 'drink_0'})])
+@pytest.mark.parametrize(
+    'task, draw, seed, expected',
+    [
+        (PickAndPlaceRehearsal, tabletop_scene.draw, 4, {'object_0'}),
+        (PickAndPlaceRehearsal, tabletop_scene.draw, 9, {'object_0'}),
+        (DrinkRetrievalRehearsal, kitchen_scene.draw, 3, {'fridge', 'drink_0'}),
+    ],
+)
 def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expected):
     world = WatchedWorld()
     done = rehearse(draw(seed, benign=True), world, task)
@@ -50,6 +54,7 @@ def test_a_grasp_from_which_the_arm_cannot_lift_is_left_out(monkeypatch):
         if np.allclose(grasp, grasps[0]):
             return None
         return way_up(hand, start, grasp, heights)
+
     monkeypatch.setattr(pick, 'way_up', none_from_the_first)
     world = World(binning=2)
     done = rehearse(tabletop_scene.draw(4, benign=True), world)

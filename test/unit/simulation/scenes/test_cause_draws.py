@@ -1,4 +1,5 @@
 """Which causes trials have: how many, how many of them last, and each from draws of its own."""
+
 import collections
 
 import numpy as np
@@ -60,8 +61,12 @@ def test_a_kind_more_leaves_the_values_of_the_others_as_they_were():
     more = {LASTING: {'glare': 1.0, 'other': 0.2}, PASSING: {'reflex': 1.0}}
 
     def values(kinds):
-        return {(seed, kind): generator.random() for seed in range(300)
-                for kind, generator in drawn_kinds(seed, 5, 0.8, kinds, 0.5)}
+        return {
+            (seed, kind): generator.random()
+            for seed in range(300)
+            for kind, generator in drawn_kinds(seed, 5, 0.8, kinds, 0.5)
+        }
+
     first, second = values(few), values(more)
     both = set(first) & set(second)
     assert len(both) > 150 and all(first[each] == second[each] for each in both)

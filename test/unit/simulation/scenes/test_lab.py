@@ -1,4 +1,5 @@
 """A lab in which a robot goes on: what each trial finds, by the hour and by what was left."""
+
 import json
 
 import numpy as np
@@ -30,8 +31,9 @@ def left(scene, **more):
     """The lab as it is after a trial in which nothing but the thing of the task was moved."""
     began = begins_at(RUN, scene.seed, None)
     things = tuple(each for each in scene.bodies if each.mass > 0 and each.name != scene.goal.body)
-    return LabState(began, began + 0.02, tuple(each for each in things if each.shape != 'urdf'),
-                    **more)
+    return LabState(
+        began, began + 0.02, tuple(each for each in things if each.shape != 'urdf'), **more
+    )
 
 
 def carried(scene):
@@ -57,24 +59,38 @@ def test_what_stays_in_the_fridge_is_not_in_the_hands_way_to_the_next_drink():
     x, y, yaw = kitchen.place
     turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
     for seed in range(301, 409):
-        there = carried(lab_scene(TASKS[1], RUN, seed + 1, left(
-            lab_scene(TASKS[1], RUN, seed, None, benign=True)), benign=True))
-        places = {name: turn @ np.subtract(each.position[:2], (x, y))
-                  for name, each in there.items()}
+        there = carried(
+            lab_scene(
+                TASKS[1],
+                RUN,
+                seed + 1,
+                left(lab_scene(TASKS[1], RUN, seed, None, benign=True)),
+                benign=True,
+            )
+        )
+        places = {
+            name: turn @ np.subtract(each.position[:2], (x, y)) for name, each in there.items()
+        }
         ordered = places.pop(kitchen_scene.ORDERED)
-        assert not any(place[0] < ordered[0] - 1e-9 and abs(place[1] - ordered[1]) <
-                       kitchen_scene.HAND for place in places.values()), seed
+        assert not any(
+            place[0] < ordered[0] - 1e-9 and abs(place[1] - ordered[1]) < kitchen_scene.HAND
+            for place in places.values()
+        ), seed
 
 
 @pytest.mark.parametrize('task', TASKS)
 def test_once_an_hour_all_is_set_anew(task):
     state = left(lab_scene(task, RUN, 309, None, benign=True))
-    fresh = (tabletop_scene.fresh_things(310) if task == TASKS[0]
-             else kitchen_scene.fresh_drinks(310, true_kitchen(RUN.seed)))
+    fresh = (
+        tabletop_scene.fresh_things(310)
+        if task == TASKS[0]
+        else kitchen_scene.fresh_drinks(310, true_kitchen(RUN.seed))
+    )
     assert begins_at(RUN, 309, None) < 1.0 <= begins_at(RUN, 310, state)
     found = carried(lab_scene(task, RUN, 310, state, benign=True))
     assert {name: each.position[:2] for name, each in found.items()} == {
-        each.name: each.position[:2] for each in fresh}
+        each.name: each.position[:2] for each in fresh
+    }
 
 
 def test_where_there_are_too_few_things_the_table_is_set_anew():
@@ -85,24 +101,38 @@ def test_where_there_are_too_few_things_the_table_is_set_anew():
 
 def test_a_run_goes_on_from_what_was_written_as_from_what_was_kept():
     scene = lab_scene(TASKS[1], RUN, 301, None, benign=False)
-    state = left(scene, joints=(('torso_lift_joint', 0.2501),), base=(0.1, 1 / 3, 1.5),
-                 localisation=(0.01, 0.02, 0.003))
+    state = left(
+        scene,
+        joints=(('torso_lift_joint', 0.2501),),
+        base=(0.1, 1 / 3, 1.5),
+        localisation=(0.01, 0.02, 0.003),
+    )
     again = state_from(json.loads(json.dumps(state.as_data())))
     assert again == state
-    assert lab_scene(TASKS[1], RUN, 302, again, False) == lab_scene(TASKS[1], RUN, 302, state,
-                                                                    False)
+    assert lab_scene(TASKS[1], RUN, 302, again, False) == lab_scene(
+        TASKS[1], RUN, 302, state, False
+    )
 
 
 def test_the_robot_stands_as_it_was_left_or_was_set_right():
-    state = left(lab_scene(TASKS[1], RUN, 301, None, True), base=(0.1, 0.2, 1.5),
-                 joints=(('torso_lift_joint', 0.29),), localisation=(0.01, -0.02, 0.003))
+    state = left(
+        lab_scene(TASKS[1], RUN, 301, None, True),
+        base=(0.1, 0.2, 1.5),
+        joints=(('torso_lift_joint', 0.29),),
+        localisation=(0.01, -0.02, 0.003),
+    )
     robot = lab_scene(TASKS[1], RUN, 302, state, True).robot
     assert (robot.base, robot.localisation_error) == (state.base, state.localisation)
     assert dict(robot.joints)['torso_lift_joint'] == 0.29
     stowed = dict(kitchen_scene.posture())
     assert dict(robot.joints)['r_elbow_flex_joint'] == stowed['r_elbow_flex_joint']
-    robot = lab_scene(TASKS[1], RUN, 302, state._replace(joints=(), base=(0.0,) * 3,
-                                                         localisation=(0.0,) * 3), True).robot
+    robot = lab_scene(
+        TASKS[1],
+        RUN,
+        302,
+        state._replace(joints=(), base=(0.0,) * 3, localisation=(0.0,) * 3),
+        True,
+    ).robot
     assert robot.base == (0.0, 0.0, 0.0) and dict(robot.joints) == stowed
     assert robot.localisation_error != (0.0, 0.0, 0.0), 'a person is as wrong as any localisation'
 
@@ -144,8 +174,11 @@ def test_a_spell_goes_on_from_trial_to_trial_and_ends_with_the_day():
 
 
 def test_calibration_drifts_slowly_with_the_same_spread_at_every_hour():
-    steps = [drifting(seed, 'camera_error', hour + 0.1, 6) - drifting(seed, 'camera_error', hour, 6)
-             for seed in range(20) for hour in np.arange(0.0, 20.0, 0.7)]
+    steps = [
+        drifting(seed, 'camera_error', hour + 0.1, 6) - drifting(seed, 'camera_error', hour, 6)
+        for seed in range(20)
+        for hour in np.arange(0.0, 20.0, 0.7)
+    ]
     assert 0 < np.abs(steps).max() < 0.25
     for hour in (0.0, 2.0, 4.0, 17.3):
         drawn = np.array([drifting(seed, 'camera_error', hour, 6) for seed in range(400)])
@@ -165,8 +198,12 @@ def test_finger_tips_wear_in_the_course_of_a_run():
 @pytest.mark.parametrize('task', TASKS)
 def test_the_furniture_is_that_of_the_run(task):
     def fixed(scene):
-        return [each for each in scene.bodies if each.mass == 0 and each.name in (
-            'table', 'leg_0', 'fridge')]
+        return [
+            each
+            for each in scene.bodies
+            if each.mass == 0 and each.name in ('table', 'leg_0', 'fridge')
+        ]
+
     scenes = [lab_scene(task, RUN, seed, None, True) for seed in (300, 304)]
     assert fixed(scenes[0]) == fixed(scenes[1]) and all(map(fixed, scenes))
     assert fixed(lab_scene(task, LabRun(299, 0.1), 300, None, True)) != fixed(scenes[0])

@@ -1,4 +1,5 @@
 """The drink that is ordered: red, anywhere in a hand's reach, and not always the nearest."""
+
 import numpy as np
 
 from smach_oracle.simulation.scenes.kitchen_causes import KINDS_OF, TARGET
@@ -12,8 +13,11 @@ def drinks_of(scene):
     """The drinks on the shelf, x and y in the true fridge's frame, m."""
     x, y, yaw = true_kitchen(scene.seed).place
     turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-    return {body.name: turn @ (np.array(body.position[:2]) - (x, y))
-            for body in scene.bodies if body.name.startswith('drink_')}
+    return {
+        body.name: turn @ (np.array(body.position[:2]) - (x, y))
+        for body in scene.bodies
+        if body.name.startswith('drink_')
+    }
 
 
 def test_the_ordered_drink_is_the_red_one_and_often_not_the_nearest():

@@ -1,4 +1,5 @@
 """The scenes of the first use case: they repeat, can be built, and fail for several reasons."""
+
 import collections
 import itertools
 
@@ -80,8 +81,14 @@ def test_cups_and_bottles_stand_as_wide_and_high_as_they_should():
     table = Body('table', 'box', (0.7, 1.4, 0.04), (0.82, 0.0, 0.70))
     for shape in ('cup', 'bottle'):
         size = (0.08, 0.08, 0.20)
-        world = World(Scene('test', 1, (table, Body('thing', shape, size, (0.7, 0.0, 0.821),
-                                                    mass=0.3)), Goal('stands_at', '')))
+        world = World(
+            Scene(
+                'test',
+                1,
+                (table, Body('thing', shape, size, (0.7, 0.0, 0.821), mass=0.3)),
+                Goal('stands_at', ''),
+            )
+        )
         world.step(60)
         number = next(k for k in range(4) if world.seen_as(k) == 'thing')
         low, high = pybullet.getAABB(number, physicsClientId=world.client)

@@ -1,4 +1,5 @@
 """Each task that the world's parameter allows has scenes of its own."""
+
 import pytest
 
 from smach_oracle.simulation.node.settings import read_settings

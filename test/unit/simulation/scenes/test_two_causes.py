@@ -1,4 +1,5 @@
 """Two causes in one scene: none takes away what the other one needs."""
+
 import itertools
 import sys
 
@@ -10,8 +11,7 @@ from smach_oracle.simulation.scenes.scene import LOCALISATION
 from smach_oracle.simulation.scenes.tasks import TASKS, draw
 
 CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
-PAIRS = [(task, *pair) for task in TASKS
-         for pair in itertools.permutations(CAUSES[task].KINDS, 2)]
+PAIRS = [(task, *pair) for task in TASKS for pair in itertools.permutations(CAUSES[task].KINDS, 2)]
 TABLE, KITCHEN = TASKS
 SEEDS = range(8)
 NEAREST_AT_GOAL = 0.695  # m from the robot to the goal
@@ -19,8 +19,13 @@ NEAREST_AT_GOAL = 0.695  # m from the robot to the goal
 
 def given(monkeypatch, task, *kinds):
     """The scenes of some seeds that have just these kinds of causes, in this order."""
-    monkeypatch.setattr(CAUSES[task], 'drawn_kinds', lambda seed, *_: iter(
-        [(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]))
+    monkeypatch.setattr(
+        CAUSES[task],
+        'drawn_kinds',
+        lambda seed, *_: iter(
+            [(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]
+        ),
+    )
     return [draw(task, seed, False) for seed in SEEDS]
 
 
@@ -76,5 +81,7 @@ def test_no_drink_stands_in_another(monkeypatch):
 
 def least_gap(bodies, radius):
     """m between the outlines of the two that stand nearest to each other."""
-    return min(np.hypot(*np.subtract(one.position[:2], other.position[:2])) - radius(one)
-               - radius(other) for one, other in itertools.combinations(bodies, 2))
+    return min(
+        np.hypot(*np.subtract(one.position[:2], other.position[:2])) - radius(one) - radius(other)
+        for one, other in itertools.combinations(bodies, 2)
+    )

@@ -1,4 +1,5 @@
 """The worlds differ from the robot's map: by some centimetres, each trial by others."""
+
 import numpy as np
 
 from smach_oracle.pr2.kitchen import Kitchen
@@ -24,9 +25,11 @@ def spread(values):
 
 
 def test_the_fridge_the_palm_and_the_localisation_are_off_by_centimetres():
-    for values in ([true_kitchen(seed).place[:2] for seed in SEEDS],
-                   [true_palm(seed) for seed in SEEDS],
-                   [localisation_error(seed)[:2] for seed in SEEDS]):
+    for values in (
+        [true_kitchen(seed).place[:2] for seed in SEEDS],
+        [true_palm(seed) for seed in SEEDS],
+        [localisation_error(seed)[:2] for seed in SEEDS],
+    ):
         usual, most = spread(values)
         assert (usual > 0.006).all() and (usual < 0.03).all() and (most < 0.06).all()
     mean = np.mean([true_palm(seed) for seed in SEEDS], axis=0)

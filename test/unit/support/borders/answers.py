@@ -1,4 +1,5 @@
 """Border of the expert's port: answers with anything in them."""
+
 import threading
 from typing import Any, Callable, List, Optional
 from unittest import mock
@@ -16,12 +17,20 @@ from .border import TAKEN, Border, refused
 from .json_texts import json_texts
 from .values import plain, texts, words
 
-_given = st.one_of(plain, st.builds(
-    Answer, st.one_of(st.sampled_from(list(AnswerKind)), st.integers(0, 9), plain),
-    st.one_of(words('A', 'B'), plain), st.one_of(words('done', 'aborted'), plain),
-    st.one_of(texts, plain), st.one_of(st.none(), st.dictionaries(words('cups'), plain, max_size=2),
-                                       plain),
-    st.one_of(words('eva'), plain), texts, st.one_of(words('', 'task'), plain)))
+_given = st.one_of(
+    plain,
+    st.builds(
+        Answer,
+        st.one_of(st.sampled_from(list(AnswerKind)), st.integers(0, 9), plain),
+        st.one_of(words('A', 'B'), plain),
+        st.one_of(words('done', 'aborted'), plain),
+        st.one_of(texts, plain),
+        st.one_of(st.none(), st.dictionaries(words('cups'), plain, max_size=2), plain),
+        st.one_of(words('eva'), plain),
+        texts,
+        st.one_of(words('', 'task'), plain),
+    ),
+)
 
 
 class _Gives(Expert):
@@ -30,8 +39,9 @@ class _Gives(Expert):
     def __init__(self, given: Any) -> None:
         self.given: List[Any] = [given]
 
-    def ask(self, question: Question, cancelled: threading.Event, progress: Any
-            ) -> Optional[Answer]:
+    def ask(
+        self, question: Question, cancelled: threading.Event, progress: Any
+    ) -> Optional[Answer]:
         return self.given.pop() if self.given else Answer(AnswerKind.GIVE_UP, by='eva')
 
     def run_interface(self, *_: Any) -> Optional[Answer]:
@@ -47,13 +57,17 @@ def _take_answer(given: Any) -> str:
     said: List[str] = []
     made = smach.StateMachine(outcomes=['done', 'aborted'])
     with made:
-        smach.StateMachine.add('A', smach.CBState(
-            _fails_once(), outcomes=['done', 'aborted'], output_keys=['cups']), {'done': 'B'})
+        smach.StateMachine.add(
+            'A',
+            smach.CBState(_fails_once(), outcomes=['done', 'aborted'], output_keys=['cups']),
+            {'done': 'B'},
+        )
         smach.StateMachine.add('B', smach.CBState(lambda _: 'done', outcomes=['done']))
     expert = _Gives(given)
     with mock.patch.object(smach, 'logwarn', said.append):
-        machine = OracleContainer.wrap(made, name='task', expert=expert, settings={
-            'policy': 'always_ask'})
+        machine = OracleContainer.wrap(
+            made, name='task', expert=expert, settings={'policy': 'always_ask'}
+        )
         assert machine.execute() in ('done', 'aborted')
     assert not expert.given, 'it was asked'
     unfit = [text for text in said if 'does not fit' in text or 'port failed' in text]

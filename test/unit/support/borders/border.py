@@ -1,4 +1,5 @@
 """One border: what may come over it, and what takes that or refuses it."""
+
 import collections
 import contextlib
 import signal
@@ -42,9 +43,16 @@ def try_border(border: Border, examples: int, is_random: bool = False) -> Counte
     """
     ends: Counter[str] = collections.Counter()
 
-    @settings(max_examples=examples, deadline=None, derandomize=not is_random, database=None,
-              suppress_health_check=list(HealthCheck), print_blob=False, report_multiple_bugs=False,
-              phases=[Phase.explicit, Phase.generate, Phase.shrink])
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        derandomize=not is_random,
+        database=None,
+        suppress_health_check=list(HealthCheck),
+        print_blob=False,
+        report_multiple_bugs=False,
+        phases=[Phase.explicit, Phase.generate, Phase.shrink],
+    )
     @given(border.given)
     def each(drawn: Any) -> None:
         with in_time():
@@ -59,6 +67,7 @@ def try_border(border: Border, examples: int, is_random: bool = False) -> Counte
 @contextlib.contextmanager
 def in_time() -> Iterator[None]:
     """Raise Hangs in the main thread where the body does not end."""
+
     def on_alarm(*_: object) -> None:
         raise Hangs('not done within {:g} s'.format(LONGEST_S))
 

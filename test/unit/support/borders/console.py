@@ -1,4 +1,5 @@
 """Border of the console: the messages of its pages' sockets, and its cookies."""
+
 import asyncio
 import json
 from types import SimpleNamespace
@@ -23,21 +24,50 @@ from .values import mapping_of, numbers, plain, texts, words
 _axes = st.lists(st.floats(-1, 1), min_size=3, max_size=3)
 _points = st.lists(st.lists(st.floats(-9, 900), min_size=2, max_size=2), min_size=3, max_size=5)
 _ARGUMENTS: Dict[str, Any] = {
-    'question': words('q1'), 'kind': words('goto', 'supersede'), 'name': texts,
-    'container': texts, 'outputs': st.one_of(st.none(), st.lists(mapping_of({
-        'key': words('grasped'), 'value': plain, 'type': texts}, ['key', 'value']), max_size=2)),
-    'why': texts, 'seen': st.one_of(st.none(), numbers), 'held': st.booleans(),
-    'frame': words('tool', 'at_goal', 'fresh'), 'linear': _axes, 'angular': _axes,
-    'gripper': words('', 'open'), 'sent': st.floats(0, 1e6), 'xsrf': words('right'),
-    'expert': words('eva'), 'trial': words('t'), 'at': words('', 'trials'),
-    'stamp': words('1.000000000', '4294967296.000000000'), 'region': _points,
-    'strokes': st.lists(mapping_of({
-        'foreground': st.booleans(), 'width': st.floats(1, 9), 'points': _points},
-        ['foreground', 'width', 'points']), max_size=2),
-    'outcome': words('succeeded'), 'robot': words('/robot'), 'path': words('', 'task'),
-    'pattern': words('A'), 'remove': st.booleans(), 'arm': words('', 'left'),
-    'down': words('robot.db#1'), 'moment': st.integers(0, 9), 'label': words('A', 'KITCHEN/LOOK'),
-    'key': words('cups'), 'json': st.one_of(json_texts, texts)}
+    'question': words('q1'),
+    'kind': words('goto', 'supersede'),
+    'name': texts,
+    'container': texts,
+    'outputs': st.one_of(
+        st.none(),
+        st.lists(
+            mapping_of({'key': words('grasped'), 'value': plain, 'type': texts}, ['key', 'value']),
+            max_size=2,
+        ),
+    ),
+    'why': texts,
+    'seen': st.one_of(st.none(), numbers),
+    'held': st.booleans(),
+    'frame': words('tool', 'at_goal', 'fresh'),
+    'linear': _axes,
+    'angular': _axes,
+    'gripper': words('', 'open'),
+    'sent': st.floats(0, 1e6),
+    'xsrf': words('right'),
+    'expert': words('eva'),
+    'trial': words('t'),
+    'at': words('', 'trials'),
+    'stamp': words('1.000000000', '4294967296.000000000'),
+    'region': _points,
+    'strokes': st.lists(
+        mapping_of(
+            {'foreground': st.booleans(), 'width': st.floats(1, 9), 'points': _points},
+            ['foreground', 'width', 'points'],
+        ),
+        max_size=2,
+    ),
+    'outcome': words('succeeded'),
+    'robot': words('/robot'),
+    'path': words('', 'task'),
+    'pattern': words('A'),
+    'remove': st.booleans(),
+    'arm': words('', 'left'),
+    'down': words('robot.db#1'),
+    'moment': st.integers(0, 9),
+    'label': words('A', 'KITCHEN/LOOK'),
+    'key': words('cups'),
+    'json': st.one_of(json_texts, texts),
+}
 
 
 def _command(name: str) -> Any:
@@ -85,8 +115,9 @@ class Socket(page_socket.PageSocket):
         self.request = SimpleNamespace(remote_ip='127.0.0.1')
         carried = _Carried()
         with mock.patch.object(page_socket, 'ThreadPoolExecutor', mock.Mock()):
-            pages = page_socket.OpenPages(PageSections(), TrialLog(), carried, carried, _Hand(),
-                                          carried)
+            pages = page_socket.OpenPages(
+                PageSections(), TrialLog(), carried, carried, _Hand(), carried
+            )
         pages.workers = None  # of the loop
         self._prepare(pages)
         self.said: List[Any] = []
@@ -109,8 +140,7 @@ def _take(message: Any) -> str:
     async def hear() -> List[Any]:
         page = Socket()
         right = sessions.xsrf_token(page.session, 'secret')
-        await page.on_message(json.dumps({'id': 1, 'do': 'hello', 'xsrf': right,
-                                          'expert': 'eva'}))
+        await page.on_message(json.dumps({'id': 1, 'do': 'hello', 'xsrf': right, 'expert': 'eva'}))
         assert page.said.pop()['ok']
         await page.on_message(message)
         while page._tasks:
@@ -126,8 +156,10 @@ def _take(message: Any) -> str:
 def _take_sign_in(text: str) -> str:
     body = text.encode('utf-8', 'surrogatepass')
     tokens = AccessTokens('operator operator-token-of-sufficient-length', 'tokens')
-    handler = SimpleNamespace(request=SimpleNamespace(body=body), access=SimpleNamespace(
-        settings=SimpleNamespace(tokens=tokens)))
+    handler = SimpleNamespace(
+        request=SimpleNamespace(body=body),
+        access=SimpleNamespace(settings=SimpleNamespace(tokens=tokens)),
+    )
     handler._token = lambda: SessionHandler._token(handler)
     try:
         identity = SessionHandler._given(handler)
@@ -136,8 +168,9 @@ def _take_sign_in(text: str) -> str:
     return TAKEN if identity is not None else REFUSED
 
 
-_tokens = words('operator-token-of-sufficient-length').map(lambda token: json.dumps(
-    {'token': token}))
+_tokens = words('operator-token-of-sufficient-length').map(
+    lambda token: json.dumps({'token': token})
+)
 BORDERS = [
     Border('console socket', _messages, _take),
     Border('console sign-in', st.one_of(_tokens, json_texts), _take_sign_in),

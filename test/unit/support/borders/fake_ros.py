@@ -1,4 +1,5 @@
 """ROS without a master: what servers offer is kept, what they publish is made into bytes."""
+
 import contextlib
 import io
 import threading
@@ -45,8 +46,14 @@ class SilentPublisher:
 class FakeActionServer:
     """Takes goals by hand."""
 
-    def __init__(self, name: str, spec: type, on_goal: Callable[[Any], None],
-                 on_cancel: Callable[[Any], None], auto_start: bool) -> None:
+    def __init__(
+        self,
+        name: str,
+        spec: type,
+        on_goal: Callable[[Any], None],
+        on_cancel: Callable[[Any], None],
+        auto_start: bool,
+    ) -> None:
         self.name, self.spec, self.on_goal, self.on_cancel = name, spec, on_goal, on_cancel
         self.lock = threading.RLock()
         self.status_timer = None
@@ -138,15 +145,31 @@ def fake_ros() -> Iterator[Offered]:
         offered.actions.append(made)
         return made
 
-    quiet = {name: (lambda *said: None) for name in (
-        'logdebug', 'loginfo', 'logwarn', 'logerr', 'logwarn_throttle', 'logerr_throttle',
-        'on_shutdown')}
+    quiet = {
+        name: (lambda *said: None)
+        for name in (
+            'logdebug',
+            'loginfo',
+            'logwarn',
+            'logerr',
+            'logwarn_throttle',
+            'logerr_throttle',
+            'on_shutdown',
+        )
+    }
     with mock.patch.multiple(
-            rospy, Service=service, Subscriber=subscriber, Publisher=_Publisher,
-            resolve_name=lambda name: name, get_name=lambda: '/node',
-            is_shutdown=lambda: False, get_rostime=lambda: rospy.Time(7), **quiet), \
-            mock.patch.object(rospy.Time, 'now', lambda: rospy.Time(7)), \
-            mock.patch.object(actionlib, 'ActionServer', action), \
-            mock.patch.object(interface_goal, 'QuietActionServer', action), \
-            mock.patch.object(server, 'QuietActionServer', action):
+        rospy,
+        Service=service,
+        Subscriber=subscriber,
+        Publisher=_Publisher,
+        resolve_name=lambda name: name,
+        get_name=lambda: '/node',
+        is_shutdown=lambda: False,
+        get_rostime=lambda: rospy.Time(7),
+        **quiet,
+    ), mock.patch.object(rospy.Time, 'now', lambda: rospy.Time(7)), mock.patch.object(
+        actionlib, 'ActionServer', action
+    ), mock.patch.object(interface_goal, 'QuietActionServer', action), mock.patch.object(
+        server, 'QuietActionServer', action
+    ):
         yield offered

@@ -1,4 +1,5 @@
 """Borders of files: bags, rates, stores, and values that a store holds."""
+
 import contextlib
 import functools
 import io
@@ -61,6 +62,7 @@ def _quiet(*_: object) -> None:
 
 # -- bags
 
+
 @functools.lru_cache(None)
 def recorded() -> bytes:
     """A bag as the recorder writes it."""
@@ -68,7 +70,7 @@ def recorded() -> bytes:
         recorder = TrialRecorder(where, warn=_quiet, say=_quiet)
         play(recorder, 1)
         assert recorder.close(60.0)
-        bag, = os.listdir(where)
+        (bag,) = os.listdir(where)
         with open(os.path.join(where, bag), 'rb') as stream:
             return stream.read()
 
@@ -112,14 +114,42 @@ def _read(path: str) -> str:
     return TAKEN
 
 
-_event_fields = st.fixed_dictionaries({}, optional={
-    'kind': st.integers(0, 40), 'trial_id': texts, 'seq': st.integers(0, 2 ** 32 - 1),
-    'wall_time': st.floats(), 'path': texts, 'state': texts, 'outcome': texts, 'target': texts,
-    'failure_kind': st.integers(0, 255), 'failure_class': st.integers(0, 255),
-    'rate': st.floats(), 'query_id': texts, 'by': texts, 'text': texts, 'data': st.one_of(
-        mapping_of({'recovers': st.booleans(), 'experiment': texts, 'variant': texts, 'seed': plain,
-                    'settings': plain, 'last_seq': plain, 'to': plain, 'tried': plain,
-                    'initial': plain, 'policy': plain}), plain)})
+_event_fields = st.fixed_dictionaries(
+    {},
+    optional={
+        'kind': st.integers(0, 40),
+        'trial_id': texts,
+        'seq': st.integers(0, 2**32 - 1),
+        'wall_time': st.floats(),
+        'path': texts,
+        'state': texts,
+        'outcome': texts,
+        'target': texts,
+        'failure_kind': st.integers(0, 255),
+        'failure_class': st.integers(0, 255),
+        'rate': st.floats(),
+        'query_id': texts,
+        'by': texts,
+        'text': texts,
+        'data': st.one_of(
+            mapping_of(
+                {
+                    'recovers': st.booleans(),
+                    'experiment': texts,
+                    'variant': texts,
+                    'seed': plain,
+                    'settings': plain,
+                    'last_seq': plain,
+                    'to': plain,
+                    'tried': plain,
+                    'initial': plain,
+                    'policy': plain,
+                }
+            ),
+            plain,
+        ),
+    },
+)
 
 
 def _take_event(fields: Dict[str, Any]) -> str:
@@ -143,31 +173,51 @@ def _take_active(damage: Damage) -> str:
 
 # -- rates
 
-_estimators = mapping_of({
-    'estimator': words('window', 'exponential'), 'successes': st.integers(0, 9),
-    'failures': st.integers(0, 9), 'window': st.lists(st.sampled_from((0, 1)), max_size=5),
-    'rate': st.floats(0, 1)})
-_rates = mapping_of({
-    'format': st.just(rates_file.FORMAT), 'version': st.just(1), 'containers': st.dictionaries(
-        words('', 'KITCHEN'), st.dictionaries(words('A', 'LOOK'), _estimators, max_size=2),
-        max_size=2)}, ['format', 'version', 'containers'])
-_rates_texts = st.one_of(_rates.map(json.dumps).map(str.encode), json_texts.map(
-    lambda text: text.encode('utf-8', 'surrogatepass')), _rates.map(
-    lambda given: json.dumps(given).encode()).flatmap(damaged))
+_estimators = mapping_of(
+    {
+        'estimator': words('window', 'exponential'),
+        'successes': st.integers(0, 9),
+        'failures': st.integers(0, 9),
+        'window': st.lists(st.sampled_from((0, 1)), max_size=5),
+        'rate': st.floats(0, 1),
+    }
+)
+_rates = mapping_of(
+    {
+        'format': st.just(rates_file.FORMAT),
+        'version': st.just(1),
+        'containers': st.dictionaries(
+            words('', 'KITCHEN'),
+            st.dictionaries(words('A', 'LOOK'), _estimators, max_size=2),
+            max_size=2,
+        ),
+    },
+    ['format', 'version', 'containers'],
+)
+_rates_texts = st.one_of(
+    _rates.map(json.dumps).map(str.encode),
+    json_texts.map(lambda text: text.encode('utf-8', 'surrogatepass')),
+    _rates.map(lambda given: json.dumps(given).encode()).flatmap(damaged),
+)
 
 
 def machine(**settings: Any) -> Any:
     """A small wrapped machine."""
     inner = smach.StateMachine(outcomes=['done', 'aborted'])
     with inner:
-        smach.StateMachine.add('LOOK', smach.CBState(
-            lambda ud: 'done', outcomes=['done', 'aborted']))
+        smach.StateMachine.add(
+            'LOOK', smach.CBState(lambda ud: 'done', outcomes=['done', 'aborted'])
+        )
     made = smach.StateMachine(outcomes=['done', 'aborted'])
     made.userdata.cups = 1
     with made:
-        smach.StateMachine.add('A', smach.CBState(
-            _a, outcomes=['done', 'aborted'], input_keys=['cups'], output_keys=['cups']),
-            {'done': 'KITCHEN'})
+        smach.StateMachine.add(
+            'A',
+            smach.CBState(
+                _a, outcomes=['done', 'aborted'], input_keys=['cups'], output_keys=['cups']
+            ),
+            {'done': 'KITCHEN'},
+        )
         smach.StateMachine.add('KITCHEN', inner)
     return OracleContainer.wrap(made, name='task', settings=settings)
 
@@ -191,6 +241,7 @@ def _take_rates(data: bytes) -> str:
 
 
 # -- stores
+
 
 @functools.lru_cache(None)
 def stored() -> bytes:
@@ -226,8 +277,10 @@ def _take_store(damage: Damage) -> str:
 
 def _resumed(path: str) -> str:
     """Look at a store by oracle_state, and have a machine go on with it."""
-    ends = {_state_command([path] + words) for words in (
-        ['list'], ['show'], ['edit', 'cups=3'], ['goto', 'A'])}
+    ends = {
+        _state_command([path] + words)
+        for words in (['list'], ['show'], ['edit', 'cups=3'], ['goto', 'A'])
+    }
     said: List[str] = []
     with mock.patch.multiple(smach, logwarn=said.append, logerr=said.append), waiting_for_nobody():
         made = machine(checkpoint=path, checkpoint_synchronous='OFF', on_resume='recover')
@@ -247,25 +300,46 @@ def _state_command(arguments: List[str]) -> int:
     return code
 
 
-_facts = st.lists(st.tuples(
-    words('task', 'task/KITCHEN', ''), words(
-        'at', 'history', 'execution', 'asked', 'items', 'state:A', 'state:LOOK', 'visit:0:0',
-        'key:cups', 'out:cups', 'goal:g', 'counted', 'budget', 'tree', 'seq'),
-    st.one_of(json_texts, st.none()), st.one_of(st.none(), st.binary(max_size=20))), min_size=1,
-    max_size=4)
+_facts = st.lists(
+    st.tuples(
+        words('task', 'task/KITCHEN', ''),
+        words(
+            'at',
+            'history',
+            'execution',
+            'asked',
+            'items',
+            'state:A',
+            'state:LOOK',
+            'visit:0:0',
+            'key:cups',
+            'out:cups',
+            'goal:g',
+            'counted',
+            'budget',
+            'tree',
+            'seq',
+        ),
+        st.one_of(json_texts, st.none()),
+        st.one_of(st.none(), st.binary(max_size=20)),
+    ),
+    min_size=1,
+    max_size=4,
+)
 
 
 def _take_facts(facts: List[Any]) -> str:
     with folder() as where:
         path = written(os.path.join(where, 'robot.db'), stored())
         with contextlib.closing(sqlite3.connect(path)) as database:
-            last, = database.execute('SELECT max(number) FROM moments').fetchone()
+            (last,) = database.execute('SELECT max(number) FROM moments').fetchone()
             for of, name, text, whole in facts:
                 if text is not None and not _is_utf8(text):
                     text = None
                 database.execute('DELETE FROM facts WHERE path = ? AND name = ?', (of, name))
-                database.execute('INSERT INTO facts VALUES (?, ?, ?, ?, ?)',
-                                 (last, of, name, text, whole))
+                database.execute(
+                    'INSERT INTO facts VALUES (?, ?, ?, ?, ?)', (last, of, name, text, whole)
+                )
             database.commit()
         return _resumed(path)
 
@@ -277,13 +351,43 @@ def _is_utf8(text: str) -> bool:
         return False
 
 
-_tagged = st.recursive(st.one_of(plain, json_texts), lambda inner: st.one_of(
-    st.lists(inner, max_size=2), st.tuples(st.sampled_from((
-        '$tuple', '$float', '$map', '$bytes', '$bytearray', '$set', '$frozenset', '$complex',
-        '$ordered', '$part', '$enum', '$data', '$named', '$by', '$else')), st.one_of(
-            inner, st.lists(st.lists(inner, min_size=2, max_size=2), max_size=2), st.lists(
-                st.one_of(words('os:system', 'builtins:object', 'enum:Enum'), inner), min_size=2,
-                max_size=2))).map(lambda both: {both[0]: both[1]})), max_leaves=6)
+_tagged = st.recursive(
+    st.one_of(plain, json_texts),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=2),
+        st.tuples(
+            st.sampled_from(
+                (
+                    '$tuple',
+                    '$float',
+                    '$map',
+                    '$bytes',
+                    '$bytearray',
+                    '$set',
+                    '$frozenset',
+                    '$complex',
+                    '$ordered',
+                    '$part',
+                    '$enum',
+                    '$data',
+                    '$named',
+                    '$by',
+                    '$else',
+                )
+            ),
+            st.one_of(
+                inner,
+                st.lists(st.lists(inner, min_size=2, max_size=2), max_size=2),
+                st.lists(
+                    st.one_of(words('os:system', 'builtins:object', 'enum:Enum'), inner),
+                    min_size=2,
+                    max_size=2,
+                ),
+            ),
+        ).map(lambda both: {both[0]: both[1]}),
+    ),
+    max_leaves=6,
+)
 
 
 def _take_value(value: Any) -> str:
@@ -294,9 +398,16 @@ def _take_value(value: Any) -> str:
     return TAKEN
 
 
-_anything = st.one_of(plain, st.binary(max_size=300), st.sets(numbers, max_size=3), st.tuples(
-    plain, plain), st.complex_numbers(), st.dictionaries(st.one_of(numbers, st.tuples(
-        texts, texts)), plain, max_size=3), st.builds(object), st.text(min_size=200, max_size=400))
+_anything = st.one_of(
+    plain,
+    st.binary(max_size=300),
+    st.sets(numbers, max_size=3),
+    st.tuples(plain, plain),
+    st.complex_numbers(),
+    st.dictionaries(st.one_of(numbers, st.tuples(texts, texts)), plain, max_size=3),
+    st.builds(object),
+    st.text(min_size=200, max_size=400),
+)
 
 
 def _take_userdata(value: Any) -> str:

@@ -1,4 +1,5 @@
 """Border of the health port: messages of topics and diagnostics, by conditions of any field."""
+
 import io
 import threading
 from typing import Any, Dict, List, Tuple
@@ -21,8 +22,17 @@ from .values import damages, message, words
 
 LONGEST = 2000  # letters of what is said, beside the field's name
 KINDS = (Bool, Float64, String, BatteryState)
-_fields = words('data', 'percentage', 'cell_voltage.0', 'data.\u00b2', 'header.stamp.secs',
-                'data.' + '9' * 5000, 'cell_voltage', 'data.__class__', 'raw')
+_fields = words(
+    'data',
+    'percentage',
+    'cell_voltage.0',
+    'data.\u00b2',
+    'header.stamp.secs',
+    'data.' + '9' * 5000,
+    'cell_voltage',
+    'data.__class__',
+    'raw',
+)
 
 
 _definitions = st.sampled_from(('', '', '', 'int8 data', 'no definition'))  # '': the true one
@@ -41,11 +51,18 @@ class UnknownBytes(rospy.AnyMsg):
 
 def _wire(kind: Any) -> Any:
     """A message of a type that is not installed here, damaged perhaps."""
+
     def told(drawn: Tuple[Any, Any, str]) -> rospy.AnyMsg:
         one, damage, definition = drawn
-        return UnknownBytes(damage.of(_bytes_of(one)), {
-            'type': kind._type, 'md5sum': kind._md5sum if not definition else definition,
-            'message_definition': definition or kind._full_text})
+        return UnknownBytes(
+            damage.of(_bytes_of(one)),
+            {
+                'type': kind._type,
+                'md5sum': kind._md5sum if not definition else definition,
+                'message_definition': definition or kind._full_text,
+            },
+        )
+
     return st.tuples(message(kind), damages, _definitions).map(told)
 
 
@@ -55,23 +72,37 @@ def _bytes_of(one: Any) -> bytes:
     return buffer.getvalue()
 
 
-_limits = st.one_of(st.just({}), st.fixed_dictionaries({'equals': st.sampled_from(
-    (True, 0, 'on'))}), st.fixed_dictionaries({'at_least': st.floats(0.0, 1.0)}))
-_by_topic = st.tuples(_fields, _limits, st.lists(st.one_of(
-    *[message(kind) for kind in KINDS], _wire(Bool), _wire(BatteryState)), max_size=2))
-_status = message(DiagnosticStatus, {'name': words('Power', '/Power/'),
-                                     'level': st.integers(0, 3)})
-_by_diagnostics = st.tuples(st.sampled_from(('ok', 'warn')), st.lists(st.one_of(
-    message(DiagnosticArray, {'status': st.lists(_status, max_size=2)}),
-    _wire(DiagnosticArray)), max_size=2))
+_limits = st.one_of(
+    st.just({}),
+    st.fixed_dictionaries({'equals': st.sampled_from((True, 0, 'on'))}),
+    st.fixed_dictionaries({'at_least': st.floats(0.0, 1.0)}),
+)
+_by_topic = st.tuples(
+    _fields,
+    _limits,
+    st.lists(
+        st.one_of(*[message(kind) for kind in KINDS], _wire(Bool), _wire(BatteryState)), max_size=2
+    ),
+)
+_status = message(DiagnosticStatus, {'name': words('Power', '/Power/'), 'level': st.integers(0, 3)})
+_by_diagnostics = st.tuples(
+    st.sampled_from(('ok', 'warn')),
+    st.lists(
+        st.one_of(
+            message(DiagnosticArray, {'status': st.lists(_status, max_size=2)}),
+            _wire(DiagnosticArray),
+        ),
+        max_size=2,
+    ),
+)
 
 
 def _heard(condition: Dict[str, Any], topic: str, messages: List[Any]) -> str:
     conditions = checked_health([dict(condition, name='robot')])
     types = {name: rospy.AnyMsg for name in ('/health', *health_topics.DIAGNOSTICS)}
     with fake_ros() as offered, mock.patch.multiple(
-            health_topics, types_at_master=lambda: types, types_in_process=lambda: {}), \
-            mock.patch.object(threading, 'Timer', mock.Mock()):
+        health_topics, types_at_master=lambda: types, types_in_process=lambda: {}
+    ), mock.patch.object(threading, 'Timer', mock.Mock()):
         port = TopicHealth(conditions, health_topics.HealthTopics())
         for each in messages:
             offered.topics[topic](each)

@@ -1,4 +1,5 @@
 """A machine that goes from A through KITCHEN, a nested machine with LOOK, to B."""
+
 import contextlib
 from typing import Iterator, Tuple
 from unittest import mock
@@ -23,7 +24,8 @@ def kitchen_at_hand() -> Iterator[Tuple[Offered, OracleContainer]]:
         smach.StateMachine.add('B', _done())
     machine = OracleContainer.wrap(made, name='task')
     with fake_ros() as offered, mock.patch.multiple(
-            hand_server, ControlPublisher=SilentPublisher, ViewerCommands=SilentPublisher):
+        hand_server, ControlPublisher=SilentPublisher, ViewerCommands=SilentPublisher
+    ):
         server = HandServer()
         server.watch(machine)
         yield offered, machine

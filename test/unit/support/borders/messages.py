@@ -1,4 +1,5 @@
 """Borders of services, actions and topics: messages with fields of any value."""
+
 import json
 from typing import Any, Callable, List
 from unittest import mock
@@ -55,17 +56,29 @@ from .values import message, words
 
 _ids = words('q1', 'q2', '')
 _people = words('eva', 'ann', '')
-_item = message(UserdataItem, {
-    'key': words('grasped', 'object'), 'encoding': st.sampled_from((1, 2, 3, 4)),
-    'type': words('', 'geometry_msgs/Point', 'std_msgs/String'),
-    'md5sum': words('', '4a842b65f413084dc2b10fb484ea7f17', '992ce8a1687cec8c8bd883ec73ca41d1'),
-    'value': st.one_of(json_texts.map(str.encode), st.binary(max_size=24))})
+_item = message(
+    UserdataItem,
+    {
+        'key': words('grasped', 'object'),
+        'encoding': st.sampled_from((1, 2, 3, 4)),
+        'type': words('', 'geometry_msgs/Point', 'std_msgs/String'),
+        'md5sum': words('', '4a842b65f413084dc2b10fb484ea7f17', '992ce8a1687cec8c8bd883ec73ca41d1'),
+        'value': st.one_of(json_texts.map(str.encode), st.binary(max_size=24)),
+    },
+)
 _items = st.lists(_item, max_size=2)
-_decisions = message(ExpertDecision, {
-    'kind': st.sampled_from((1, 2, 3, 4)), 'state': words('DETECT', 'PICK', 'PLACE'),
-    'outcome': words('succeeded', 'aborted', ''), 'interface': words('assist'),
-    'container': words('', 'PICK_AND_PLACE'), 'outputs': st.one_of(st.just([]), _items),
-    'by': _people})
+_decisions = message(
+    ExpertDecision,
+    {
+        'kind': st.sampled_from((1, 2, 3, 4)),
+        'state': words('DETECT', 'PICK', 'PLACE'),
+        'outcome': words('succeeded', 'aborted', ''),
+        'interface': words('assist'),
+        'container': words('', 'PICK_AND_PLACE'),
+        'outputs': st.one_of(st.just([]), _items),
+        'by': _people,
+    },
+)
 _deadlines = st.sampled_from((0.0, 5.0, 1e308))
 
 
@@ -97,17 +110,20 @@ def _take_query(goal: ExpertQueryGoal) -> str:
         assert handle.accepted or handle.end == 'rejected'
         made._action.on_cancel(handle)
         return TAKEN if handle.accepted else refused(handle.text)
+
     return _with_questions(work)
 
 
 def _take_claim(request: ClaimQueryRequest) -> str:
-    return _with_questions(lambda made, offered: _told(
-        offered.call('~expert_query/claim', request)))
+    return _with_questions(
+        lambda made, offered: _told(offered.call('~expert_query/claim', request))
+    )
 
 
 def _take_answer(request: AnswerQueryRequest) -> str:
-    return _with_questions(lambda made, offered: _told(
-        offered.call('~expert_query/answer', request)))
+    return _with_questions(
+        lambda made, offered: _told(offered.call('~expert_query/answer', request))
+    )
 
 
 def _take_result(result: ExpertQueryResult) -> str:
@@ -126,40 +142,59 @@ def _take_result(result: ExpertQueryResult) -> str:
 
 def _take_handed_over(result: SharedAutonomyResult) -> str:
     said: List[str] = []
-    with fake_ros(), mock.patch.object(client.rospy, 'logwarn', lambda text, *given: said.append(
-            text % given)):
+    with fake_ros(), mock.patch.object(
+        client.rospy, 'logwarn', lambda text, *given: said.append(text % given)
+    ):
         answer = client._to_supersede(InterfaceOffer('assist', '/assist'), result)
     return refused(''.join(said)) if answer is None else TAKEN
 
 
 # -- an operator's hand
 
+
 def _hand(service: str) -> Callable[[Any], str]:
     def take(request: Any) -> str:
         with kitchen_at_hand() as (offered, _):
             return _told(offered.call('~oracle/' + service, request))
+
     return take
 
 
 _paths = words('', 'task', 'task/KITCHEN', '/task/', 'other')
 _states = words('A', 'LOOK', 'KITCHEN/LOOK', 'ORACLE')
 _HAND = {
-    **{name: message(CommandMachineRequest, {'path': _paths, 'by': _people})
-       for name in hand_server.TREE_COMMANDS + hand_server.PLACE_COMMANDS},
+    **{
+        name: message(CommandMachineRequest, {'path': _paths, 'by': _people})
+        for name in hand_server.TREE_COMMANDS + hand_server.PLACE_COMMANDS
+    },
     'go_to': message(SendMachineRequest, {'path': _paths, 'state': _states, 'by': _people}),
-    'breakpoint': message(SetBreakpointRequest, {
-        'path': _paths, 'pattern': words('A', '*', 'KITCHEN/*'), 'by': _people}),
-    'autonomy': message(SetAutonomyRequest, {
-        'path': _paths, 'pattern': words('A', '*'), 'level': words('run', 'announce', 'confirm'),
-        'by': _people}),
+    'breakpoint': message(
+        SetBreakpointRequest,
+        {'path': _paths, 'pattern': words('A', '*', 'KITCHEN/*'), 'by': _people},
+    ),
+    'autonomy': message(
+        SetAutonomyRequest,
+        {
+            'path': _paths,
+            'pattern': words('A', '*'),
+            'level': words('run', 'announce', 'confirm'),
+            'by': _people,
+        },
+    ),
 }
 
 
 # -- interfaces
 
-_goals = message(SharedAutonomyGoal, {
-    'query_id': _ids, 'state': words('PICK', ''), 'outcomes': st.lists(
-        words('succeeded'), max_size=2), 'output_keys': st.lists(words('grasped'), max_size=2)})
+_goals = message(
+    SharedAutonomyGoal,
+    {
+        'query_id': _ids,
+        'state': words('PICK', ''),
+        'outcomes': st.lists(words('succeeded'), max_size=2),
+        'output_keys': st.lists(words('grasped'), max_size=2),
+    },
+)
 
 
 def _with_interface(goal: SharedAutonomyGoal, work: Callable[[Any, Any], str]) -> str:
@@ -172,12 +207,17 @@ def _with_interface(goal: SharedAutonomyGoal, work: Callable[[Any, Any], str]) -
 
 
 def _take_goal(goal: SharedAutonomyGoal) -> str:
-    return _with_interface(goal, lambda handle, offered: TAKEN if handle.accepted
-                           else refused(handle.text))
+    return _with_interface(
+        goal, lambda handle, offered: TAKEN if handle.accepted else refused(handle.text)
+    )
 
 
-_PICK = SharedAutonomyGoal(query_id='q1', state='PICK', outcomes=['succeeded', 'aborted'],
-                           output_keys=['grasped', 'object'])
+_PICK = SharedAutonomyGoal(
+    query_id='q1',
+    state='PICK',
+    outcomes=['succeeded', 'aborted'],
+    output_keys=['grasped', 'object'],
+)
 
 
 def _take_finish(request: Any) -> str:
@@ -186,14 +226,23 @@ def _take_finish(request: Any) -> str:
         end = _told(offered.call(name, request))
         assert (end == TAKEN) == bool(handle.end), 'a goal that is refused stays open'
         return end
+
     return _with_interface(_PICK, work)
 
 
 # -- topics
 
-_events = message(OracleEvent, {
-    'kind': st.integers(0, 40), 'trial_id': words('t'), 'seq': st.integers(0, 9),
-    'path': words('task'), 'state': words('A'), 'data': json_texts})
+_events = message(
+    OracleEvent,
+    {
+        'kind': st.integers(0, 40),
+        'trial_id': words('t'),
+        'seq': st.integers(0, 9),
+        'path': words('task'),
+        'state': words('A'),
+        'data': json_texts,
+    },
+)
 
 
 def _take_events(events: List[OracleEvent]) -> str:
@@ -224,6 +273,7 @@ def _robot(handler: str) -> Callable[[Any], str]:
         robot = FollowedRobot('/robot')
         getattr(robot, handler)(given)
         return _written(robot)
+
     return take
 
 
@@ -245,35 +295,93 @@ def _take_item(item: UserdataItem) -> str:
 
 
 BORDERS = [
-    Border('action ExpertQuery: goal', message(ExpertQueryGoal, {
-        'query_id': words('q2', 'q3', ''), 'deadline': _deadlines,
-        'interface': words('', 'assist')}), _take_query),
-    Border('action ExpertQuery: result', message(ExpertQueryResult, {
-        'status': st.just(ExpertQueryResult.ANSWERED), 'decision': _decisions}), _take_result),
-    Border('service ClaimQuery', message(ClaimQueryRequest, {
-        'action': st.sampled_from((1, 2, 3, 4)), 'query_id': _ids, 'expert': _people,
-        'lease': _deadlines}), _take_claim),
-    Border('service AnswerQuery', message(AnswerQueryRequest, {
-        'query_id': _ids, 'decision': _decisions}), _take_answer),
-    *[Border('service ' + name, given, _hand(name), (  # the machine does not run
-        (REFUSED,) if name in hand_server.PLACE_COMMANDS else BOTH))
-      for name, given in sorted(_HAND.items())],
+    Border(
+        'action ExpertQuery: goal',
+        message(
+            ExpertQueryGoal,
+            {
+                'query_id': words('q2', 'q3', ''),
+                'deadline': _deadlines,
+                'interface': words('', 'assist'),
+            },
+        ),
+        _take_query,
+    ),
+    Border(
+        'action ExpertQuery: result',
+        message(
+            ExpertQueryResult,
+            {'status': st.just(ExpertQueryResult.ANSWERED), 'decision': _decisions},
+        ),
+        _take_result,
+    ),
+    Border(
+        'service ClaimQuery',
+        message(
+            ClaimQueryRequest,
+            {
+                'action': st.sampled_from((1, 2, 3, 4)),
+                'query_id': _ids,
+                'expert': _people,
+                'lease': _deadlines,
+            },
+        ),
+        _take_claim,
+    ),
+    Border(
+        'service AnswerQuery',
+        message(AnswerQueryRequest, {'query_id': _ids, 'decision': _decisions}),
+        _take_answer,
+    ),
+    *[
+        Border(
+            'service ' + name,
+            given,
+            _hand(name),
+            (  # the machine does not run
+                (REFUSED,) if name in hand_server.PLACE_COMMANDS else BOTH
+            ),
+        )
+        for name, given in sorted(_HAND.items())
+    ],
     Border('action SharedAutonomy: goal', _goals, _take_goal),
-    Border('action SharedAutonomy: result', message(SharedAutonomyResult, {'outputs': _items}),
-           _take_handed_over),
-    Border('service FinishInterface', message(FinishInterfaceRequest, {
-        'query_id': _ids, 'outcome': words('succeeded'), 'outputs': _items}), _take_finish),
-    Border('service GiveUpInterface', message(GiveUpInterfaceRequest, {'query_id': _ids}),
-           _take_finish),
-    Border('topic OracleEvent, console', st.lists(_events, min_size=1, max_size=4), _take_events,
-           (TAKEN,)),
+    Border(
+        'action SharedAutonomy: result',
+        message(SharedAutonomyResult, {'outputs': _items}),
+        _take_handed_over,
+    ),
+    Border(
+        'service FinishInterface',
+        message(
+            FinishInterfaceRequest,
+            {'query_id': _ids, 'outcome': words('succeeded'), 'outputs': _items},
+        ),
+        _take_finish,
+    ),
+    Border(
+        'service GiveUpInterface', message(GiveUpInterfaceRequest, {'query_id': _ids}), _take_finish
+    ),
+    Border(
+        'topic OracleEvent, console',
+        st.lists(_events, min_size=1, max_size=4),
+        _take_events,
+        (TAKEN,),
+    ),
     Border('topic OracleRates, console', message(OracleRates), _robot('on_rates'), (TAKEN,)),
     Border('topic ControlStatus, console', message(ControlStatus), _robot('on_control'), (TAKEN,)),
-    Border('topic SmachContainerStructure', message(SmachContainerStructure),
-           _robot('on_structure'), (TAKEN,)),
-    Border('topic SmachContainerStatus', message(SmachContainerStatus), _robot('on_status'),
-           (TAKEN,)),
-    Border('topic SmachContainerInitialStatusCmd', message(SmachContainerInitialStatusCmd, {
-        'local_data': pickles}), _take_wish),
+    Border(
+        'topic SmachContainerStructure',
+        message(SmachContainerStructure),
+        _robot('on_structure'),
+        (TAKEN,),
+    ),
+    Border(
+        'topic SmachContainerStatus', message(SmachContainerStatus), _robot('on_status'), (TAKEN,)
+    ),
+    Border(
+        'topic SmachContainerInitialStatusCmd',
+        message(SmachContainerInitialStatusCmd, {'local_data': pickles}),
+        _take_wish,
+    ),
     Border('message UserdataItem', _item, _take_item),
 ]

@@ -1,4 +1,5 @@
 """Borders of the PR2's skills and perception: goals with fields of any value."""
+
 import functools
 from typing import Any, Callable, Dict
 from unittest import mock
@@ -54,8 +55,10 @@ class StillRobot:
     def joints(self) -> Dict[str, float]:
         if not self._sees:
             raise RobotError('joint_states: ' + STILL)
-        return {**dict.fromkeys((joint.name for joint in _links().values() if joint.moves), 0.0),
-                **REST}
+        return {
+            **dict.fromkeys((joint.name for joint in _links().values() if joint.moves), 0.0),
+            **REST,
+        }
 
     def odom_from_base(self) -> np.ndarray:
         return np.eye(4)
@@ -74,6 +77,7 @@ class StillRobot:
     def __getattr__(self, name: str) -> Callable[..., None]:
         def refuse(*_: object, **__: object) -> None:
             raise RobotError('{}: {}'.format(name, STILL))
+
         return refuse
 
 
@@ -126,8 +130,9 @@ def servers() -> Dict[str, FakeSimpleServer]:
         skills = SkillServer(lambda: None, lambda: None)
         serve(KitchenSkills(SkillContext(StillRobot(False), installed_model()), Kitchen()), skills)
         perception = Perception(StillRobot(True), _links(), Kitchen())
-        skills.offer('detect_tabletop', DetectTabletopAction, perception.detect_tabletop,
-                     (NotSeen,))
+        skills.offer(
+            'detect_tabletop', DetectTabletopAction, perception.detect_tabletop, (NotSeen,)
+        )
         skills.offer('detect_drink', DetectDrinkAction, perception.detect_drink, (NotSeen,))
     return made
 
@@ -140,11 +145,13 @@ def _action(name: str) -> Callable[[Any], str]:
         end, text = server.end
         assert not text.startswith('error in'), text
         return TAKEN if end == TAKEN else refused(text)
+
     return take
 
 
-_header = message(Header, {'frame_id': words('base_footprint', 'base_link', 'odom_combined',
-                                             '/base_footprint')})
+_header = message(
+    Header, {'frame_id': words('base_footprint', 'base_link', 'odom_combined', '/base_footprint')}
+)
 _coordinates = st.floats(-1.0, 1.0)
 _place = st.builds(Point, _coordinates, _coordinates, _coordinates)
 _upright = st.just(Quaternion(0.0, 0.0, 0.0, 1.0))
@@ -160,44 +167,108 @@ _counts = st.one_of(*[st.integers(0, 3)] * 7, st.just(_MANY))
 
 def a_mug_many_times(count: int) -> BuildCollisionMapGoal:
     """A goal with so many objects."""
-    mug = PoseStamped(Header(frame_id='base_footprint'), Pose(
-        Point(0.6, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)))
-    return sent(BuildCollisionMapGoal(table=mug, objects=[mug] * count,
-                                      sizes=[Vector3(0.06, 0.06, 0.1)] * count))
+    mug = PoseStamped(
+        Header(frame_id='base_footprint'),
+        Pose(Point(0.6, 0.0, 0.8), Quaternion(0.0, 0.0, 0.0, 1.0)),
+    )
+    return sent(
+        BuildCollisionMapGoal(
+            table=mug, objects=[mug] * count, sizes=[Vector3(0.06, 0.06, 0.1)] * count
+        )
+    )
 
 
 _maps = st.one_of(
-    message(BuildCollisionMapGoal, {'table': _pose, 'objects': st.lists(_pose, max_size=2),
-                                    'sizes': st.lists(_size, max_size=2)}),
-    _counts.map(a_mug_many_times))
+    message(
+        BuildCollisionMapGoal,
+        {
+            'table': _pose,
+            'objects': st.lists(_pose, max_size=2),
+            'sizes': st.lists(_size, max_size=2),
+        },
+    ),
+    _counts.map(a_mug_many_times),
+)
 _colour = message(ColorRGBA, {name: st.floats(0, 1, width=32) for name in 'rgba'})
 BORDERS = [
-    Border('action move_arms_aside', message(MoveArmsAsideGoal, {
-        'arms': st.one_of(st.lists(_arm, max_size=2),
-                          _counts.map(lambda count: ['left'] * count))}),
-        _action('move_arms_aside'), (REFUSED,)),
-    Border('action point_head', message(PointHeadGoal, {
-        'target': message(PointStamped, {'header': _header, 'point': _place})}),
-        _action('point_head')),
+    Border(
+        'action move_arms_aside',
+        message(
+            MoveArmsAsideGoal,
+            {
+                'arms': st.one_of(
+                    st.lists(_arm, max_size=2), _counts.map(lambda count: ['left'] * count)
+                )
+            },
+        ),
+        _action('move_arms_aside'),
+        (REFUSED,),
+    ),
+    Border(
+        'action point_head',
+        message(
+            PointHeadGoal, {'target': message(PointStamped, {'header': _header, 'point': _place})}
+        ),
+        _action('point_head'),
+    ),
     Border('action build_collision_map', _maps, _action('build_collision_map')),
-    Border('action pick', message(PickGoal, {
-        'arm': _arm, 'object': _pose, 'size': _size, 'map_id': _map}), _action('pick'),
-        (REFUSED,)),
-    Border('action place', message(PlaceGoal, {
-        'arm': _arm, 'pose': _pose, 'grasp': _pose, 'map_id': _map,
-        'tolerance': st.floats(0.0, 0.1)}), _action('place'), (REFUSED,)),
-    Border('action localise_at_fridge', message(LocaliseAtFridgeGoal),
-           _action('localise_at_fridge'), (REFUSED,)),
-    Border('action open_door', message(OpenDoorGoal, {'arm': _arm}), _action('open_door'),
-           (REFUSED,)),
-    Border('action close_door', message(CloseDoorGoal, {'arm': _arm}), _action('close_door'),
-           (REFUSED,)),
-    Border('action hand_over', message(HandOverGoal, {'arm': _arm, 'pose': _pose}),
-           _action('hand_over'), (REFUSED,)),
-    Border('action detect_tabletop', message(DetectTabletopGoal, {
-        'min_height': st.floats(0.0, 0.3), 'colour': _colour, 'size': _size}),
-        _action('detect_tabletop'), BOTH),
-    Border('action detect_drink', message(DetectDrinkGoal, {
-        'min_height': st.floats(0.0, 0.3), 'colour': words('', 'red', 'grey')}),
-        _action('detect_drink'), (REFUSED,)),
+    Border(
+        'action pick',
+        message(PickGoal, {'arm': _arm, 'object': _pose, 'size': _size, 'map_id': _map}),
+        _action('pick'),
+        (REFUSED,),
+    ),
+    Border(
+        'action place',
+        message(
+            PlaceGoal,
+            {
+                'arm': _arm,
+                'pose': _pose,
+                'grasp': _pose,
+                'map_id': _map,
+                'tolerance': st.floats(0.0, 0.1),
+            },
+        ),
+        _action('place'),
+        (REFUSED,),
+    ),
+    Border(
+        'action localise_at_fridge',
+        message(LocaliseAtFridgeGoal),
+        _action('localise_at_fridge'),
+        (REFUSED,),
+    ),
+    Border(
+        'action open_door', message(OpenDoorGoal, {'arm': _arm}), _action('open_door'), (REFUSED,)
+    ),
+    Border(
+        'action close_door',
+        message(CloseDoorGoal, {'arm': _arm}),
+        _action('close_door'),
+        (REFUSED,),
+    ),
+    Border(
+        'action hand_over',
+        message(HandOverGoal, {'arm': _arm, 'pose': _pose}),
+        _action('hand_over'),
+        (REFUSED,),
+    ),
+    Border(
+        'action detect_tabletop',
+        message(
+            DetectTabletopGoal,
+            {'min_height': st.floats(0.0, 0.3), 'colour': _colour, 'size': _size},
+        ),
+        _action('detect_tabletop'),
+        BOTH,
+    ),
+    Border(
+        'action detect_drink',
+        message(
+            DetectDrinkGoal, {'min_height': st.floats(0.0, 0.3), 'colour': words('', 'red', 'grey')}
+        ),
+        _action('detect_drink'),
+        (REFUSED,),
+    ),
 ]

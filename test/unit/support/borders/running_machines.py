@@ -1,4 +1,5 @@
 """Borders of an operator's hand on a machine that runs, and waits for it."""
+
 import contextlib
 import threading
 from typing import Any, Callable, Iterator
@@ -26,8 +27,9 @@ def _waits(needs_confirmation: bool) -> Iterator[Offered]:
         thread = threading.Thread(target=machine.execute, daemon=True)
         thread.start()
         try:
-            assert wait_for(lambda: any(each.state == 'LOOK' and each.held_by
-                                        for each in hand.status().active))
+            assert wait_for(
+                lambda: any(each.state == 'LOOK' and each.held_by for each in hand.status().active)
+            )
             yield offered
         finally:
             hand.preempt('eva')
@@ -41,15 +43,23 @@ def _command(name: str) -> Callable[[Any], str]:
         with _waits(name == 'confirm') as offered:
             reply = offered.call('~oracle/' + name, request)
         return TAKEN if reply.ok else refused(reply.message)
+
     return take
 
 
 _paths = words('', 'task', 'task/KITCHEN', '/task/KITCHEN/', 'task/KITCHEN/LOOK', 'other')
 _commands = message(CommandMachineRequest, {'path': _paths, 'by': words('eva', 'ann', '')})
 BORDERS = [
-    *[Border('service {}, while it waits'.format(name), _commands, _command(name))
-      for name in ('step', 'confirm', 'resume')],
-    Border('service go_to, while it waits', message(SendMachineRequest, {
-        'path': _paths, 'state': words('B', 'KITCHEN/LOOK', 'LOOK'), 'by': words('eva', '')}),
-        _command('go_to')),
+    *[
+        Border('service {}, while it waits'.format(name), _commands, _command(name))
+        for name in ('step', 'confirm', 'resume')
+    ],
+    Border(
+        'service go_to, while it waits',
+        message(
+            SendMachineRequest,
+            {'path': _paths, 'state': words('B', 'KITCHEN/LOOK', 'LOOK'), 'by': words('eva', '')},
+        ),
+        _command('go_to'),
+    ),
 ]

@@ -1,4 +1,5 @@
 """Borders of settings: YAML files, parameters, rules."""
+
 import contextlib
 import os
 import tempfile
@@ -29,45 +30,94 @@ from .values import damaged, mapping_of, numbers, plain, texts, words
 names = words('A', 'B', 'KITCHEN/LOOK')
 shares, seconds, flags = st.floats(0, 1), st.floats(0, 60), st.booleans()
 counts, lists = st.integers(1, 20), st.lists(names, max_size=3)
-_PRECONDITION = st.one_of(names, st.just('python:checks:near'), mapping_of(
-    {'check': names, 'achieve': names}, ['check', 'achieve']))
+_PRECONDITION = st.one_of(
+    names,
+    st.just('python:checks:near'),
+    mapping_of({'check': names, 'achieve': names}, ['check', 'achieve']),
+)
 _EACH_STATE = {
-    'memory': counts, 'prior': shares, 'moderate_from': shares, 'high_from': shares,
-    'estimator': words('window', 'exponential'), 'max_recoveries': counts,
+    'memory': counts,
+    'prior': shares,
+    'moderate_from': shares,
+    'high_from': shares,
+    'estimator': words('window', 'exponential'),
+    'max_recoveries': counts,
     'on_retry': words('allow', 'confirm', 'never'),
-    'autonomy': words('run', 'announce', 'confirm'), 'failure_outcomes': lists,
-    'author_recoveries': words('keep', 'override'), 'time_limit_s': seconds,
-    'grace_period_s': seconds}
+    'autonomy': words('run', 'announce', 'confirm'),
+    'failure_outcomes': lists,
+    'author_recoveries': words('keep', 'override'),
+    'time_limit_s': seconds,
+    'grace_period_s': seconds,
+}
 _MACHINE = {
     'policy': words('prose', 'algorithm1', 'retry'),
     'budget': mapping_of({'recoveries': counts, 'minutes': seconds, 'questions': counts}),
-    'failing_outcomes': lists, 'userdata': words('restore', 'keep'), 'deep_copy_keys': lists,
-    'deadline_s': seconds, 'on_no_answer': words('stop', 'goto:A', 'give_up:aborted'),
-    'escalate': flags, 'step_back_across': flags, 'still_running_s': seconds,
-    'still_running_factor': st.floats(1, 9), 'watch_preconditions': flags,
-    'history_length': counts, 'rates_file': texts, 'checkpoint': texts,
-    'checkpoint_wait_s': seconds, 'on_resume': words('ask', 'recover', 'restart', 'state:A'),
-    'resume_from': counts, 'resume_map': st.dictionaries(names, names, max_size=2),
-    'resume_repeat': lists, 'after_preempt_s': seconds,
-    'checkpoint_synchronous': words('FULL', 'OFF'), 'oracle_label': names,
-    'nested': st.one_of(flags, lists), 'health_settle_s': seconds}
+    'failing_outcomes': lists,
+    'userdata': words('restore', 'keep'),
+    'deep_copy_keys': lists,
+    'deadline_s': seconds,
+    'on_no_answer': words('stop', 'goto:A', 'give_up:aborted'),
+    'escalate': flags,
+    'step_back_across': flags,
+    'still_running_s': seconds,
+    'still_running_factor': st.floats(1, 9),
+    'watch_preconditions': flags,
+    'history_length': counts,
+    'rates_file': texts,
+    'checkpoint': texts,
+    'checkpoint_wait_s': seconds,
+    'on_resume': words('ask', 'recover', 'restart', 'state:A'),
+    'resume_from': counts,
+    'resume_map': st.dictionaries(names, names, max_size=2),
+    'resume_repeat': lists,
+    'after_preempt_s': seconds,
+    'checkpoint_synchronous': words('FULL', 'OFF'),
+    'oracle_label': names,
+    'nested': st.one_of(flags, lists),
+    'health_settle_s': seconds,
+}
 assert set(_EACH_STATE) == set(executive._STATE_CHECKS)
 assert set(_MACHINE) == set(executive._MACHINE_CHECKS)
-_OFFER = mapping_of({
-    'action': names, 'states': lists, 'description': texts, 'launch': words('robot/assist.launch'),
-    'node': words('robot assist.py'), 'args': st.dictionaries(names, numbers, max_size=2),
-    'start_limit_s': seconds}, ['action'])
+_OFFER = mapping_of(
+    {
+        'action': names,
+        'states': lists,
+        'description': texts,
+        'launch': words('robot/assist.launch'),
+        'node': words('robot assist.py'),
+        'args': st.dictionaries(names, numbers, max_size=2),
+        'start_limit_s': seconds,
+    },
+    ['action'],
+)
 _HEALTHY = st.one_of(
-    mapping_of({'topic': words('/motors_on'), 'field': words('data', 'a.b'), 'equals': plain,
-                'at_least': numbers, 'at_most': numbers, 'max_age_s': seconds}, ['topic']),
+    mapping_of(
+        {
+            'topic': words('/motors_on'),
+            'field': words('data', 'a.b'),
+            'equals': plain,
+            'at_least': numbers,
+            'at_most': numbers,
+            'max_age_s': seconds,
+        },
+        ['topic'],
+    ),
     mapping_of({'diagnostics': texts, 'worst': words('ok', 'warn')}, ['diagnostics']),
-    mapping_of({'function': words('python:checks:near'), 'name': texts}, ['function']))
-settings_given = mapping_of({
-    **_EACH_STATE, **_MACHINE,
-    'states': st.dictionaries(names, mapping_of(
-        dict(_EACH_STATE, preconditions=st.lists(_PRECONDITION, max_size=2))), max_size=2),
-    'interfaces': st.dictionaries(names, _OFFER, max_size=2),
-    'healthy': st.one_of(st.lists(_HEALTHY, max_size=2), _HEALTHY)})
+    mapping_of({'function': words('python:checks:near'), 'name': texts}, ['function']),
+)
+settings_given = mapping_of(
+    {
+        **_EACH_STATE,
+        **_MACHINE,
+        'states': st.dictionaries(
+            names,
+            mapping_of(dict(_EACH_STATE, preconditions=st.lists(_PRECONDITION, max_size=2))),
+            max_size=2,
+        ),
+        'interfaces': st.dictionaries(names, _OFFER, max_size=2),
+        'healthy': st.one_of(st.lists(_HEALTHY, max_size=2), _HEALTHY),
+    }
+)
 
 
 def _settled(make: Callable[[], Any]) -> str:
@@ -89,15 +139,40 @@ def _as_yaml(value: Any) -> bytes:
 
 
 def _odd_yaml(whole: bytes) -> Any:
-    tags = st.sampled_from([
-        b'memory: !!int x', b'a: &a [*a]', b'a: &a {b: *a}', b'? [1]\n: 2', b'memory: 1\nmemory: 2',
-        b'states: {A: !!python/object/apply:os.system [ls]}', b'{' * 2000, b'- ' * 3000,
-        b'<<: {memory: 3}', b'memory: !!timestamp 2001-99-99', b'memory: 0x', b'memory: 1:99:99',
-        b'a: !!binary "%"', b'!!set {a, b}', b'!!omap [a: 1]', b'memory: .inf', b'\xff\xfe',
-        b'--- 1\n--- 2', b'states: !!pairs [a: 1]', b'"memory": 99999999999999999999',
-        b'states: {1: {}}', b'memory: 2001-01-01', b'a: !!float x', b'a: !!bool x', b'a: !!null x',
-        b'"\\ud800": 1', b'memory: "\\ud800"', b'memory: 2020-01-01 25:00:00',
-        b'9' * 5000 + b': 1', b'memory: ' + b'9' * 5000])
+    tags = st.sampled_from(
+        [
+            b'memory: !!int x',
+            b'a: &a [*a]',
+            b'a: &a {b: *a}',
+            b'? [1]\n: 2',
+            b'memory: 1\nmemory: 2',
+            b'states: {A: !!python/object/apply:os.system [ls]}',
+            b'{' * 2000,
+            b'- ' * 3000,
+            b'<<: {memory: 3}',
+            b'memory: !!timestamp 2001-99-99',
+            b'memory: 0x',
+            b'memory: 1:99:99',
+            b'a: !!binary "%"',
+            b'!!set {a, b}',
+            b'!!omap [a: 1]',
+            b'memory: .inf',
+            b'\xff\xfe',
+            b'--- 1\n--- 2',
+            b'states: !!pairs [a: 1]',
+            b'"memory": 99999999999999999999',
+            b'states: {1: {}}',
+            b'memory: 2001-01-01',
+            b'a: !!float x',
+            b'a: !!bool x',
+            b'a: !!null x',
+            b'"\\ud800": 1',
+            b'memory: "\\ud800"',
+            b'memory: 2020-01-01 25:00:00',
+            b'9' * 5000 + b': 1',
+            b'memory: ' + b'9' * 5000,
+        ]
+    )
     return st.one_of(tags, damaged(whole), damaged(whole))
 
 
@@ -133,18 +208,19 @@ def _with_origins(path: str) -> None:
 @contextlib.contextmanager
 def parameters_are(given: Dict[str, Any]) -> Any:
     """Have a parameter server, as far as settings ask it."""
+
     def get(name: str, default: object = None) -> object:
         return given.get(name.lstrip('~').split('/node/')[-1], default)
 
-    with mock.patch.multiple('rospy', get_param=get, resolve_name=lambda name: name), \
-            mock.patch('rospy.core.is_initialized', lambda: True):
+    with mock.patch.multiple('rospy', get_param=get, resolve_name=lambda name: name), mock.patch(
+        'rospy.core.is_initialized', lambda: True
+    ):
         yield
 
 
 def _take_parameter(given: Dict[str, Any]) -> str:
     with parameters_are(given):
-        return _settled(lambda: Settings.from_dict(
-            loaded_settings.load_settings(), _resolved))
+        return _settled(lambda: Settings.from_dict(loaded_settings.load_settings(), _resolved))
 
 
 def _take_server(given: Dict[str, Any]) -> str:
@@ -154,9 +230,13 @@ def _take_server(given: Dict[str, Any]) -> str:
 
 def _take_machine(given: Dict[str, Any]) -> str:
     with parameters_are(given):
-        return _settled(lambda: (parameters.private_flag('introspection', True),
-                                 parameters.private_text('record'),
-                                 parameters.private_names('record_topics')))
+        return _settled(
+            lambda: (
+                parameters.private_flag('introspection', True),
+                parameters.private_text('record'),
+                parameters.private_names('record_topics'),
+            )
+        )
 
 
 def _take_hand(given: Dict[str, Any]) -> str:
@@ -167,13 +247,13 @@ def _take_hand(given: Dict[str, Any]) -> str:
 def _take_console(given: Dict[str, Any]) -> str:
     # a file of tokens that is not there is made: none is named here
     given = {key: value for key, value in given.items() if key != 'token_file'}
-    return _settled(lambda: read_console(
-        lambda name, default: given.get(name.lstrip('~'), default)))
+    return _settled(
+        lambda: read_console(lambda name, default: given.get(name.lstrip('~'), default))
+    )
 
 
 def _take_world(given: Dict[str, Any]) -> str:
-    return _settled(lambda: read_world(
-        lambda name, default: given.get(name.lstrip('~'), default)))
+    return _settled(lambda: read_world(lambda name, default: given.get(name.lstrip('~'), default)))
 
 
 def _take_rules(given: Any) -> str:
@@ -192,68 +272,182 @@ def _nodes(fields: Dict[str, Any], always: Sequence[str] = ()) -> Any:
     return mapping_of(fields, always).filter(lambda drawn: isinstance(drawn, dict))
 
 
-_ARM = mapping_of(dict({name: words('left_tool') for name in ARM_FIELDS},
-                       posture=st.lists(numbers, max_size=2)), ARM_FIELDS)
-_RULE = mapping_of({
-    'kind': words('goto', 'supersede', 'give_up', 'interface', 'ignore'), 'state': names,
-    'outcome': names, 'interface': names,
-    'outputs': st.dictionaries(texts, plain, max_size=2), 'why': texts, 'delay_s': seconds,
-    'confirm': flags, 'container': texts}, ['kind', 'state', 'outcome', 'interface'])
-_RULES = st.dictionaries(words('A', 'TASK/B', 'default'),
-                         st.one_of(_RULE, st.lists(_RULE, max_size=2)), max_size=3)
-_TEMPLATES = st.dictionaries(texts, mapping_of({
-    'outcome': names, 'outputs': st.dictionaries(names, st.sampled_from(sorted(OUTPUT_PARTS)),
-                                                 min_size=1, max_size=2)}, ['outputs']),
-                              max_size=2)
+_ARM = mapping_of(
+    dict({name: words('left_tool') for name in ARM_FIELDS}, posture=st.lists(numbers, max_size=2)),
+    ARM_FIELDS,
+)
+_RULE = mapping_of(
+    {
+        'kind': words('goto', 'supersede', 'give_up', 'interface', 'ignore'),
+        'state': names,
+        'outcome': names,
+        'interface': names,
+        'outputs': st.dictionaries(texts, plain, max_size=2),
+        'why': texts,
+        'delay_s': seconds,
+        'confirm': flags,
+        'container': texts,
+    },
+    ['kind', 'state', 'outcome', 'interface'],
+)
+_RULES = st.dictionaries(
+    words('A', 'TASK/B', 'default'), st.one_of(_RULE, st.lists(_RULE, max_size=2)), max_size=3
+)
+_TEMPLATES = st.dictionaries(
+    texts,
+    mapping_of(
+        {
+            'outcome': names,
+            'outputs': st.dictionaries(
+                names, st.sampled_from(sorted(OUTPUT_PARTS)), min_size=1, max_size=2
+            ),
+        },
+        ['outputs'],
+    ),
+    max_size=2,
+)
 
 BORDERS = [
     Border('settings of a YAML file', settings_given.map(_as_yaml).flatmap(_odd_yaml), _take_yaml),
-    Border('settings of a mapping', settings_given, lambda given: _settled(
-        lambda: Settings.from_dict(given, _resolved))),
-    Border('parameter oracle', _nodes({'oracle': settings_given, 'checkpoint': texts}),
-           _take_parameter),
-    Border('parameters of a wrapped machine', _nodes({
-        'introspection': st.booleans(), 'record': texts,
-        'record_topics': st.lists(texts, max_size=2)}), _take_machine),
-    Border('parameters of expert_query_server', _nodes({
-        'server_name': words('experts'), 'lease_s': seconds, 'asker_gone_s': seconds}),
-           _take_server),
-    Border('parameters of manipulation_interface', _nodes({
-        'arms': st.dictionaries(words('left', 'right'), _ARM, min_size=1, max_size=2),
-        'base_frame': names, 'limits': mapping_of({
-            'linear': shares, 'stop_below': shares, 'slow_below': shares,
-            'workspace': st.lists(st.lists(numbers, min_size=3, max_size=3), min_size=2,
-                                  max_size=2)}),
-        'states': st.dictionaries(names, mapping_of({
-            'arm': words('left'),
-            'outputs': st.dictionaries(names, words('tool_pose'), max_size=2)}), max_size=2),
-        'rate_hz': st.sampled_from((30, 60, 45, 500)), 'lock_step': flags, 'lead': shares},
-        ['arms']), _take_hand),
-    Border('parameters of perception_interface', st.one_of(_TEMPLATES, plain),
-           lambda given: _settled(lambda: templates_from(given))),
-    Border('parameters of expert_console', _nodes({
-        'address': words('127.0.0.1', 'localhost', '0.0.0.0'), 'port': numbers,
-        'allow_remote': st.booleans(), 'certificate': texts, 'private_key': texts,
-        'hosts': st.lists(texts, max_size=2), 'bags': st.lists(texts, max_size=2),
-        'cameras': st.dictionaries(texts, st.lists(texts, max_size=2), max_size=2)}),
-        _take_console),
-    Border('parameters of pr2_world', _nodes({
-        'task': words('pick_and_place', 'kitchen'), 'seed': counts, 'benign': flags,
-        'real_time_factor': shares, 'idle_speed': seconds, 'idle_grace': seconds,
-        'truth_file': words('none'), 'film': words('none'), 'film_events': words('none'),
-        'state_rate': seconds, 'camera_rate': seconds,
-        'camera_binning': counts}), _take_world),
-    Border('parameters of joy_teleoperation', _nodes({
-        'axes': st.dictionaries(words('x', 'y', 'yaw'), st.tuples(
-            counts, shares), min_size=1, max_size=2),
-        'buttons': mapping_of({'dead_man': counts, 'open': counts, 'toggle': counts}, ['dead_man']),
-        'dead_zone': shares, 'rate_hz': seconds, 'frame': names, 'arm': texts},
-        ['axes', 'buttons', 'frame']),
-        lambda given: _settled(lambda: JoySettings.from_dict(given))),
-    Border('parameters of scripted_operator', st.one_of(plain, st.dictionaries(names, mapping_of({
-        'means': st.sampled_from(sorted(MEANS)), 'arm': words('left', 'right'), 'otherwise': names,
-        'tries': counts, 'inside': flags}, ['means']), max_size=2)),
-        lambda given: _settled(lambda: StatePlans(given))),
+    Border(
+        'settings of a mapping',
+        settings_given,
+        lambda given: _settled(lambda: Settings.from_dict(given, _resolved)),
+    ),
+    Border(
+        'parameter oracle', _nodes({'oracle': settings_given, 'checkpoint': texts}), _take_parameter
+    ),
+    Border(
+        'parameters of a wrapped machine',
+        _nodes(
+            {
+                'introspection': st.booleans(),
+                'record': texts,
+                'record_topics': st.lists(texts, max_size=2),
+            }
+        ),
+        _take_machine,
+    ),
+    Border(
+        'parameters of expert_query_server',
+        _nodes({'server_name': words('experts'), 'lease_s': seconds, 'asker_gone_s': seconds}),
+        _take_server,
+    ),
+    Border(
+        'parameters of manipulation_interface',
+        _nodes(
+            {
+                'arms': st.dictionaries(words('left', 'right'), _ARM, min_size=1, max_size=2),
+                'base_frame': names,
+                'limits': mapping_of(
+                    {
+                        'linear': shares,
+                        'stop_below': shares,
+                        'slow_below': shares,
+                        'workspace': st.lists(
+                            st.lists(numbers, min_size=3, max_size=3), min_size=2, max_size=2
+                        ),
+                    }
+                ),
+                'states': st.dictionaries(
+                    names,
+                    mapping_of(
+                        {
+                            'arm': words('left'),
+                            'outputs': st.dictionaries(names, words('tool_pose'), max_size=2),
+                        }
+                    ),
+                    max_size=2,
+                ),
+                'rate_hz': st.sampled_from((30, 60, 45, 500)),
+                'lock_step': flags,
+                'lead': shares,
+            },
+            ['arms'],
+        ),
+        _take_hand,
+    ),
+    Border(
+        'parameters of perception_interface',
+        st.one_of(_TEMPLATES, plain),
+        lambda given: _settled(lambda: templates_from(given)),
+    ),
+    Border(
+        'parameters of expert_console',
+        _nodes(
+            {
+                'address': words('127.0.0.1', 'localhost', '0.0.0.0'),
+                'port': numbers,
+                'allow_remote': st.booleans(),
+                'certificate': texts,
+                'private_key': texts,
+                'hosts': st.lists(texts, max_size=2),
+                'bags': st.lists(texts, max_size=2),
+                'cameras': st.dictionaries(texts, st.lists(texts, max_size=2), max_size=2),
+            }
+        ),
+        _take_console,
+    ),
+    Border(
+        'parameters of pr2_world',
+        _nodes(
+            {
+                'task': words('pick_and_place', 'kitchen'),
+                'seed': counts,
+                'benign': flags,
+                'real_time_factor': shares,
+                'idle_speed': seconds,
+                'idle_grace': seconds,
+                'truth_file': words('none'),
+                'film': words('none'),
+                'film_events': words('none'),
+                'state_rate': seconds,
+                'camera_rate': seconds,
+                'camera_binning': counts,
+            }
+        ),
+        _take_world,
+    ),
+    Border(
+        'parameters of joy_teleoperation',
+        _nodes(
+            {
+                'axes': st.dictionaries(
+                    words('x', 'y', 'yaw'), st.tuples(counts, shares), min_size=1, max_size=2
+                ),
+                'buttons': mapping_of(
+                    {'dead_man': counts, 'open': counts, 'toggle': counts}, ['dead_man']
+                ),
+                'dead_zone': shares,
+                'rate_hz': seconds,
+                'frame': names,
+                'arm': texts,
+            },
+            ['axes', 'buttons', 'frame'],
+        ),
+        lambda given: _settled(lambda: JoySettings.from_dict(given)),
+    ),
+    Border(
+        'parameters of scripted_operator',
+        st.one_of(
+            plain,
+            st.dictionaries(
+                names,
+                mapping_of(
+                    {
+                        'means': st.sampled_from(sorted(MEANS)),
+                        'arm': words('left', 'right'),
+                        'otherwise': names,
+                        'tries': counts,
+                        'inside': flags,
+                    },
+                    ['means'],
+                ),
+                max_size=2,
+            ),
+        ),
+        lambda given: _settled(lambda: StatePlans(given)),
+    ),
     Border('rules of a YAML file', _RULES.map(_as_yaml).flatmap(_odd_yaml), _take_rules_file),
     Border('rules of scripted_expert', st.one_of(_RULES, plain), _take_rules),
 ]

@@ -1,4 +1,5 @@
 """A small image of a can on a table, as a camera gives it."""
+
 import functools
 from typing import Any, NamedTuple
 
@@ -30,8 +31,15 @@ def small_image() -> SmallImage:
     scale = np.array([[1 / COARSER], [1 / COARSER], [1.0]])
     rows, columns = np.nonzero(seen.bodies[kept, kept] == 1)
     return SmallImage(
-        CameraImage(whole.stamp, np.ascontiguousarray(whole.colour[kept, kept]),
-                    np.ascontiguousarray(whole.depth[kept, kept]), whole.intrinsics * scale,
-                    whole.base_from_camera),
-        tuple(int(each) for each in (columns.min() - 3, rows.min() - 3, np.ptp(columns) + 7,
-                                     np.ptp(rows) + 7)))
+        CameraImage(
+            whole.stamp,
+            np.ascontiguousarray(whole.colour[kept, kept]),
+            np.ascontiguousarray(whole.depth[kept, kept]),
+            whole.intrinsics * scale,
+            whole.base_from_camera,
+        ),
+        tuple(
+            int(each)
+            for each in (columns.min() - 3, rows.min() - 3, np.ptp(columns) + 7, np.ptp(rows) + 7)
+        ),
+    )

@@ -1,4 +1,5 @@
 """All borders, by name."""
+
 from . import (
     answers,
     console,
@@ -12,6 +13,19 @@ from . import (
     world_services,
 )
 
-BORDERS = {border.name: border for room in (
-    settings, messages, console, files, answers, health_heard, people_at_robots, robot_goals,
-    running_machines, world_services) for border in room.BORDERS}
+BORDERS = {
+    border.name: border
+    for room in (
+        settings,
+        messages,
+        console,
+        files,
+        answers,
+        health_heard,
+        people_at_robots,
+        robot_goals,
+        running_machines,
+        world_services,
+    )
+    for border in room.BORDERS
+}

@@ -1,4 +1,5 @@
 """What is drawn: plain data, texts, damaged bytes and messages of any type."""
+
 import io
 import re
 from typing import Any, Dict, NamedTuple, Optional, Sequence
@@ -7,15 +8,50 @@ import genpy
 import roslib.message
 from hypothesis import strategies as st
 
-WORDS = ('', 'A', 'B', 'task', 'task/A', 'succeeded', 'aborted', 'preempted', 'q1', 'eva', 'stop',
-         'goto', 'goto:A', '*', '**', '/', '//', 'T/../A', '~', '$', 'default', 'x' * 300, '\0',
-         '\ud7ff', '\x1b[2J', 'python:os:system', 'a\nb', '-1', 'nan', '1e999', 'None', '[')
+WORDS = (
+    '',
+    'A',
+    'B',
+    'task',
+    'task/A',
+    'succeeded',
+    'aborted',
+    'preempted',
+    'q1',
+    'eva',
+    'stop',
+    'goto',
+    'goto:A',
+    '*',
+    '**',
+    '/',
+    '//',
+    'T/../A',
+    '~',
+    '$',
+    'default',
+    'x' * 300,
+    '\0',
+    '\ud7ff',
+    '\x1b[2J',
+    'python:os:system',
+    'a\nb',
+    '-1',
+    'nan',
+    '1e999',
+    'None',
+    '[',
+)
 texts = st.one_of(st.sampled_from(WORDS), st.text(max_size=12))
 numbers = st.one_of(
-    st.integers(-3, 20), st.integers(), st.floats(), st.sampled_from((0.0, 0.5, 1e308, 2 ** 63)))
+    st.integers(-3, 20), st.integers(), st.floats(), st.sampled_from((0.0, 0.5, 1e308, 2**63))
+)
 leaves = st.one_of(st.none(), st.booleans(), numbers, texts)
-plain = st.recursive(leaves, lambda inner: st.one_of(
-    st.lists(inner, max_size=4), st.dictionaries(texts, inner, max_size=4)), max_leaves=10)
+plain = st.recursive(
+    leaves,
+    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(texts, inner, max_size=4)),
+    max_leaves=10,
+)
 """What JSON, YAML and the parameter server hold."""
 
 
@@ -26,9 +62,12 @@ def mapping_of(fields: Dict[str, Any], always: Sequence[str] = ()) -> Any:
     """
     right = st.sets(st.sampled_from(sorted(fields)), max_size=4).flatmap(
         lambda names: st.fixed_dictionaries(
-            {name: fields[name] for name in sorted(names.union(always))}))
+            {name: fields[name] for name in sorted(names.union(always))}
+        )
+    )
     wrong = st.tuples(right, st.sampled_from(sorted(fields)), plain).map(
-        lambda drawn: dict(drawn[0], **{drawn[1]: drawn[2]}))
+        lambda drawn: dict(drawn[0], **{drawn[1]: drawn[2]})
+    )
     odd = st.tuples(right, texts, plain).map(lambda drawn: dict(drawn[0], **{drawn[1]: drawn[2]}))
     return st.one_of(right, right, right, right, right, wrong, wrong, odd, plain)
 
@@ -46,17 +85,20 @@ class Damage(NamedTuple):
         if self.kind == 'cut':
             return whole[:place]
         if self.kind == 'overwritten':
-            return whole[:place] + self.noise + whole[place + len(self.noise):]
+            return whole[:place] + self.noise + whole[place + len(self.noise) :]
         if self.kind == 'put in':
             return whole[:place] + self.noise + whole[place:]
         if self.kind == 'flipped' and place < len(whole):
-            return whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1:]
+            return whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :]
         return self.noise if self.kind == 'another' else whole
 
 
-damages = st.builds(Damage, st.sampled_from(
-    ('none', 'cut', 'overwritten', 'put in', 'flipped', 'another')), st.floats(0, 1), st.one_of(
-        st.binary(max_size=40), st.integers(1, 9000).map(bytes)))
+damages = st.builds(
+    Damage,
+    st.sampled_from(('none', 'cut', 'overwritten', 'put in', 'flipped', 'another')),
+    st.floats(0, 1),
+    st.one_of(st.binary(max_size=40), st.integers(1, 9000).map(bytes)),
+)
 
 
 def damaged(whole: bytes) -> Any:
@@ -65,9 +107,13 @@ def damaged(whole: bytes) -> Any:
 
 
 _ARRAY = re.compile(r'(.+)\[(\d*)\]\Z')
-_INTEGERS = {'{}int{}'.format(sign, bits): (
-    (0, 2 ** bits - 1) if sign else (-2 ** (bits - 1), 2 ** (bits - 1) - 1))
-    for sign in ('', 'u') for bits in (8, 16, 32, 64)}
+_INTEGERS = {
+    '{}int{}'.format(sign, bits): (
+        (0, 2**bits - 1) if sign else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    )
+    for sign in ('', 'u')
+    for bits in (8, 16, 32, 64)
+}
 _INTEGERS.update(byte=_INTEGERS['int8'], char=_INTEGERS['uint8'])
 
 
@@ -111,9 +157,10 @@ def _field(of: str) -> Any:
     if of == 'string':
         return texts
     if of in ('time', 'duration'):
-        seconds, nanoseconds = st.integers(0, 2 ** 31 - 1), st.integers(0, 999999999)
+        seconds, nanoseconds = st.integers(0, 2**31 - 1), st.integers(0, 999999999)
         return st.tuples(seconds, nanoseconds).map(
-            lambda parts: (genpy.Time if of == 'time' else genpy.Duration)(*parts))
+            lambda parts: (genpy.Time if of == 'time' else genpy.Duration)(*parts)
+        )
     kind = roslib.message.get_message_class('std_msgs/Header' if of == 'Header' else of)
     return message(kind)
 
@@ -129,5 +176,3 @@ def _array(of: str, size: str) -> Any:
 def words(*first: str) -> Any:
     """One of these words, or another text."""
     return st.one_of(st.sampled_from(first), st.sampled_from(first), texts)
-
-

@@ -1,4 +1,5 @@
 """Borders of the simulated world: its services, on one world that stays as it is."""
+
 import functools
 from types import SimpleNamespace
 from typing import Any, Callable
@@ -28,8 +29,9 @@ from .values import message, words
 
 LONGEST_S = 36000.0  # that may pass at once, as srv/PassTime.srv has it
 SETTINGS = WorldSettings(camera_binning=2, reveal=True)
-_seeds = st.one_of(st.integers(0, 9), st.sampled_from((2 ** 31, 2 ** 32, 2 ** 53, 2 ** 64 - 1)),
-                   st.integers(0, 2 ** 64 - 1))
+_seeds = st.one_of(
+    st.integers(0, 9), st.sampled_from((2**31, 2**32, 2**53, 2**64 - 1)), st.integers(0, 2**64 - 1)
+)
 _bodies = st.lists(words('table', 'robot', 'floor', 'thing', 'fridge'), max_size=3)
 
 
@@ -49,12 +51,19 @@ def _world() -> Any:
     node._world.reset = lambda drawn: setattr(node._world, '_scene', drawn)
     node._loop.pass_by = _pass_by
     shown = functools.lru_cache(maxsize=1)(lambda: reveal_view(node._world))
-    return SimpleNamespace(node=node, offered=offered, stamp=image.stamp, scene=scene, names=names,
-                           view=lambda *_: shown())
+    return SimpleNamespace(
+        node=node,
+        offered=offered,
+        stamp=image.stamp,
+        scene=scene,
+        names=names,
+        view=lambda *_: shown(),
+    )
 
 
-reveal_view = (lambda view: lambda world: view(world, reveal.camera_pose(world),
-                                              reveal.size_of(world)))(reveal.RenderedView)
+reveal_view = (
+    lambda view: lambda world: view(world, reveal.camera_pose(world), reveal.size_of(world))
+)(reveal.RenderedView)
 
 
 def _pass_by(world: Any, seconds: float) -> None:
@@ -78,6 +87,7 @@ def _service(name: str, task: str = TASKS[0], with_lab: bool = False) -> Callabl
                 node._world._scene = made.scene
                 node._recognition._views = kept
         return TAKEN if getattr(reply, 'ok', True) else refused(reply.message)
+
     return take
 
 
@@ -90,17 +100,37 @@ def _things() -> Any:
 
 
 BORDERS = [
-    *[Border('service world/reset, ' + task, message(ResetWorldRequest, {'seed': _seeds}),
-             _service('reset', task), (TAKEN,)) for task in TASKS],
-    Border('service world/reset, in a lab', message(ResetWorldRequest, {'seed': _seeds}),
-           _service('reset', with_lab=True)),
+    *[
+        Border(
+            'service world/reset, ' + task,
+            message(ResetWorldRequest, {'seed': _seeds}),
+            _service('reset', task),
+            (TAKEN,),
+        )
+        for task in TASKS
+    ],
+    Border(
+        'service world/reset, in a lab',
+        message(ResetWorldRequest, {'seed': _seeds}),
+        _service('reset', with_lab=True),
+    ),
     Border('service world/snapshot', message(SnapshotRequest), _service('snapshot'), (TAKEN,)),
-    Border('service world/pass_time', message(PassTimeRequest, {
-        'seconds': st.sampled_from((0.0, 0.5, 36000.0, 36000.1))}), _service('pass_time')),
-    Border('service world/charge_time', message(ChargeTimeRequest), _service('charge_time'),
-           (TAKEN,)),
-    Border('service world/recognise', message(RecogniseRequest, {
-        'stamp': _stamps(), 'names': _bodies}), _service('recognise')),
-    Border('service world/reveal', message(RevealRequest, {
-        'names': st.one_of(_bodies, _things())}), _service('reveal')),
+    Border(
+        'service world/pass_time',
+        message(PassTimeRequest, {'seconds': st.sampled_from((0.0, 0.5, 36000.0, 36000.1))}),
+        _service('pass_time'),
+    ),
+    Border(
+        'service world/charge_time', message(ChargeTimeRequest), _service('charge_time'), (TAKEN,)
+    ),
+    Border(
+        'service world/recognise',
+        message(RecogniseRequest, {'stamp': _stamps(), 'names': _bodies}),
+        _service('recognise'),
+    ),
+    Border(
+        'service world/reveal',
+        message(RevealRequest, {'names': st.one_of(_bodies, _things())}),
+        _service('reveal'),
+    ),
 ]

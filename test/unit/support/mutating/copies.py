@@ -1,4 +1,5 @@
 """Copies of the tree: tests run there, so that the checkout stays as it is."""
+
 import os
 import shutil
 import sys
@@ -60,12 +61,20 @@ class Copy:
         :raises TestsNotRun: where pytest finds none, or is not installed.
         :raises KeyboardInterrupt: where the runner was stopped.
         """
-        path = os.pathsep.join(filter(None, (env.get('PYTHONPATH'), str(self.folder / 'src'),
-                                             os.environ.get('PYTHONPATH'))))
+        path = os.pathsep.join(
+            filter(
+                None,
+                (env.get('PYTHONPATH'), str(self.folder / 'src'), os.environ.get('PYTHONPATH')),
+            )
+        )
         begun_s = time.monotonic()
         problem = self._runner.run(
-            [*MEMORY, sys.executable, *PYTEST, *tests], self.folder / LOG, limit_s, self.folder,
-            dict(env, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE='1', PYTHONHASHSEED='0'))
+            [*MEMORY, sys.executable, *PYTEST, *tests],
+            self.folder / LOG,
+            limit_s,
+            self.folder,
+            dict(env, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE='1', PYTHONHASHSEED='0'),
+        )
         if problem == 'interrupted':
             raise KeyboardInterrupt
         if problem in NOT_RUN:
@@ -80,16 +89,23 @@ class Copy:
         shutil.rmtree(str(self._measured), ignore_errors=True)
         self._measured.mkdir()
         settings = self._measured / 'settings'
-        settings.write_text('[run]\nparallel = True\nsource = {}\ndata_file = {}\n'.format(
-            self.folder / below, self._measured / 'lines'))
+        settings.write_text(
+            '[run]\nparallel = True\nsource = {}\ndata_file = {}\n'.format(
+                self.folder / below, self._measured / 'lines'
+            )
+        )
         (self._measured / 'sitecustomize.py').write_text(MEASURES)
-        ending = self.run([test], limit_s, {'COVERAGE_PROCESS_START': str(settings),
-                                            'PYTHONPATH': str(self._measured)})
+        ending = self.run(
+            [test],
+            limit_s,
+            {'COVERAGE_PROCESS_START': str(settings), 'PYTHONPATH': str(self._measured)},
+        )
         return ending, set(self._lines(self.folder / below))
 
     def _lines(self, below: Path) -> Iterator[Tuple[str, int]]:
         from coverage import CoverageData
         from coverage.exceptions import CoverageException
+
         for path in self._measured.glob('lines.*'):
             data = CoverageData(str(path))
             try:
@@ -106,5 +122,7 @@ class Copy:
 
     def files_of_tests(self, below: str) -> List[str]:
         """Return the files of tests below a folder."""
-        return [str(path.relative_to(self.folder))
-                for path in sorted((self.folder / below).rglob('test_*.py'))]
+        return [
+            str(path.relative_to(self.folder))
+            for path in sorted((self.folder / below).rglob('test_*.py'))
+        ]

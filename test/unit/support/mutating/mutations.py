@@ -1,4 +1,5 @@
 """The small faults that are put in: each changes one expression or statement of a module."""
+
 import ast
 from typing import Callable, Dict, Iterable, Iterator, List, NamedTuple, Tuple, Type, Union
 
@@ -7,12 +8,27 @@ Change = Tuple[Part, str]  # a part of a module, and the text in its place
 
 # what an operator becomes: more than one where each is a fault that people make
 COMPARED = {
-    ast.Lt: ('<=', '>='), ast.LtE: ('<', '>'), ast.Gt: ('>=', '<='), ast.GtE: ('>', '<'),
-    ast.Eq: ('!=',), ast.NotEq: ('==',), ast.Is: ('is not',), ast.IsNot: ('is',),
-    ast.In: ('not in',), ast.NotIn: ('in',),
+    ast.Lt: ('<=', '>='),
+    ast.LtE: ('<', '>'),
+    ast.Gt: ('>=', '<='),
+    ast.GtE: ('>', '<'),
+    ast.Eq: ('!=',),
+    ast.NotEq: ('==',),
+    ast.Is: ('is not',),
+    ast.IsNot: ('is',),
+    ast.In: ('not in',),
+    ast.NotIn: ('in',),
 }
-CALCULATED = {ast.Add: '-', ast.Sub: '+', ast.Mult: '/', ast.Div: '*', ast.BitOr: '&',
-              ast.BitAnd: '|', ast.FloorDiv: '*', ast.Mod: '*'}
+CALCULATED = {
+    ast.Add: '-',
+    ast.Sub: '+',
+    ast.Mult: '/',
+    ast.Div: '*',
+    ast.BitOr: '&',
+    ast.BitAnd: '|',
+    ast.FloorDiv: '*',
+    ast.Mod: '*',
+}
 # parts that need no parentheses in front of an operator or behind it
 ATOMS = (ast.Name, ast.Attribute, ast.Call, ast.Constant, ast.Subscript)
 
@@ -42,8 +58,11 @@ class Mutant(NamedTuple):
         """Return the module with the change in it."""
         text = source.encode()
         starts = _starts_of(text)
-        return (text[:starts[self.line - 1] + self.column] + self.text.encode()
-                + text[starts[self.last_line - 1] + self.last_column:]).decode()
+        return (
+            text[: starts[self.line - 1] + self.column]
+            + self.text.encode()
+            + text[starts[self.last_line - 1] + self.last_column :]
+        ).decode()
 
     def shown(self) -> str:
         """Return the change, to be read."""
@@ -61,8 +80,9 @@ class Source:
     def text(self, node: Part) -> str:
         """Return the text of a part, much faster than `ast.get_source_segment`."""
         last, column = _end_of(node)
-        return self._text[self._starts[node.lineno - 1] + node.col_offset:
-                          self._starts[last - 1] + column].decode()
+        return self._text[
+            self._starts[node.lineno - 1] + node.col_offset : self._starts[last - 1] + column
+        ].decode()
 
     def operand(self, node: ast.expr) -> str:
         """Return the text of a part, in parentheses where an operator next to it needs them."""
@@ -93,16 +113,27 @@ def mutants_of(text: str, module: str) -> List[Mutant]:
     for node, place, statement in _parts(source.tree, '', (1, 1)):
         for part, new in _changes_of(node, source):
             where = (part.lineno, part.col_offset)
-            found.append(Mutant(
-                module, place, *where, *_end_of(part), seen.count(where),
-                lines[part.lineno - 1].strip(), statement, new,
-                ' '.join(source.text(part).split()), ' '.join(new.split())))
+            found.append(
+                Mutant(
+                    module,
+                    place,
+                    *where,
+                    *_end_of(part),
+                    seen.count(where),
+                    lines[part.lineno - 1].strip(),
+                    statement,
+                    new,
+                    ' '.join(source.text(part).split()),
+                    ' '.join(new.split()),
+                )
+            )
             seen.append(where)
     return found
 
 
-def _parts(node: ast.AST, place: str, statement: Tuple[int, int]
-           ) -> Iterator[Tuple[ast.AST, str, Tuple[int, int]]]:
+def _parts(
+    node: ast.AST, place: str, statement: Tuple[int, int]
+) -> Iterator[Tuple[ast.AST, str, Tuple[int, int]]]:
     """Yield each part with the place and the lines of the statement around it.
 
     Annotations, protocols and f-strings, whose parts have no true place in Python 3.8, are left
@@ -116,8 +147,10 @@ def _parts(node: ast.AST, place: str, statement: Tuple[int, int]
     for name, value in ast.iter_fields(node):
         for child in value if isinstance(value, list) else [value]:
             if isinstance(child, ast.AST) and not (
-                    name in ('annotation', 'returns') or isinstance(child, ast.JoinedStr)
-                    or _is_protocol(child)):
+                name in ('annotation', 'returns')
+                or isinstance(child, ast.JoinedStr)
+                or _is_protocol(child)
+            ):
                 yield from _parts(child, place, statement)
 
 
@@ -129,8 +162,9 @@ def _lines_of(statement: ast.stmt) -> Tuple[int, int]:
 
 
 def _is_protocol(node: ast.AST) -> bool:
-    return isinstance(node, ast.ClassDef) and any('Protocol' in ast.dump(base)
-                                                  for base in node.bases)
+    return isinstance(node, ast.ClassDef) and any(
+        'Protocol' in ast.dump(base) for base in node.bases
+    )
 
 
 # -- the changes, by kind of part
@@ -145,14 +179,18 @@ def _changes_of(node: ast.AST, source: Source) -> Iterator[Change]:
 def _other_comparison(node: ast.Compare, source: Source) -> Iterator[Change]:
     if len(node.ops) == 1:
         for operator in COMPARED[type(node.ops[0])]:
-            yield node, '{} {} {}'.format(source.operand(node.left), operator,
-                                          source.operand(node.comparators[0]))
+            yield (
+                node,
+                '{} {} {}'.format(
+                    source.operand(node.left), operator, source.operand(node.comparators[0])
+                ),
+            )
 
 
 def _other_logic(node: ast.BoolOp, source: Source) -> Iterator[Change]:
     yield node, source.joined(ast.And() if isinstance(node.op, ast.Or) else ast.Or(), node.values)
     for left_out in range(len(node.values)):
-        yield node, source.joined(node.op, node.values[:left_out] + node.values[left_out + 1:])
+        yield node, source.joined(node.op, node.values[:left_out] + node.values[left_out + 1 :])
 
 
 def _without_not(node: ast.UnaryOp, source: Source) -> Iterator[Change]:
@@ -161,11 +199,17 @@ def _without_not(node: ast.UnaryOp, source: Source) -> Iterator[Change]:
 
 
 def _other_sum(node: ast.BinOp, source: Source) -> Iterator[Change]:
-    texts = any(isinstance(each, ast.Constant) and isinstance(each.value, str)
-                for each in (node.left, node.right))
+    texts = any(
+        isinstance(each, ast.Constant) and isinstance(each.value, str)
+        for each in (node.left, node.right)
+    )
     if type(node.op) in CALCULATED and not texts:
-        yield node, '({} {} {})'.format(source.operand(node.left), CALCULATED[type(node.op)],
-                                        source.operand(node.right))
+        yield (
+            node,
+            '({} {} {})'.format(
+                source.operand(node.left), CALCULATED[type(node.op)], source.operand(node.right)
+            ),
+        )
 
 
 def _turned_condition(node: Union[ast.If, ast.While], source: Source) -> Iterator[Change]:
@@ -180,7 +224,8 @@ def _turned_filter(node: ast.comprehension, source: Source) -> Iterator[Change]:
 def _turned(test: ast.expr, source: Source) -> Iterator[Change]:
     """Yield the opposite, unless another change is the same."""
     if not isinstance(test, ast.Compare) and not (
-            isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)):
+        isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not)
+    ):
         yield test, '(not ({}))'.format(source.text(test))
 
 
@@ -230,10 +275,20 @@ def _falls_through(node: ast.Continue, source: Source) -> Iterator[Change]:
 
 
 CHANGES: Dict[Type[ast.AST], Callable[..., Iterator[Change]]] = {
-    ast.Compare: _other_comparison, ast.BoolOp: _other_logic, ast.UnaryOp: _without_not,
-    ast.BinOp: _other_sum, ast.If: _turned_condition, ast.While: _turned_condition,
-    ast.comprehension: _turned_filter, ast.IfExp: _one_branch, ast.Constant: _other_constant,
-    ast.Return: _nothing_returned, ast.Expr: _no_call, ast.Raise: _no_error,
-    ast.Assign: _not_written, ast.AugAssign: _not_counted, ast.Break: _goes_on,
+    ast.Compare: _other_comparison,
+    ast.BoolOp: _other_logic,
+    ast.UnaryOp: _without_not,
+    ast.BinOp: _other_sum,
+    ast.If: _turned_condition,
+    ast.While: _turned_condition,
+    ast.comprehension: _turned_filter,
+    ast.IfExp: _one_branch,
+    ast.Constant: _other_constant,
+    ast.Return: _nothing_returned,
+    ast.Expr: _no_call,
+    ast.Raise: _no_error,
+    ast.Assign: _not_written,
+    ast.AugAssign: _not_counted,
+    ast.Break: _goes_on,
     ast.Continue: _falls_through,
 }

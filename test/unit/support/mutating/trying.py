@@ -1,4 +1,5 @@
 """Mutants put in and tried: which of them does no test see?"""
+
 import queue
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
@@ -27,8 +28,11 @@ class Project(NamedTuple):
     def mutants(self) -> List[Mutant]:
         """Return every mutant of its modules."""
         modules = self.root / self.mutated
-        return [mutant for path in sorted(modules.rglob('*.py'))
-                for mutant in mutants_of(path.read_text('utf-8'), str(path.relative_to(modules)))]
+        return [
+            mutant
+            for path in sorted(modules.rglob('*.py'))
+            for mutant in mutants_of(path.read_text('utf-8'), str(path.relative_to(modules)))
+        ]
 
 
 class Reach(NamedTuple):
@@ -80,14 +84,17 @@ class Workshop:
         """
         return self._each(lambda copy, test: _measure(copy, test, self._mutated), self._tests)
 
-    def try_all(self, mutants: Sequence[Mutant], reaches: List[Reach]
-                ) -> Generator[Trial, None, None]:
+    def try_all(
+        self, mutants: Sequence[Mutant], reaches: List[Reach]
+    ) -> Generator[Trial, None, None]:
         """Try each mutant, and yield what has become of it."""
         return self._each(lambda copy, mutant: _try(copy, self._mutated, mutant, reaches), mutants)
 
-    def _each(self, work: Callable[[Copy, Item], Found], items: Sequence[Item]
-              ) -> Generator[Found, None, None]:
+    def _each(
+        self, work: Callable[[Copy, Item], Found], items: Sequence[Item]
+    ) -> Generator[Found, None, None]:
         """Work on each item in a copy. Whatever ends that early leaves no process behind."""
+
         def in_copy(item: Item) -> Found:
             copy = self._copies.get()
             try:
@@ -150,5 +157,3 @@ def _verdict_of(copy: Copy, reach: Reach) -> Tuple[str, float]:
         if ending.is_fine and not failed:
             break
     return '', took_s
-
-

@@ -1,4 +1,5 @@
 """SMACH machines of drawn trees; their states tell a journal what they do."""
+
 import collections
 import random
 import threading
@@ -19,14 +20,17 @@ OUTCOMES = ['ok', 'aborted', 'preempted']
 class Told:
     """What the states of one process share."""
 
-    def __init__(self, tree: Tree, journal: Journal, before: List[Dict[str, Any]],
-                 chance: random.Random) -> None:
+    def __init__(
+        self, tree: Tree, journal: Journal, before: List[Dict[str, Any]], chance: random.Random
+    ) -> None:
         """`before`: the journal of the processes that were killed."""
         self.tree, self.journal, self.chance = tree, journal, chance
         self.ended = collections.Counter(
-            (line['path'], tuple(line['items'])) for line in before if line['what'] == 'ends')
-        self.keys = tree.leaves + [item_key(path) for path, node in tree.nodes.items()
-                                   if node.kind == 'repeated']
+            (line['path'], tuple(line['items'])) for line in before if line['what'] == 'ends'
+        )
+        self.keys = tree.leaves + [
+            item_key(path) for path, node in tree.nodes.items() if node.kind == 'repeated'
+        ]
 
 
 def item_key(path: str) -> str:
@@ -67,8 +71,11 @@ class Willing(Expert):
 
     def ask(self, question: Any, cancelled: threading.Event, progress: Any) -> Optional[Answer]:
         time.sleep(self._told.chance.uniform(0.0, LONGEST_S))  # a person takes time, too
-        self._told.journal.write('answers', query=question.question_id, path='{}/{}'.format(
-            question.container_path, question.failed_state))
+        self._told.journal.write(
+            'answers',
+            query=question.question_id,
+            path='{}/{}'.format(question.container_path, question.failed_state),
+        )
         return Answer(AnswerKind.GOTO, state=question.failed_state)
 
 
@@ -78,27 +85,49 @@ def build(told: Told, store: str) -> smach.StateMachine:
     for key in told.keys:
         machine.userdata[key] = []
     wrapped = OracleContainer.wrap(
-        machine, name=TOP, expert=Willing(told), settings={
-            'checkpoint': store, 'checkpoint_synchronous': 'OFF', 'checkpoint_wait_s': 60,
-            'on_resume': 'recover', 'memory': 1000, 'max_recoveries': 100})
+        machine,
+        name=TOP,
+        expert=Willing(told),
+        settings={
+            'checkpoint': store,
+            'checkpoint_synchronous': 'OFF',
+            'checkpoint_wait_s': 60,
+            'on_resume': 'recover',
+            'memory': 1000,
+            'max_recoveries': 100,
+        },
+    )
     journal = told.journal
-    wrapped._oracle.events.observers.append(lambda event: journal.write(
-        'event', kind=event.kind.name, seq=event.seq, trial=event.trial_id, path=event.path,
-        state=event.state, target=event.target, query=event.query_id,
-        failure=event.failure_kind, last_seq=(event.data or {}).get('last_seq')))
+    wrapped._oracle.events.observers.append(
+        lambda event: journal.write(
+            'event',
+            kind=event.kind.name,
+            seq=event.seq,
+            trial=event.trial_id,
+            path=event.path,
+            state=event.state,
+            target=event.target,
+            query=event.query_id,
+            failure=event.failure_kind,
+            last_seq=(event.data or {}).get('last_seq'),
+        )
+    )
     return wrapped
 
 
 def _built(told: Told, path: str, node: Node) -> Any:
     if node.kind == 'leaf':
         return Witnessed(told, path)
-    return {'machine': _machine, 'sequence': _sequence, 'beside': _beside,
-            'repeated': _repeated}[node.kind](told, path, node)
+    return {'machine': _machine, 'sequence': _sequence, 'beside': _beside, 'repeated': _repeated}[
+        node.kind
+    ](told, path, node)
 
 
 def _children(told: Told, path: str, node: Node) -> Any:
-    return [(child.label, _built(told, '{}/{}'.format(path, child.label), child))
-            for child in node.children]
+    return [
+        (child.label, _built(told, '{}/{}'.format(path, child.label), child))
+        for child in node.children
+    ]
 
 
 def _keys(told: Told, path: str) -> Any:
@@ -125,8 +154,12 @@ def _sequence(told: Told, path: str, node: Node) -> Any:
 
 def _beside(told: Told, path: str, node: Node) -> Any:
     children = _children(told, path, node)
-    both = smach.Concurrence(OUTCOMES, 'aborted', *_keys(told, path),
-                             outcome_map={'ok': {label: 'ok' for label, _ in children}})
+    both = smach.Concurrence(
+        OUTCOMES,
+        'aborted',
+        *_keys(told, path),
+        outcome_map={'ok': {label: 'ok' for label, _ in children}},
+    )
     with both:
         for label, child in children:
             smach.Concurrence.add(label, child)
@@ -134,9 +167,14 @@ def _beside(told: Told, path: str, node: Node) -> Any:
 
 
 def _repeated(told: Told, path: str, node: Node) -> Any:
-    iterator = smach.Iterator(OUTCOMES, *_keys(told, path), it=range(node.items),
-                              it_label=item_key(path), exhausted_outcome='ok')
-    (label, child), = _children(told, path, node)
+    iterator = smach.Iterator(
+        OUTCOMES,
+        *_keys(told, path),
+        it=range(node.items),
+        it_label=item_key(path),
+        exhausted_outcome='ok',
+    )
+    ((label, child),) = _children(told, path, node)
     with iterator:
         smach.Iterator.set_contained_state(label, child, loop_outcomes=['ok'])
     return iterator

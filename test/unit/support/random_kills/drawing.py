@@ -1,4 +1,5 @@
 """Trees drawn at random in which every state runs once, unless it is decided otherwise."""
+
 import random
 from typing import Dict, Iterator, List, NamedTuple, Tuple
 
@@ -32,29 +33,30 @@ class Tree(NamedTuple):
 
     def iterators_above(self, path: str) -> List[str]:
         """The paths of the Iterators that hold a node, outermost first."""
-        return [above for above in ways_down(path) if above != path
-                and self.nodes[above].kind == 'repeated']
+        return [
+            above
+            for above in ways_down(path)
+            if above != path and self.nodes[above].kind == 'repeated'
+        ]
 
     def precede(self, path: str, later: str) -> bool:
         """Whether a node ends before another begins, in each round of what holds both."""
         holder, index, later_index = _meeting(self, path, later)
-        return (holder in self.nodes and self.nodes[holder].kind in LINES
-                and index < later_index)
+        return holder in self.nodes and self.nodes[holder].kind in LINES and index < later_index
 
     def is_behind(self, path: str, target: str) -> bool:
         """Whether a node is `target`, is in it, or follows it in the container that has it."""
         holder = target.rpartition('/')[0]
         if not path.startswith(holder + '/'):
             return False
-        child = holder + '/' + path[len(holder) + 1:].split('/')[0]
+        child = holder + '/' + path[len(holder) + 1 :].split('/')[0]
         return child == target or self.precede(target, child)
 
     def visits_of(self, path: str) -> List[Tuple[int, ...]]:
         """The items of the Iterators above with which a state is to run."""
         found: List[Tuple[int, ...]] = [()]
         for above in self.iterators_above(path):
-            found = [items + (item,) for items in found
-                     for item in range(self.nodes[above].items)]
+            found = [items + (item,) for items in found for item in range(self.nodes[above].items)]
         return found
 
 
@@ -91,7 +93,6 @@ def _walk(path: str, node: Node) -> Iterator[Tuple[str, Node]]:
 
 
 class _Drawing:
-
     def __init__(self, seed: str) -> None:
         self._chance = random.Random('killed tree ' + seed)
         self._fails = self._chance.choice((0.0, 0.0, 0.3))
@@ -103,19 +104,26 @@ class _Drawing:
         return '{}{}'.format(letter, self._number)
 
     def line(self, label: str, depth: int, kind: str) -> Node:
-        return Node(kind, label, tuple(self._child(depth) for _ in range(
-            self._chance.randint(2, 4))))
+        return Node(
+            kind, label, tuple(self._child(depth) for _ in range(self._chance.randint(2, 4)))
+        )
 
     def _child(self, depth: int) -> Node:
         chance = self._chance
         drawn = chance.random()
         if depth <= 0 or self._left <= 0 or drawn < 0.4:
             self._left -= 1
-            return Node('leaf', self._label('L'), failures=int(chance.random() < self._fails) * (
-                chance.randint(1, 2)))
+            return Node(
+                'leaf',
+                self._label('L'),
+                failures=int(chance.random() < self._fails) * (chance.randint(1, 2)),
+            )
         if drawn < 0.65:
             return self.line(self._label('M'), depth - 1, chance.choice(LINES))
         if drawn < 0.85:
-            return Node('beside', self._label('C'), tuple(
-                self._child(depth - 1) for _ in range(chance.randint(2, 3))))
+            return Node(
+                'beside',
+                self._label('C'),
+                tuple(self._child(depth - 1) for _ in range(chance.randint(2, 3))),
+            )
         return Node('repeated', self._label('I'), (self._child(depth - 1),), chance.randint(2, 3))

@@ -1,4 +1,5 @@
 """Holds the journal of a tree that was killed against what must hold."""
+
 import collections
 from typing import Any, Dict, List, NamedTuple, Tuple
 
@@ -67,15 +68,21 @@ class Judge:
             return
         rates = {path: count for path, count in told['rates']}
         for path in self._tree.leaves:
-            counted = sum(self._visits[path, items].counted
-                          for items in self._tree.visits_of(path))
+            counted = sum(self._visits[path, items].counted for items in self._tree.visits_of(path))
             if rates.get(path) != counted:
-                self.wrong.append('{}: {} visits are in its rates, and {} ended'.format(
-                    path, rates.get(path), counted))
+                self.wrong.append(
+                    '{}: {} visits are in its rates, and {} ended'.format(
+                        path, rates.get(path), counted
+                    )
+                )
 
     def _missing(self) -> List[Tuple[str, Items]]:
-        return [(path, items) for path in self._tree.leaves for items in self._tree.visits_of(path)
-                if not self._visits[path, items].counted]
+        return [
+            (path, items)
+            for path in self._tree.leaves
+            for items in self._tree.visits_of(path)
+            if not self._visits[path, items].counted
+        ]
 
     def _say(self, line: Line, text: str) -> None:
         self.wrong.append('{}: {}'.format(text, line))
@@ -86,9 +93,14 @@ class Judge:
         path, items = line['path'], tuple(line['items'])
         visits = self._visits[path, items]
         if visits.phase != 'new' and not any(
-                self._covers(each, path, items) for each in visits.decisions):
-            self._say(line, 'runs again and nobody has decided that ({} in run {})'.format(
-                visits.phase, visits.run))
+            self._covers(each, path, items) for each in visits.decisions
+        ):
+            self._say(
+                line,
+                'runs again and nobody has decided that ({} in run {})'.format(
+                    visits.phase, visits.run
+                ),
+            )
         if visits.phase == 'begun' and visits.run == line['run']:
             self._say(line, 'begins twice in one process without an end')
         visits.phase, visits.run, visits.decisions = 'begun', line['run'], []
@@ -101,14 +113,20 @@ class Judge:
         above = tree.iterators_above(decision.target)
         held = dict(zip(tree.iterators_above(path), items))
         return tree.is_behind(path, decision.target) and all(
-            held.get(each) == decision.items.get(each, 0) for each in above)
+            held.get(each) == decision.items.get(each, 0) for each in above
+        )
 
     def _sees(self, line: Line, path: str) -> None:
         for other in self._tree.leaves:
             if self._tree.precede(other, path) and line['seen'].get(other) != self._stamps.get(
-                    other, 'nothing, as it has not ended'):
-                self._say(line, 'sees {!r} of {}, which left {!r}'.format(
-                    line['seen'].get(other), other, self._stamps.get(other)))
+                other, 'nothing, as it has not ended'
+            ):
+                self._say(
+                    line,
+                    'sees {!r} of {}, which left {!r}'.format(
+                        line['seen'].get(other), other, self._stamps.get(other)
+                    ),
+                )
 
     def _ends(self, line: Line) -> None:
         path = line['path']
@@ -153,8 +171,12 @@ class Judge:
         if kind == 'TRANSITION':
             return line['target'] == 'ORACLE' or nodes[line['path']].kind not in LINES
         holder = nodes.get(line['path'].rpartition('/')[0])
-        ends_branch = (kind == 'CONTAINER_END' and nodes[line['path']].kind in LINES
-                       and holder is not None and holder.kind not in LINES)
+        ends_branch = (
+            kind == 'CONTAINER_END'
+            and nodes[line['path']].kind in LINES
+            and holder is not None
+            and holder.kind not in LINES
+        )
         return kind in PROMISED or ends_branch
 
     def _begin(self, line: Line) -> None:
@@ -202,8 +224,11 @@ class Judge:
             visits.decisions.append(Decision(target, dict(self._items)))
 
     def _place(self, container: str, target: str) -> str:
-        for path in ('{}/{}'.format(container, target), target,
-                     '{}/{}'.format(TOP, target.lstrip('/'))):
+        for path in (
+            '{}/{}'.format(container, target),
+            target,
+            '{}/{}'.format(TOP, target.lstrip('/')),
+        ):
             if path in self._tree.nodes:
                 return path
         return container

@@ -1,4 +1,5 @@
 """Runs a tree in one process after another, each killed at a random instant, until it ends."""
+
 import json
 import os
 import random
@@ -58,8 +59,11 @@ def kill_until_it_ends(tree: Tree, most: int) -> Course:
         open(journal, 'w').close()
         while told is None:
             scale_s = 0.08 * (1 + kills // EASIER_AFTER)
-            instant = None if kills == most else Instant(
-                chance.uniform(0.0, scale_s), chance.random() < EARLY)
+            instant = (
+                None
+                if kills == most
+                else Instant(chance.uniform(0.0, scale_s), chance.random() < EARLY)
+            )
             told = _run(tree, folder, kills + 1, chance.random(), instant)
             kills += told is None
             lines = read_journal(journal)
@@ -69,13 +73,18 @@ def kill_until_it_ends(tree: Tree, most: int) -> Course:
     judge.end(told)
     begun = sum(line['what'] == 'begins' for line in lines)
     due = sum(len(tree.visits_of(path)) for path in tree.leaves)
-    return Course(tree.seed, kills, sum(
-        line['what'] == 'event' and line['kind'] == 'RESUMED' for line in lines), begun - due,
-                  judge.wrong)
+    return Course(
+        tree.seed,
+        kills,
+        sum(line['what'] == 'event' and line['kind'] == 'RESUMED' for line in lines),
+        begun - due,
+        judge.wrong,
+    )
 
 
-def _run(tree: Tree, folder: str, run: int, seed: float, instant: Optional[Instant]
-         ) -> Optional[Dict[str, Any]]:
+def _run(
+    tree: Tree, folder: str, run: int, seed: float, instant: Optional[Instant]
+) -> Optional[Dict[str, Any]]:
     """Run the program; return what it has told, None where it was killed before it did.
 
     `instant`: None: it is not killed.
@@ -112,12 +121,16 @@ def _work(tree: Tree, folder: str, run: int, seed: float, writer: int) -> None:
     told: Dict[str, Any] = {}
     try:
         path = os.path.join(folder, 'journal')
-        machine = build(Told(tree, Journal(path, run), read_journal(path), random.Random(seed)),
-                        os.path.join(folder, 'robot.db'))
+        machine = build(
+            Told(tree, Journal(path, run), read_journal(path), random.Random(seed)),
+            os.path.join(folder, 'robot.db'),
+        )
         _say_at_first_event(machine, writer)
         told['outcome'] = machine.execute()
-        told['rates'] = [['{}/{}'.format(row.path, row.state), row.successes + row.failures]
-                         for row in machine.rates()]
+        told['rates'] = [
+            ['{}/{}'.format(row.path, row.state), row.successes + row.failures]
+            for row in machine.rates()
+        ]
         told['threads'] = _threads_left()
     except BaseException:
         told['error'] = traceback.format_exc()

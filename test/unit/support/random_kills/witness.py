@@ -1,4 +1,5 @@
 """A journal beside the store: what states and events have said, on the disk before they go on."""
+
 import json
 import os
 import threading

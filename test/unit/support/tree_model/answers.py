@@ -1,4 +1,5 @@
 """What an expert answers, drawn from what a question offers."""
+
 import random
 from typing import NamedTuple, Optional, Tuple
 
@@ -19,8 +20,9 @@ class Options(NamedTuple):
     outputs: Tuple[str, ...]
 
 
-def draw_reply(plan: TreePlan, path: str, label: str, number: int,
-               options: Options) -> Optional[Reply]:
+def draw_reply(
+    plan: TreePlan, path: str, label: str, number: int, options: Options
+) -> Optional[Reply]:
     """The answer to the question of that number about a state, None where there is none."""
     chance = random.Random('{} answer {}/{} {}'.format(plan.seed, path, label, number))
     drawn = chance.random()
@@ -31,7 +33,10 @@ def draw_reply(plan: TreePlan, path: str, label: str, number: int,
     if drawn < 0.3:
         return None
     if drawn < 0.55:
-        outputs = {key: '{}/{} answer {}'.format(path, label, number) for key in options.outputs
-                   if chance.random() < 0.5}
+        outputs = {
+            key: '{}/{} answer {}'.format(path, label, number)
+            for key in options.outputs
+            if chance.random() < 0.5
+        }
         return Reply('supersede', '', chance.choice(options.supersede)[0], outputs)
     return Reply('goto', *chance.choice(options.places)) if options.places else None

@@ -1,4 +1,5 @@
 """The model's branches: plain states of Iterators and Concurrences, each with an oracle."""
+
 from typing import Any, Dict, Optional, Set
 
 from .ends import Failed, Way
@@ -15,8 +16,9 @@ class BranchPart(MachinePart):
 
     def __init__(self, run: Any, leaf: Leaf, path: str, parent: Any) -> None:
         """`path`: of the Iterator or Concurrence that is the parent."""
-        super().__init__(run, Machine(leaf.label, leaf.outcomes, (leaf,), {leaf.label: {}}, {}, ()),
-                         path, parent)
+        super().__init__(
+            run, Machine(leaf.label, leaf.outcomes, (leaf,), {leaf.label: {}}, {}, ()), path, parent
+        )
         self.leaf = leaf
         self.userdata = parent.userdata  # the same: what a branch writes is seen at once
 
@@ -24,8 +26,7 @@ class BranchPart(MachinePart):
         """Run to the end, on the userdata of the parent; returns the outcome."""
         return super().execute(View({}, {}))
 
-    def tell(self, kind: str, label: str, outcome: str = '', target: str = '',
-             *more: Any) -> None:
+    def tell(self, kind: str, label: str, outcome: str = '', target: str = '', *more: Any) -> None:
         """Note an event; its beginning and end are those of the parent."""
         if not kind.startswith('CONTAINER'):
             super().tell(kind, label, outcome, target, *more)
@@ -47,9 +48,12 @@ class BranchPart(MachinePart):
             plan = self.parent.plan
             return failed.outcome in plan.loop_outcomes or (
                 failed.outcome in plan.final_map
-                and not _is_failure(self.parent, plan.final_map[failed.outcome]))
-        return any(wanted.get(self.label) == failed.outcome and not _is_failure(self.parent, name)
-                   for name, wanted in self.parent.plan.outcome_map.items())
+                and not _is_failure(self.parent, plan.final_map[failed.outcome])
+            )
+        return any(
+            wanted.get(self.label) == failed.outcome and not _is_failure(self.parent, name)
+            for name, wanted in self.parent.plan.outcome_map.items()
+        )
 
     def after_jump(self, target: str, written: Set[str]) -> Dict[str, Any]:
         """The userdata that a retry leaves: that of a Concurrence stays live."""

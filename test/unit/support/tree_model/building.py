@@ -1,4 +1,5 @@
 """Trees of SMACH made from a plan."""
+
 import threading
 import time
 from typing import Any, Callable, Dict, List, Optional
@@ -63,8 +64,9 @@ class Scripted(smach.State):
     """A leaf."""
 
     def __init__(self, world: World, plan: Leaf, path: str) -> None:
-        super().__init__(outcomes=list(plan.outcomes), input_keys=list(plan.reads),
-                         output_keys=list(plan.writes))
+        super().__init__(
+            outcomes=list(plan.outcomes), input_keys=list(plan.reads), output_keys=list(plan.writes)
+        )
         self._world = world
         self._plan = plan
         self._path = path
@@ -109,8 +111,9 @@ class Scripted(smach.State):
         return 'preempted'
 
     def _note_entry(self, ud: Any) -> None:
-        self._world.enter(self._path, self._plan.label, {
-            key: ud[key] for key in self._plan.reads if key in ud})
+        self._world.enter(
+            self._path, self._plan.label, {key: ud[key] for key in self._plan.reads if key in ud}
+        )
 
     def _await_preempt(self) -> None:
         """Where a Concurrence around passes a preempt on in a thread of its own, wait for it."""
@@ -240,6 +243,7 @@ class Parallel(smach.Concurrence):
 
 def _told(base: type) -> type:
     """The class of containers that tell a Concurrence around when they raise."""
+
     class Told(base):  # type: ignore
         around: Any = None
         plan_label = ''
@@ -286,15 +290,23 @@ def _machine(world: World, plan: Machine, path: str) -> Any:
         machine = ToldMachine(list(plan.outcomes), **keys)
     with machine:
         for child in plan.children:
-            machine.add(child.label, _node(world, child, path, machine),
-                        dict(plan.transitions[child.label]), dict(plan.remappings[child.label]))
+            machine.add(
+                child.label,
+                _node(world, child, path, machine),
+                dict(plan.transitions[child.label]),
+                dict(plan.remappings[child.label]),
+            )
     return machine
 
 
 def _beside(world: World, plan: Beside, path: str) -> Any:
     made = ToldConcurrence(
-        list(plan.outcomes), plan.default, input_keys=list(plan.keys), output_keys=list(plan.keys),
-        outcome_map=plan.outcome_map)
+        list(plan.outcomes),
+        plan.default,
+        input_keys=list(plan.keys),
+        output_keys=list(plan.keys),
+        outcome_map=plan.outcome_map,
+    )
     made.prepare(world, [child.label for child in plan.children], plan.stops_at)
     with made:
         for child in plan.children:
@@ -304,14 +316,25 @@ def _beside(world: World, plan: Beside, path: str) -> Any:
 
 def _repeated(world: World, plan: Repeated, path: str) -> Any:
     made = ToldIterator(
-        list(plan.outcomes), list(plan.keys), list(plan.keys), it=list(range(plan.items)),
-        it_label='item', exhausted_outcome='ok')
+        list(plan.outcomes),
+        list(plan.keys),
+        list(plan.keys),
+        it=list(range(plan.items)),
+        it_label='item',
+        exhausted_outcome='ok',
+    )
     with made:
         smach.Iterator.set_contained_state(
-            plan.child.label, _node(world, plan.child, path, made),
-            loop_outcomes=list(plan.loop_outcomes), final_outcome_map=dict(plan.final_map))
+            plan.child.label,
+            _node(world, plan.child, path, made),
+            loop_outcomes=list(plan.loop_outcomes),
+            final_outcome_map=dict(plan.final_map),
+        )
     return made
 
 
-_BUILDERS: Dict[type, Callable[..., Any]] = {Machine: _machine, Beside: _beside,
-                                             Repeated: _repeated}
+_BUILDERS: Dict[type, Callable[..., Any]] = {
+    Machine: _machine,
+    Beside: _beside,
+    Repeated: _repeated,
+}

@@ -1,4 +1,5 @@
 """One tree, both ways: where the courses part."""
+
 import itertools
 import threading
 from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
@@ -36,22 +37,36 @@ class Comparison(NamedTuple):
     @property
     def is_fine(self) -> bool:
         """Whether nothing is wrong."""
-        return not (self.difference or self.is_hung or self.still_running or self.threads_left
-                    or any(mine != theirs for mine, theirs in self.outcomes))
+        return not (
+            self.difference
+            or self.is_hung
+            or self.still_running
+            or self.threads_left
+            or any(mine != theirs for mine, theirs in self.outcomes)
+        )
 
     def report(self) -> str:
         """What is wrong: the seed, and both courses up to where they part, and a little on."""
-        lines = ['seed {}: outcomes (model, executive) {}{}{}'.format(
-            self.plan.seed, self.outcomes, ', hung' if self.is_hung else '',
-            ', threads left: {}'.format(self.threads_left) if self.threads_left else '')]
+        lines = [
+            'seed {}: outcomes (model, executive) {}{}{}'.format(
+                self.plan.seed,
+                self.outcomes,
+                ', hung' if self.is_hung else '',
+                ', threads left: {}'.format(self.threads_left) if self.threads_left else '',
+            )
+        ]
         if self.difference:
             path, number, mine, theirs = self.difference
-            courses = [_by_path(self.plan, course, bool(path)).get(path, [])
-                       for course in (self.model.course, self.executed.course)]
-            lines += ['  {}'.format(event) for event in courses[0][max(0, number - 12):number]]
+            courses = [
+                _by_path(self.plan, course, bool(path)).get(path, [])
+                for course in (self.model.course, self.executed.course)
+            ]
+            lines += ['  {}'.format(event) for event in courses[0][max(0, number - 12) : number]]
             for name, course in zip(('model', 'executive'), courses):
-                lines += ['  {:9} {}'.format(name, event)
-                          for event in course[number:number + 4] or ['(nothing more)']]
+                lines += [
+                    '  {:9} {}'.format(name, event)
+                    for event in course[number : number + 4] or ['(nothing more)']
+                ]
         return '\n'.join(lines)
 
 
@@ -69,9 +84,16 @@ def compare(plan: TreePlan, is_upstream: bool, trials: int = 2) -> Comparison:
         outcomes.append((model.execute(), said))
         if outcomes[-1][0] != outcomes[-1][1] or CUT in outcomes[-1]:
             break
-    return Comparison(plan, model, executed, tuple(outcomes),
-                      difference_of(plan, model.course, executed.course), is_hung,
-                      executed.machine.is_running(), threads_left(before))
+    return Comparison(
+        plan,
+        model,
+        executed,
+        tuple(outcomes),
+        difference_of(plan, model.course, executed.course),
+        is_hung,
+        executed.machine.is_running(),
+        threads_left(before),
+    )
 
 
 def in_time(executed: Executed) -> Optional[str]:
@@ -111,8 +133,11 @@ def _moment(plan: TreePlan, model: List[Any], is_concurrent: bool, difference: D
     if not is_concurrent:
         return difference.number
     branches = _branches_of(plan)
-    places = [place for place, (path, event) in enumerate(model)
-              if _course_of(path, event, branches) == difference.path]
+    places = [
+        place
+        for place, (path, event) in enumerate(model)
+        if _course_of(path, event, branches) == difference.path
+    ]
     return (places + [len(model)])[min(difference.number, len(places))]
 
 
@@ -120,9 +145,12 @@ def _is_same(one: Any, other: Any) -> bool:
     """Whether two events are the same; rates differ in their last places."""
     if one is None or other is None or len(one) != len(other):
         return one == other
-    return all(abs(mine - theirs) < 1e-9 if isinstance(mine, float) and isinstance(theirs, float)
-               else mine == theirs or isinstance(mine, Unsaid) and mine.also == theirs
-               for mine, theirs in zip(one, other))
+    return all(
+        abs(mine - theirs) < 1e-9
+        if isinstance(mine, float) and isinstance(theirs, float)
+        else mine == theirs or isinstance(mine, Unsaid) and mine.also == theirs
+        for mine, theirs in zip(one, other)
+    )
 
 
 def _by_path(plan: TreePlan, course: List[Any], is_concurrent: bool) -> Dict[str, List[Any]]:
@@ -136,15 +164,22 @@ def _by_path(plan: TreePlan, course: List[Any], is_concurrent: bool) -> Dict[str
 
 def _branches_of(plan: TreePlan) -> Set[Tuple[str, str]]:
     """The places of the branches, each of which goes its own way."""
-    return {(path, child.label) for path, node in nodes_below(TOP, plan.top)
-            if isinstance(node, (Beside, Repeated))
-            for child in children_of(node) if isinstance(child, Leaf)}
+    return {
+        (path, child.label)
+        for path, node in nodes_below(TOP, plan.top)
+        if isinstance(node, (Beside, Repeated))
+        for child in children_of(node)
+        if isinstance(child, Leaf)
+    }
 
 
 def _course_of(path: str, event: Any, branches: Set[Tuple[str, str]]) -> str:
     """The path of the container that an event is of, or of its branch."""
-    return '/'.join((path, event[1])) if (path, event[1]) in branches and not event[0].startswith(
-        'CONTAINER') else path
+    return (
+        '/'.join((path, event[1]))
+        if (path, event[1]) in branches and not event[0].startswith('CONTAINER')
+        else path
+    )
 
 
 def threads_left(before: Any) -> Tuple[str, ...]:

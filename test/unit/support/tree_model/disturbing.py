@@ -1,4 +1,5 @@
 """Preempts that come at any moment, from another thread: what must hold anyway."""
+
 import random
 import threading
 from typing import List, Optional
@@ -26,8 +27,9 @@ def disturb(plan: TreePlan, trials: int = 2) -> List[str]:
             wrong.append('seed {}: {}'.format(plan.seed, said))
     if executed.machine.is_running():
         wrong.append('seed {}: still running'.format(plan.seed))
-    return wrong + ['seed {}: thread left: {}'.format(plan.seed, name)
-                    for name in threads_left(before)]
+    return wrong + [
+        'seed {}: thread left: {}'.format(plan.seed, name) for name in threads_left(before)
+    ]
 
 
 def _preempted(executed: Executed, entry: int) -> Optional[str]:

@@ -1,4 +1,5 @@
 """Trees drawn at random."""
+
 import random
 from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
@@ -46,7 +47,6 @@ def draw(seed: object, shape: Shape = ANY) -> TreePlan:
 
 
 class _Drawing:
-
     def __init__(self, seed: str, shape: Shape) -> None:
         self._seed = seed
         self._shape = shape
@@ -63,12 +63,21 @@ class _Drawing:
         depth = chance.randint(min(1, self._shape.depth), self._shape.depth)
         top = self._machine(TOP, depth, False)
         plan = TreePlan(
-            self._seed, top, policy=chance.choice(('prose', 'algorithm1')),
-            estimator=chance.choice(('window', 'exponential')), memory=chance.choice((2, 4, 10)),
-            prior=chance.choice((0.05, 0.1, 0.3)), max_recoveries=chance.choice((0, 1, 2, 5, 5)),
-            budget=self._budget(), author_recoveries=self._one_of('keep', 'override', 0.2),
-            userdata=self._one_of('restore', 'keep', 0.3), escalate=chance.random() < 0.4,
-            on_no_answer=('stop', ''), has_expert=chance.random() < 0.85, states={})
+            self._seed,
+            top,
+            policy=chance.choice(('prose', 'algorithm1')),
+            estimator=chance.choice(('window', 'exponential')),
+            memory=chance.choice((2, 4, 10)),
+            prior=chance.choice((0.05, 0.1, 0.3)),
+            max_recoveries=chance.choice((0, 1, 2, 5, 5)),
+            budget=self._budget(),
+            author_recoveries=self._one_of('keep', 'override', 0.2),
+            userdata=self._one_of('restore', 'keep', 0.3),
+            escalate=chance.random() < 0.4,
+            on_no_answer=('stop', ''),
+            has_expert=chance.random() < 0.85,
+            states={},
+        )
         plan = plan._replace(on_no_answer=self._fallback(plan))
         for path, node in nodes_below(TOP, top):
             self._settings(plan.states, path, node)
@@ -92,8 +101,12 @@ class _Drawing:
         if drawn < 0.8 and all('aborted' in machine.outcomes for _, machine in machines_of(plan)):
             return 'give_up', 'aborted'
         return 'goto', self._chance.choice(
-            ['{}/{}'.format(path, child.label)[len(TOP) + 1:]
-             for path, machine in machines_of(plan) for child in machine.children])
+            [
+                '{}/{}'.format(path, child.label)[len(TOP) + 1 :]
+                for path, machine in machines_of(plan)
+                for child in machine.children
+            ]
+        )
 
     # -- nodes
 
@@ -113,8 +126,15 @@ class _Drawing:
         overruns = not beside and self._shape.time_limits and chance.random() < 0.02
         outcomes = tuple(dict.fromkeys(('ok', 'aborted', 'preempted') + more))
         self._left -= 1
-        return Leaf(self._label('L'), outcomes, self._some_keys(), self._some_keys(),
-                    self._trouble * chance.choice((0.0, 1.0, 1.0)), tuple(kinds), overruns)
+        return Leaf(
+            self._label('L'),
+            outcomes,
+            self._some_keys(),
+            self._some_keys(),
+            self._trouble * chance.choice((0.0, 1.0, 1.0)),
+            tuple(kinds),
+            overruns,
+        )
 
     def _child(self, depth: int, beside: bool) -> Node:
         drawn = self._chance.random()
@@ -144,18 +164,26 @@ class _Drawing:
         labels = [child.label for child in children]
         transitions = {
             child.label: self._transitions(child, labels, index, outcomes)
-            for index, child in enumerate(children)}
-        return Machine(label, outcomes, children, transitions,
-                       {child.label: self._remapping() for child in children}, self._some_keys(),
-                       is_sequence=chance.random() < 0.2)
+            for index, child in enumerate(children)
+        }
+        return Machine(
+            label,
+            outcomes,
+            children,
+            transitions,
+            {child.label: self._remapping() for child in children},
+            self._some_keys(),
+            is_sequence=chance.random() < 0.2,
+        )
 
     def _remapping(self) -> Dict[str, str]:
         if self._chance.random() < 0.7:
             return {}
         return dict(zip(KEYS, self._chance.sample(KEYS, len(KEYS))))
 
-    def _transitions(self, child: Node, labels: List[str], index: int,
-                     outcomes: Tuple[str, ...]) -> Dict[str, str]:
+    def _transitions(
+        self, child: Node, labels: List[str], index: int, outcomes: Tuple[str, ...]
+    ) -> Dict[str, str]:
         following = labels[index + 1] if index + 1 < len(labels) else 'ok'
         drawn = {'ok': following}
         for outcome in child.outcomes[1:]:
@@ -164,15 +192,16 @@ class _Drawing:
                 drawn[outcome] = target
         return drawn
 
-    def _target(self, outcome: str, labels: List[str], index: int,
-                outcomes: Tuple[str, ...]) -> Optional[str]:
+    def _target(
+        self, outcome: str, labels: List[str], index: int, outcomes: Tuple[str, ...]
+    ) -> Optional[str]:
         """Where the author leads an outcome; None: it falls through."""
         chance = self._chance
         ends = [name for name in outcomes if name != 'preempted']
         if outcome == 'preempted':
             return None if outcome in outcomes else chance.choice(ends)
         if outcome == 'again':
-            return chance.choice(labels[:index + 1])
+            return chance.choice(labels[: index + 1])
         drawn = chance.random()
         if drawn < 0.2:
             return chance.choice(labels)
@@ -188,8 +217,15 @@ class _Drawing:
         children = tuple(self._branch(depth) for _ in range(chance.randint(1, 3)))
         outcomes = ('ok', 'aborted', 'preempted')
         outcome_map = {'ok': {child.label: 'ok' for child in children}}
-        return Beside(self._label('C'), outcomes, children, 'aborted', outcome_map,
-                      self._some_keys(), ('aborted',) if chance.random() < 0.3 else ())
+        return Beside(
+            self._label('C'),
+            outcomes,
+            children,
+            'aborted',
+            outcome_map,
+            self._some_keys(),
+            ('aborted',) if chance.random() < 0.3 else (),
+        )
 
     def _branch(self, depth: int) -> Node:
         if self._shape.leaf_branches and self._chance.random() < 0.3:
@@ -208,33 +244,47 @@ class _Drawing:
             child = self._repeated(depth - 1, beside)
         else:
             child = self._machine(self._label('E'), depth, beside)
-        loop = tuple(name for name in child.outcomes
-                     if name == 'ok' or name != 'preempted' and chance.random() < 0.15)
+        loop = tuple(
+            name
+            for name in child.outcomes
+            if name == 'ok' or name != 'preempted' and chance.random() < 0.15
+        )
         outcomes = tuple(dict.fromkeys(child.outcomes + ('ok', 'aborted')))
-        final = {name: chance.choice(outcomes) for name in child.outcomes
-                 if name not in ('ok', 'preempted') and chance.random() < 0.2}
-        return Repeated(self._label('I'), outcomes, child, chance.randint(1, 3), loop, final,
-                        self._some_keys())
+        final = {
+            name: chance.choice(outcomes)
+            for name in child.outcomes
+            if name not in ('ok', 'preempted') and chance.random() < 0.2
+        }
+        return Repeated(
+            self._label('I'), outcomes, child, chance.randint(1, 3), loop, final, self._some_keys()
+        )
 
     # -- settings of states
 
-    def _settings(self, states: Dict[Tuple[str, str], StateSettings], path: str,
-                  node: Node) -> None:
+    def _settings(
+        self, states: Dict[Tuple[str, str], StateSettings], path: str, node: Node
+    ) -> None:
         chance = self._chance
         for index, child in enumerate(children_of(node)):
             if not isinstance(node, Machine) and not isinstance(child, Leaf):
                 continue
             limit = chance.choice((0, 1, 3)) if chance.random() < 0.1 else None
-            listed = tuple(name for name in child.outcomes
-                           if name not in ('ok', 'preempted') and chance.random() < 0.1)
+            listed = tuple(
+                name
+                for name in child.outcomes
+                if name not in ('ok', 'preempted') and chance.random() < 0.1
+            )
             states[path, child.label] = StateSettings(
-                self._checks(node, index), listed,
+                self._checks(node, index),
+                listed,
                 prior=chance.choice((0.2, 0.5, 0.8)) if chance.random() < 0.15 else None,
                 max_recoveries=limit,
-                author_recoveries=(chance.choice(('keep', 'override')) if chance.random() < 0.1
-                                   else None),
+                author_recoveries=(
+                    chance.choice(('keep', 'override')) if chance.random() < 0.1 else None
+                ),
                 memory=chance.choice((1, 3)) if chance.random() < 0.1 else None,
-                on_retry=self._on_retry(path, node))
+                on_retry=self._on_retry(path, node),
+            )
 
     def _on_retry(self, path: str, node: Node) -> str:
         is_beside = isinstance(node, Beside) or '/C' in path
@@ -249,12 +299,21 @@ class _Drawing:
             return ()
         checks = []
         for number in range(chance.randint(1, 2)):
-            others = [child.label for child in children_of(node)[:index]
-                      if isinstance(node, Machine) and isinstance(child, Leaf)
-                      and 'preempt' not in child.kinds and not child.overruns]
+            others = [
+                child.label
+                for child in children_of(node)[:index]
+                if isinstance(node, Machine)
+                and isinstance(child, Leaf)
+                and 'preempt' not in child.kinds
+                and not child.overruns
+            ]
             if others and chance.random() < 0.4:
                 checks.append(Check(chance.choice(others), is_label=True))
             else:
-                checks.append(Check('check_{}'.format(number), writes=(
-                    chance.choice(KEYS) if chance.random() < 0.5 else None)))
+                checks.append(
+                    Check(
+                        'check_{}'.format(number),
+                        writes=(chance.choice(KEYS) if chance.random() < 0.5 else None),
+                    )
+                )
         return tuple(dict.fromkeys(checks))

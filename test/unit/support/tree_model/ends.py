@@ -1,4 +1,5 @@
 """How a state ends in the model, and where a recovery leads."""
+
 from typing import Any, Dict, NamedTuple, Optional, Set, Tuple
 
 

@@ -1,4 +1,5 @@
 """Trees of SMACH executed under an oracle; what happens is noted as the model notes it."""
+
 import threading
 import time
 from typing import Any, Dict, List, Optional, Tuple
@@ -16,10 +17,20 @@ from .ends import Reply
 from .plan import CUT, KEYS, TOP, TreePlan
 
 NOTED = {
-    EventKind.CONTAINER_START, EventKind.CONTAINER_END, EventKind.STATE_START,
-    EventKind.TRANSITION, EventKind.FAILURE, EventKind.PRECONDITION_START,
-    EventKind.PRECONDITION_END, EventKind.DECISION, EventKind.JUMP, EventKind.QUERY_OPENED,
-    EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.SUPERSEDE, EventKind.GIVE_UP
+    EventKind.CONTAINER_START,
+    EventKind.CONTAINER_END,
+    EventKind.STATE_START,
+    EventKind.TRANSITION,
+    EventKind.FAILURE,
+    EventKind.PRECONDITION_START,
+    EventKind.PRECONDITION_END,
+    EventKind.DECISION,
+    EventKind.JUMP,
+    EventKind.QUERY_OPENED,
+    EventKind.QUERY_ANSWERED,
+    EventKind.QUERY_EXPIRED,
+    EventKind.SUPERSEDE,
+    EventKind.GIVE_UP,
 }
 CLASSES = ('', 'LOW', 'MODERATE', 'HIGH')
 
@@ -32,8 +43,12 @@ class Executed:
         self.world = World(plan)
         self.machine = build(self.world)
         OracleContainer.wrap(
-            self.machine, name=TOP, settings=settings_of(plan), preconditions=self._checks(),
-            expert=DrawnExpert(self.world) if plan.has_expert else None)
+            self.machine,
+            name=TOP,
+            settings=settings_of(plan),
+            preconditions=self._checks(),
+            expert=DrawnExpert(self.world) if plan.has_expert else None,
+        )
         for node in nodes_of(self.machine):
             _InTurn.take_over(self.world, node)
         self.machine.events.observers.append(self._observe)
@@ -46,8 +61,7 @@ class Executed:
         self.machine.userdata.update(_userdata())
         try:
             outcome = self.machine.execute()
-        except (smach.InvalidUserCodeError, smach.InvalidTransitionError,
-                smach.InvalidStateError):
+        except (smach.InvalidUserCodeError, smach.InvalidTransitionError, smach.InvalidStateError):
             outcome = ''
         finally:
             world.turns.end()
@@ -64,8 +78,12 @@ class Executed:
             return
         noted: Tuple[Any, ...] = (event.kind.name, event.state, event.outcome, event.target)
         if event.kind is EventKind.FAILURE:
-            noted += (FailureKind(event.failure_kind).name, CLASSES[event.failure_class],
-                      event.rate, event.continuous)
+            noted += (
+                FailureKind(event.failure_kind).name,
+                CLASSES[event.failure_class],
+                event.rate,
+                event.continuous,
+            )
         elif event.kind is EventKind.DECISION:
             noted += ((event.data or {}).get('decided_by'),)
         elif event.kind is EventKind.JUMP:
@@ -74,10 +92,13 @@ class Executed:
 
     def _checks(self) -> Dict[str, List[Any]]:
         return {
-            _relative(path, label): [check.name if check.is_label
-                                     else _Check(self.plan, path, label, check)
-                                     for check in own.preconditions]
-            for (path, label), own in self.plan.states.items() if own.preconditions}
+            _relative(path, label): [
+                check.name if check.is_label else _Check(self.plan, path, label, check)
+                for check in own.preconditions
+            ]
+            for (path, label), own in self.plan.states.items()
+            if own.preconditions
+        }
 
 
 class _InTurn(OracleState):
@@ -121,7 +142,7 @@ def _userdata() -> smach.UserData:
 
 
 def _relative(path: str, label: str) -> str:
-    return '{}/{}'.format(path, label)[len(TOP) + 1:]
+    return '{}/{}'.format(path, label)[len(TOP) + 1 :]
 
 
 class _Check:
@@ -145,20 +166,30 @@ def settings_of(plan: TreePlan) -> Dict[str, Any]:
     """The settings of a plan as `wrap` takes them."""
     kind, name = plan.on_no_answer
     settings: Dict[str, Any] = {
-        'policy': plan.policy, 'estimator': plan.estimator, 'memory': plan.memory,
-        'prior': plan.prior, 'max_recoveries': plan.max_recoveries, 'budget': dict(plan.budget),
-        'author_recoveries': plan.author_recoveries, 'userdata': plan.userdata,
-        'escalate': plan.escalate, 'on_no_answer': kind if kind == 'stop' else {kind: name},
-        'states': {}}
+        'policy': plan.policy,
+        'estimator': plan.estimator,
+        'memory': plan.memory,
+        'prior': plan.prior,
+        'max_recoveries': plan.max_recoveries,
+        'budget': dict(plan.budget),
+        'author_recoveries': plan.author_recoveries,
+        'userdata': plan.userdata,
+        'escalate': plan.escalate,
+        'on_no_answer': kind if kind == 'stop' else {kind: name},
+        'states': {},
+    }
     for (path, label), own in plan.states.items():
-        said = {key: list(value) if isinstance(value, tuple) else value
-                for key, value in own._asdict().items()
-                if key != 'preconditions' and value not in (None, (), 'allow')}
+        said = {
+            key: list(value) if isinstance(value, tuple) else value
+            for key, value in own._asdict().items()
+            if key != 'preconditions' and value not in (None, (), 'allow')
+        }
         if said:
             settings['states'][_relative(path, label)] = said
     for path, leaf in _overrunning(TOP, plan.top):
         settings['states'].setdefault(_relative(path, leaf.label), {}).update(
-            time_limit_s=LIMIT_S, grace_period_s=5)
+            time_limit_s=LIMIT_S, grace_period_s=5
+        )
     return settings
 
 
@@ -197,14 +228,28 @@ def options_of(question: Any) -> Options:
     open_now = [choice for choice in question.choices if not choice.blocked]
     return Options(
         tuple(sorted((choice.container or path, choice.state) for choice in open_now)),
-        tuple(sorted((choice.container or path, choice.state, tuple(sorted(choice.missing_keys)))
-                     for choice in open_now)),
-        tuple(sorted((choice.container or path, choice.state, tuple(sorted(choice.repeats)))
-                     for choice in open_now if choice.repeats)),
+        tuple(
+            sorted(
+                (choice.container or path, choice.state, tuple(sorted(choice.missing_keys)))
+                for choice in open_now
+            )
+        ),
+        tuple(
+            sorted(
+                (choice.container or path, choice.state, tuple(sorted(choice.repeats)))
+                for choice in open_now
+                if choice.repeats
+            )
+        ),
         tuple(sorted((choice.outcome, choice.target) for choice in question.supersede_outcomes)),
-        tuple(sorted([(path, outcome) for outcome in question.give_up_outcomes]
-                     + [(each.container, each.outcome) for each in question.give_up_above])),
-        tuple(sorted(question.output_keys)))
+        tuple(
+            sorted(
+                [(path, outcome) for outcome in question.give_up_outcomes]
+                + [(each.container, each.outcome) for each in question.give_up_above]
+            )
+        ),
+        tuple(sorted(question.output_keys)),
+    )
 
 
 def answer_of(reply: Reply) -> Answer:

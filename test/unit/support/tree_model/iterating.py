@@ -1,4 +1,5 @@
 """The model's Iterators: from item to item, and how they go on when they are entered again."""
+
 from typing import Any, Dict, List, Optional
 
 from .parts import Jumping, Part, Raised, Unsaid, View

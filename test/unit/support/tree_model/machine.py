@@ -1,4 +1,5 @@
 """The model's StateMachines under an oracle: from state to state, and what is a failure."""
+
 from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Way
@@ -108,8 +109,9 @@ class MachinePart(Part, Recovering):
         self.tell('STATE_START', label)
         outcome, raised = None, False
         try:
-            outcome = yield from child.execute(View(
-                self.userdata, self.plan.remappings.get(label, {})))
+            outcome = yield from child.execute(
+                View(self.userdata, self.plan.remappings.get(label, {}))
+            )
         except Raised:
             raised = True
         except Jumping as jump:
@@ -120,8 +122,12 @@ class MachinePart(Part, Recovering):
 
     def _ended(self, label: str, outcome: Any, raised: bool) -> Course:
         failed = self.failure_of(label, outcome, raised)
-        if self.flag and self.run.top.flag and not self.work and (
-                failed or outcome == 'preempted' or not self.child(label).flag):
+        if (
+            self.flag
+            and self.run.top.flag
+            and not self.work
+            and (failed or outcome == 'preempted' or not self.child(label).flag)
+        ):
             self.work = set(self.snapshots)
         if failed is None:
             is_success = not self.flag and outcome != 'preempted'
@@ -165,8 +171,16 @@ class MachinePart(Part, Recovering):
     def count_failure(self, failed: Failed, continuous: bool) -> None:
         """Report a failure and remember it."""
         memory, label = self.memory, failed.label
-        self.tell('FAILURE', label, failed.outcome, '', failed.kind, memory.failure_class(label),
-                  float(memory.rate(label)), continuous)
+        self.tell(
+            'FAILURE',
+            label,
+            failed.outcome,
+            '',
+            failed.kind,
+            memory.failure_class(label),
+            float(memory.rate(label)),
+            continuous,
+        )
         memory.fails(label)
 
     # -- what an end of a state is
@@ -176,8 +190,10 @@ class MachinePart(Part, Recovering):
         target = self.plan.transitions[label].get(outcome)
         if target in self.labels:
             return Way(target, True)
-        return next((Way(name, False) for name in (target, outcome)
-                     if name in self.plan.outcomes), Way('', False))
+        return next(
+            (Way(name, False) for name in (target, outcome) if name in self.plan.outcomes),
+            Way('', False),
+        )
 
     def failure_of(self, label: str, outcome: Any, raised: bool) -> Optional[Failed]:
         """What the end of a state is, None where it is no failure."""
@@ -206,9 +222,14 @@ class MachinePart(Part, Recovering):
         own = self.settings_of(failed.label).author_recoveries
         if (own or self.run.plan.author_recoveries) == 'override':
             return False
-        return failed.kind == 'FAILING_OUTCOME' and failed.way is not None and (
-            failed.way.is_state
-            or failed.outcome not in self.settings_of(failed.label).failure_outcomes)
+        return (
+            failed.kind == 'FAILING_OUTCOME'
+            and failed.way is not None
+            and (
+                failed.way.is_state
+                or failed.outcome not in self.settings_of(failed.label).failure_outcomes
+            )
+        )
 
     def settings_of(self, label: str) -> Any:
         """The settings of a state."""
@@ -291,7 +312,6 @@ class MachinePart(Part, Recovering):
         else:
             self.left_with = failing_outcome_of(outcomes) or ''
 
-    def tell(self, kind: str, label: str, outcome: str = '', target: str = '',
-             *more: Any) -> None:
+    def tell(self, kind: str, label: str, outcome: str = '', target: str = '', *more: Any) -> None:
         """Note an event."""
         self.run.tell(self.path, (kind, label, outcome or '', target) + more)

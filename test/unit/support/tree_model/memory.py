@@ -1,4 +1,5 @@
 """What the model's oracle of one container remembers: results, visits, failures in a row."""
+
 import copy
 from fractions import Fraction
 from typing import Any, Dict, List, NamedTuple, Optional
@@ -56,7 +57,9 @@ class Remembered:
             own = plan.of(path, label)
             self._results[label] = Results(
                 plan.memory if own.memory is None else own.memory,
-                plan.prior if own.prior is None else own.prior, plan.estimator)
+                plan.prior if own.prior is None else own.prior,
+                plan.estimator,
+            )
             if own.preconditions:
                 self._conditioned.add(label)
         self.begin_trial()
@@ -146,5 +149,11 @@ class Remembered:
         if self._goal is not None and self._goal_of == label and self.is_continuous('prose', label):
             return
         self._goal_of = label
-        self._goal = next((visit.label for visit in reversed(self.chain)
-                           if visit.label != label and visit.result == SUCCESS), self._initial)
+        self._goal = next(
+            (
+                visit.label
+                for visit in reversed(self.chain)
+                if visit.label != label and visit.result == SUCCESS
+            ),
+            self._initial,
+        )

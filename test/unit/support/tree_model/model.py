@@ -1,4 +1,5 @@
 """The model of a tree under an oracle: brute force, from the words of doc/, without SMACH."""
+
 from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .answers import Options, draw_reply
@@ -19,7 +20,8 @@ class Model:
     """A tree, executed by the model; what happens, by path of the container."""
 
     def __init__(self, plan: TreePlan, is_upstream: bool) -> None:
-        """`is_upstream`: SMACH's own engine, which preempts Concurrences and Iterators otherwise.
+        """`is_upstream`: SMACH's own engine, which preempts Concurrences and Iterators
+        otherwise.
         """
         self.plan = plan
         self.is_upstream = is_upstream
@@ -35,8 +37,9 @@ class Model:
 
     def part_of(self, plan: Any, path: str, parent: Part) -> Part:
         """Make the part of a node; `path`: of its container."""
-        return self._make(plan, path if isinstance(plan, Leaf) else '{}/{}'.format(
-            path, plan.label), parent)
+        return self._make(
+            plan, path if isinstance(plan, Leaf) else '{}/{}'.format(path, plan.label), parent
+        )
 
     def _make(self, plan: Any, path: str, parent: Any) -> Any:
         part = PARTS[type(plan)](self, plan, path, parent)
@@ -73,9 +76,13 @@ class Model:
         for part in machine.children():
             if isinstance(part, IteratorPart):
                 outcome = part.ended_with
-                part.ask_to_go_on(part.label == target and (
-                    outcome in (None, 'preempted')
-                    or machine.failure_of(part.label, outcome, False) is not None))
+                part.ask_to_go_on(
+                    part.label == target
+                    and (
+                        outcome in (None, 'preempted')
+                        or machine.failure_of(part.label, outcome, False) is not None
+                    )
+                )
 
     def forget_rests_below(self, part: Part) -> None:
         """Another item begins: what Iterators in it have left was that of the one before."""
@@ -92,8 +99,9 @@ class Model:
             machine.memory.begin_trial()
         for iterator in self._iterators:
             iterator.forget()
-        self._numbers = {key: number for key, number in self._numbers.items()
-                         if key[0] != 'question'}
+        self._numbers = {
+            key: number for key, number in self._numbers.items() if key[0] != 'question'
+        }
         self.entries = 0
         self._is_preempted = False
         scheduler = Scheduler(self.plan.seed)
@@ -141,8 +149,17 @@ class Model:
 
     def holder(self, path: str, label: str) -> MachinePart:
         """The machine that holds a place, or the branch that is it."""
-        return next((branch for branch in self._branches
-                     if (branch.path, branch.label) == (path, label)), None) or self._machines[path]
+        return (
+            next(
+                (
+                    branch
+                    for branch in self._branches
+                    if (branch.path, branch.label) == (path, label)
+                ),
+                None,
+            )
+            or self._machines[path]
+        )
 
     def machine(self, path: str) -> MachinePart:
         """The machine of that path."""
@@ -173,13 +190,20 @@ class Model:
         if level.author_recovers(failed):
             return True
         way = failed.way
-        return way is not None and bool(way.target) and not way.is_state and self.is_foreseen(
-            level, way.target)
+        return (
+            way is not None
+            and bool(way.target)
+            and not way.is_state
+            and self.is_foreseen(level, way.target)
+        )
 
     def _passes_over(self, iterator: IteratorPart, inner: Part, outcome: str) -> bool:
         own = self.plan.of(iterator.path, inner.label).author_recoveries
-        return (outcome in iterator.plan.loop_outcomes and sounds_like_failure(outcome)
-                and (own or self.plan.author_recoveries) != 'override')
+        return (
+            outcome in iterator.plan.loop_outcomes
+            and sounds_like_failure(outcome)
+            and (own or self.plan.author_recoveries) != 'override'
+        )
 
     def forget_begins(self, part: Part) -> None:
         """What was not entered in the middle is entered at its own start from now on."""
@@ -229,9 +253,13 @@ class Model:
         machine = self.holder(path, label)
         part = machine.child(label)
         remapping = machine.plan.remappings.get(label, {})
-        return tuple(sorted(
-            key for key in getattr(part.plan, 'reads', part.keys)
-            if not self._will_have(machine, remapping.get(key, key), goal.machine, userdata)))
+        return tuple(
+            sorted(
+                key
+                for key in getattr(part.plan, 'reads', part.keys)
+                if not self._will_have(machine, remapping.get(key, key), goal.machine, userdata)
+            )
+        )
 
     def _will_have(self, part: Any, key: str, around: Any, userdata: Dict[str, Any]) -> bool:
         """Whether a container has a key once the machine has come down to it."""
@@ -258,8 +286,11 @@ class Model:
     def options(self, machine: MachinePart, label: str, written: Set[str]) -> Options:
         """What may be answered."""
         part = machine.child(label)
-        places = [(each.path, name) for each in [*self._machines.values(), *self._branches]
-                  for name in each.labels]
+        places = [
+            (each.path, name)
+            for each in [*self._machines.values(), *self._branches]
+            for name in each.labels
+        ]
         levels = [each for each in _with_ancestors(machine) if isinstance(each, MachinePart)]
         places = [place for place in places if not self.is_closed(self.goal_of(machine, *place))]
         missing, repeats = [], []
@@ -268,15 +299,36 @@ class Model:
             repeated = self.repeats.repeated_by(goal.machine, goal.label)
             if repeated:
                 repeats.append((path, name, repeated))
-            missing.append((path, name, self.missing_at(goal, goal.machine.after_jump(
-                goal.label, written if goal.machine is machine else set()))))
+            missing.append(
+                (
+                    path,
+                    name,
+                    self.missing_at(
+                        goal,
+                        goal.machine.after_jump(
+                            goal.label, written if goal.machine is machine else set()
+                        ),
+                    ),
+                )
+            )
         return Options(
-            tuple(sorted(places)), tuple(sorted(missing)), tuple(sorted(repeats)),
-            tuple(sorted((name, machine.leads_to(name) if isinstance(machine, BranchPart)
-                          else machine.way_of(label, name).target)
-                         for name in part.plan.outcomes)),
+            tuple(sorted(places)),
+            tuple(sorted(missing)),
+            tuple(sorted(repeats)),
+            tuple(
+                sorted(
+                    (
+                        name,
+                        machine.leads_to(name)
+                        if isinstance(machine, BranchPart)
+                        else machine.way_of(label, name).target,
+                    )
+                    for name in part.plan.outcomes
+                )
+            ),
             tuple(sorted((each.path, name) for each in levels for name in each.plan.outcomes)),
-            tuple(sorted(getattr(part.plan, 'writes', part.keys))))
+            tuple(sorted(getattr(part.plan, 'writes', part.keys))),
+        )
 
 
 def _with_ancestors(part: Part) -> List[Part]:

@@ -1,4 +1,5 @@
 """The model's leafs and Concurrences, as the contract of SMACH says."""
+
 from typing import Any, Dict, List, Optional, Tuple
 
 from .plan import Beside, Leaf

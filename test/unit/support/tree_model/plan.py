@@ -1,4 +1,5 @@
 """The plan of a tree: what the executive's machines and the model's are both made of."""
+
 import random
 from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, Union
 
@@ -127,8 +128,12 @@ class TreePlan(NamedTuple):
 
     def holds(self, path: str, label: str, check: Check, number: int) -> bool:
         """Whether a function among the preconditions says yes when it is called for that time."""
-        return random.Random('{} {}/{} {} {}'.format(
-            self.seed, path, label, check.name, number)).random() < 0.6
+        return (
+            random.Random(
+                '{} {}/{} {} {}'.format(self.seed, path, label, check.name, number)
+            ).random()
+            < 0.6
+        )
 
 
 def children_of(node: Node) -> List[Node]:
@@ -148,5 +153,4 @@ def nodes_below(path: str, node: Node) -> Iterator[Tuple[str, Node]]:
 
 def machines_of(plan: TreePlan) -> List[Tuple[str, Machine]]:
     """All StateMachines and Sequences, with their paths."""
-    return [(path, node) for path, node in nodes_below(TOP, plan.top)
-            if isinstance(node, Machine)]
+    return [(path, node) for path, node in nodes_below(TOP, plan.top) if isinstance(node, Machine)]

@@ -1,4 +1,5 @@
 """One failure in the model: decided, asked about, obeyed (doc/executive.md, policies.md, trees)."""
+
 from typing import Any, Dict, List, NamedTuple, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Reply, Way
@@ -55,8 +56,13 @@ class Recovering:
         return self.jump(label, self._to(decision))
 
     def _to(self: Any, decision: Decision, failed: Optional[Failed] = None) -> Goal:
-        return Goal(self, decision.target, failed=failed, written=decision.written,
-                    place=(self.path, decision.target))
+        return Goal(
+            self,
+            decision.target,
+            failed=failed,
+            written=decision.written,
+            place=(self.path, decision.target),
+        )
 
     def _count_recovery(self: Any, label: str) -> None:
         recoveries = self.memory.recoveries
@@ -124,7 +130,8 @@ class Recovering:
             number = self.run.number_of('check', self.path, label, check.name)
             if check.writes:
                 self.userdata[check.writes] = '{}/{} {}#{}'.format(
-                    self.path, label, check.name, number)
+                    self.path, label, check.name, number
+                )
             return self.run.plan.holds(self.path, label, check, number)
         place = (self.path, check.name)
         if self.run.repeats.blocks_precondition(place):
@@ -132,8 +139,9 @@ class Recovering:
         self.run.repeats.runs_as_precondition(place)
         self.current = self.child(check.name)
         try:
-            outcome = yield from self.current.execute(View(
-                self.userdata, self.plan.remappings.get(check.name, {})))
+            outcome = yield from self.current.execute(
+                View(self.userdata, self.plan.remappings.get(check.name, {}))
+            )
         except Raised:
             return False
         return outcome != 'preempted' and self.failure_of(check.name, outcome, False) is None
@@ -148,13 +156,20 @@ class Recovering:
 
     def _ask(self: Any, failed: Failed, decision: Decision) -> Course:
         is_held_back = failed.kind == 'HELD_BACK'
-        if not is_held_back and failed.ending is not None and not (
-                failed.ending.is_state) and self.run.is_foreseen(
-                self, failed.ending.target):
+        if (
+            not is_held_back
+            and failed.ending is not None
+            and not (failed.ending.is_state)
+            and self.run.is_foreseen(self, failed.ending.target)
+        ):
             return self.give_up(failed, failed.ending)
         would_end = failed.ending is None or not failed.ending.is_state
-        if self.run.plan.escalate and would_end and decision.by == 'policy' and (
-                self.memory.failure_class(failed.label) != 'HIGH'):
+        if (
+            self.run.plan.escalate
+            and would_end
+            and decision.by == 'policy'
+            and (self.memory.failure_class(failed.label) != 'HIGH')
+        ):
             yield from self._ask_above(failed)
         reply = self._ask_expert(failed, decision.written)
         if reply is None:
@@ -174,8 +189,9 @@ class Recovering:
                 self._count_recovery(failed.label)
                 level._count_recovery(inner.label)
                 self.run.budget['recoveries'] += 1
-                level.count_failure(outer, level.memory.is_continuous(
-                    self.run.plan.policy, inner.label))
+                level.count_failure(
+                    outer, level.memory.is_continuous(self.run.plan.policy, inner.label)
+                )
                 level._tell_decision(inner.label, decision)
                 raise self.run.depart(self, level._to(decision, outer))
             ending = outer.ending
@@ -193,7 +209,8 @@ class Recovering:
             return None
         name = '{}/{}'.format(reply.path, reply.name)
         is_own = reply.path in ('', self.path) and (
-            reply.kind != 'goto' or reply.name in self.labels)  # not that of a branch beside
+            reply.kind != 'goto' or reply.name in self.labels
+        )  # not that of a branch beside
         self.tell('QUERY_ANSWERED', failed.label, reply.kind, reply.name if is_own else name)
         return reply
 
@@ -202,12 +219,16 @@ class Recovering:
         if kind == 'give_up' and name in self.plan.outcomes:
             return self.give_up(failed, Way(name, False))
         gone = self.memory.fallbacks.get(failed.label, 0)
-        if kind == 'goto' and gone < max(1, self.limit_of(failed.label)) and (
-                not self.run.is_spent('recoveries')):
+        if (
+            kind == 'goto'
+            and gone < max(1, self.limit_of(failed.label))
+            and (not self.run.is_spent('recoveries'))
+        ):
             path, label = self.run.place(name)
             goal = self.run.goal_of(self, path, label)
-            if not (self.run.is_closed(goal)
-                    or self.run.repeats.repeated_by(goal.machine, goal.label)):
+            if not (
+                self.run.is_closed(goal) or self.run.repeats.repeated_by(goal.machine, goal.label)
+            ):
                 self.memory.fallbacks[failed.label] = gone + 1
                 self.run.budget['recoveries'] += 1
                 return self.go_to_place(failed.label, path, label, written)
@@ -219,8 +240,9 @@ class Recovering:
             return self.go_to_place(label, reply.path, reply.name, written)
         if reply.kind == 'supersede':
             remapping = self.plan.remappings.get(label, {})
-            self.userdata.update({remapping.get(key, key): value
-                                  for key, value in reply.outputs.items()})
+            self.userdata.update(
+                {remapping.get(key, key): value for key, value in reply.outputs.items()}
+            )
             if failed.kind == 'HELD_BACK':
                 self.memory.ended(label, 'superseded')
                 self.run.repeats.superseded((self.path, label))
@@ -237,8 +259,12 @@ class Recovering:
 
     def give_up(self: Any, failed: Failed, ending: Optional[Way]) -> Way:
         """End as settled, or go the author's way."""
-        self.tell('GIVE_UP', failed.label, '' if ending is None or ending.is_state
-                  else ending.target, ending.target if ending and ending.is_state else '')
+        self.tell(
+            'GIVE_UP',
+            failed.label,
+            '' if ending is None or ending.is_state else ending.target,
+            ending.target if ending and ending.is_state else '',
+        )
         if ending is None:
             self.settled = True
             raise Raised()
@@ -258,8 +284,14 @@ class Recovering:
         self.userdata.update(after)
         self.run.repeats.leave_for(self, goal.label, self.run.places_on(goal))
         self._note_begins(goal)
-        self.tell('JUMP', label, '', goal.label, self.run.missing_at(goal, self.userdata),
-                  'restore' if restores else 'keep')
+        self.tell(
+            'JUMP',
+            label,
+            '',
+            goal.label,
+            self.run.missing_at(goal, self.userdata),
+            'restore' if restores else 'keep',
+        )
         self.run.cross_jumps += bool(goal.begins or goal.crosses)
         return Way(goal.label, True)
 
@@ -325,16 +357,15 @@ class Recovering:
             self.memory.ended(label, 'preempted')
         self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
         told = set(goal.repeats)
-        if self.run.is_closed(goal) or (
-                set(self.run.repeats.repeated_by(self, goal.label)) - told):
+        if self.run.is_closed(goal) or (set(self.run.repeats.repeated_by(self, goal.label)) - told):
             return self._ask_on_arrival(label)
         return self.jump(label, goal._replace(crosses=True))
 
     def _ask_on_arrival(self: Any, label: str) -> Way:
         """The place has closed, or something was done meanwhile: ask again, here."""
         failing = failing_outcome_of(self.plan.outcomes)
-        failed = Failed(label, 'TIME_LIMIT', '', None, failing and Way(failing, False),
-                        was_left=True)
+        failed = Failed(
+            label, 'TIME_LIMIT', '', None, failing and Way(failing, False), was_left=True
+        )
         reply = self._ask_expert(failed, set())
-        return self._fall_back(failed, set()) if reply is None else self._obey(
-            failed, reply, set())
+        return self._fall_back(failed, set()) if reply is None else self._obey(failed, reply, set())

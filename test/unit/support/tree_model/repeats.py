@@ -1,4 +1,5 @@
 """What a trial of the model has done to states that are not to be repeated (`on_retry`)."""
+
 from typing import Any, Dict, Iterator, List, Set, Tuple
 
 from .plan import TreePlan
@@ -43,8 +44,10 @@ class Repeats:
         """The guarded states that were begun, in a container or below it."""
         for place in sorted(self._done):
             if self.rule(place) != 'allow' and (
-                    place in machine.own_places()
-                    or (place[0] + '/').startswith(machine.path + '/') and machine.holds_paths()):
+                place in machine.own_places()
+                or (place[0] + '/').startswith(machine.path + '/')
+                and machine.holds_paths()
+            ):
                 yield place
 
     def _since(self, machine: Any, target: str) -> List[Place]:
@@ -60,12 +63,12 @@ class Repeats:
             again = bool(since) and self._begun.get(place, 0) >= since
             waits = not since or (place in self._spent and place in self._came)
             if again or (waits and self._label_in(machine, place) in behind):
-                found.append('/'.join(place)[len(machine.path) + 1:])
+                found.append('/'.join(place)[len(machine.path) + 1 :])
         return tuple(sorted(found))
 
     @staticmethod
     def _label_in(machine: Any, place: Place) -> str:
-        return '/'.join(place)[len(machine.path) + 1:].split('/')[0]
+        return '/'.join(place)[len(machine.path) + 1 :].split('/')[0]
 
     def leave_for(self, machine: Any, target: str, below: List[Place]) -> None:
         """The oracle goes to a state: what was begun since it was there last is spent."""
@@ -98,6 +101,7 @@ def _followers(machine: Any, target: str) -> Set[str]:
         label = waiting.pop()
         if label not in found:
             found.add(label)
-            waiting += [name for name in machine.plan.transitions[label].values()
-                        if name in machine.labels]
+            waiting += [
+                name for name in machine.plan.transitions[label].values() if name in machine.labels
+            ]
     return found

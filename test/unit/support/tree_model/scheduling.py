@@ -1,4 +1,5 @@
 """The model's threads: one at a time, each up to its next turn."""
+
 import random
 from typing import Any, Dict, Generator, List, NamedTuple, Optional, Tuple
 
@@ -19,7 +20,6 @@ class Fork(NamedTuple):
 
 
 class _Thread:
-
     def __init__(self, course: Course, parent: Optional['_Thread'], owner: Any, label: str) -> None:
         self.course = course
         self.parent = parent
@@ -64,8 +64,9 @@ class Scheduler:
         thread.children_left = len(said.branches)
         ready.extend(_Thread(course, thread, said.owner, label) for label, course in said.branches)
 
-    def _ended(self, thread: _Thread, outcome: Any, error: Optional[Exception],
-               ready: List[_Thread]) -> None:
+    def _ended(
+        self, thread: _Thread, outcome: Any, error: Optional[Exception], ready: List[_Thread]
+    ) -> None:
         thread.owner.child_ended(thread.label, outcome, error)
         parent = thread.parent
         if parent is not None:

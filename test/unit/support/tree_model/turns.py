@@ -1,4 +1,5 @@
 """Turns for leafs that run in threads: one acts at a time, in the order that the model draws."""
+
 import random
 import threading
 from typing import Any, Dict, List

@@ -1,4 +1,5 @@
 """What doc/policies.md and doc/executive.md say, in tables and words, apart from the executive."""
+
 import re
 from fractions import Fraction
 from pathlib import Path

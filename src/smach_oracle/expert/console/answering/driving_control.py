@@ -2,6 +2,7 @@
 
 Times are monotonic, in s.
 """
+
 import math
 from typing import Any, Dict, NamedTuple, Optional, Sequence, Tuple
 
@@ -56,8 +57,11 @@ class DrivingControl:
 
     def take(self, session: DrivingSession, now_s: float) -> str:
         """Take control, and return why not, or ''. A page that has fallen silent has lost it."""
-        if self.session is not None and self.session.page != session.page and not self.silent(
-                now_s):
+        if (
+            self.session is not None
+            and self.session.page != session.page
+            and not self.silent(now_s)
+        ):
             return '{} drives; one at a time'.format(self.session.person.expert)
         self.session, self._heard_s, self.held = session, now_s, False
         self._delay_check, self._counts = DelayCheck(), {'relayed': 0, 'late': 0}

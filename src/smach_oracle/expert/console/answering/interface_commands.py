@@ -2,6 +2,7 @@
 
 The interface is found by the action that the question names, and must be one of the closed set.
 """
+
 import base64
 from typing import Any, Callable, Dict, List, Mapping
 
@@ -45,8 +46,9 @@ InterfaceCommand = Callable[[str, Arguments, Person, ExpertQueryGoal], CommandRe
 class InterfaceCommands:
     """Carries out commands for the interfaces that run for questions."""
 
-    def __init__(self, known: Callable[[str], bool],
-                 call: Callable[..., Any] = call_service) -> None:
+    def __init__(
+        self, known: Callable[[str], bool], call: Callable[..., Any] = call_service
+    ) -> None:
         """Without ROS calls until a command comes.
 
         :param known: whether there is a SharedAutonomy action of that name.
@@ -55,8 +57,10 @@ class InterfaceCommands:
         self._known = known
         self._call = call
         self._carry_out: Dict[str, InterfaceCommand] = {
-            'mark': self._mark, 'use_frame': self._use_frame, 'hand_over': self._hand_over,
-            'give_up_interface': self._give_up_interface
+            'mark': self._mark,
+            'use_frame': self._use_frame,
+            'hand_over': self._hand_over,
+            'give_up_interface': self._give_up_interface,
         }
 
     @property
@@ -64,8 +68,9 @@ class InterfaceCommands:
         """Return the commands by name, for QuestionCommands."""
         return {name: self.carry_out for name in self._carry_out}
 
-    def carry_out(self, command: PageCommand, person: Person,
-                  listed: ListedQuestion) -> CommandReply:
+    def carry_out(
+        self, command: PageCommand, person: Person, listed: ListedQuestion
+    ) -> CommandReply:
         """Do one of them.
 
         :raises ServerGoneError: where the interface does not answer.
@@ -77,10 +82,13 @@ class InterfaceCommands:
 
     def _mark(self, action: str, arguments: Arguments, *_: object) -> CommandReply:
         request = SegmentObjectRequest(
-            stamp=arguments['stamp'], polygon=Polygon(_corners(arguments['region'])), strokes=[
+            stamp=arguments['stamp'],
+            polygon=Polygon(_corners(arguments['region'])),
+            strokes=[
                 SegmentStroke(stroke.foreground, _corners(stroke.points), stroke.width)
                 for stroke in arguments['strokes']
-            ])
+            ],
+        )
         answer = self._call(action + '/segment', SegmentObject, request)
         return CommandReply(answer.ok, answer.message, marked_view(answer))
 
@@ -89,15 +97,21 @@ class InterfaceCommands:
         answer = self._call(action + '/use_frame', UseFrame, UseFrameRequest(which), IMAGE_LIMIT_S)
         return CommandReply(answer.ok, answer.message)
 
-    def _hand_over(self, action: str, arguments: Arguments, person: Person,
-                   goal: ExpertQueryGoal) -> CommandReply:
-        request = FinishInterfaceRequest(arguments['outcome'], items(arguments['outputs'], goal),
-                                         _record(person, arguments['why']), goal.query_id)
+    def _hand_over(
+        self, action: str, arguments: Arguments, person: Person, goal: ExpertQueryGoal
+    ) -> CommandReply:
+        request = FinishInterfaceRequest(
+            arguments['outcome'],
+            items(arguments['outputs'], goal),
+            _record(person, arguments['why']),
+            goal.query_id,
+        )
         answer = self._call(action + '/finish', FinishInterface, request)
         return CommandReply(answer.ok, answer.message)
 
-    def _give_up_interface(self, action: str, arguments: Arguments, person: Person,
-                           goal: ExpertQueryGoal) -> CommandReply:
+    def _give_up_interface(
+        self, action: str, arguments: Arguments, person: Person, goal: ExpertQueryGoal
+    ) -> CommandReply:
         request = GiveUpInterfaceRequest(_record(person, arguments['why']), goal.query_id)
         answer = self._call(action + '/give_up', GiveUpInterface, request)
         return CommandReply(answer.ok, answer.message)
@@ -107,16 +121,17 @@ def marked_view(answer: SegmentObjectResponse) -> Dict[str, Any]:
     """A segmentation for the page: outlines of the mask (px), place and size of the object."""
     data: Dict[str, Any] = {
         'outlines': outlines(colour_of(answer.mask)[:, :, 0]) if answer.mask.data else [],
-        'elapsed': round(float(answer.elapsed), 3)
+        'elapsed': round(float(answer.elapsed), 3),
     }
     if answer.ok:
         place, turn = answer.object.pose.position, answer.object.pose.orientation
         data['object'] = {
             'frame': answer.object.header.frame_id[:200],
             'position': _finite(place.x, place.y, place.z),
-            'yaw': _finite(2 * np.arctan2(turn.z, turn.w))[0], 'points': answer.cloud.width,
-            'size': _finite(answer.size.x, answer.size.y,
-                            answer.size.z), 'cloud': _points(answer.cloud)
+            'yaw': _finite(2 * np.arctan2(turn.z, turn.w))[0],
+            'points': answer.cloud.width,
+            'size': _finite(answer.size.x, answer.size.y, answer.size.z),
+            'cloud': _points(answer.cloud),
         }
     return data
 

@@ -1,11 +1,14 @@
 """The printed output of an interface, as plain data for the page. Pure."""
+
 from typing import Any, Dict, Optional
 
 from smach_oracle.msg import InterfaceOutput
 
 _STATUS = {
-    InterfaceOutput.STARTING: 'starting', InterfaceOutput.RUNNING: 'running',
-    InterfaceOutput.FAILED: 'failed', InterfaceOutput.STOPPED: 'stopped'
+    InterfaceOutput.STARTING: 'starting',
+    InterfaceOutput.RUNNING: 'running',
+    InterfaceOutput.FAILED: 'failed',
+    InterfaceOutput.STOPPED: 'stopped',
 }
 SHOWN_LINES = 60
 LONGEST_TEXT = 500
@@ -15,5 +18,8 @@ def interface_output_view(message: Optional[InterfaceOutput]) -> Optional[Dict[s
     """Status, text and the last lines, or None where nothing was started."""
     if message is None:
         return None
-    return {'status': _STATUS.get(message.status, ''), 'text': message.text[:LONGEST_TEXT],
-            'lines': list(message.lines[-SHOWN_LINES:])}
+    return {
+        'status': _STATUS.get(message.status, ''),
+        'text': message.text[:LONGEST_TEXT],
+        'lines': list(message.lines[-SHOWN_LINES:]),
+    }

@@ -2,6 +2,7 @@
 
 The page gets it once a second, with a beat: a page that gets none knows that the console is silent.
 """
+
 import time
 from typing import Any, Callable, Dict, List, Mapping, Optional
 
@@ -23,9 +24,14 @@ GetHeard = Callable[[], Optional[float]]
 class LastHeard:
     """One thread calls `write_sections`. Any thread calls the rest."""
 
-    def __init__(self, front_end: FrontEnd, pulse: NodePulse,
-                 nodes: Callable[[], Mapping[str, Any]], master_heard_s: GetHeard,
-                 clocks: Optional[RobotClocks] = None) -> None:
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        pulse: NodePulse,
+        nodes: Callable[[], Mapping[str, Any]],
+        master_heard_s: GetHeard,
+        clocks: Optional[RobotClocks] = None,
+    ) -> None:
         """
         :param nodes: of each robot that is there the nodes that publish it.
         :param master_heard_s: when the master answered last, by the monotonic clock.
@@ -46,22 +52,30 @@ class LastHeard:
             return
         self._beat_s = now_s
         self._follow()
-        self._told = {name: _came_s(self._front_end.news(name))
-                      for name in self._front_end.servers}
-        sections.put('heard', {
-            'beat': round(now_s, 1), 'master': _age(self._master_heard_s(), now_s), 'servers': {
-                name: _age(came_s, now_s) for name, came_s in self._told.items()
-            }, 'robots': {robot: _age(self._robot_heard_s(robot), now_s)
-                          for robot in sorted(self._followed)}
-        })
+        self._told = {name: _came_s(self._front_end.news(name)) for name in self._front_end.servers}
+        sections.put(
+            'heard',
+            {
+                'beat': round(now_s, 1),
+                'master': _age(self._master_heard_s(), now_s),
+                'servers': {name: _age(came_s, now_s) for name, came_s in self._told.items()},
+                'robots': {
+                    robot: _age(self._robot_heard_s(robot), now_s)
+                    for robot in sorted(self._followed)
+                },
+            },
+        )
 
     def _is_heard_again(self) -> bool:
         """A server without questions is silent. With the next one it must not read as silent."""
         for name in self._front_end.servers:
             came_s = _came_s(self._front_end.news(name))
             before_s = self._told.get(name)
-            if came_s is not None and before_s is not None and (
-                    self._beat_s - before_s > SILENT_AFTER_S and came_s > before_s):
+            if (
+                came_s is not None
+                and before_s is not None
+                and (self._beat_s - before_s > SILENT_AFTER_S and came_s > before_s)
+            ):
                 return True
         return False
 
@@ -71,7 +85,8 @@ class LastHeard:
             return ''
         now_s = time.monotonic()
         return self.robot_refusal(listed.goal.robot, command.arguments.get('seen')) or _silence(
-            listed.server, _came_s(self._front_end.news(listed.server)), now_s)
+            listed.server, _came_s(self._front_end.news(listed.server)), now_s
+        )
 
     def robot_refusal(self, robot: str, seen: Optional[float]) -> str:
         """Return why nothing is sent to a robot that would have it go on, or '' where it may be.
@@ -80,10 +95,13 @@ class LastHeard:
         """
         now_s = time.monotonic()
         if seen is not None and now_s - seen > OLDEST_SEEN_S:
-            return ('This was said of what the page knew {:.0f} s ago: it is not carried out. '
-                    'Look again, and answer again.'.format(now_s - seen))
+            return (
+                'This was said of what the page knew {:.0f} s ago: it is not carried out. '
+                'Look again, and answer again.'.format(now_s - seen)
+            )
         return _silence('The ROS master', self._master_heard_s(), now_s) or _silence(
-            robot, self._robot_heard_s(robot), now_s)
+            robot, self._robot_heard_s(robot), now_s
+        )
 
     def _follow(self) -> None:
         nodes = {robot: sorted(found) for robot, found in self._nodes().items()}

@@ -1,4 +1,5 @@
 """The people who look at each question, sent to all pages. Only the sockets' thread calls it."""
+
 from typing import Any, Dict, List, NamedTuple
 
 from ..web.audit import Person
@@ -42,6 +43,7 @@ class Onlookers:
     def _write(self) -> None:
         by_question: Dict[str, List[Dict[str, Any]]] = {}
         for _, (question, person) in sorted(self._by_page.items()):
-            by_question.setdefault(question, []).append({
-                'name': person.expert, 'role': person.role, 'session': person.session})
+            by_question.setdefault(question, []).append(
+                {'name': person.expert, 'role': person.role, 'session': person.session}
+            )
         self._sections.put(SECTION, by_question)

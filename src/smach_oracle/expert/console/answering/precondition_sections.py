@@ -1,4 +1,5 @@
 """The preconditions of the choices of open questions, as the robots publish them now."""
+
 import threading
 import time
 from collections import OrderedDict
@@ -25,8 +26,9 @@ class PreconditionStatuses:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._topics = RobotTopics('/oracle/preconditions', PreconditionChecks, self.taker,
-                                   queue_size=5)
+        self._topics = RobotTopics(
+            '/oracle/preconditions', PreconditionChecks, self.taker, queue_size=5
+        )
         self._newest: 'OrderedDict[Tuple[str, str], StatusByState]' = OrderedDict()
 
     def write_sections(self, sections: PageSections, questions: Iterable[ListedQuestion]) -> None:
@@ -42,6 +44,7 @@ class PreconditionStatuses:
 
     def taker(self, robot: str) -> Callable[[PreconditionChecks], None]:
         """Return the callback for a robot's messages."""
+
         def take(message: PreconditionChecks) -> None:
             view = status_view(message, time.time())
             with self._lock:
@@ -49,6 +52,7 @@ class PreconditionStatuses:
                 self._newest.move_to_end((robot, message.query_id))
                 while len(self._newest) > MOST_QUESTIONS:
                     self._newest.popitem(last=False)
+
         return take
 
 
@@ -61,8 +65,12 @@ def status_view(message: PreconditionChecks, now: float) -> StatusByState:
     found: StatusByState = {}
     for check in message.checks:
         checked = round(now - check.age, 1) if check.age >= 0 else None
-        found.setdefault(check.state, []).append({
-            'name': check.name, 'holds': _HOLDS.get(check.result),
-            'text': check.text[:LONGEST_TEXT], 'checked': checked
-        })
+        found.setdefault(check.state, []).append(
+            {
+                'name': check.name,
+                'holds': _HOLDS.get(check.result),
+                'text': check.text[:LONGEST_TEXT],
+                'checked': checked,
+            }
+        )
     return found

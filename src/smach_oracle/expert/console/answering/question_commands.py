@@ -3,6 +3,7 @@
 Claims are kept alive as long as the pages are there that show the questions. Called from several
 threads. A call takes as long as a robot's service does, 5 s at most.
 """
+
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Union
 
 import genpy
@@ -22,10 +23,22 @@ from ..commands.commands import KINDS, CommandReply, PageCommand
 from ..web.audit import Audit, Person
 from .session_claims import SessionClaims
 
-_KIND = dict(zip(KINDS, (ExpertDecision.GOTO, ExpertDecision.SUPERSEDE, ExpertDecision.GIVE_UP,
-                         ExpertDecision.INTERFACE)))
-_ACTION = {'claim': ClaimQueryRequest.CLAIM, 'take_over': ClaimQueryRequest.TAKE_OVER,
-           'release': ClaimQueryRequest.RELEASE}
+_KIND = dict(
+    zip(
+        KINDS,
+        (
+            ExpertDecision.GOTO,
+            ExpertDecision.SUPERSEDE,
+            ExpertDecision.GIVE_UP,
+            ExpertDecision.INTERFACE,
+        ),
+    )
+)
+_ACTION = {
+    'claim': ClaimQueryRequest.CLAIM,
+    'take_over': ClaimQueryRequest.TAKE_OVER,
+    'release': ClaimQueryRequest.RELEASE,
+}
 _FIELD = {'goto': 'state', 'supersede': 'outcome', 'give_up': 'outcome', 'interface': 'interface'}
 
 
@@ -42,8 +55,13 @@ class OutputError(OracleError):
 class QuestionCommands:
     """Works on the open questions of a front end, for several people at once."""
 
-    def __init__(self, front_end: FrontEnd, audit: Audit, others: Mapping[str, CommandWorker],
-                 refusal: Refusal = lambda command, listed: '') -> None:
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        audit: Audit,
+        others: Mapping[str, CommandWorker],
+        refusal: Refusal = lambda command, listed: '',
+    ) -> None:
         """
         :param others: further commands about questions, by name.
         :param refusal: says of each command whether it is too late for it.
@@ -67,8 +85,9 @@ class QuestionCommands:
         """A page is gone: its claims are renewed no longer, and run out unless it comes back."""
         self.claims.leave_all(page)
 
-    def _try(self, command: PageCommand, person: Person, page: int,
-             listed: Optional[ListedQuestion]) -> CommandReply:
+    def _try(
+        self, command: PageCommand, person: Person, page: int, listed: Optional[ListedQuestion]
+    ) -> CommandReply:
         if listed is None:
             return CommandReply(False, 'This question is open no longer.')
         refused = self._refusal(command, listed) or self.sessions.refusal(command, person, listed)
@@ -90,8 +109,9 @@ class QuestionCommands:
                 return CommandReply(True, '')  # it is not this browser's to give back
             if not self.claims.leave(claim, page):
                 return CommandReply(True, '')  # another page of the same browser shows it
-        response = self._front_end.server(listed).claim(listed.goal.query_id, person.expert,
-                                                        _ACTION[name], LEASE_S)
+        response = self._front_end.server(listed).claim(
+            listed.goal.query_id, person.expert, _ACTION[name], LEASE_S
+        )
         if response.ok and name == 'release':
             self.sessions.give_back(person, listed)
         elif response.ok:
@@ -103,8 +123,12 @@ class QuestionCommands:
 
     def _answer(self, command: PageCommand, person: Person, listed: ListedQuestion) -> CommandReply:
         arguments = command.arguments
-        decision = ExpertDecision(kind=_KIND[arguments['kind']], by=person.expert,
-                                  why=arguments['why'], container=arguments['container'])
+        decision = ExpertDecision(
+            kind=_KIND[arguments['kind']],
+            by=person.expert,
+            why=arguments['why'],
+            container=arguments['container'],
+        )
         setattr(decision, _FIELD[arguments['kind']], arguments['name'])
         decision.outputs = items(arguments['outputs'], listed.goal)
         response = self._front_end.server(listed).answer(listed.goal.query_id, decision)
@@ -127,8 +151,11 @@ def items(outputs: Sequence[TypedOutput], goal: ExpertQueryGoal) -> List[Userdat
     found = []
     for output in outputs:
         if output.type and output.type not in known:
-            raise OutputError('output {}: {} is not a message type of this question'.format(
-                output.key, output.type))
+            raise OutputError(
+                'output {}: {} is not a message type of this question'.format(
+                    output.key, output.type
+                )
+            )
         found.append(encode(output.key, _message(output) if output.type else output.value))
         if found[-1].encoding == UserdataItem.UNSENT:
             raise OutputError('output {}: this value cannot be sent'.format(output.key))
@@ -141,12 +168,21 @@ def _message(output: TypedOutput) -> Union[genpy.Message, List[genpy.Message]]:
     if message_class is None:
         raise OutputError('output {}: {} is not installed here'.format(output.key, output.type))
     values = output.value if many else [output.value]
-    if not isinstance(values, list) or not values or not all(
-            isinstance(value, dict) for value in values):
-        raise OutputError('output {}: {} is written as {}'.format(
-            output.key, output.type, 'a list of JSON objects' if many else 'a JSON object'))
-    return [_filled(output, message_class(), value) for value in values] if many else _filled(
-        output, message_class(), values[0])
+    if (
+        not isinstance(values, list)
+        or not values
+        or not all(isinstance(value, dict) for value in values)
+    ):
+        raise OutputError(
+            'output {}: {} is written as {}'.format(
+                output.key, output.type, 'a list of JSON objects' if many else 'a JSON object'
+            )
+        )
+    return (
+        [_filled(output, message_class(), value) for value in values]
+        if many
+        else _filled(output, message_class(), values[0])
+    )
 
 
 def _filled(output: TypedOutput, message: genpy.Message, value: Dict[str, Any]) -> genpy.Message:

@@ -1,4 +1,5 @@
 """The open questions of all robots as one section."""
+
 import time
 from collections import OrderedDict
 from typing import Any, Callable, Dict, List, Optional
@@ -17,8 +18,12 @@ MOST_REMEMBERED = 1000
 class QuestionSections:
     """Draws the queue. One thread calls it."""
 
-    def __init__(self, front_end: FrontEnd, log: TrialLog, session_of: Callable[[
-            ListedQuestion], str] = lambda listed: '') -> None:
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        log: TrialLog,
+        session_of: Callable[[ListedQuestion], str] = lambda listed: '',
+    ) -> None:
         """`session_of`: the browser that holds a question, in short."""
         self._session_of = session_of
         self._front_end = front_end
@@ -30,24 +35,27 @@ class QuestionSections:
     def write_sections(self, sections: PageSections) -> None:
         """Bring the section up to date."""
         listed = self._front_end.questions()
-        views = sorted((self._view(each) for each in listed), key=lambda view:
-                       (view['asked'], view['key']))
+        views = sorted(
+            (self._view(each) for each in listed), key=lambda view: (view['asked'], view['key'])
+        )
         self._times = {
-            view['key']: {'asked': view['asked'], 'deadline': view['deadline']}
-            for view in views
+            view['key']: {'asked': view['asked'], 'deadline': view['deadline']} for view in views
         }
         # first: where a question goes with its server, that is told of it
         sections.put('servers', self._servers())
         sections.put('questions', views)
 
     def _servers(self) -> List[Dict[str, Any]]:
-        return [{'name': name, 'connected': self._front_end.connected(name)}
-                for name in self._front_end.servers]
+        return [
+            {'name': name, 'connected': self._front_end.connected(name)}
+            for name in self._front_end.servers
+        ]
 
     def _view(self, listed: ListedQuestion) -> Dict[str, Any]:
         place = (listed.goal.robot, listed.goal.container_path, listed.goal.failed_state)
-        view = question_view(listed, self._epoch_s,
-                             lambda target: self._log.recovery_counts(place, target))
+        view = question_view(
+            listed, self._epoch_s, lambda target: self._log.recovery_counts(place, target)
+        )
         for name, before in self._times.get(listed.key, {}).items():
             now = view[name]
             if before is not None and now is not None and abs(before - now) < _JITTER_S:

@@ -1,4 +1,5 @@
 """An open question as plain data for the page. Pure."""
+
 import math
 from typing import Any, Callable, Dict, List
 
@@ -14,12 +15,16 @@ from ..trials.recovery_statistics import RecoveryCounts
 LONGEST_TEXT = 8000
 LONGEST_VALUE = 4000
 _VISITS = {1: 'success', 2: 'failure', 3: 'superseded', 4: 'preempted'}
-_STATUS = {OpenQuery.PENDING: 'pending', OpenQuery.CLAIMED: 'claimed',
-           OpenQuery.INTERFACE_RUNNING: 'interface'}
+_STATUS = {
+    OpenQuery.PENDING: 'pending',
+    OpenQuery.CLAIMED: 'claimed',
+    OpenQuery.INTERFACE_RUNNING: 'interface',
+}
 
 
-def question_view(listed: ListedQuestion, epoch_s: float,
-                  recovery_counts: Callable[[str], RecoveryCounts]) -> Dict[str, Any]:
+def question_view(
+    listed: ListedQuestion, epoch_s: float, recovery_counts: Callable[[str], RecoveryCounts]
+) -> Dict[str, Any]:
     """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
@@ -27,48 +32,84 @@ def question_view(listed: ListedQuestion, epoch_s: float,
     """
     goal = listed.goal
     return {
-        'key': listed.key, 'server': listed.server, 'id': goal.query_id, 'trial': goal.trial_id,
-        'robot': goal.robot, 'path': goal.container_path, 'state': goal.failed_state,
-        'stands': standing_words(goal), 'running': still_runs(goal),
-        'what': failure_words(goal), 'outcome': goal.outcome,
+        'key': listed.key,
+        'server': listed.server,
+        'id': goal.query_id,
+        'trial': goal.trial_id,
+        'robot': goal.robot,
+        'path': goal.container_path,
+        'state': goal.failed_state,
+        'stands': standing_words(goal),
+        'running': still_runs(goal),
+        'what': failure_words(goal),
+        'outcome': goal.outcome,
         'text': shortened(goal.text, LONGEST_TEXT),
-        'class': goal.failure_class, 'rate': number(goal.rate), 'continuous': goal.continuous,
-        'recoveries': goal.recoveries, 'reason': goal.reason, 'tried': list(goal.tried),
-        'status': _STATUS.get(listed.status, 'pending'), 'holder': listed.holder,
-        'interface': goal.interface, 'asked': round(epoch_s + listed.asked_s, 1),
-        'deadline': None if listed.deadline_s == math.inf else round(epoch_s +
-                                                                     listed.deadline_s, 1),
-        'fallback': goal.fallback, 'history': [{
-            'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')
-        } for visit in goal.history], 'choices': _choices(goal, recovery_counts),
-        'supersede': _supersede(goal), 'outputs': list(goal.output_keys),
-        'give_up': list(goal.give_up_outcomes), 'give_up_above': [
+        'class': goal.failure_class,
+        'rate': number(goal.rate),
+        'continuous': goal.continuous,
+        'recoveries': goal.recoveries,
+        'reason': goal.reason,
+        'tried': list(goal.tried),
+        'status': _STATUS.get(listed.status, 'pending'),
+        'holder': listed.holder,
+        'interface': goal.interface,
+        'asked': round(epoch_s + listed.asked_s, 1),
+        'deadline': None
+        if listed.deadline_s == math.inf
+        else round(epoch_s + listed.deadline_s, 1),
+        'fallback': goal.fallback,
+        'history': [
+            {
+                'state': visit.state,
+                'outcome': visit.outcome,
+                'result': _VISITS.get(visit.result, ''),
+            }
+            for visit in goal.history
+        ],
+        'choices': _choices(goal, recovery_counts),
+        'supersede': _supersede(goal),
+        'outputs': list(goal.output_keys),
+        'give_up': list(goal.give_up_outcomes),
+        'give_up_above': [
             {'container': each.container, 'outcome': each.outcome} for each in goal.give_up_above
-        ], 'interfaces': [
+        ],
+        'interfaces': [
             {'name': offer.name, 'description': offer.description} for offer in goal.interfaces
-        ], 'userdata': [_item(item) for item in goal.userdata]
+        ],
+        'userdata': [_item(item) for item in goal.userdata],
     }
 
 
-def _choices(goal: ExpertQueryGoal,
-             recovery_counts: Callable[[str], RecoveryCounts]) -> List[Dict[str, Any]]:
-    return [{
-        'state': choice.state, 'container': choice.container,
-        'success': number(choice.predicted_success),
-        'class': choice.failure_class, 'visits': choice.visits,
-        'missing': list(choice.missing_keys), 'preconditions': list(choice.preconditions),
-        'blocked': choice.blocked, 'repeats': list(choice.repeats),
-        'runs_again': list(choice.runs_again),
-        'helped': [0, 0] if choice.container else list(recovery_counts(choice.state))
-    } for choice in goal.choices]
+def _choices(
+    goal: ExpertQueryGoal, recovery_counts: Callable[[str], RecoveryCounts]
+) -> List[Dict[str, Any]]:
+    return [
+        {
+            'state': choice.state,
+            'container': choice.container,
+            'success': number(choice.predicted_success),
+            'class': choice.failure_class,
+            'visits': choice.visits,
+            'missing': list(choice.missing_keys),
+            'preconditions': list(choice.preconditions),
+            'blocked': choice.blocked,
+            'repeats': list(choice.repeats),
+            'runs_again': list(choice.runs_again),
+            'helped': [0, 0] if choice.container else list(recovery_counts(choice.state)),
+        }
+        for choice in goal.choices
+    ]
 
 
 def _supersede(goal: ExpertQueryGoal) -> List[Dict[str, str]]:
     """First those with which the machine goes on."""
     states = {choice.state for choice in goal.choices if not choice.container}
-    return [{
-        'outcome': choice.outcome, 'target': choice.target
-    } for choice in sorted(goal.supersede_outcomes, key=lambda choice: choice.target not in states)]
+    return [
+        {'outcome': choice.outcome, 'target': choice.target}
+        for choice in sorted(
+            goal.supersede_outcomes, key=lambda choice: choice.target not in states
+        )
+    ]
 
 
 def _item(item: UserdataItem) -> Dict[str, str]:
@@ -78,8 +119,10 @@ def _item(item: UserdataItem) -> Dict[str, str]:
     try:
         if item.encoding == UserdataItem.JSON:
             return {
-                'key': item.key, 'type': '',
-                'value': bytes(item.value).decode('utf-8')[:LONGEST_VALUE], 'note': ''
+                'key': item.key,
+                'type': '',
+                'value': bytes(item.value).decode('utf-8')[:LONGEST_VALUE],
+                'note': '',
             }
         value = decode(item)
         text = '\n---\n'.join(map(str, value)) if isinstance(value, list) else str(value)
@@ -87,6 +130,8 @@ def _item(item: UserdataItem) -> Dict[str, str]:
         return {'key': item.key, 'type': kind, 'value': text[:LONGEST_VALUE], 'note': ''}
     except (UserdataCodecError, UnicodeDecodeError) as err:
         return {
-            'key': item.key, 'type': item.type, 'value': '',
-            'note': 'cannot be shown: {}'.format(err)
+            'key': item.key,
+            'type': item.type,
+            'value': '',
+            'note': 'cannot be shown: {}'.format(err),
         }

@@ -1,4 +1,5 @@
 """Keeps the closed sets of sensors and of perception interfaces up to date."""
+
 from functools import partial
 from types import MappingProxyType
 from typing import Any, Dict, Mapping, Sequence, Set
@@ -26,8 +27,12 @@ _SEGMENT = '/segment'
 class SensorDiscovery:
     """Its threads ask the master, and subscribe to the sensors that somebody watches."""
 
-    def __init__(self, sections: PageSections, front_end: FrontEnd,
-                 cameras: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
+    def __init__(
+        self,
+        sections: PageSections,
+        front_end: FrontEnd,
+        cameras: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ) -> None:
         """`cameras`: of robots, as set."""
         self.sensors = SensorStreams()
         self.cameras = RobotCameras(self.sensors, cameras)
@@ -49,23 +54,29 @@ class SensorDiscovery:
         master = timed_master()
         published = master.getPublishedTopics('')
         parameters = master.getParamNames()
-        self.sensors.follow(published, [
-            DerivedStream(camera.depth + AS_A_CLOUD, DEPTH_TYPE,
-                          partial(DepthCloudStream, camera=camera))
-            for camera in depth_cameras(published)
-        ] + [
-            DerivedStream(name, DESCRIPTION, partial(RobotStream, parameter=name))
-            for name in robots_in(parameters)
-        ])
-        self.cameras.declare({robot: master.getParam(robot + PARAMETER)
-                              for robot in declared_in(parameters)})
+        self.sensors.follow(
+            published,
+            [
+                DerivedStream(
+                    camera.depth + AS_A_CLOUD, DEPTH_TYPE, partial(DepthCloudStream, camera=camera)
+                )
+                for camera in depth_cameras(published)
+            ]
+            + [
+                DerivedStream(name, DESCRIPTION, partial(RobotStream, parameter=name))
+                for name in robots_in(parameters)
+            ],
+        )
+        self.cameras.declare(
+            {robot: master.getParam(robot + PARAMETER) for robot in declared_in(parameters)}
+        )
         self._follow_interfaces(published, {name for name, _ in master.getSystemState()[2]})
 
     def write_sections(self) -> None:
         """Bring the section up to date."""
-        self._sections.put('sensors', {
-            'sensors': self.sensors.view(), 'perception': self._running()
-        })
+        self._sections.put(
+            'sensors', {'sensors': self.sensors.view(), 'perception': self._running()}
+        )
 
     def _update(self) -> None:
         self.sensors.update_subscriptions()
@@ -82,8 +93,10 @@ class SensorDiscovery:
             if action and self.is_perception(action):
                 running[listed.key] = {
                     name: sensor.number if sensor else None
-                    for name, sensor in ((name, self.sensors.on('{}/{}'.format(action, name)))
-                                         for name in ('image', 'cloud'))
+                    for name, sensor in (
+                        (name, self.sensors.on('{}/{}'.format(action, name)))
+                        for name in ('image', 'cloud')
+                    )
                 }
         return running
 
@@ -91,8 +104,7 @@ class SensorDiscovery:
         there = {action for action in interface_actions(published) if action + _SEGMENT in services}
         known = self._perception_actions & there
         self._perception_actions = known | {
-            action
-            for action in there - known if _is_segmentation(action + _SEGMENT)
+            action for action in there - known if _is_segmentation(action + _SEGMENT)
         }
 
 

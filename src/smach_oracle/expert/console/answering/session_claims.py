@@ -3,6 +3,7 @@
 Robots know a claim by the expert's name alone, and two people may have the same. Here it belongs to
 the session of one browser: another one of the same name neither shares it nor answers by it.
 """
+
 import threading
 import time
 from collections import OrderedDict
@@ -46,13 +47,15 @@ class SessionClaims:
         """Return why a claim or an answer is not the person's, or '' where it may be."""
         if command.name == 'claim':
             held = self._valid(listed)
-            if held is not None and held.expert == person.expert \
-                    and held.session != person.session:
+            if held is not None and held.expert == person.expert and held.session != person.session:
                 return '{} works on this question in another browser'.format(held.expert)
         if command.name == 'answer' and not self.holds(person, listed):
             others = listed.holder and (listed.holder != person.expert or self._valid(listed))
-            return '{} works on this question; take it over first'.format(
-                listed.holder) if others else CLAIM_FIRST
+            return (
+                '{} works on this question; take it over first'.format(listed.holder)
+                if others
+                else CLAIM_FIRST
+            )
         return ''
 
     def take(self, person: Person, listed: ListedQuestion) -> None:

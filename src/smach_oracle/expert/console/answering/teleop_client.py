@@ -1,4 +1,5 @@
 """One manipulation interface as the console drives it: commands out, states in."""
+
 import math
 import time
 from typing import Any, Dict, List, Optional
@@ -33,15 +34,18 @@ class TeleopClient:
         self._linear = float(rospy.get_param(action + '/limits/linear', 0.25))
         self._angular = float(rospy.get_param(action + '/limits/angular', 1.0))
         self._open = float(rospy.get_param(action + '/gripper_open', GRIPPER_OPEN))
-        self._publisher = rospy.Publisher(action + '/command', TeleopCommand, queue_size=2,
-                                          tcp_nodelay=True)
+        self._publisher = rospy.Publisher(
+            action + '/command', TeleopCommand, queue_size=2, tcp_nodelay=True
+        )
         # number of boxes in the robot's collision map. None means there is no map
         self.boxes: Optional[int] = None
         self._subscribers = [
-            rospy.Subscriber(action + '/state', TeleopState, self._on_state, queue_size=2,
-                             tcp_nodelay=True),
             rospy.Subscriber(
-                rosgraph.names.namespace(action) + 'collision_map', CollisionBoxes, self._on_map)
+                action + '/state', TeleopState, self._on_state, queue_size=2, tcp_nodelay=True
+            ),
+            rospy.Subscriber(
+                rosgraph.names.namespace(action) + 'collision_map', CollisionBoxes, self._on_map
+            ),
         ]
 
     def _on_state(self, state: TeleopState) -> None:
@@ -55,8 +59,10 @@ class TeleopClient:
 
         More would wait, and move the arm after it was let go.
         """
-        answered = self.state is not None and (self.state.sender, self.state.seq) == (operator,
-                                                                                      self._seq)
+        answered = self.state is not None and (self.state.sender, self.state.seq) == (
+            operator,
+            self._seq,
+        )
         return self._in_steps and not answered and time.monotonic() - self._sent_s < ANSWER_S
 
     @property
@@ -81,12 +87,19 @@ class TeleopClient:
         self._seq, self._sent_s = self._seq + 1, time.monotonic()
         self._publisher.publish(
             TeleopCommand(
-                header=Header(frame_id=frame, stamp=rospy.Time.now()), operator=operator,
-                seq=self._seq, arm=arm, dead_man=held, twist=Twist(
+                header=Header(frame_id=frame, stamp=rospy.Time.now()),
+                operator=operator,
+                seq=self._seq,
+                arm=arm,
+                dead_man=held,
+                twist=Twist(
                     Vector3(*along(arguments['frame'], arguments['linear'], self._linear)),
-                    Vector3(*along(arguments['frame'], arguments['angular'], self._angular))),
+                    Vector3(*along(arguments['frame'], arguments['angular'], self._angular)),
+                ),
                 move_gripper=held and bool(arguments['gripper']),
-                gripper=self._open if arguments['gripper'] == 'open' else 0.0))
+                gripper=self._open if arguments['gripper'] == 'open' else 0.0,
+            )
+        )
 
     def release(self, operator: str) -> None:
         """Stop the arm now."""

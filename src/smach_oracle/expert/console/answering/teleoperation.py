@@ -1,4 +1,5 @@
 """Drives the manipulation interfaces that run for questions, as the pages command."""
+
 import math
 import threading
 import time
@@ -51,14 +52,18 @@ class Teleoperation:
 
     def start(self) -> None:
         """Begin. The threads end with the node."""
-        for step, period_s in ((self.discover, DISCOVERY_PERIOD_S), (self.write_sections,
-                                                                     SECTIONS_PERIOD_S)):
+        for step, period_s in (
+            (self.discover, DISCOVERY_PERIOD_S),
+            (self.write_sections, SECTIONS_PERIOD_S),
+        ):
             repeat(step, period_s)
 
     def drives(self, page: int) -> bool:
         """Whether a page is in control of an interface."""
-        return any(client.control.session is not None and client.control.session.page == page
-                   for client in list(self._clients.values()))
+        return any(
+            client.control.session is not None and client.control.session.page == page
+            for client in list(self._clients.values())
+        )
 
     def drive(self, command: PageCommand, page: int) -> CommandReply:
         """Relay one command of the page in control. A command that comes late stops the arm."""
@@ -73,8 +78,11 @@ class Teleoperation:
             if arguments['arm'] and arguments['arm'] not in client.arms:
                 client.release(_operator(session))
                 return CommandReply(
-                    False, 'unknown arm {}; allowed: {}'.format(shown(arguments['arm']),
-                                                                ', '.join(client.arms)))
+                    False,
+                    'unknown arm {}; allowed: {}'.format(
+                        shown(arguments['arm']), ', '.join(client.arms)
+                    ),
+                )
             was_held = client.control.held
             if client.control.accept(arguments['sent'] / 1e3, arguments['held'], time.monotonic()):
                 if not client.busy(_operator(session)):
@@ -95,8 +103,9 @@ class Teleoperation:
         who = person.expert or 'somebody at {}'.format(person.client)  # to stop needs no name
         self._leave(key, None, '{} has stopped the hand'.format(who))
         reply = CommandReply(client is not None, '' if client is not None else NOT_RUNNING)
-        self._audit.record(person, command.name, reply.ok, reply.message, {},
-                           self._front_end.find(key))
+        self._audit.record(
+            person, command.name, reply.ok, reply.message, {}, self._front_end.find(key)
+        )
         return reply
 
     def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
@@ -136,11 +145,15 @@ class Teleoperation:
         self._interfaces = interface_actions(types.items())
         running = {
             listed.key: action_of(listed)
-            for listed in self._front_end.questions() if listed.goal.interface
+            for listed in self._front_end.questions()
+            if listed.goal.interface
         }
-        moving = {key: action for key, action in running.items()
-                  if types.get(action + '/state') == TeleopState._type
-                  and types.get(action + '/command') == TeleopCommand._type}
+        moving = {
+            key: action
+            for key, action in running.items()
+            if types.get(action + '/state') == TeleopState._type
+            and types.get(action + '/command') == TeleopCommand._type
+        }
         for key in set(self._clients) - set(moving):
             self._leave(key, None, 'the interface has ended')
             self._clients.pop(key).stop()
@@ -154,22 +167,28 @@ class Teleoperation:
         except (AttributeError, TypeError, ValueError) as err:
             # one robot's wrong settings must not stop the others' interfaces
             rospy.logerr_throttle(
-                10, '{} does not have the settings of a manipulation interface: {!r}'.format(
-                    action, err))
+                10,
+                '{} does not have the settings of a manipulation interface: {!r}'.format(
+                    action, err
+                ),
+            )
 
     def write_sections(self) -> None:
         """Bring the sections up to date. End the sessions of pages that have fallen silent."""
         for key, client in list(self._clients.items()):
             if client.control.session is not None and client.control.silent(time.monotonic()):
                 self._leave(key, None, 'the page has fallen silent')
-        self._sections.put('manipulation',
-                           {key: _view(client)
-                            for key, client in list(self._clients.items())})
         self._sections.put(
-            'interface_output', {
+            'manipulation', {key: _view(client) for key, client in list(self._clients.items())}
+        )
+        self._sections.put(
+            'interface_output',
+            {
                 listed.key: interface_output_view(self._outputs.newest(listed.goal.query_id))
-                for listed in self._front_end.questions() if self._known(listed)
-            })
+                for listed in self._front_end.questions()
+                if self._known(listed)
+            },
+        )
 
     def _known(self, listed: ListedQuestion) -> bool:
         output = self._outputs.newest(listed.goal.query_id)
@@ -184,17 +203,24 @@ def _operator(session: DrivingSession) -> str:
 def _view(client: TeleopClient) -> Dict[str, Any]:
     state, session = client.state, client.control.session
     view: Dict[str, Any] = {
-        'frames': sorted(client.frames(client.arm)), 'arms': client.arms, 'boxes': client.boxes,
+        'frames': sorted(client.frames(client.arm)),
+        'arms': client.arms,
+        'boxes': client.boxes,
         'wheel': session.page if session else None,
-        'driver': session.person.expert if session else ''
+        'driver': session.person.expert if session else '',
     }
     if state is not None:
         at, way = state.tool_pose.position, state.achieved.linear
         view['state'] = {
-            'arm': state.arm, 'moving': state.moving, 'limit': state.limit[:300],
-            'refused': state.refused[:300], 'share': number(state.speed, 3),
+            'arm': state.arm,
+            'moving': state.moving,
+            'limit': state.limit[:300],
+            'refused': state.refused[:300],
+            'share': number(state.speed, 3),
             'speed': number(math.sqrt(way.x**2 + way.y**2 + way.z**2), 3),
-            'clearance': number(state.clearance, 3), 'gripper': number(state.gripper, 3),
-            'stalled': state.gripper_stalled, 'at': [number(each, 3) for each in (at.x, at.y, at.z)]
+            'clearance': number(state.clearance, 3),
+            'gripper': number(state.gripper, 3),
+            'stalled': state.gripper_stalled,
+            'at': [number(each, 3) for each in (at.x, at.y, at.z)],
         }
     return view

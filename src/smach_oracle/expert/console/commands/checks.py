@@ -4,6 +4,7 @@ A check takes an argument as it came, and returns its value.
 
 :raises ValueError: (each check) for anything else. The text says what is allowed.
 """
+
 import math
 from typing import Any, Callable, Dict, List, NamedTuple, Tuple
 
@@ -36,15 +37,20 @@ def text(longest: int, least: int = 0) -> Check:
     Control characters are refused. An argument that is left out is read as the empty text, if that
     is allowed.
     """
+
     def check(value: object) -> str:
         if value is None and not least:
             return ''
         if not isinstance(value, str) or not least <= len(value) <= longest:
-            raise ValueError('{} is not allowed; allowed: text of {} to {} characters'.format(
-                shown(value), least, longest))
+            raise ValueError(
+                '{} is not allowed; allowed: text of {} to {} characters'.format(
+                    shown(value), least, longest
+                )
+            )
         if any(ord(character) < 32 and character not in '\n\t' for character in value):
             raise ValueError('control characters are not allowed')
         return value.encode('utf-8', 'replace').decode('utf-8')
+
     return check
 
 
@@ -56,7 +62,8 @@ def one_of(allowed: Tuple[str, ...]) -> Check:
 def number(low: float, high: float, allowed: str = '') -> Check:
     """Return a check that admits a finite number from `low` to `high`. A refusal says `allowed`."""
     return _argument(
-        checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high)))
+        checks.number(low, high, allowed or 'a number from {:g} to {:g}'.format(low, high))
+    )
 
 
 def whole(low: int, high: int, allowed: str) -> Check:
@@ -66,12 +73,15 @@ def whole(low: int, high: int, allowed: str) -> Check:
 
 def _argument(check: checks.Check) -> Check:
     """Return a check of arguments made of one of settings. A refusal shows a part of the value."""
+
     def checked(value: object) -> Any:
         try:
             return check('', value)
         except SettingsError as err:
-            raise ValueError('{} is not allowed; allowed: {}'.format(shown(value),
-                                                                     err.allowed)) from err
+            raise ValueError(
+                '{} is not allowed; allowed: {}'.format(shown(value), err.allowed)
+            ) from err
+
     return checked
 
 
@@ -110,8 +120,11 @@ def outputs(value: object) -> List[TypedOutput]:
 
 
 def _output(value: object) -> TypedOutput:
-    if not isinstance(value,
-                      dict) or not {'key', 'value'} <= set(value) <= {'key', 'value', 'type'}:
+    if not isinstance(value, dict) or not {'key', 'value'} <= set(value) <= {
+        'key',
+        'value',
+        'type',
+    }:
         raise ValueError('an output is {"key": ..., "value": ..., "type": ...}')
     _check_depth(value['value'])
     return TypedOutput(text(200, 1)(value['key']), value['value'], text(200)(value.get('type')))
@@ -125,8 +138,9 @@ def _check_depth(value: object) -> None:
             raise ValueError('an output is nested deeper than {}'.format(_DEEPEST))
         if isinstance(item, float) and not math.isfinite(item):
             raise ValueError('an output holds a number that is too large')
-        children = item.values() if isinstance(item,
-                                               dict) else item if isinstance(item, list) else ()
+        children = (
+            item.values() if isinstance(item, dict) else item if isinstance(item, list) else ()
+        )
         waiting += [(child, depth + 1) for child in children]
 
 

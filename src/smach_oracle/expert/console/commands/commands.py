@@ -3,6 +3,7 @@
 A command is a JSON object {"id": number, "do": name, ...arguments}. No argument is ever the name of
 a topic, a service or a type to call: questions are named by their keys, and must be open ones.
 """
+
 from typing import Any, Dict, Mapping, NamedTuple, Optional
 
 from smach_oracle.oracle.errors import OracleError
@@ -17,7 +18,7 @@ from .stored import STORED_COMMANDS
 
 MOST_BYTES = 65536
 KINDS = ('goto', 'supersede', 'give_up', 'interface')
-_id = whole(1, 2 ** 53 - 1, 'a whole number from 1')
+_id = whole(1, 2**53 - 1, 'a whole number from 1')
 
 
 class CommandError(OracleError):
@@ -61,15 +62,16 @@ def parse(text: object) -> PageCommand:
     if not isinstance(name, str) or name not in COMMANDS:
         raise CommandError(
             'there is no command {}; allowed: {}'.format(shown(name), ', '.join(sorted(COMMANDS))),
-            number)
+            number,
+        )
     checks = COMMANDS[name].checks
     unknown = sorted(set(data) - set(checks))
     if unknown:
         raise CommandError('{} takes no {}'.format(name, shown(unknown[0])), number)
     try:
-        return PageCommand(number, name,
-                           {field: check(data.get(field))
-                            for field, check in checks.items()})
+        return PageCommand(
+            number, name, {field: check(data.get(field)) for field, check in checks.items()}
+        )
     except ValueError as err:
         raise CommandError('{}: {}'.format(name, err), number) from err
 
@@ -115,8 +117,16 @@ COMMANDS: Dict[str, CommandSpec] = {
     'release': CommandSpec('operator', QUESTION),
     'answer': CommandSpec(
         'operator',
-        dict(QUESTION, kind=one_of(KINDS), name=text(400), container=text(4000),
-             outputs=outputs, why=text(2000), seen=seen)),
+        dict(
+            QUESTION,
+            kind=one_of(KINDS),
+            name=text(400),
+            container=text(4000),
+            outputs=outputs,
+            why=text(2000),
+            seen=seen,
+        ),
+    ),
     **MARKING_COMMANDS,
     **DRIVING_COMMANDS,
     **HOLDING_COMMANDS,

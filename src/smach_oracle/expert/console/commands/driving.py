@@ -1,4 +1,5 @@
 """Commands to drive a robot's arm through a manipulation interface. Pure."""
+
 from typing import Any, Dict, Mapping, Tuple
 
 from .checks import QUESTION, CommandSpec, flag, number, one_of, shown, text
@@ -30,8 +31,17 @@ DRIVING_COMMANDS: Dict[str, CommandSpec] = {
     # arm: checked against the interface's own. '' means the one that it has chosen for the state
     'drive': CommandSpec(
         'teleoperator',
-        dict(QUESTION, held=flag, frame=one_of(FRAMES), linear=_axes, angular=_axes,
-             gripper=one_of(GRIPPER), sent=_age, arm=text(100))),
+        dict(
+            QUESTION,
+            held=flag,
+            frame=one_of(FRAMES),
+            linear=_axes,
+            angular=_axes,
+            gripper=one_of(GRIPPER),
+            sent=_age,
+            arm=text(100),
+        ),
+    ),
 }
 
 

@@ -1,4 +1,5 @@
 """Commands to hold a machine: stop it, pause it, let it go on. Pure."""
+
 from typing import Dict
 
 from .checks import CommandSpec, flag, seen, text

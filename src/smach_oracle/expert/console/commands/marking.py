@@ -1,4 +1,5 @@
 """Commands to mark an object through a perception interface, and to end any interface. Pure."""
+
 import re
 from typing import Callable, Dict, List, NamedTuple, Tuple
 
@@ -30,11 +31,15 @@ def _points(least: int, most: int) -> Callable[[object], List[Point]]:
 
     def check(value: object) -> List[Point]:
         if not isinstance(value, list) or not least <= len(value) <= most:
-            raise ValueError('{} is not allowed; allowed: {} to {} points [x, y]'.format(
-                shown(value), least, most))
+            raise ValueError(
+                '{} is not allowed; allowed: {} to {} points [x, y]'.format(
+                    shown(value), least, most
+                )
+            )
         if not all(isinstance(point, list) and len(point) == 2 for point in value):
             raise ValueError('a point is [x, y]')
         return [(coordinate(x), coordinate(y)) for x, y in value]
+
     return check
 
 
@@ -47,25 +52,31 @@ def _strokes(value: object) -> List[StrokeArgument]:
 def _stroke(value: object) -> StrokeArgument:
     if not isinstance(value, dict) or set(value) != {'foreground', 'width', 'points'}:
         raise ValueError('a stroke is {"foreground": ..., "width": ..., "points": ...}')
-    return StrokeArgument(flag(value['foreground']), number(0.5, _WIDEST)(value['width']),
-                       _points(1, MOST_STROKE_POINTS)(value['points']))
+    return StrokeArgument(
+        flag(value['foreground']),
+        number(0.5, _WIDEST)(value['width']),
+        _points(1, MOST_STROKE_POINTS)(value['points']),
+    )
 
 
 def _stamp(value: object) -> genpy.Time:
     found = _STAMP.fullmatch(value) if isinstance(value, str) else None
-    if found is None or int(found.group(1)) >= 2 ** 32:
+    if found is None or int(found.group(1)) >= 2**32:
         raise ValueError(
             '{} is not allowed; allowed: the stamp of an image, as seconds.nanoseconds'.format(
-                shown(value)))
+                shown(value)
+            )
+        )
     return genpy.Time(int(found.group(1)), int(found.group(2)))
 
 
 MARKING_COMMANDS: Dict[str, CommandSpec] = {
-    'mark': CommandSpec('operator',
-                 dict(QUESTION, stamp=_stamp, region=_points(3, MOST_CORNERS), strokes=_strokes)),
+    'mark': CommandSpec(
+        'operator', dict(QUESTION, stamp=_stamp, region=_points(3, MOST_CORNERS), strokes=_strokes)
+    ),
     'use_frame': CommandSpec('operator', dict(QUESTION, frame=one_of((AT_GOAL, FRESH)))),
-    'hand_over': CommandSpec('operator',
-                      dict(QUESTION, outcome=text(400, 1), outputs=outputs, why=text(2000),
-                           seen=seen)),
+    'hand_over': CommandSpec(
+        'operator', dict(QUESTION, outcome=text(400, 1), outputs=outputs, why=text(2000), seen=seen)
+    ),
     'give_up_interface': CommandSpec('operator', dict(QUESTION, why=text(2000))),
 }

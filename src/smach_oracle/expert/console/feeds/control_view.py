@@ -1,4 +1,5 @@
 """The state of a robot's machines, as plain data for the page. Pure."""
+
 from typing import Any, Dict, List
 
 from smach_oracle.msg import ControlStatus, MachineControl
@@ -16,10 +17,18 @@ def control_view(message: ControlStatus) -> List[MachineView]:
 
 def _machine(machine: MachineControl) -> MachineView:
     return {
-        'path': machine.path, 'running': machine.running, 'paused': machine.paused,
+        'path': machine.path,
+        'running': machine.running,
+        'paused': machine.paused,
         'by': machine.paused_by,
-        'active': [{'path': each.path, 'state': each.state, 'held': each.held_by,
-                    'confirm': each.waits_for_confirmation}
-                   for each in machine.active[:MOST_ACTIVE]],
-        'breakpoints': list(machine.breakpoints[:MOST_BREAKPOINTS])
+        'active': [
+            {
+                'path': each.path,
+                'state': each.state,
+                'held': each.held_by,
+                'confirm': each.waits_for_confirmation,
+            }
+            for each in machine.active[:MOST_ACTIVE]
+        ],
+        'breakpoints': list(machine.breakpoints[:MOST_BREAKPOINTS]),
     }

@@ -3,6 +3,7 @@
 A node that was killed stays registered at the master, and one that is stopped keeps its
 connections. Neither answers.
 """
+
 import threading
 import time
 import xmlrpc.client
@@ -46,8 +47,9 @@ class NodeLink:
             raise
 
     def _look_up(self) -> str:
-        code, message, uri = _proxy(rosgraph.get_master_uri()).lookupNode(rospy.get_name(),
-                                                                          self._node)
+        code, message, uri = _proxy(rosgraph.get_master_uri()).lookupNode(
+            rospy.get_name(), self._node
+        )
         if code != 1:
             raise NodeUnknownError('{}: {}'.format(self._node, message))
         return str(uri)
@@ -69,8 +71,9 @@ class NodePulse:
         for node in wanted:
             if node not in self._stops:
                 self._stops[node] = stop = threading.Event()
-                threading.Thread(target=self._run, args=(node, stop), name='pulse ' + node,
-                                 daemon=True).start()
+                threading.Thread(
+                    target=self._run, args=(node, stop), name='pulse ' + node, daemon=True
+                ).start()
         for node in set(self._stops) - set(wanted):
             self._stops.pop(node).set()
 

@@ -2,6 +2,7 @@
 
 A robot's words are passed on as text, never as markup.
 """
+
 import json
 import math
 from typing import Any, Dict, Optional
@@ -29,10 +30,24 @@ def event_of(message: OracleEvent) -> Event:
     elif kind in (EventKind.JUMP, EventKind.DECISION):
         data = told_in_words(_parsed(message.data))
     time_s = message.wall_time if 0 <= message.wall_time <= LATEST_S else 0.0  # NaN is neither
-    return Event(kind, message.trial_id, message.seq, time_s, message.path, message.state,
-                 message.outcome, message.target, message.failure_kind, message.failure_class,
-                 message.rate, message.continuous, message.query_id, message.by, message.text,
-                 data)
+    return Event(
+        kind,
+        message.trial_id,
+        message.seq,
+        time_s,
+        message.path,
+        message.state,
+        message.outcome,
+        message.target,
+        message.failure_kind,
+        message.failure_class,
+        message.rate,
+        message.continuous,
+        message.query_id,
+        message.by,
+        message.text,
+        data,
+    )
 
 
 def _parsed(data: str) -> Any:
@@ -45,11 +60,21 @@ def _parsed(data: str) -> Any:
 def event_view(event: Event) -> Dict[str, Any]:
     """Return one event of a trial's time axis."""
     return {
-        'seq': event.seq, 'kind': getattr(event.kind, 'name', str(event.kind)).lower(),
-        't': event.wall_time, 'path': event.path, 'state': event.state, 'outcome': event.outcome,
-        'target': event.target, 'class': event.failure_class, 'rate': number(event.rate),
-        'continuous': event.continuous, 'counted': is_counted(event), 'query': event.query_id,
-        'by': event.by, 'text': last_line(event.text), 'words': event_words(event)
+        'seq': event.seq,
+        'kind': getattr(event.kind, 'name', str(event.kind)).lower(),
+        't': event.wall_time,
+        'path': event.path,
+        'state': event.state,
+        'outcome': event.outcome,
+        'target': event.target,
+        'class': event.failure_class,
+        'rate': number(event.rate),
+        'continuous': event.continuous,
+        'counted': is_counted(event),
+        'query': event.query_id,
+        'by': event.by,
+        'text': last_line(event.text),
+        'words': event_words(event),
     }
 
 
@@ -63,9 +88,12 @@ def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
     found: Dict[str, Dict[str, Dict[str, Any]]] = {}
     for row in message.states:
         found.setdefault(row.path, {})[row.state] = {
-            'rate': number(row.rate), 'class': row.failure_class, 'successes': row.successes,
-            'failures': row.failures, 'recoveries': row.recoveries,
-            'preconditions': row.has_preconditions
+            'rate': number(row.rate),
+            'class': row.failure_class,
+            'successes': row.successes,
+            'failures': row.failures,
+            'recoveries': row.recoveries,
+            'preconditions': row.has_preconditions,
         }
     return found
 

@@ -3,6 +3,7 @@
 ORACLE is left out of the layout: with one edge from and one to every state it would pull all others
 to itself. The page draws it beside the rest, and its edges as thin curves.
 """
+
 import json
 from typing import Any, Counter, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
 
@@ -48,8 +49,9 @@ class GraphLayout(NamedTuple):
     edges: Dict[str, Tuple[List[Point], Optional[Point]]]
 
 
-def make_structure(path: str, children: Iterable[str], edges: Iterable[GraphEdge],
-                   outcomes: Iterable[str]) -> ContainerGraph:
+def make_structure(
+    path: str, children: Iterable[str], edges: Iterable[GraphEdge], outcomes: Iterable[str]
+) -> ContainerGraph:
     """Return the graph of a container as its introspection server publishes it."""
     labels = list(dict.fromkeys(children))[:MOST_STATES]
     all_edges = list(dict.fromkeys(edges))[:MOST_EDGES]
@@ -86,19 +88,27 @@ def dot_text(structure: ContainerGraph) -> str:
     """
     names = _names(structure)
     large = len(structure.edges) > MOST_LABELLED
-    lines = ['digraph {', 'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
-             ' edge [fontsize=11];' + (_HASTE if large else '')]
+    lines = [
+        'digraph {',
+        'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
+        ' edge [fontsize=11];' + (_HASTE if large else ''),
+    ]
     for label, name in names.items():
         width, height = box(label) if label in structure.states else (box(label)[0] * 0.9, 30.0)
-        lines.append('{} [width={:.3f}, height={:.3f}];'.format(
-            name, width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH))
+        lines.append(
+            '{} [width={:.3f}, height={:.3f}];'.format(
+                name, width / _PIXELS_PER_INCH, height / _PIXELS_PER_INCH
+            )
+        )
     if structure.outcomes:
-        lines.append('{{rank=sink; {}}}'.format('; '.join(names[outcome]
-                                                          for outcome in structure.outcomes)))
+        lines.append(
+            '{{rank=sink; {}}}'.format('; '.join(names[outcome] for outcome in structure.outcomes))
+        )
     for number, edge in enumerate(structure.edges):
         label = '' if large else ', label="{}"'.format('x' * min(24, len(edge.outcome) + 5))
-        lines.append('{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number,
-                                                   label))
+        lines.append(
+            '{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number, label)
+        )
     return '\n'.join(lines + ['}'])
 
 
@@ -117,7 +127,8 @@ def read_layout(text: str) -> GraphLayout:
         left, bottom, right, top = (float(number) for number in data['bb'].split(','))
         nodes = {
             each['name']: _node(each, top)
-            for each in data.get('objects', []) if 'nodes' not in each
+            for each in data.get('objects', [])
+            if 'nodes' not in each
         }
         edges = {each['id']: _edge(each, top) for each in data.get('edges', [])}
     except (KeyError, TypeError, AttributeError) as err:
@@ -125,8 +136,9 @@ def read_layout(text: str) -> GraphLayout:
     return GraphLayout(right - left, top - bottom, nodes, edges)
 
 
-def drawing(structure: ContainerGraph, layout: Optional[GraphLayout],
-            nested: Iterable[str]) -> Dict[str, Any]:
+def drawing(
+    structure: ContainerGraph, layout: Optional[GraphLayout], nested: Iterable[str]
+) -> Dict[str, Any]:
     """The section of a graph: plain data for the page. Positions only where there is a layout.
 
     :param nested: labels of the states that are containers themselves.
@@ -134,24 +146,34 @@ def drawing(structure: ContainerGraph, layout: Optional[GraphLayout],
     names = _names(structure)
     inner = set(nested)
     data: Dict[str, Any] = {
-        'path': structure.path, 'oracle': structure.oracle, 'drawn': layout is not None,
+        'path': structure.path,
+        'oracle': structure.oracle,
+        'drawn': layout is not None,
         'size': [layout.width, layout.height] if layout else None,
-        'states': [{'label': label, 'nested': label in inner, 'at': _place(layout, names[label])}
-                   for label in structure.states],
-        'outcomes': [{'label': label, 'at': _place(layout, names[label])}
-                     for label in structure.outcomes], 'edges': []
+        'states': [
+            {'label': label, 'nested': label in inner, 'at': _place(layout, names[label])}
+            for label in structure.states
+        ],
+        'outcomes': [
+            {'label': label, 'at': _place(layout, names[label])} for label in structure.outcomes
+        ],
+        'edges': [],
     }
     for number, edge in enumerate(structure.edges):
         points, label = _drawn_edge(layout, 'e{}'.format(number))
-        data['edges'].append({
-            'from': edge.source, 'outcome': edge.outcome, 'to': edge.target,
-            'points': [coordinate for point in points for coordinate in point], 'label': label
-        })
+        data['edges'].append(
+            {
+                'from': edge.source,
+                'outcome': edge.outcome,
+                'to': edge.target,
+                'points': [coordinate for point in points for coordinate in point],
+                'label': label,
+            }
+        )
     return data
 
 
-def _drawn_edge(layout: Optional[GraphLayout],
-                name: str) -> Tuple[List[Point], Optional[Point]]:
+def _drawn_edge(layout: Optional[GraphLayout], name: str) -> Tuple[List[Point], Optional[Point]]:
     """Points and place of the label of an edge. None where it is not laid out."""
     edge = layout.edges.get(name) if layout else None
     return edge if edge else ([], None)
@@ -165,18 +187,24 @@ def _names(structure: ContainerGraph) -> Dict[str, str]:
 
 
 def _place(layout: Optional[GraphLayout], name: str) -> Optional[List[float]]:
-    return [round(number, 1)
-            for number in layout.nodes[name]] if layout and name in layout.nodes else None
+    return (
+        [round(number, 1) for number in layout.nodes[name]]
+        if layout and name in layout.nodes
+        else None
+    )
 
 
 def _node(data: Dict[str, Any], top: float) -> Tuple[float, float, float, float]:
     x, y = (float(number) for number in data['pos'].split(','))
-    return x, top - y, float(data['width']) * _PIXELS_PER_INCH, float(
-        data['height']) * _PIXELS_PER_INCH
+    return (
+        x,
+        top - y,
+        float(data['width']) * _PIXELS_PER_INCH,
+        float(data['height']) * _PIXELS_PER_INCH,
+    )
 
 
-def _edge(data: Dict[str, Any],
-          top: float) -> Tuple[List[Point], Optional[Point]]:
+def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Point], Optional[Point]]:
     """The spline's points, its arrow's tip at the end."""
     tip: List[Point] = []
     points = []
@@ -185,8 +213,9 @@ def _edge(data: Dict[str, Any],
             tip = [_point(part[2:], top)]
         elif not part.startswith('s,'):
             points.append(_point(part, top))
-    return points + tip, _point(data['lp'], top) if 'lp' in data else points[len(points) //
-                                                                             3] if points else None
+    return points + tip, _point(data['lp'], top) if 'lp' in data else points[
+        len(points) // 3
+    ] if points else None
 
 
 def _point(text: str, top: float) -> Point:
@@ -200,8 +229,11 @@ def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
     totals: Counter[str] = Counter()
     for source, _, _, times in rows:
         totals[source] += times
-    return [[source, outcome, target, times, round(times / totals[source], 4)]
-            for source, outcome, target, times in rows if totals[source]]
+    return [
+        [source, outcome, target, times, round(times / totals[source], 4)]
+        for source, outcome, target, times in rows
+        if totals[source]
+    ]
 
 
 def structure_from_counts(path: str, labels: List[str], counts: List[List[Any]]) -> ContainerGraph:
@@ -210,9 +242,18 @@ def structure_from_counts(path: str, labels: List[str], counts: List[List[Any]])
     :param counts: rows as of `shares`.
     """
     targets = {str(target) for _, _, target, _, _ in counts}
-    oracle: Optional[str] = next((str(source) for source, outcome, target, _, _ in counts
-                                  if outcome == target and source not in labels), None)
-    edges = tuple(GraphEdge(source, outcome, target) for source, outcome, target, _, _ in counts
-                  if source in labels and target != oracle)
+    oracle: Optional[str] = next(
+        (
+            str(source)
+            for source, outcome, target, _, _ in counts
+            if outcome == target and source not in labels
+        ),
+        None,
+    )
+    edges = tuple(
+        GraphEdge(source, outcome, target)
+        for source, outcome, target, _, _ in counts
+        if source in labels and target != oracle
+    )
     outcomes = tuple(sorted(targets - set(labels) - {oracle or ''}))
     return ContainerGraph(path, tuple(labels), outcomes, edges, oracle or '')

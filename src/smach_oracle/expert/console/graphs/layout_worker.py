@@ -1,4 +1,5 @@
 """Runs dot, in a thread of its own, for graphs that have not been laid out yet."""
+
 import queue
 import shutil
 import subprocess
@@ -35,7 +36,8 @@ class LayoutWorker:
         if self._command is None:
             rospy.logwarn(
                 'Graphviz is not installed (no %s in PATH): state graphs are shown as lists.',
-                command)
+                command,
+            )
         else:
             threading.Thread(target=self._run, name='layout', daemon=True).start()
 
@@ -72,17 +74,23 @@ class LayoutWorker:
             with self._lock:
                 self._layouts[text] = layout
                 waiting = self._asked.pop(text)
-                for old in [each for each in self._layouts
-                            if each not in self._asked][:-_REMEMBERED]:
+                for old in [each for each in self._layouts if each not in self._asked][
+                    :-_REMEMBERED
+                ]:
                     del self._layouts[old]
             for done in waiting:
                 done()
 
     def _lay_out(self, text: str) -> Optional[GraphLayout]:
         try:
-            result = subprocess.run([str(self._command), '-Tjson0'], input=text.encode(),
-                                    stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                    timeout=self._limit_s, check=True)
+            result = subprocess.run(
+                [str(self._command), '-Tjson0'],
+                input=text.encode(),
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                timeout=self._limit_s,
+                check=True,
+            )
             return read_layout(result.stdout.decode('utf-8', 'replace'))
         except (OSError, ValueError, subprocess.SubprocessError) as err:
             warn_once('dot could not lay a state graph out; it is shown as a list: {}'.format(err))

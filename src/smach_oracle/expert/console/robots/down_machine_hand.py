@@ -1,4 +1,5 @@
 """Changes machines that are down, as the pages command: goto, edit and drop of oracle_state."""
+
 from typing import Any, Mapping
 
 from smach_oracle.store.errors import StoreError
@@ -26,8 +27,10 @@ class DownMachineHand:
         who = '{} (console, session {})'.format(person.expert, person.session)
         try:
             done = self._machines.change(
-                command.arguments['down'], command.arguments['moment'],
-                lambda stopped: _change(stopped, command.name, command.arguments, who))
+                command.arguments['down'],
+                command.arguments['moment'],
+                lambda stopped: _change(stopped, command.name, command.arguments, who),
+            )
         except StoreError as err:
             return CommandReply(False, str(err))
         return CommandReply(True, done)

@@ -1,4 +1,5 @@
 """Machines that are down: their program has stopped, and their trial in a store has not ended."""
+
 import os
 import shlex
 import threading
@@ -87,8 +88,11 @@ class DownMachines:
         if looked is None or looked.stamp != stamp:
             looked = self._looked[path] = _Looked(stamp, _read(path))
         try:
-            return [row for row in looked.rows if not row['machine'] or not MachineLock(
-                path, row['machine']).is_held_elsewhere()]
+            return [
+                row
+                for row in looked.rows
+                if not row['machine'] or not MachineLock(path, row['machine']).is_held_elsewhere()
+            ]
         except StoreError as err:
             return [_problem(path, err)]
 
@@ -124,18 +128,24 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
     stopped = StoppedTrial(store, trial)
     userdata = list(stopped.userdata())
     return {
-        'key': '{}#{}'.format(store.path, trial.number), 'store': store.path,
-        'machine': trial.machine, 'trial': trial.number, 'moment': stopped.latest,
+        'key': '{}#{}'.format(store.path, trial.number),
+        'store': store.path,
+        'machine': trial.machine,
+        'trial': trial.number,
+        'moment': stopped.latest,
         'since': _stored_last(store.moments(trial.number)),
         'states': stopped.states()[:MOST_STATES],
         'stood': [in_words(standing) for standing in stopped.places()],
-        'questions': ['{} about {}'.format(question, path)
-                      for path, question in stopped.questions()],
+        'questions': [
+            '{} about {}'.format(question, path) for path, question in stopped.questions()
+        ],
         'userdata': [list(each) for each in userdata[:MOST_KEYS]],
         'more_userdata': max(0, len(userdata) - MOST_KEYS),
         'command': 'rosrun smach_oracle oracle_state {} show --trial {}'.format(
-            shlex.quote(store.path), trial.number),
-        'problem': ''}
+            shlex.quote(store.path), trial.number
+        ),
+        'problem': '',
+    }
 
 
 def _stored_last(moments: Sequence[StoredMoment]) -> float:
@@ -144,6 +154,18 @@ def _stored_last(moments: Sequence[StoredMoment]) -> float:
 
 
 def _problem(path: str, err: Exception) -> Dict[str, Any]:
-    return {'key': path, 'store': path, 'machine': '', 'trial': 0, 'moment': 0, 'since': 0.0,
-            'states': [], 'stood': [], 'questions': [], 'userdata': [], 'more_userdata': 0,
-            'command': '', 'problem': str(err)}
+    return {
+        'key': path,
+        'store': path,
+        'machine': '',
+        'trial': 0,
+        'moment': 0,
+        'since': 0.0,
+        'states': [],
+        'stood': [],
+        'questions': [],
+        'userdata': [],
+        'more_userdata': 0,
+        'command': '',
+        'problem': str(err),
+    }

@@ -1,4 +1,5 @@
 """One robot as its topics show it: containers, active states, learned rates."""
+
 import threading
 from typing import Any, Dict, FrozenSet, List, Optional
 
@@ -21,8 +22,12 @@ from ..web.sections import PageSections
 from .same_machine import Source
 
 MOST_CONTAINERS = 200
-_LEAVES_ORACLE = (OracleEvent.JUMP, OracleEvent.SUPERSEDE, OracleEvent.GIVE_UP,
-                  OracleEvent.TRIAL_END)
+_LEAVES_ORACLE = (
+    OracleEvent.JUMP,
+    OracleEvent.SUPERSEDE,
+    OracleEvent.GIVE_UP,
+    OracleEvent.TRIAL_END,
+)
 _ENDS_WAIT = (OracleEvent.HEALTH_WAIT_END, OracleEvent.TRIAL_START, OracleEvent.TRIAL_END)
 
 
@@ -132,18 +137,24 @@ class FollowedRobot:
             reshaped, self._reshaped = self._reshaped, False
             structures = self._all_structures()
             live = {
-                'trial': self._trial, 'alive': self.alive, 'unwell': self._unwell,
-                'active': dict(self._active), 'latest': dict(self._latest),
-                'failed': dict(self._failed), 'rates': dict(self._rates),
-                'counts': dict(self._counts), 'paths': sorted(structures),
-                'control': self.machines
+                'trial': self._trial,
+                'alive': self.alive,
+                'unwell': self._unwell,
+                'active': dict(self._active),
+                'latest': dict(self._latest),
+                'failed': dict(self._failed),
+                'rates': dict(self._rates),
+                'counts': dict(self._counts),
+                'paths': sorted(structures),
+                'control': self.machines,
             }
         sections.put('live ' + self.name, live)
         if reshaped:
             self._write_graphs(structures, sections, layouts)
 
-    def _write_graphs(self, structures: Dict[str, ContainerGraph], sections: PageSections,
-                     layouts: LayoutWorker) -> None:
+    def _write_graphs(
+        self, structures: Dict[str, ContainerGraph], sections: PageSections, layouts: LayoutWorker
+    ) -> None:
         for path, structure in structures.items():
             nested = [
                 label for label in structure.states if '{}/{}'.format(path, label) in structures
@@ -160,10 +171,15 @@ class FollowedRobot:
     def source(self, nodes: FrozenSet[str]) -> Source:
         """Return what it shows, to compare. `nodes`: those that publish it."""
         with self._lock:
-            return Source(self.name, nodes, self.learns, {
-                path: frozenset(structure.states)
-                for path, structure in self._all_structures().items()
-            })
+            return Source(
+                self.name,
+                nodes,
+                self.learns,
+                {
+                    path: frozenset(structure.states)
+                    for path, structure in self._all_structures().items()
+                },
+            )
 
     def set_alive(self, alive: bool) -> None:
         """Whether the master knows it now."""

@@ -1,4 +1,5 @@
 """All robots that the master knows, found by the types of their topics and then followed."""
+
 import threading
 from collections import OrderedDict
 from types import MappingProxyType
@@ -26,18 +27,25 @@ _GONE_AFTER = 2  # rounds without any of its topics
 _QUEUE = 2000
 CONTROL = '/oracle/control'
 _TOPICS: Dict[str, Tuple[Any, str]] = {
-    '/oracle/events': (OracleEvent, 'on_event'), '/oracle/rates': (OracleRates, 'on_rates'),
+    '/oracle/events': (OracleEvent, 'on_event'),
+    '/oracle/rates': (OracleRates, 'on_rates'),
     CONTROL: (ControlStatus, 'on_control'),
     '/smach/container_structure': (SmachContainerStructure, 'on_structure'),
-    '/smach/container_status': (SmachContainerStatus, 'on_status')}
+    '/smach/container_status': (SmachContainerStatus, 'on_status'),
+}
 
 
 class FollowedRobots:
     """Follows all topics of four types and names. The name in front of them is the robot's."""
 
-    def __init__(self, sections: PageSections, log: TrialLog, layouts: LayoutWorker,
-                 clocks: Optional[RobotClocks] = None,
-                 look_up: Callable[[Sequence[str]], None] = lambda robots: None) -> None:
+    def __init__(
+        self,
+        sections: PageSections,
+        log: TrialLog,
+        layouts: LayoutWorker,
+        clocks: Optional[RobotClocks] = None,
+        look_up: Callable[[Sequence[str]], None] = lambda robots: None,
+    ) -> None:
         """`look_up`: learns where robots are stopped, before they are followed."""
         self._look_up = look_up
         self._clocks = clocks or RobotClocks()
@@ -55,12 +63,20 @@ class FollowedRobots:
         master = timed_master()
         published = master.getPublishedTopics('')
         # a machine that can be held can be stopped from then on, whatever becomes of the master
-        self._look_up([topic[:-len(CONTROL)] for topic, kind in published
-                       if topic.endswith(CONTROL) and kind == ControlStatus._type])
+        self._look_up(
+            [
+                topic[: -len(CONTROL)]
+                for topic, kind in published
+                if topic.endswith(CONTROL) and kind == ControlStatus._type
+            ]
+        )
         self.follow(published, dict(master.getSystemState()[0]))
 
-    def follow(self, published: Sequence[Sequence[str]],
-               nodes: Mapping[str, Sequence[str]] = MappingProxyType({})) -> None:
+    def follow(
+        self,
+        published: Sequence[Sequence[str]],
+        nodes: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    ) -> None:
         """Subscribe to what is new. One thread calls it.
 
         :param published: topics and their types.
@@ -70,13 +86,14 @@ class FollowedRobots:
         for topic, kind in published:
             for suffix, (message, _) in _TOPICS.items():
                 if topic.endswith(suffix) and kind == message._type and len(topic) > len(suffix):
-                    seen.add(topic[:-len(suffix)])
+                    seen.add(topic[: -len(suffix)])
         for name in sorted(seen - set(self._robots)):
             self._begin(name)
         for name, robot in list(self._robots.items()):
             if name in seen:
                 publishers = frozenset(
-                    node for suffix in _TOPICS for node in nodes.get(name + suffix, ()))
+                    node for suffix in _TOPICS for node in nodes.get(name + suffix, ())
+                )
                 # of a robot that is there, a node that plays its bag shows nothing
                 self._nodes[name] = publishers & {name} or publishers
             self._unseen[name] = 0 if name in seen else self._unseen.get(name, 0) + 1
@@ -89,8 +106,11 @@ class FollowedRobots:
     def nodes(self) -> Dict[str, FrozenSet[str]]:
         """Return the robots that the master knows now, each with the nodes that publish it."""
         with self._lock:
-            return {name: self._nodes.get(name) or frozenset([name])
-                    for name, robot in self._robots.items() if robot.alive}
+            return {
+                name: self._nodes.get(name) or frozenset([name])
+                for name, robot in self._robots.items()
+                if robot.alive
+            }
 
     def holdable(self) -> Dict[str, FrozenSet[str]]:
         """Return the robots whose machines can be held, each with the paths of its containers."""
@@ -105,8 +125,9 @@ class FollowedRobots:
             for robot in robots:
                 robot.write_sections(self._sections, self._layouts)
             twice = self._copies(robots)
-            self._sections.put('robots',
-                               sorted(robot.name for robot in robots if robot.name not in twice))
+            self._sections.put(
+                'robots', sorted(robot.name for robot in robots if robot.name not in twice)
+            )
 
     def _copies(self, robots: Sequence[FollowedRobot]) -> Set[str]:
         if all(robot.learns for robot in robots):
@@ -117,8 +138,13 @@ class FollowedRobots:
         """Without the lock: a master that hangs must not hold up the writing of sections."""
         robot = FollowedRobot(name)
         self._subscribers[name] = [
-            subscribe_to_owner(name + suffix, message, self._receiver(robot, method),
-                               queue_size=_QUEUE, buff_size=READ_BYTES)
+            subscribe_to_owner(
+                name + suffix,
+                message,
+                self._receiver(robot, method),
+                queue_size=_QUEUE,
+                buff_size=READ_BYTES,
+            )
             for suffix, (message, method) in _TOPICS.items()
         ]
         with self._lock:
@@ -134,12 +160,14 @@ class FollowedRobots:
         def take(message: Any) -> None:
             self._clocks.take(robot.name, message.header.stamp.to_sec())
             take_in(message)
+
         if method != 'on_event':
             return take
 
         def take_event(message: OracleEvent) -> None:
             take(message)
             self._log.add(robot.name, event_of(message))
+
         return take_event
 
     def _take_control(self, robot: FollowedRobot, message: ControlStatus) -> None:
@@ -154,7 +182,7 @@ class FollowedRobots:
     def _forget_gone(self) -> None:
         """Keep the latest of very many robots that are gone, such as anonymous nodes."""
         gone = [name for name, robot in self._robots.items() if not robot.alive]
-        for name in gone[:max(0, len(self._robots) - MOST_ROBOTS)]:
+        for name in gone[: max(0, len(self._robots) - MOST_ROBOTS)]:
             for subscriber in self._subscribers.pop(name):
                 subscriber.unregister()
             del self._unseen[name]

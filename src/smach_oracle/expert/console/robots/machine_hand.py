@@ -2,6 +2,7 @@
 
 To stop and to pause waits for nothing here, and is refused for nothing.
 """
+
 import asyncio
 from concurrent.futures import Future
 from typing import Any, Callable, Collection, Dict, List, Mapping, Optional, Tuple
@@ -20,8 +21,14 @@ from ..commands.holding import MACHINE_STARTS
 from ..web.audit import Audit, Person
 
 MOST_AT_ONCE = 4  # equal stops that are under way: a robot that hangs needs no more of them
-SERVICES = {'stop_machine': 'preempt', 'pause_machine': 'pause', 'resume_machine': 'resume',
-            'step_machine': 'step', 'confirm_state': 'confirm', 'set_breakpoint': 'breakpoint'}
+SERVICES = {
+    'stop_machine': 'preempt',
+    'pause_machine': 'pause',
+    'resume_machine': 'resume',
+    'step_machine': 'step',
+    'confirm_state': 'confirm',
+    'set_breakpoint': 'breakpoint',
+}
 NO_HAND = 'There is no robot {} here whose machines can be held.'
 NO_MACHINE = 'There is no machine {} of {} here.'
 NO_ANSWER = '{} has not answered within {:.0f} s: whether it has heard that is not known.'
@@ -35,9 +42,14 @@ _Key = Tuple[str, str, str]
 class MachineHand:
     """Sends the commands of operators to machines, for all pages."""
 
-    def __init__(self, holdable: Holdable, audit: Audit, refusal: Refusal,
-                 calls: Optional[StopCalls] = None,
-                 call: Callable[..., Any] = call_service) -> None:
+    def __init__(
+        self,
+        holdable: Holdable,
+        audit: Audit,
+        refusal: Refusal,
+        calls: Optional[StopCalls] = None,
+        call: Callable[..., Any] = call_service,
+    ) -> None:
         """
         :param holdable: the robots that can be held.
         :param refusal: of a robot, and the newest beat that the page had seen.
@@ -63,7 +75,8 @@ class MachineHand:
             return CommandReply(False, why)
         try:
             response = await asyncio.wait_for(
-                asyncio.shield(asyncio.wrap_future(self._begin(command, by))), CALL_LIMIT_S)
+                asyncio.shield(asyncio.wrap_future(self._begin(command, by))), CALL_LIMIT_S
+            )
         except StopError as err:
             return CommandReply(False, str(err))
         except asyncio.TimeoutError:
@@ -73,13 +86,19 @@ class MachineHand:
     def _begin(self, command: PageCommand, by: str) -> 'Future[Any]':
         robot, path = command.arguments['robot'], command.arguments['path']
         key = (robot, command.name, path)
-        for each in [each for each, calls in self._under_way.items()
-                     if all(call.done() for call in calls)]:
+        for each in [
+            each for each, calls in self._under_way.items() if all(call.done() for call in calls)
+        ]:
             del self._under_way[each]
         under_way = [call for call in self._under_way.get(key, []) if not call.done()]
         if len(under_way) < MOST_AT_ONCE:
-            under_way.append(in_thread(lambda: self._calls.call(
-                robot, _service(command), CommandMachineRequest(path, by))))
+            under_way.append(
+                in_thread(
+                    lambda: self._calls.call(
+                        robot, _service(command), CommandMachineRequest(path, by)
+                    )
+                )
+            )
         self._under_way[key] = under_way
         return under_way[-1]
 
@@ -98,8 +117,12 @@ class MachineHand:
             return CommandReply(False, why)
         kind, request = CommandMachine, CommandMachineRequest(arguments['path'], by)
         if command.name == 'set_breakpoint':
-            kind, request = SetBreakpoint, SetBreakpointRequest(
-                arguments['pattern'], arguments['remove'], arguments['path'], by)
+            kind, request = (
+                SetBreakpoint,
+                SetBreakpointRequest(
+                    arguments['pattern'], arguments['remove'], arguments['path'], by
+                ),
+            )
         try:
             response = self._call(_service(command), kind, request)
         except ServerGoneError as err:

@@ -3,6 +3,7 @@
 A script may run its own introspection server in addition to that of its oracle. Both publish the
 same containers, under roots of their own names.
 """
+
 from typing import FrozenSet, Iterable, Mapping, NamedTuple, Set
 
 States = Mapping[str, FrozenSet[str]]  # labels by container path
@@ -23,9 +24,14 @@ def copies(sources: Iterable[Source]) -> Set[str]:
     learning = [source for source in listed if source.learns]
     return {
         source.name
-        for source in listed if not source.learns and source.nodes and source.states and any(
+        for source in listed
+        if not source.learns
+        and source.nodes
+        and source.states
+        and any(
             source.nodes <= other.nodes and _is_part(source.states, other.states)
-            for other in learning)
+            for other in learning
+        )
     }
 
 
@@ -33,5 +39,9 @@ def _is_part(part: States, whole: States) -> bool:
     """Whether there is a container in `whole` below which all of `part` is found again."""
     root = min(part, key=len)
     return any(
-        all(path.startswith(root) and whole.get(top + path[len(root):]) == states
-            for path, states in part.items()) for top in whole)
+        all(
+            path.startswith(root) and whole.get(top + path[len(root) :]) == states
+            for path, states in part.items()
+        )
+        for top in whole
+    )

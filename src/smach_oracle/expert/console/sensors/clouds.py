@@ -1,4 +1,5 @@
 """Point clouds thinned to what a browser can turn round smoothly. Messages only, no node."""
+
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
@@ -12,9 +13,14 @@ MOST_POINTS = 20000000  # of a message
 MOST_JOINTS = 500
 _SPARE = 4  # so many times more points are read than are shown, for some are not finite
 _CODES = {
-    PointField.INT8: 'i1', PointField.UINT8: 'u1', PointField.INT16: 'i2', PointField.UINT16: 'u2',
-    PointField.INT32: 'i4', PointField.UINT32: 'u4', PointField.FLOAT32: 'f4',
-    PointField.FLOAT64: 'f8'
+    PointField.INT8: 'i1',
+    PointField.UINT8: 'u1',
+    PointField.INT16: 'i2',
+    PointField.UINT16: 'u2',
+    PointField.INT32: 'i4',
+    PointField.UINT32: 'u4',
+    PointField.FLOAT32: 'f4',
+    PointField.FLOAT64: 'f8',
 }
 
 
@@ -45,11 +51,15 @@ def encode_points(cloud: Cloud, of: int) -> BrowserFile:
     packed = np.round((cloud.points - low) / span * 65535).astype('<u2')
     return BrowserFile(
         'application/octet-stream',
-        packed.tobytes() + cloud.colours.tobytes(), {
-            'kind': 'cloud', 'count': len(cloud.points), 'of': of,
-            'offset': [round(float(each), 6)
-                       for each in low], 'scale': [round(float(each), 6) for each in span]
-        })
+        packed.tobytes() + cloud.colours.tobytes(),
+        {
+            'kind': 'cloud',
+            'count': len(cloud.points),
+            'of': of,
+            'offset': [round(float(each), 6) for each in low],
+            'scale': [round(float(each), 6) for each in span],
+        },
+    )
 
 
 def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
@@ -61,17 +71,30 @@ def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
     """
     fields = {field.name: field for field in message.fields}
     count = message.width * message.height
-    if not {'x', 'y', 'z'} <= set(fields) or count > MOST_POINTS or (count and (
-            message.row_step < message.width * message.point_step
-            or len(message.data) < message.row_step * message.height)):
+    if (
+        not {'x', 'y', 'z'} <= set(fields)
+        or count > MOST_POINTS
+        or (
+            count
+            and (
+                message.row_step < message.width * message.point_step
+                or len(message.data) < message.row_step * message.height
+            )
+        )
+    ):
         raise CloudError(
             'PointCloud2 claims {} x {} points but carries {} bytes; allowed: x, y, z and at '
-            'most {} points'.format(message.width, message.height, len(message.data), MOST_POINTS))
-    chosen = np.unique(np.linspace(0, count - 1, min(count, _SPARE *
-                                                     most)).astype(np.int64)) if count else []
+            'most {} points'.format(message.width, message.height, len(message.data), MOST_POINTS)
+        )
+    chosen = (
+        np.unique(np.linspace(0, count - 1, min(count, _SPARE * most)).astype(np.int64))
+        if count
+        else []
+    )
     records = _records(message, np.asarray(chosen, np.int64))
     points = np.stack(
-        [_values(records, fields[name], message).astype(np.float64) for name in 'xyz'], axis=1)
+        [_values(records, fields[name], message).astype(np.float64) for name in 'xyz'], axis=1
+    )
     kept = np.flatnonzero(np.isfinite(points).all(axis=1) & (np.abs(points) < 1e6).all(axis=1))
     if len(kept) > most:
         kept = kept[np.linspace(0, len(kept) - 1, most).astype(np.int64)]
@@ -80,39 +103,52 @@ def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:
 
 def encode_joints(message: JointState) -> BrowserFile:
     """Joint states as JSON, under `joints` of the facts: name, position, velocity, effort."""
+
     def column(values: List[float], index: int) -> Optional[float]:
         return number(values[index]) if index < len(values) else None
 
-    joints = [[
-        name[:200],
-        column(message.position, index),
-        column(message.velocity, index),
-        column(message.effort, index)
-    ] for index, name in enumerate(message.name[:MOST_JOINTS])]
+    joints = [
+        [
+            name[:200],
+            column(message.position, index),
+            column(message.velocity, index),
+            column(message.effort, index),
+        ]
+        for index, name in enumerate(message.name[:MOST_JOINTS])
+    ]
     return BrowserFile('application/json', b'', {'kind': 'joints', 'joints': joints})
 
 
 def _records(message: PointCloud2, chosen: np.ndarray) -> np.ndarray:
     """(n, point_step) bytes."""
     data = np.frombuffer(message.data, np.uint8)
-    starts = chosen // max(message.width, 1) * message.row_step + chosen % max(
-        message.width, 1) * message.point_step
+    starts = (
+        chosen // max(message.width, 1) * message.row_step
+        + chosen % max(message.width, 1) * message.point_step
+    )
     return data[starts[:, None] + np.arange(message.point_step)]
 
 
-def _values(records: np.ndarray, field: PointField, message: PointCloud2,
-            code: str = '') -> np.ndarray:
-    kind = np.dtype(
-        code or _CODES.get(field.datatype, 'f4')).newbyteorder('>' if message.is_bigendian else '<')
+def _values(
+    records: np.ndarray, field: PointField, message: PointCloud2, code: str = ''
+) -> np.ndarray:
+    kind = np.dtype(code or _CODES.get(field.datatype, 'f4')).newbyteorder(
+        '>' if message.is_bigendian else '<'
+    )
     if field.offset + kind.itemsize > message.point_step:
-        raise CloudError('field {} lies outside of the points of {} bytes'.format(
-            field.name[:40], message.point_step))
-    return np.ascontiguousarray(records[:, field.offset:field.offset + kind.itemsize]).view(kind)[:,
-                                                                                                  0]
+        raise CloudError(
+            'field {} lies outside of the points of {} bytes'.format(
+                field.name[:40], message.point_step
+            )
+        )
+    return np.ascontiguousarray(records[:, field.offset : field.offset + kind.itemsize]).view(kind)[
+        :, 0
+    ]
 
 
-def _colours(records: np.ndarray, points: np.ndarray, fields: Dict[str, PointField],
-             message: PointCloud2) -> np.ndarray:
+def _colours(
+    records: np.ndarray, points: np.ndarray, fields: Dict[str, PointField], message: PointCloud2
+) -> np.ndarray:
     field = fields.get('rgb') or fields.get('rgba')
     if field is not None:
         # declared as a float by custom
@@ -125,7 +161,8 @@ def by_rank(values: np.ndarray) -> np.ndarray:
     """(n, 3) uint8 of (n,): blue for the least, yellow for the most."""
     share = _ranked(values)[:, None]
     return ((1 - share) * np.array([60, 110, 220]) + share * np.array([250, 190, 60])).astype(
-        np.uint8)
+        np.uint8
+    )
 
 
 def _ranked(values: np.ndarray) -> np.ndarray:

@@ -1,4 +1,5 @@
 """Point clouds of cameras that give depth and a calibration, but no cloud themselves."""
+
 import re
 from typing import Dict, List, NamedTuple, Optional, Sequence
 
@@ -42,15 +43,31 @@ def depth_cameras(published: Sequence[Sequence[str]]) -> List[DepthCamera]:
     for depth in images:
         split = _DEPTH.fullmatch(depth)
         if split is None or any(
-                topic.startswith(split.group(1) + '/')
-                for topic in kinds.get(PointCloud2._type, [])):
+            topic.startswith(split.group(1) + '/') for topic in kinds.get(PointCloud2._type, [])
+        ):
             continue
         camera, registered = split.group(1), _REGISTERED.search(split.group(2))
-        colour = next((image for image in images if image.startswith(camera + '/')
-                       and _COLOUR.fullmatch(image[len(camera):])), None) if registered else None
+        colour = (
+            next(
+                (
+                    image
+                    for image in images
+                    if image.startswith(camera + '/') and _COLOUR.fullmatch(image[len(camera) :])
+                ),
+                None,
+            )
+            if registered
+            else None
+        )
         near = [depth, colour] if colour else [depth]
-        info = next((each for each in (image.rsplit('/', 1)[0] + '/camera_info'
-                                       for image in near) if each in infos), None)
+        info = next(
+            (
+                each
+                for each in (image.rsplit('/', 1)[0] + '/camera_info' for image in near)
+                if each in infos
+            ),
+            None,
+        )
         if info is not None:
             found.append(DepthCamera(depth, info, colour))
     return found
@@ -70,10 +87,13 @@ class DepthCloudStream(SensorStream):
         topics = [(self._camera.info, CameraInfo, self.take_info)]
         if self._camera.colour is not None:
             topics.append((self._camera.colour, Image, self.take_colour))
-        self._others = [rospy.Subscriber(topic, kind, take, queue_size=1, buff_size=1 << 24)
-                        for topic, kind, take in topics]
-        return rospy.Subscriber(self._camera.depth, Image, self.take, queue_size=1,
-                                buff_size=1 << 24)
+        self._others = [
+            rospy.Subscriber(topic, kind, take, queue_size=1, buff_size=1 << 24)
+            for topic, kind, take in topics
+        ]
+        return rospy.Subscriber(
+            self._camera.depth, Image, self.take, queue_size=1, buff_size=1 << 24
+        )
 
     def _end(self) -> None:
         super()._end()
@@ -96,8 +116,9 @@ class DepthCloudStream(SensorStream):
         return encode_points(cloud, message.width * message.height)
 
 
-def cloud_of_depth(depth: Image, info: CameraInfo, colour: Optional[Image] = None,
-                   most: int = MOST_SHOWN) -> Cloud:
+def cloud_of_depth(
+    depth: Image, info: CameraInfo, colour: Optional[Image] = None, most: int = MOST_SHOWN
+) -> Cloud:
     """Return at most so many points, evenly taken, in the camera's optical frame.
 
     :param colour: gives colours where it is of the same moment and size, else distance does.
@@ -105,8 +126,11 @@ def cloud_of_depth(depth: Image, info: CameraInfo, colour: Optional[Image] = Non
         calibrated.
     """
     if depth.width * depth.height > MOST_PIXELS:
-        raise ImageError('the image has {} x {} pixels; allowed: {}'.format(
-            depth.width, depth.height, MOST_PIXELS))
+        raise ImageError(
+            'the image has {} x {} pixels; allowed: {}'.format(
+                depth.width, depth.height, MOST_PIXELS
+            )
+        )
     intrinsics = _scaled(intrinsics_of(info), info, depth)
     stride = max(1, int(np.sqrt(depth.width * depth.height / (2.0 * most))))
     metres = depth_of(depth)[::stride, ::stride]
@@ -115,8 +139,11 @@ def cloud_of_depth(depth: Image, info: CameraInfo, colour: Optional[Image] = Non
     if len(kept) > most:
         kept = kept[np.linspace(0, len(kept) - 1, most).astype(np.int64)]
     points = points.reshape(-1, 3)[kept]
-    if colour is None or (colour.width, colour.height) != (depth.width, depth.height) or abs(
-            (colour.header.stamp - depth.header.stamp).to_sec()) > SAME_MOMENT_S:
+    if (
+        colour is None
+        or (colour.width, colour.height) != (depth.width, depth.height)
+        or abs((colour.header.stamp - depth.header.stamp).to_sec()) > SAME_MOMENT_S
+    ):
         return Cloud(points, by_rank(points[:, 2]))
     return Cloud(points, colour_of(colour)[::stride, ::stride].reshape(-1, 3)[kept])
 

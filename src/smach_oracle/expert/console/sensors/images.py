@@ -3,12 +3,13 @@
 Messages only, no node. The images of a robot are decoded here and encoded again: none of their
 bytes reaches a browser.
 """
+
 import os
 import struct
 from typing import Any, Dict, List, NamedTuple, Union
 
 # before cv2 is there: small files of huge images
-os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2 ** 26))
+os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2**26))
 
 import numpy as np  # noqa: E402
 from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
@@ -17,15 +18,21 @@ from smach_oracle.packages import optional  # noqa: E402
 from smach_oracle.ros.images import ImageError, colour_of, depth_of  # noqa: E402
 
 cv2 = optional('cv2')  # without it the page has everything but pictures
-NO_PICTURES = ('OpenCV is missing, so the console shows no pictures; install python3-opencv, or '
-               'opencv-python-headless by pip, and start the console again')
+NO_PICTURES = (
+    'OpenCV is missing, so the console shows no pictures; install python3-opencv, or '
+    'opencv-python-headless by pip, and start the console again'
+)
 WIDTHS = (320, 640, 1280)  # px that a browser may ask for
-MOST_BYTES = 2 ** 26  # of a message
-MOST_PIXELS = 2 ** 26
+MOST_BYTES = 2**26  # of a message
+MOST_PIXELS = 2**26
 JPEG_QUALITY = 88
 _DEPTHS = ('32FC1', '16UC1', 'mono16')
-_BAYER = {'bayer_rggb8': 'COLOR_BayerBG2RGB', 'bayer_bggr8': 'COLOR_BayerRG2RGB',
-          'bayer_gbrg8': 'COLOR_BayerGR2RGB', 'bayer_grbg8': 'COLOR_BayerGB2RGB'}
+_BAYER = {
+    'bayer_rggb8': 'COLOR_BayerBG2RGB',
+    'bayer_bggr8': 'COLOR_BayerRG2RGB',
+    'bayer_gbrg8': 'COLOR_BayerGR2RGB',
+    'bayer_grbg8': 'COLOR_BayerGB2RGB',
+}
 _DEPTH_HEADER = struct.Struct('<iff')  # compressed_depth_image_transport: format, quantisation
 
 
@@ -47,23 +54,35 @@ def encode_image(message: Union[Image, CompressedImage], width: int) -> BrowserF
     if cv2 is None:
         raise ImageError(NO_PICTURES)
     if len(message.data) > MOST_BYTES:
-        raise ImageError('the image has {} bytes; allowed: {}'.format(len(message.data),
-                                                                      MOST_BYTES))
+        raise ImageError(
+            'the image has {} bytes; allowed: {}'.format(len(message.data), MOST_BYTES)
+        )
     if not isinstance(message, Image):
         if 'compressedDepth' in message.format:
             return _depth_file(_unpacked_depth(message), width)
         return _colour_file(_decoded(bytes(message.data), cv2.IMREAD_COLOR)[:, :, ::-1], width)
     if message.height * message.width > MOST_PIXELS:
-        raise ImageError('the image has {} x {} pixels; allowed: {}'.format(
-            message.width, message.height, MOST_PIXELS))
+        raise ImageError(
+            'the image has {} x {} pixels; allowed: {}'.format(
+                message.width, message.height, MOST_PIXELS
+            )
+        )
     if message.encoding in _DEPTHS:
         return _depth_file(depth_of(message), width)
     if message.encoding in _BAYER:
         mosaic = colour_of(
-            Image(height=message.height, width=message.width, step=message.step, data=message.data,
-                  encoding='mono8'))[:, :, 0]
-        return _colour_file(cv2.cvtColor(np.ascontiguousarray(mosaic),
-                                         getattr(cv2, _BAYER[message.encoding])), width)
+            Image(
+                height=message.height,
+                width=message.width,
+                step=message.step,
+                data=message.data,
+                encoding='mono8',
+            )
+        )[:, :, 0]
+        return _colour_file(
+            cv2.cvtColor(np.ascontiguousarray(mosaic), getattr(cv2, _BAYER[message.encoding])),
+            width,
+        )
     return _colour_file(colour_of(message), width)
 
 
@@ -78,22 +97,29 @@ def false_colours(depth: np.ndarray, near: float, far: float) -> np.ndarray:
 
 def _colour_file(colour: np.ndarray, width: int) -> BrowserFile:
     height, original = colour.shape[:2]
-    return BrowserFile('image/jpeg', _file('.jpg', _narrowed(colour, width, cv2.INTER_AREA),
-                                       [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]),
-                   {'kind': 'colour', 'size': [original, height]})
+    return BrowserFile(
+        'image/jpeg',
+        _file(
+            '.jpg',
+            _narrowed(colour, width, cv2.INTER_AREA),
+            [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY],
+        ),
+        {'kind': 'colour', 'size': [original, height]},
+    )
 
 
 def _depth_file(depth: np.ndarray, width: int) -> BrowserFile:
     height, original = depth.shape
     small = _narrowed(depth, width, cv2.INTER_NEAREST)
     measured = small[np.isfinite(small)]
-    near, far = (float(each)
-                 for each in np.percentile(measured, (2, 98))) if measured.size else (0.0, 0.0)
+    near, far = (
+        (float(each) for each in np.percentile(measured, (2, 98))) if measured.size else (0.0, 0.0)
+    )
     return BrowserFile(
-        'image/png', _file('.png', false_colours(small, near, far),
-                           [cv2.IMWRITE_PNG_COMPRESSION, 1]),
-        {'kind': 'depth', 'size': [original, height], 'range': [round(near, 3),
-                                                                round(far, 3)]})
+        'image/png',
+        _file('.png', false_colours(small, near, far), [cv2.IMWRITE_PNG_COMPRESSION, 1]),
+        {'kind': 'depth', 'size': [original, height], 'range': [round(near, 3), round(far, 3)]},
+    )
 
 
 def _narrowed(image: np.ndarray, width: int, how: int) -> np.ndarray:
@@ -126,12 +152,15 @@ def _unpacked_depth(message: CompressedImage) -> np.ndarray:
     if len(data) <= _DEPTH_HEADER.size:
         raise ImageError('the compressed depth image has {} bytes'.format(len(data)))
     _, factor, offset = _DEPTH_HEADER.unpack_from(data)
-    stored = _decoded(data[_DEPTH_HEADER.size:], cv2.IMREAD_UNCHANGED)
+    stored = _decoded(data[_DEPTH_HEADER.size :], cv2.IMREAD_UNCHANGED)
     if stored.ndim != 2 or stored.dtype != np.uint16:
         raise ImageError('the compressed depth image holds no 16 bit depth')
     depth = stored.astype(np.float32)
     with np.errstate(divide='ignore', invalid='ignore'):
-        depth = factor / (depth - offset) if message.format.startswith(
-            '32FC1') else depth * np.float32(0.001)
+        depth = (
+            factor / (depth - offset)
+            if message.format.startswith('32FC1')
+            else depth * np.float32(0.001)
+        )
     depth[(stored == 0) | ~np.isfinite(depth) | (depth <= 0)] = np.nan
     return depth

@@ -4,6 +4,7 @@ Names come from the parameter server, never from a browser. `package://NAME/PATH
 within that package. An absolute path (with or without file://) is read where it ends as a mesh does
 and is a plain file of a mesh's size.
 """
+
 import os
 import stat
 from typing import Dict, Optional
@@ -41,16 +42,21 @@ class MeshFiles:
         if '\0' in name or len(name) > 2000:
             raise MeshError('it is no file name')
         if name.startswith('package://'):
-            return self._in_package(unquote(name[len('package://'):]))
-        path = unquote(name[len('file://'):]) if name.startswith('file://') else name
+            return self._in_package(unquote(name[len('package://') :]))
+        path = unquote(name[len('file://') :]) if name.startswith('file://') else name
         if not os.path.isabs(path) or '\0' in path:
             raise MeshError('it is neither package://NAME/PATH nor an absolute path')
         return path
 
     def _in_package(self, name: str) -> str:
         package, _, path = name.partition('/')
-        if not package or not path or '\0' in path or '..' in name.split('/') or os.path.isabs(
-                path):
+        if (
+            not package
+            or not path
+            or '\0' in path
+            or '..' in name.split('/')
+            or os.path.isabs(path)
+        ):
             raise MeshError('it does not stay within a package')
         if self._packages is None:
             self._packages = rospkg.RosPack()
@@ -67,12 +73,16 @@ class MeshFiles:
             with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), 'rb') as file:
                 status = os.fstat(file.fileno())
                 self._bytes += status.st_size
-                if not stat.S_ISREG(
-                        status.st_mode
-                ) or status.st_size > MOST_BYTES or self._bytes > MOST_BYTES_TOGETHER:
+                if (
+                    not stat.S_ISREG(status.st_mode)
+                    or status.st_size > MOST_BYTES
+                    or self._bytes > MOST_BYTES_TOGETHER
+                ):
                     raise MeshError(
                         'it is no plain file of at most {} bytes ({} with the others)'.format(
-                            MOST_BYTES, MOST_BYTES_TOGETHER))
+                            MOST_BYTES, MOST_BYTES_TOGETHER
+                        )
+                    )
                 data = file.read(MOST_BYTES + 1)
         except OSError as err:
             raise MeshError(os.strerror(err.errno or 0)) from err

@@ -5,6 +5,7 @@ Bounded. Any thread may use it.
 Those that a robot itself publishes (~failure_frames) come first: it had them before there was a
 question. For other robots the console takes images itself, as soon as the question appears.
 """
+
 import itertools
 import threading
 import time
@@ -25,7 +26,7 @@ from .sensor_streams import SensorStreams
 
 SECTION = 'images'
 MOST_KEPT = 200
-MOST_BYTES = 40 * 2 ** 20  # of all together
+MOST_BYTES = 40 * 2**20  # of all together
 MOST_QUESTIONS = 64
 MOST_CAMERAS = 2  # from which the console takes images by itself, for one question
 # an older image does not belong to the question: the camera may have died since
@@ -60,8 +61,10 @@ class ImageStore:
         with self._lock:
             number = next(self._numbers)
             self._files[number] = encoded
-            while len(self._files) > MOST_KEPT or sum(
-                    len(each.body) for each in self._files.values()) > MOST_BYTES:
+            while (
+                len(self._files) > MOST_KEPT
+                or sum(len(each.body) for each in self._files.values()) > MOST_BYTES
+            ):
                 self._files.popitem(last=False)
             return number
 
@@ -70,29 +73,33 @@ class ImageStore:
         with self._lock:
             return self._files.get(number)
 
-    def keep(self, topic: str, image: Union[Image, CompressedImage],
-             late_s: Optional[float]) -> QuestionImage:
+    def keep(
+        self, topic: str, image: Union[Image, CompressedImage], late_s: Optional[float]
+    ) -> QuestionImage:
         """Keep an image message as a file.
 
         :raises ValueError: where it cannot be encoded.
         """
         encoded = encode_image(image, WIDTH)
         width, height = encoded.facts['size']
-        return QuestionImage(self.put(encoded), topic, late_s, width, height,
-                             image.header.stamp.to_sec())
+        return QuestionImage(
+            self.put(encoded), topic, late_s, width, height, image.header.stamp.to_sec()
+        )
 
 
 class QuestionImages:
     """The images of open questions."""
 
-    def __init__(self, files: ImageStore, sensors: SensorStreams,
-                 cameras: Optional[RobotCameras] = None) -> None:
+    def __init__(
+        self, files: ImageStore, sensors: SensorStreams, cameras: Optional[RobotCameras] = None
+    ) -> None:
         self._cameras = cameras or RobotCameras(sensors, {})
         self._files = files
         self._sensors = sensors
         self._lock = threading.Lock()
-        self._topics = RobotTopics('/failure_frames', FailureFrames, self.taker, queue_size=5,
-                                   buff_size=1 << 24)
+        self._topics = RobotTopics(
+            '/failure_frames', FailureFrames, self.taker, queue_size=5, buff_size=1 << 24
+        )
         self._sent: 'OrderedDict[str, List[QuestionImage]]' = OrderedDict()  # by robot and query id
         # by question: topic -> our image
         self._seen: 'OrderedDict[str, Dict[str, QuestionImage]]' = OrderedDict()
@@ -124,8 +131,13 @@ class QuestionImages:
                     self._take_image(camera, listed, seen, now_s)
         return list(seen.values())
 
-    def _take_image(self, camera: Dict[str, Any], listed: ListedQuestion,
-                    seen: Dict[str, QuestionImage], now_s: float) -> None:
+    def _take_image(
+        self,
+        camera: Dict[str, Any],
+        listed: ListedQuestion,
+        seen: Dict[str, QuestionImage],
+        now_s: float,
+    ) -> None:
         sensor = self._sensors.find(camera['id'])
         sample = sensor.newer(0) if sensor is not None else None
         if sample is None or sample.came_s < listed.asked_s - BEFORE_S:
@@ -136,25 +148,29 @@ class QuestionImages:
         if now_s - self._failed.get(camera['topic'], -TAKE_WITHIN_S) < TAKE_WITHIN_S:
             return
         try:
-            seen[camera['topic']] = self._files.keep(camera['topic'], sample.message,
-                                                     sample.came_s - listed.asked_s)
+            seen[camera['topic']] = self._files.keep(
+                camera['topic'], sample.message, sample.came_s - listed.asked_s
+            )
         except ValueError as err:
             self._failed[camera['topic']] = now_s
             rospy.logdebug('An image of %s cannot be shown: %s', camera['topic'], err)
 
     def taker(self, robot: str) -> Callable[[FailureFrames], None]:
         """Return the callback for a robot's messages."""
+
         def take(message: FailureFrames) -> None:
             images = list(stored_images(self._files, message.topics, message.images))
             with self._lock:
                 self._sent[_key(robot, message.query_id)] = images
                 while len(self._sent) > MOST_QUESTIONS:
                     self._sent.popitem(last=False)
+
         return take
 
 
-def stored_images(files: ImageStore, topics: Sequence[str],
-                images: Sequence[CompressedImage]) -> Iterable[QuestionImage]:
+def stored_images(
+    files: ImageStore, topics: Sequence[str], images: Sequence[CompressedImage]
+) -> Iterable[QuestionImage]:
     """Keep a robot's images, four at most. Those that cannot be encoded are left out."""
     for topic, image in list(zip(topics, images))[:4]:
         try:
@@ -173,15 +189,19 @@ def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
     if late is not None and image.late_s is None and abs(late) < AT_ONCE_S:
         late = None
     return {
-        'id': image.number, 'topic': image.topic, 'late': None if late is None else round(late, 1),
-        'stamped': stamped or late is None, 'size': [image.width, image.height]
+        'id': image.number,
+        'topic': image.topic,
+        'late': None if late is None else round(late, 1),
+        'stamped': stamped or late is None,
+        'size': [image.width, image.height],
     }
 
 
 def _is_too_old(image: Optional[QuestionImage], listed: ListedQuestion) -> bool:
     """Whether another image is wanted: there is none, or a latched one of long before."""
     return image is None or bool(
-        image.stamp_s and image.stamp_s < listed.goal.asked.to_sec() - BEFORE_S)
+        image.stamp_s and image.stamp_s < listed.goal.asked.to_sec() - BEFORE_S
+    )
 
 
 def _key(robot: str, query_id: str) -> str:

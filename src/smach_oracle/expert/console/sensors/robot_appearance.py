@@ -1,4 +1,5 @@
 """The looks of a robot in a browser: its geometries once, then the poses of its links. No node."""
+
 import hashlib
 import json
 import struct
@@ -63,23 +64,41 @@ class RobotAppearance:
         for mesh in self._geometries:
             low = mesh.corners.min(axis=0)
             span = np.maximum(np.ptp(mesh.corners, axis=0), 1e-9)
-            blocks += [np.round((mesh.corners - low) / span * 65535).astype('<u2').tobytes(),
-                       mesh.triangles.astype('<u2').tobytes()]
-            geometries.append({'corners': len(mesh.corners), 'triangles': len(mesh.triangles),
-                               'offset': _plain(low), 'scale': _plain(span)})
+            blocks += [
+                np.round((mesh.corners - low) / span * 65535).astype('<u2').tobytes(),
+                mesh.triangles.astype('<u2').tobytes(),
+            ]
+            geometries.append(
+                {
+                    'corners': len(mesh.corners),
+                    'triangles': len(mesh.triangles),
+                    'offset': _plain(low),
+                    'scale': _plain(span),
+                }
+            )
         header = {
-            'name': self.robot.name, 'version': self.version, 'root': self.robot.root,
-            'links': self.links, 'geometries': geometries, 'missing': self.missing[:MOST_NAMED],
-            'lost': len(self.missing), 'parts': [[
-                numbers[part.link], part.geometry,
-                _plain(part.place[:3].ravel()),
-                list(part.colour)
-            ] for part in self._parts]
+            'name': self.robot.name,
+            'version': self.version,
+            'root': self.robot.root,
+            'links': self.links,
+            'geometries': geometries,
+            'missing': self.missing[:MOST_NAMED],
+            'lost': len(self.missing),
+            'parts': [
+                [
+                    numbers[part.link],
+                    part.geometry,
+                    _plain(part.place[:3].ravel()),
+                    list(part.colour),
+                ]
+                for part in self._parts
+            ],
         }
         text = json.dumps(header, allow_nan=False, separators=(',', ':')).encode()
         text += b' ' * (-len(text) % 4)
-        return BrowserFile('application/octet-stream',
-                       b''.join([struct.pack('<I', len(text)), text] + blocks), {})
+        return BrowserFile(
+            'application/octet-stream', b''.join([struct.pack('<I', len(text)), text] + blocks), {}
+        )
 
     def _add_all(self, files: MeshFiles) -> None:
         shapes, meshes = self._found(files)
@@ -91,7 +110,8 @@ class RobotAppearance:
             if name not in known:
                 known[name] = len(self._geometries)
                 self._geometries.append(
-                    _fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[name])
+                    _fitting(meshes[name], most) if shape.mesh else _PRIMITIVES[name]
+                )
             place = shape.origin @ np.diag(list(shape.size) + [1.0])
             self._parts.append(LinkGeometry(shape.link, known[name], place, shape.colour))
 
@@ -104,7 +124,8 @@ class RobotAppearance:
         poor = {shape.link for shape in self.robot.shapes if not self._has(shape, files, meshes)}
         shapes = [shape for shape in self.robot.shapes if not shape.mesh or shape.mesh in meshes]
         shapes += [
-            shape for shape in self.robot.collisions
+            shape
+            for shape in self.robot.collisions
             if shape.link in poor and self._has(shape, files, meshes)
         ]
         return shapes, meshes
@@ -150,25 +171,35 @@ def _box() -> Mesh:
     """A box of 1 m. The other primitives have that size, too."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return Mesh(corners,
-                np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))]))
+    return Mesh(
+        corners, np.array([half for a, b, c, d in faces for half in ((a, b, c), (a, c, d))])
+    )
 
 
 def _turned(profile: List[Tuple[float, float]]) -> Mesh:
     """A profile of (radius, height), turned about z."""
     angles = np.arange(_ROUND) * 2 * np.pi / _ROUND
     rings = [
-        np.column_stack([radius * np.cos(angles), radius * np.sin(angles),
-                         np.full(_ROUND, height)]) for radius, height in profile
+        np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(_ROUND, height)])
+        for radius, height in profile
     ]
-    steps = [(ring * _ROUND + k, ring * _ROUND + (k + 1) % _ROUND)
-             for ring in range(len(profile) - 1) for k in range(_ROUND)]
-    return Mesh(np.concatenate(rings), np.array([half for a, b in steps for half in (
-        (a, b, b + _ROUND), (a, b + _ROUND, a + _ROUND))]))
+    steps = [
+        (ring * _ROUND + k, ring * _ROUND + (k + 1) % _ROUND)
+        for ring in range(len(profile) - 1)
+        for k in range(_ROUND)
+    ]
+    return Mesh(
+        np.concatenate(rings),
+        np.array(
+            [half for a, b in steps for half in ((a, b, b + _ROUND), (a, b + _ROUND, a + _ROUND))]
+        ),
+    )
 
 
 _PRIMITIVES = {
-    'box': _box(), 'cylinder': _turned([(0.0, -0.5), (0.5, -0.5), (0.5, 0.5), (0.0, 0.5)]),
-    'sphere': _turned([(0.5 * np.sin(angle), -0.5 * np.cos(angle))
-                       for angle in np.linspace(0, np.pi, 9)])
+    'box': _box(),
+    'cylinder': _turned([(0.0, -0.5), (0.5, -0.5), (0.5, 0.5), (0.0, 0.5)]),
+    'sphere': _turned(
+        [(0.5 * np.sin(angle), -0.5 * np.cos(angle)) for angle in np.linspace(0, np.pi, 9)]
+    ),
 }

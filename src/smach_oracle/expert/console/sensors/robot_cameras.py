@@ -3,6 +3,7 @@
 The setting ~cameras says so, the robot's ~failure_cameras, or name and namespace.
 A node directly below / owns no other node's cameras: nothing tells whose those are.
 """
+
 import re
 from typing import Any, Dict, Iterable, List, Mapping, Sequence
 
@@ -34,7 +35,8 @@ class RobotCameras:
         """Take in the values of ~failure_cameras, by robot."""
         self._declared = {
             robot: [_resolved(topic, robot) for topic in topics if isinstance(topic, str)]
-            for robot, topics in declared.items() if isinstance(topics, list)
+            for robot, topics in declared.items()
+            if isinstance(topics, list)
         }
 
     def of(self, robot: str) -> List[SensorView]:
@@ -47,13 +49,17 @@ class RobotCameras:
         if robot in self._chosen:
             names = self._chosen[robot]
             return [each for each in images if each['topic'] in names] + _ranked(
-                each for each in colour if each['topic'] not in names
-                and any(_is_below(each['topic'], name) for name in names))
+                each
+                for each in colour
+                if each['topic'] not in names
+                and any(_is_below(each['topic'], name) for name in names)
+            )
         declared = self._declared.get(robot, [])
         first = [each for topic in declared for each in images if each['topic'] == topic]
         own = [each for each in colour if _is_below(each['topic'], robot)]
-        return first + _ranked(each for each in own or self._around(robot, colour)
-                               if each['topic'] not in declared)
+        return first + _ranked(
+            each for each in own or self._around(robot, colour) if each['topic'] not in declared
+        )
 
     def topics_of(self, robot: str) -> List[str]:
         """Return the topics of its own cameras, as written last."""
@@ -67,21 +73,30 @@ class RobotCameras:
 
     def _around(self, robot: str, cameras: Sequence[SensorView]) -> List[SensorView]:
         """Those of its namespace that lie below no other robot's name."""
-        space = robot[:robot.rfind('/')]
+        space = robot[: robot.rfind('/')]
         others = [other for other in self._robots if other != robot]
-        return [each for each in cameras if space and _is_below(each['topic'], space)
-                and not any(_is_below(each['topic'], other) for other in others)]
+        return [
+            each
+            for each in cameras
+            if space
+            and _is_below(each['topic'], space)
+            and not any(_is_below(each['topic'], other) for other in others)
+        ]
 
 
 def declared_in(names: Iterable[str]) -> List[str]:
     """Return the robots among whose parameters is a ~failure_cameras."""
-    return [name[:-len(PARAMETER)] for name in names if name.endswith(PARAMETER)][:MOST_DECLARED]
+    return [name[: -len(PARAMETER)] for name in names if name.endswith(PARAMETER)][:MOST_DECLARED]
 
 
 def _ranked(cameras: Iterable[SensorView]) -> List[SensorView]:
-    return sorted(cameras, key=lambda each: (next(
-        rank for rank, pattern in enumerate(_RANK) if pattern.search(each['topic'])),
-        each['topic']))
+    return sorted(
+        cameras,
+        key=lambda each: (
+            next(rank for rank, pattern in enumerate(_RANK) if pattern.search(each['topic'])),
+            each['topic'],
+        ),
+    )
 
 
 def _is_below(topic: str, name: str) -> bool:

@@ -3,6 +3,7 @@
 The robot, its cameras and the console may run on machines whose clocks differ, or by simulated
 time.
 """
+
 import threading
 import time
 from typing import Dict, List, NamedTuple, Optional
@@ -66,7 +67,9 @@ class ImageAges:
 
     def age_s(self, topic: str, stamp_s: float) -> Optional[float]:
         """Below 0 where the stamp is ahead of the clock, or None where the age is not known."""
-        owner = next((robot for robot in self._clocks.robots()
-                      if topic in self._cameras.topics_of(robot)), None)
+        owner = next(
+            (robot for robot in self._clocks.robots() if topic in self._cameras.topics_of(robot)),
+            None,
+        )
         now_s = self._clocks.shared_now_s() if owner is None else self._clocks.now_s(owner)
         return None if now_s is None or not stamp_s else round(now_s - stamp_s, 2)

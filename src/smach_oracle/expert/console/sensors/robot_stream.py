@@ -1,4 +1,5 @@
 """A robot as a sensor: its description, joint states and transforms, followed while watched."""
+
 import json
 import threading
 import time
@@ -23,20 +24,22 @@ MOST_JOINTS = 2000
 
 def robots_in(parameters: Sequence[str]) -> List[str]:
     """Return the names of robot descriptions among those of the parameter server."""
-    return sorted(name for name in parameters
-                  if name.rsplit('/', 1)[-1] == DESCRIPTION)[:MOST_ROBOTS]
+    return sorted(name for name in parameters if name.rsplit('/', 1)[-1] == DESCRIPTION)[
+        :MOST_ROBOTS
+    ]
 
 
 class RobotStream(SensorStream):
     """Its samples are the poses of the links. Their geometries are in `appearance`."""
 
-    def __init__(self, sensor: int, parameter: str, read: Callable[[str],
-                                                                   Any] = rospy.get_param) -> None:
+    def __init__(
+        self, sensor: int, parameter: str, read: Callable[[str], Any] = rospy.get_param
+    ) -> None:
         """`parameter` holds the robot's description. `read` gets it."""
         super().__init__(sensor, parameter, DESCRIPTION)
         self._read = read
         self._read_s = 0.0
-        self._namespace = parameter[:-len(DESCRIPTION)]
+        self._namespace = parameter[: -len(DESCRIPTION)]
         self._urdf: Optional[str] = None
         self._appearance: Optional[RobotAppearance] = None
         self._appearance_of = ''
@@ -76,25 +79,28 @@ class RobotStream(SensorStream):
             return None, self._why_no_appearance or 'The robot is not known yet.'
         frame = frame.lstrip('/')
         prefix = self._namespace.strip('/') + '/'
-        own = frame[len(prefix):] if len(prefix) > 1 and frame.startswith(prefix) else frame
-        root = frame[:len(frame) - len(own)] + appearance.robot.root
+        own = frame[len(prefix) :] if len(prefix) > 1 and frame.startswith(prefix) else frame
+        root = frame[: len(frame) - len(own)] + appearance.robot.root
         at = transforms.at(root, frame, stamp) if transforms is not None else None
         if at is None:
             at = appearance.robot.poses(self._joints()).get(own)
         if at is None and transforms is not None:
             at = transforms.at(root, frame, rospy.Time(0))
         if at is None:
-            return None, 'No transform from {} to {}.'.format(frame[:100] or '(no frame)',
-                                                              root[:100])
+            return None, 'No transform from {} to {}.'.format(
+                frame[:100] or '(no frame)', root[:100]
+            )
         return at[:3], ''
 
     def take(self, message: JointState) -> None:
         """Take in joint states. Several nodes may each publish some of the joints."""
         with self._positions_lock:
             if len(self._positions) + len(message.name) < MOST_JOINTS:
-                self._positions.update((name, value)
-                                       for name, value in zip(message.name, message.position)
-                                       if abs(value) < 1e6)  # not NaN
+                self._positions.update(
+                    (name, value)
+                    for name, value in zip(message.name, message.position)
+                    if abs(value) < 1e6
+                )  # not NaN
         super().take(message)
 
     def _joints(self) -> Dict[str, float]:
@@ -104,8 +110,9 @@ class RobotStream(SensorStream):
     def _begin(self) -> rospy.Subscriber:
         self._read_again()
         self._transforms = _RecentTransforms()
-        subscriber = rospy.Subscriber(self._namespace + 'joint_states', JointState, self.take,
-                                      queue_size=20)
+        subscriber = rospy.Subscriber(
+            self._namespace + 'joint_states', JointState, self.take, queue_size=20
+        )
         super().take(JointState())  # so that it is drawn though nobody publishes its joints
         return subscriber
 
@@ -133,12 +140,17 @@ class RobotStream(SensorStream):
 
     def _made(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
         appearance, joints = self.appearance(), self._joints()
-        return BrowserFile('application/octet-stream',
-                           appearance.places(joints).tobytes(), {}), json.dumps({
-                               'kind': 'robot', 'model': appearance.version,
-                               'root': appearance.robot.root, 'joints': len(joints),
-                               'sequence': sample.sequence
-                           })
+        return BrowserFile(
+            'application/octet-stream', appearance.places(joints).tobytes(), {}
+        ), json.dumps(
+            {
+                'kind': 'robot',
+                'model': appearance.version,
+                'root': appearance.robot.root,
+                'joints': len(joints),
+                'sequence': sample.sequence,
+            }
+        )
 
 
 class _RecentTransforms:
@@ -157,6 +169,7 @@ class _RecentTransforms:
             found = self._buffer.lookup_transform_core(target, source, stamp).transform
             return from_quaternion(
                 (found.translation.x, found.translation.y, found.translation.z),
-                (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w))
+                (found.rotation.x, found.rotation.y, found.rotation.z, found.rotation.w),
+            )
         except (tf2_ros.TransformException, ValueError):
             return None

@@ -3,6 +3,7 @@
 The page asks again when it has shown the last one, so that a slow link or a slow machine gets fewer
 samples, never older ones.
 """
+
 import asyncio
 import itertools
 import json
@@ -77,7 +78,8 @@ class RobotAppearanceHandler(SensorHandler):
         robot = self.robot(number)
         try:
             encoded = await asyncio.get_running_loop().run_in_executor(
-                self._shared.workers, lambda: robot.appearance().encoded())
+                self._shared.workers, lambda: robot.appearance().encoded()
+            )
         except ValueError as err:
             self.refuse(err)
             return
@@ -105,7 +107,8 @@ class SampleHandler(SensorHandler):
             return
         try:
             encoded, facts = await asyncio.get_running_loop().run_in_executor(
-                self._shared.workers, sensor.file_of, sample, width)
+                self._shared.workers, sensor.file_of, sample, width
+            )
         except ValueError as err:
             self.set_header('X-Sequence', str(sample.sequence))
             self.refuse(err)
@@ -140,9 +143,13 @@ class SampleHandler(SensorHandler):
         given = {name: self.get_query_arguments(name) for name in self.request.query_arguments}
         after, width = given.pop('after', ['0']), given.pop('width', [str(WIDTHS[1])])
         robot = given.pop('robot', [''])
-        if given or not len(after) == len(width) == len(robot) == 1 \
-                or width[0] not in map(str, WIDTHS) \
-                or not _NUMBER.fullmatch(after[0]) or not _NUMBER.fullmatch(robot[0] or '0'):
+        if (
+            given
+            or not len(after) == len(width) == len(robot) == 1
+            or width[0] not in map(str, WIDTHS)
+            or not _NUMBER.fullmatch(after[0])
+            or not _NUMBER.fullmatch(robot[0] or '0')
+        ):
             raise tornado.web.HTTPError(400)
         return int(after[0]), int(width[0]), robot[0]
 

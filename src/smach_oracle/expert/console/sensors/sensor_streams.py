@@ -3,6 +3,7 @@
 A browser names a sensor by the number that it was given here. Whatever has no number cannot be
 named.
 """
+
 import itertools
 import json
 import threading
@@ -24,7 +25,8 @@ _TYPES: Dict[str, Tuple[str, type, Callable[[Any, int], BrowserFile]]] = {
     Image._type: ('image', Image, encode_image),
     CompressedImage._type: ('image', CompressedImage, encode_image),
     PointCloud2._type: ('cloud', PointCloud2, lambda message, _: encode_cloud(message)),
-    JointState._type: ('joints', JointState, lambda message, _: encode_joints(message))}
+    JointState._type: ('joints', JointState, lambda message, _: encode_joints(message)),
+}
 # by type, what they show
 _DERIVED = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}
 
@@ -74,7 +76,8 @@ class SensorStream:
             if key not in self._encoded:
                 self._encoded = {
                     known: found
-                    for known, found in self._encoded.items() if known[0] == sample.sequence
+                    for known, found in self._encoded.items()
+                    if known[0] == sample.sequence
                 }
                 self._encoded[key] = self._made(sample, width)
             return self._encoded[key]
@@ -98,8 +101,9 @@ class SensorStream:
         self._sample = SensorSample(next(self._sequence), message, time.monotonic())
 
     def _begin(self) -> rospy.Subscriber:
-        return rospy.Subscriber(self.topic, _TYPES[self.type][1], self.take, queue_size=1,
-                                buff_size=1 << 24)
+        return rospy.Subscriber(
+            self.topic, _TYPES[self.type][1], self.take, queue_size=1, buff_size=1 << 24
+        )
 
     def _go_on(self) -> None:
         """Called while it is watched."""
@@ -115,8 +119,12 @@ class SensorStream:
     def _made(self, sample: SensorSample, width: int) -> Tuple[BrowserFile, str]:
         encoded = self._encoded_of(sample.message, width)
         header = sample.message.header
-        facts = dict(encoded.facts, sequence=sample.sequence, frame=header.frame_id[:200],
-                     stamp='{}.{:09d}'.format(header.stamp.secs, header.stamp.nsecs))
+        facts = dict(
+            encoded.facts,
+            sequence=sample.sequence,
+            frame=header.frame_id[:200],
+            stamp='{}.{:09d}'.format(header.stamp.secs, header.stamp.nsecs),
+        )
         if encoded.content_type == 'application/json':
             return encoded._replace(body=json.dumps(facts, allow_nan=False).encode()), ''
         return encoded, json.dumps(facts, allow_nan=False)
@@ -147,8 +155,9 @@ class SensorStreams:
         """Return a sensor by its topic, for the server's own use."""
         return next((each for each in self._all() if each.topic == topic), None)
 
-    def follow(self, published: Sequence[Sequence[str]],
-               derived: Sequence[DerivedStream] = ()) -> None:
+    def follow(
+        self, published: Sequence[Sequence[str]], derived: Sequence[DerivedStream] = ()
+    ) -> None:
         """Take in the topics and types that the master knows, and the streams derived from them."""
         makers = {(each.topic, each.type): each.make for each in derived}
         seen = {(topic, kind) for topic, kind in published if kind in _TYPES} | set(makers)
@@ -158,11 +167,12 @@ class SensorStreams:
                 self._unseen[sensor] = 0 if key in seen else self._unseen.get(sensor, 0) + 1
                 if self._unseen[sensor] >= _GONE_AFTER and not self._by_number[sensor].listened:
                     del self._by_number[sensor], self._unseen[sensor]
-            for topic, kind in sorted(seen - set(known))[:MOST_SENSORS - len(self._by_number)]:
+            for topic, kind in sorted(seen - set(known))[: MOST_SENSORS - len(self._by_number)]:
                 number = next(self._numbers)
                 make = makers.get((topic, kind))
-                self._by_number[number] = make(number) if make else SensorStream(
-                    number, topic, kind)
+                self._by_number[number] = (
+                    make(number) if make else SensorStream(number, topic, kind)
+                )
 
     def update_subscriptions(self) -> None:
         """Subscribe and unsubscribe as needed. It is to be called often, by one thread."""
@@ -172,8 +182,10 @@ class SensorStreams:
 
     def view(self) -> List[Dict[str, Any]]:
         """Return the streams as plain data, by topic."""
-        return [{'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}
-                for each in sorted(self._all(), key=lambda sensor: (sensor.topic, sensor.number))]
+        return [
+            {'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}
+            for each in sorted(self._all(), key=lambda sensor: (sensor.topic, sensor.number))
+        ]
 
     def _all(self) -> List[SensorStream]:
         with self._lock:

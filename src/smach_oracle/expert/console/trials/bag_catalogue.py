@@ -4,6 +4,7 @@ Bags are files that may come from anywhere: their content is read as messages by
 definitions, by a process with limits, and never as code. A browser knows a trial by the number
 that it was given here.
 """
+
 import fcntl
 import itertools
 import os
@@ -29,19 +30,25 @@ from .counts_table import unwell
 SECTION = 'bags'
 SCAN_PERIOD_S = 5.0
 MOST_BAGS = 500  # the newest
-MOST_BYTES = 2 ** 30  # of a bag
+MOST_BYTES = 2**30  # of a bag
 MOST_EVENTS = 200000  # in a bag
 SHOWN_TRIALS = 300
 SHOWN_BROKEN = 50
 MOST_BAGS_OF_A_TRIAL = 20  # the newest that were read
-MOST_REPLY = 64 * 10 ** 6  # bytes, of all that is replayed of a trial
+MOST_REPLY = 64 * 10**6  # bytes, of all that is replayed of a trial
 BEING_WRITTEN_S = 60.0
 _COUNTS = {
-    'failures': 'failures of states', 'recoveries': 'oracle recoveries',
-    'questions': 'questions to the expert', 'answered': 'answered'
+    'failures': 'failures of states',
+    'recoveries': 'oracle recoveries',
+    'questions': 'questions to the expert',
+    'answered': 'answered',
 }
-_ENDINGS = {'success': 'ended in success', 'failure': 'ended in failure', 'preempted': 'preempted',
-            'unfinished': 'unfinished'}
+_ENDINGS = {
+    'success': 'ended in success',
+    'failure': 'ended in failure',
+    'preempted': 'preempted',
+    'unfinished': 'unfinished',
+}
 
 
 class RecordedTrialError(OracleError):
@@ -108,17 +115,24 @@ class BagCatalogue:
         with self._lock:
             trials = sorted(self._trials.values(), key=lambda each: -each.summary.start_time)
             broken = sorted({**self._refused, **self._broken}.items())
-        notes = self._notes + ([
-            'Of {} trials the latest {} are listed.'.format(len(trials), SHOWN_TRIALS)
-        ] if len(trials) > SHOWN_TRIALS else [])
+        notes = self._notes + (
+            ['Of {} trials the latest {} are listed.'.format(len(trials), SHOWN_TRIALS)]
+            if len(trials) > SHOWN_TRIALS
+            else []
+        )
         self._sections.put(
-            SECTION, {
-                'waiting': waiting, 'note': ' '.join(notes), 'table': _table(
-                    [each.summary
-                     for each in trials]), 'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
-                'broken': [{'name': self._folders.name_of(path), 'reason': reason[:300]}
-                           for path, reason in broken[:SHOWN_BROKEN]]
-            })
+            SECTION,
+            {
+                'waiting': waiting,
+                'note': ' '.join(notes),
+                'table': _table([each.summary for each in trials]),
+                'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
+                'broken': [
+                    {'name': self._folders.name_of(path), 'reason': reason[:300]}
+                    for path, reason in broken[:SHOWN_BROKEN]
+                ],
+            },
+        )
 
     def find(self, number: int) -> BagTrial:
         """Return a trial by its number.
@@ -129,7 +143,8 @@ class BagCatalogue:
             trial = next((each for each in self._trials.values() if each.number == number), None)
         if trial is None:
             raise RecordedTrialError(
-                'There is no trial {} any more; choose it again.'.format(number))
+                'There is no trial {} any more; choose it again.'.format(number)
+            )
         return trial
 
     def replayed(self, trial: BagTrial, most_events: int) -> BagReply:
@@ -139,8 +154,15 @@ class BagCatalogue:
         """
         paths = list(trial.summary.bags)
         try:
-            return read_bags(self._folders, _request(
-                paths, [trial.summary.trial_id], shown_events=most_events, reply_bytes=MOST_REPLY))
+            return read_bags(
+                self._folders,
+                _request(
+                    paths,
+                    [trial.summary.trial_id],
+                    shown_events=most_events,
+                    reply_bytes=MOST_REPLY,
+                ),
+            )
         except BagReadError as err:
             name = self._folders.name_of(paths[err.position])
             raise RecordedTrialError('{}: {}'.format(name, err)) from err
@@ -183,8 +205,11 @@ class BagCatalogue:
                     return  # its trial runs. It is shown live
                 raise BagReadError(UNFINISHED)
             if state.size > MOST_BYTES:
-                raise BagReadError('it has {:.1f} GiB; at most {:.0f} are read'.format(
-                    state.size / 2**30, MOST_BYTES / 2**30))
+                raise BagReadError(
+                    'it has {:.1f} GiB; at most {:.0f} are read'.format(
+                        state.size / 2**30, MOST_BYTES / 2**30
+                    )
+                )
             self._count(path)
         except BagError as err:
             reason = str(err)
@@ -222,20 +247,22 @@ class BagCatalogue:
                 number = known.number if known else next(self._numbers)
                 with self._lock:
                     self._trials[read.summary.trial_id] = BagTrial(
-                        number, read.node, read.summary._replace(bags=bags))
+                        number, read.node, read.summary._replace(bags=bags)
+                    )
 
     def _bags_of(self, trial_id: str, path: str) -> Tuple[str, ...]:
         """The bags that a trial is in, that of `path` last."""
         known = self._trials.get(trial_id)
         others = [each for each in known.summary.bags if each != path] if known else []
-        return tuple(others[1 - MOST_BAGS_OF_A_TRIAL:] + [path])
+        return tuple(others[1 - MOST_BAGS_OF_A_TRIAL :] + [path])
 
     def _together(self, bags: Sequence[str], trial_ids: List[str]) -> List[ReadTrial]:
         try:
             return read_bags(self._folders, _request(list(bags), trial_ids)).trials
         except BagReadError as err:
-            raise BagReadError('{}: {}'.format(
-                self._folders.name_of(bags[err.position]), err)) from err
+            raise BagReadError(
+                '{}: {}'.format(self._folders.name_of(bags[err.position]), err)
+            ) from err
 
 
 def _request(paths: List[str], trials: Sequence[str] = (), **more: int) -> BagRequest:
@@ -246,13 +273,22 @@ def _row(trial: BagTrial) -> Dict[str, Any]:
     """A trial as the list of live trials has it, too."""
     summary = trial.summary
     return {
-        'number': trial.number, 'id': summary.trial_id, 'robot': trial.node,
-        'experiment': summary.experiment, 'start': summary.start_time,
-        'end': summary.start_time + summary.duration_s, 'ending': summary.ending.value,
-        'outcome': summary.outcome, 'oracle': summary.recovers, 'failures': summary.failures,
-        'recoveries': summary.recoveries, 'questions': summary.questions,
-        'answered': summary.answered, 'lost': summary.lost_events, 'detailed': True,
-        'bag': os.path.basename(summary.bags[-1])
+        'number': trial.number,
+        'id': summary.trial_id,
+        'robot': trial.node,
+        'experiment': summary.experiment,
+        'start': summary.start_time,
+        'end': summary.start_time + summary.duration_s,
+        'ending': summary.ending.value,
+        'outcome': summary.outcome,
+        'oracle': summary.recovers,
+        'failures': summary.failures,
+        'recoveries': summary.recoveries,
+        'questions': summary.questions,
+        'answered': summary.answered,
+        'lost': summary.lost_events,
+        'detailed': True,
+        'bag': os.path.basename(summary.bags[-1]),
     }
 
 
@@ -263,11 +299,16 @@ def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
     rows = []
     for found in find_variants(list(summaries)):
         variant = count_variant(found)
-        rows.append({'experiment': variant.experiment, 'arm': variant.name,
-                     'trials': variant.trials,
-                     'endings': {key: variant.of(name).trials for key, name in _ENDINGS.items()},
-                     'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()},
-                     'unwell_s': unwell(found.trials)})
+        rows.append(
+            {
+                'experiment': variant.experiment,
+                'arm': variant.name,
+                'trials': variant.trials,
+                'endings': {key: variant.of(name).trials for key, name in _ENDINGS.items()},
+                'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()},
+                'unwell_s': unwell(found.trials),
+            }
+        )
     return rows
 
 

@@ -3,6 +3,7 @@
 Only plain files inside the folders may be read. Opening a pipe may wait forever, and a link may
 lead to any file of this machine.
 """
+
 import os
 import stat
 from typing import Dict, List, NamedTuple, Sequence
@@ -10,8 +11,13 @@ from typing import Dict, List, NamedTuple, Sequence
 from smach_oracle.analysis.bag_events import walk_bags
 from smach_oracle.analysis.bag_worker import BagReadError
 
-_KINDS = ((stat.S_ISFIFO, 'a named pipe'), (stat.S_ISSOCK, 'a socket'), (stat.S_ISDIR, 'a folder'),
-          (stat.S_ISCHR, 'a device'), (stat.S_ISBLK, 'a device'))
+_KINDS = (
+    (stat.S_ISFIFO, 'a named pipe'),
+    (stat.S_ISSOCK, 'a socket'),
+    (stat.S_ISDIR, 'a folder'),
+    (stat.S_ISCHR, 'a device'),
+    (stat.S_ISBLK, 'a device'),
+)
 
 
 class FileState(NamedTuple):
@@ -66,8 +72,9 @@ class BagFolders:
             raise
         except OSError as err:
             raise BagReadError('it cannot be opened: {}'.format(err.strerror)) from err
-        problem = self._problem(os.readlink('/proc/self/fd/{}'.format(descriptor)),
-                                os.fstat(descriptor).st_mode)
+        problem = self._problem(
+            os.readlink('/proc/self/fd/{}'.format(descriptor)), os.fstat(descriptor).st_mode
+        )
         if problem:
             os.close(descriptor)
             raise BagReadError(problem)
@@ -77,7 +84,7 @@ class BagFolders:
         """Return a path below the folder that it was found in."""
         for place in self._real():
             if path.startswith(_within(place)):
-                return path[len(_within(place)):]
+                return path[len(_within(place)) :]
         return os.path.basename(path)
 
     def _look_at(self, path: str, found: FoundBags) -> None:
@@ -97,7 +104,8 @@ class BagFolders:
             return 'a link that leads out of the folder'
         if not stat.S_ISREG(mode):
             return 'no plain file, but {}'.format(
-                next((name for fits, name in _KINDS if fits(mode)), 'something else'))
+                next((name for fits, name in _KINDS if fits(mode)), 'something else')
+            )
         return ''
 
     def _real(self) -> List[str]:

@@ -1,4 +1,5 @@
 """Reads bags in a process of its own, and ends that where it takes too long."""
+
 import contextlib
 import json
 import os
@@ -17,8 +18,9 @@ _WORKER = 'smach_oracle.analysis.bag_worker'
 _ONE_THREAD = {'OPENBLAS_NUM_THREADS': '1', 'OMP_NUM_THREADS': '1', 'MKL_NUM_THREADS': '1'}
 
 
-def read_bags(folders: BagFolders, request: BagRequest,
-              wall_limit_s: float = WALL_LIMIT_S) -> BagReply:
+def read_bags(
+    folders: BagFolders, request: BagRequest, wall_limit_s: float = WALL_LIMIT_S
+) -> BagReply:
     """Read bags of the folders.
 
     The process is given open files: whatever their names lead to meanwhile, it opens none by a
@@ -43,9 +45,15 @@ def read_bags(folders: BagFolders, request: BagRequest,
 
 def _reply(request: BagRequest, files: List[int], wall_limit_s: float) -> BagReply:
     worker = subprocess.Popen(
-        [sys.executable, '-m', _WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL, pass_fds=files, start_new_session=True, cwd='/',
-        env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path), **_ONE_THREAD))
+        [sys.executable, '-m', _WORKER],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        pass_fds=files,
+        start_new_session=True,
+        cwd='/',
+        env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path), **_ONE_THREAD),
+    )
     try:
         text, _ = worker.communicate(json.dumps(request).encode(), wall_limit_s)
     except subprocess.TimeoutExpired as err:
@@ -59,5 +67,6 @@ def _reply(request: BagRequest, files: List[int], wall_limit_s: float) -> BagRep
     try:
         return reply_of(text)
     except (ValueError, TypeError, KeyError) as err:
-        raise BagReadError('the process that read it has ended ({})'.format(
-            worker.returncode)) from err
+        raise BagReadError(
+            'the process that read it has ended ({})'.format(worker.returncode)
+        ) from err

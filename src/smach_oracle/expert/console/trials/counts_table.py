@@ -2,6 +2,7 @@
 
 Definitions: doc/statistics.md.
 """
+
 from collections import Counter
 from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
 
@@ -33,10 +34,12 @@ def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
 def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[str, Any]:
     endings = Counter(trial.ending for trial in trials)
     return {
-        'experiment': experiment, 'oracle': oracle, 'trials': len(trials),
+        'experiment': experiment,
+        'oracle': oracle,
+        'trials': len(trials),
         'endings': {ending.value: endings[ending] for ending in ENDINGS},
         'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED},
-        'unwell_s': unwell(trials)
+        'unwell_s': unwell(trials),
     }
 
 

@@ -1,4 +1,5 @@
 """Answers to requests for the past: a trial of a bag, an image of a question."""
+
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 
@@ -40,7 +41,8 @@ class RecordedHandler(_HistoryHandler):
         """Answer when it has been read."""
         try:
             text = await asyncio.get_running_loop().run_in_executor(
-                self._shared.workers, self._shared.recorded.text, int(number))
+                self._shared.workers, self._shared.recorded.text, int(number)
+            )
         except RecordedTrialError as err:
             self.refuse(err)
             return

@@ -1,4 +1,5 @@
 """Many lines of text in little memory: all but the latest are compressed. Pure."""
+
 import zlib
 from typing import List
 
@@ -30,10 +31,10 @@ class PackedTexts:
         """Return up to `most` lines from a position on, which counts from 0."""
         first = min(start // IN_A_PACK, len(self._packs))
         found: List[str] = []
-        for pack in self._packs[first:-(-(start + most) // IN_A_PACK)]:
+        for pack in self._packs[first : -(-(start + most) // IN_A_PACK)]:
             found += zlib.decompress(pack).decode().split('\n')
         begin = start - first * IN_A_PACK
-        return (found + self._latest)[begin:begin + most]
+        return (found + self._latest)[begin : begin + most]
 
     def clear(self) -> None:
         """Forget all lines."""

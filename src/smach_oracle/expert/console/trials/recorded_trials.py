@@ -1,4 +1,5 @@
 """One trial of a bag as the page replays it: events, graphs of its machines, camera images."""
+
 import json
 import threading
 import time
@@ -53,7 +54,8 @@ class RecordedTrials:
                 text = json.dumps(self._content(trial), allow_nan=False)
                 if len(text) > MOST_BYTES:
                     raise RecordedTrialError(
-                        'The trial is too large to be shown: {:.0f} MB.'.format(len(text) / 1e6))
+                        'The trial is too large to be shown: {:.0f} MB.'.format(len(text) / 1e6)
+                    )
                 self._known[key] = text
                 while len(self._known) > REMEMBERED:
                     self._known.popitem(last=False)
@@ -64,12 +66,16 @@ class RecordedTrials:
         if read.problem:
             warn_once('Machines in {} cannot be read: {}'.format(trial.summary.bags, read.problem))
         containers, events = _structures(read.machines), read.events
-        structures = {path: containers.get(path) or graph_from_events(path, events)
-                      for path in sorted({event.path for event in events if event.path})[:200]}
+        structures = {
+            path: containers.get(path) or graph_from_events(path, events)
+            for path in sorted({event.path for event in events if event.path})[:200]
+        }
         return {
             'events': [event_view(event) for event in events],
-            'graphs': self._graphs(structures), 'images': self._images(
-                read.machines.frames, {event.query_id for event in events if event.query_id})
+            'graphs': self._graphs(structures),
+            'images': self._images(
+                read.machines.frames, {event.query_id for event in events if event.query_id}
+            ),
         }
 
     def _images(self, frames: Sequence[FailureImage], questions: Set[str]) -> ImagesByQuestion:
@@ -79,8 +85,8 @@ class RecordedTrials:
             if frame.query_id in questions:
                 image = CompressedImage(format=frame.format, data=frame.data)
                 images.setdefault(frame.query_id, []).extend(
-                    image_view(each)
-                    for each in stored_images(self._files, [frame.topic], [image]))
+                    image_view(each) for each in stored_images(self._files, [frame.topic], [image])
+                )
         return images
 
     def _graphs(self, structures: Dict[str, ContainerGraph]) -> Dict[str, Any]:
@@ -98,8 +104,12 @@ class RecordedTrials:
 
 def _structures(machines: RecordedMachines) -> Dict[str, ContainerGraph]:
     """Containers by path."""
-    return {path: make_structure(path, graph.children, [GraphEdge(*edge) for edge in graph.edges],
-                                 graph.outcomes) for path, graph in machines.containers.items()}
+    return {
+        path: make_structure(
+            path, graph.children, [GraphEdge(*edge) for edge in graph.edges], graph.outcomes
+        )
+        for path, graph in machines.containers.items()
+    }
 
 
 def graph_from_events(path: str, events: Sequence[Event]) -> ContainerGraph:
@@ -111,5 +121,6 @@ def graph_from_events(path: str, events: Sequence[Event]) -> ContainerGraph:
             labels[event.state] = None
         elif event.path == path and event.kind == EventKind.TRANSITION:
             taken[(event.state, event.outcome, event.target)] += 1
-    return structure_from_counts(path, list(labels),
-                                 [[*edge, times, 0.0] for edge, times in taken.items()])
+    return structure_from_counts(
+        path, list(labels), [[*edge, times, 0.0] for edge, times in taken.items()]
+    )

@@ -1,4 +1,5 @@
 """Counts of how often going to a state helped after a failure, learned from live events. Pure."""
+
 from collections import OrderedDict
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
@@ -20,7 +21,9 @@ class RecoveryCounts(NamedTuple):
 def _takes_out(event: Event) -> bool:
     """Whether it may be an answer that ends a state which still runs: it does not say wait on."""
     return event.kind == EventKind.QUERY_ANSWERED and (event.outcome, event.target) != (
-        'goto', event.state)
+        'goto',
+        event.state,
+    )
 
 
 class RecoveryStatistics:
@@ -63,8 +66,9 @@ class RecoveryStatistics:
         """Return how often going to `target` has helped when the state of `place` had failed."""
         return RecoveryCounts(*self._counts.get((place, target), (0, 0)))
 
-    def _count(self, robot: str, path: str, state: str, target: Optional[str],
-                helped: bool) -> None:
+    def _count(
+        self, robot: str, path: str, state: str, target: Optional[str], helped: bool
+    ) -> None:
         """Count a try, if there was one."""
         if target:
             counts = self._counts.setdefault(((robot, path, state), target), [0, 0])

@@ -2,6 +2,7 @@
 
 Thread-safe, bounded.
 """
+
 import json
 import threading
 from collections import OrderedDict
@@ -20,7 +21,7 @@ MOST_TRIALS = 1000
 # of so many trials the events are kept, of the others the counts. Those that run come first
 MOST_DETAILED = 60
 MOST_EVENTS = 4000  # of a trial: the first ones
-MOST_BYTES = 16 * 2 ** 20  # of the events of all trials, as they are kept
+MOST_BYTES = 16 * 2**20  # of the events of all trials, as they are kept
 SHOWN_TRIALS = 300
 _FAILING = FailingNames()
 
@@ -82,8 +83,15 @@ class TrialLog:
                 if self._bytes > MOST_BYTES:
                     self._forget_events()
             self._recoveries.add(
-                robot, event, ended and (not event.outcome or event.outcome in _FAILING
-                                         or event.outcome.lower() == 'preempted'))
+                robot,
+                event,
+                ended
+                and (
+                    not event.outcome
+                    or event.outcome in _FAILING
+                    or event.outcome.lower() == 'preempted'
+                ),
+            )
 
     def end_missing(self, robot: str) -> None:
         """A robot is gone: what still ran there has ended without a word."""
@@ -102,7 +110,8 @@ class TrialLog:
             ]
             return {
                 'table': counts_table(trial.counts for trial in self._trials.values()),
-                'trials': trials[::-1], 'heard': len(self._trials)
+                'trials': trials[::-1],
+                'heard': len(self._trials),
             }
 
     def events(self, trial_id: str, start: int, most: int = MOST_EVENTS) -> List[str]:
@@ -146,10 +155,18 @@ def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
     counts = trial.counts
     outcome = 'the robot is gone' if trial.robot_gone and not trial.ended else counts.outcome
     return {
-        'id': trial_id, 'robot': trial.robot, 'experiment': counts.experiment,
-        'start': counts.start_time, 'end': counts.start_time + counts.duration_s,
-        'ending': counts.ending.value if trial.ended else '', 'outcome': outcome,
-        'oracle': has_oracle(counts), 'failures': counts.failures,
-        'recoveries': counts.recoveries, 'questions': counts.questions,
-        'answered': counts.answered, 'lost': counts.lost_events, 'detailed': trial.detailed
+        'id': trial_id,
+        'robot': trial.robot,
+        'experiment': counts.experiment,
+        'start': counts.start_time,
+        'end': counts.start_time + counts.duration_s,
+        'ending': counts.ending.value if trial.ended else '',
+        'outcome': outcome,
+        'oracle': has_oracle(counts),
+        'failures': counts.failures,
+        'recoveries': counts.recoveries,
+        'questions': counts.questions,
+        'answered': counts.answered,
+        'lost': counts.lost_events,
+        'detailed': trial.detailed,
     }

@@ -1,4 +1,5 @@
 """Rules of access: roles, tokens, hosts and origins that are answered, limits on rates. Pure."""
+
 import hashlib
 import hmac
 import ipaddress
@@ -77,11 +78,13 @@ def load_tokens(path: str) -> AccessTokens:
         mode = file.stat().st_mode
         text = file.read_text(encoding='utf-8')
     except (OSError, UnicodeDecodeError) as err:
-        raise SettingsError('~token_file', path,
-                          'a file that can be read or made ({})'.format(err)) from err
+        raise SettingsError(
+            '~token_file', path, 'a file that can be read or made ({})'.format(err)
+        ) from err
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise SettingsError('~token_file', path,
-                          'a file that its owner alone may read: chmod 600 {}'.format(path))
+        raise SettingsError(
+            '~token_file', path, 'a file that its owner alone may read: chmod 600 {}'.format(path)
+        )
     return AccessTokens(text, str(file))
 
 
@@ -123,8 +126,9 @@ class AllowedHosts:
 class RateLimit:
     """Lets `burst` events pass at once, and `rate` a second in the long run."""
 
-    def __init__(self, rate: float, burst: float, clock: Callable[[],
-                                                                  float] = time.monotonic) -> None:
+    def __init__(
+        self, rate: float, burst: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self._rate = rate
         self._burst = burst
         self._clock = clock
@@ -156,8 +160,9 @@ class ClientRateLimits:
     own, and does not count for that of all.
     """
 
-    def __init__(self, rate: float, burst: float, for_all: float,
-                 clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, rate: float, burst: float, for_all: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """`for_all`: how many times one client's share all strangers together may have."""
         self._make = lambda factor: RateLimit(rate * factor, burst * factor, clock)
         self._all = self._make(for_all)
@@ -219,11 +224,14 @@ def _entry(words: List[str], where: str) -> _AccessToken:
     if words[0] not in ROLES:
         raise SettingsError(where, words[0], ', '.join(ROLES) + ' in front of the token')
     if len(words) < 2 or len(words[1]) < SHORTEST_TOKEN:
-        raise SettingsError(where,
-                          'a token of {} characters'.format(len(words[1]) if len(words) > 1 else 0),
-                          '{} or more'.format(SHORTEST_TOKEN))
-    return _AccessToken(_digest(words[1]),
-                        Identity(words[0], words[2].strip() if len(words) > 2 else ''))
+        raise SettingsError(
+            where,
+            'a token of {} characters'.format(len(words[1]) if len(words) > 1 else 0),
+            '{} or more'.format(SHORTEST_TOKEN),
+        )
+    return _AccessToken(
+        _digest(words[1]), Identity(words[0], words[2].strip() if len(words) > 2 else '')
+    )
 
 
 def _digest(token: str) -> bytes:

@@ -1,4 +1,5 @@
 """The checks that every request passes first: its host, its rate, its origin, and its session."""
+
 import time
 from typing import Dict, Optional, Tuple
 
@@ -34,7 +35,8 @@ class AccessControl:
     def session(self, handler: tornado.web.RequestHandler) -> Optional[BrowserSession]:
         """Return the session of a request's cookie, or None where it has none of ours."""
         session = sessions.from_text(
-            handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0))
+            handler.get_secure_cookie(self.cookie, max_age_days=sessions.HOURS / 24.0)
+        )
         over = session is None or session.id in self._ended or session.left_s <= 0.0
         return None if over else session
 
@@ -42,8 +44,7 @@ class AccessControl:
         """End a session: its cookie, of which somebody may have a copy, is refused from now on."""
         now_s = time.monotonic()
         self._ended = {
-            id_: at_s
-            for id_, at_s in self._ended.items() if now_s - at_s < 3600.0 * sessions.HOURS
+            id_: at_s for id_, at_s in self._ended.items() if now_s - at_s < 3600.0 * sessions.HOURS
         }
         self._ended[session.id] = now_s
 
@@ -59,8 +60,12 @@ class AccessControl:
         signed_in = session is not None and session.role and session.left_s > 0.0
         return Identity(session.role, session.name) if session and signed_in else None
 
-    def refusal(self, handler: tornado.web.RequestHandler,
-                limits: Optional[ClientRateLimits] = None, limited: bool = True) -> int:
+    def refusal(
+        self,
+        handler: tornado.web.RequestHandler,
+        limits: Optional[ClientRateLimits] = None,
+        limited: bool = True,
+    ) -> int:
         """Return the status with which a request is refused, or 0 where it may go on.
 
         :param limits: of its own, where it has any.
@@ -79,8 +84,9 @@ class AccessControl:
             return 403
         return 0
 
-    def _share_of(self, request: tornado.httputil.HTTPServerRequest,
-                  known: str) -> Tuple[str, bool]:
+    def _share_of(
+        self, request: tornado.httputil.HTTPServerRequest, known: str
+    ) -> Tuple[str, bool]:
         """For whose limit a request counts, and whether that one has come with a token.
 
         Strangers of the same address, or very many of them, take nothing from who has a token.
@@ -95,5 +101,6 @@ class AccessControl:
         origin = headers.get('Origin')
         if origin is None:
             return not must_say
-        return self.settings.hosts.allows_origin(origin, headers.get('Host', ''),
-                                                 self.settings.scheme)
+        return self.settings.hosts.allows_origin(
+            origin, headers.get('Host', ''), self.settings.scheme
+        )

@@ -1,4 +1,5 @@
 """The audit of commands: in the log, on ~audit, and beside the expert query server in question."""
+
 import json
 import threading
 import time
@@ -41,8 +42,9 @@ class AuditTopic(rospy.SubscribeListener):
         self._lock = threading.Lock()
         self._stopped = False
         self._waiting: Deque[Tuple[float, ConsoleCommand]] = deque(maxlen=MOST_WAITING)
-        self._publisher = rospy.Publisher(topic, ConsoleCommand, subscriber_listener=self,
-                                          queue_size=1000)
+        self._publisher = rospy.Publisher(
+            topic, ConsoleCommand, subscriber_listener=self, queue_size=1000
+        )
 
     def publish(self, record: ConsoleCommand) -> None:
         """Publish a record, or keep it for the first subscriber."""
@@ -60,8 +62,9 @@ class AuditTopic(rospy.SubscribeListener):
             self._stopped = True
         self._publisher.unregister()
 
-    def peer_subscribe(self, topic_name: str, topic_publish: Callable,
-                       peer_publish: Callable) -> None:
+    def peer_subscribe(
+        self, topic_name: str, topic_publish: Callable, peer_publish: Callable
+    ) -> None:
         """Called by rospy for each new subscriber."""
         with self._lock:
             for said_s, record in self._waiting:
@@ -90,23 +93,42 @@ class Audit:
         for topic in gone:
             topic.stop()
 
-    def record(self, person: Person, command: str, ok: bool, message: str,
-               arguments: Optional[Mapping[str, Any]] = None,
-               listed: Optional[ListedQuestion] = None) -> None:
+    def record(
+        self,
+        person: Person,
+        command: str,
+        ok: bool,
+        message: str,
+        arguments: Optional[Mapping[str, Any]] = None,
+        listed: Optional[ListedQuestion] = None,
+    ) -> None:
         """Record one command and its result."""
         record = ConsoleCommand(
-            wall_time=time.time(), console=rospy.get_name(), client=person.client,
-            session=person.session, role=person.role, expert=person.expert, command=command, ok=ok,
-            message=shortened(message, 1000), arguments=json.dumps(arguments or {},
-                                                         default=str)[:LONGEST_ARGUMENTS])
+            wall_time=time.time(),
+            console=rospy.get_name(),
+            client=person.client,
+            session=person.session,
+            role=person.role,
+            expert=person.expert,
+            command=command,
+            ok=ok,
+            message=shortened(message, 1000),
+            arguments=json.dumps(arguments or {}, default=str)[:LONGEST_ARGUMENTS],
+        )
         record.header.stamp = ros_now()
         if listed is not None:
             goal = listed.goal
             record.robot, record.trial_id = goal.robot, goal.trial_id
             record.query_id = goal.query_id
-        rospy.loginfo('%s of %s (%s, %s): %s%s', command, person.expert or 'nobody', person.role
-                      or 'no role', person.client, 'done' if ok else 'refused',
-                      ': ' + repr(message) if message else '')
+        rospy.loginfo(
+            '%s of %s (%s, %s): %s%s',
+            command,
+            person.expert or 'nobody',
+            person.role or 'no role',
+            person.client,
+            'done' if ok else 'refused',
+            ': ' + repr(message) if message else '',
+        )
         if rospy.is_shutdown():
             return
         self._own.publish(record)

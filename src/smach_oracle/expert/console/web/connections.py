@@ -3,6 +3,7 @@
 Each takes one of the files that the process may open, and the ROS side needs files, too. Who has
 not come with a token is turned away first, and nobody can take the place of who has.
 """
+
 import resource
 from collections import Counter, OrderedDict
 from typing import Any, Dict, Optional
@@ -71,8 +72,10 @@ class OpenConnections:
         return True
 
     def _has_no_room(self, session: str) -> bool:
-        return len(self._known) >= MOST_KNOWN or sum(
-            1 for each in self._known.values() if each == session) >= MOST_OF_A_SESSION
+        return (
+            len(self._known) >= MOST_KNOWN
+            or sum(1 for each in self._known.values() if each == session) >= MOST_OF_A_SESSION
+        )
 
     def _is_over(self, network: str) -> bool:
         return len(self._strangers) > MOST_STRANGERS or self._of(network) > MOST_OF_A_NETWORK
@@ -89,8 +92,11 @@ class OpenConnections:
         network = self._strangers.pop(stream)
         stream.close()
         if self._warnings.take():
-            rospy.logwarn('Too many connections without a token, among them some from %s: those '
-                          'that ask for nothing are closed.', network)
+            rospy.logwarn(
+                'Too many connections without a token, among them some from %s: those '
+                'that ask for nothing are closed.',
+                network,
+            )
 
     def _forget_closed(self) -> None:
         for streams in (self._strangers, self._known):

@@ -1,4 +1,5 @@
 """HTTP handlers of the page and the session. Every request passes the same access control first."""
+
 import json
 from typing import Any, Callable, Dict, Optional, Protocol
 
@@ -12,16 +13,30 @@ from .access_control import AccessControl
 from .audit import Person
 from .sessions import BrowserSession
 
-POLICY = '; '.join([
-    "default-src 'none'", "script-src 'self'", "style-src 'self'", "img-src 'self' blob:",
-    "connect-src 'self'", "manifest-src 'self'", "base-uri 'none'", "form-action 'none'",
-    "frame-ancestors 'none'", "require-trusted-types-for 'script'", "trusted-types 'none'"
-])
+POLICY = '; '.join(
+    [
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' blob:",
+        "connect-src 'self'",
+        "manifest-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+        "require-trusted-types-for 'script'",
+        "trusted-types 'none'",
+    ]
+)
 HEADERS = {
-    'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff',
-    'X-Frame-Options': 'DENY', 'Referrer-Policy': 'no-referrer',
-    'Cross-Origin-Opener-Policy': 'same-origin', 'Cross-Origin-Resource-Policy': 'same-origin',
-    'Cache-Control': 'no-cache', 'Permissions-Policy': 'camera=(), microphone=(), geolocation=()'
+    'Content-Security-Policy': POLICY,
+    'X-Content-Type-Options': 'nosniff',
+    'X-Frame-Options': 'DENY',
+    'Referrer-Policy': 'no-referrer',
+    'Cross-Origin-Opener-Policy': 'same-origin',
+    'Cross-Origin-Resource-Policy': 'same-origin',
+    'Cache-Control': 'no-cache',
+    'Permissions-Policy': 'camera=(), microphone=(), geolocation=()',
 }
 LONGEST_BODY = 4096
 
@@ -48,8 +63,9 @@ class CheckedHandler(tornado.web.RequestHandler):
         """Before anything else."""
         self.demand_admission()
 
-    def demand_admission(self, limits: Optional[ClientRateLimits] = None,
-                         limited: bool = True) -> None:
+    def demand_admission(
+        self, limits: Optional[ClientRateLimits] = None, limited: bool = True
+    ) -> None:
         """Let a request pass the access control, or answer it with the status of the refusal."""
         status = self.access.refusal(self, limits, limited)
         if status:
@@ -61,8 +77,9 @@ class CheckedHandler(tornado.web.RequestHandler):
     def demand_xsrf(self, session: Optional[BrowserSession]) -> BrowserSession:
         """Return the session, of a request that knows its token. Any other is answered with 403."""
         given = self.request.headers.get('X-Xsrf', '')
-        if session is None or not sessions.same(given, sessions.xsrf_token(
-                session, self.access.secret)):
+        if session is None or not sessions.same(
+            given, sessions.xsrf_token(session, self.access.secret)
+        ):
             raise tornado.web.HTTPError(403)
         return session
 
@@ -156,13 +173,15 @@ class SessionHandler(CheckedHandler):
         identity = self._given()
         if identity is None:
             slow = not self.access.sign_ins.take(network_of(person.client))
-            self.access.audit.record(person, 'sign_in', False,
-                                     'too many tries' if slow else 'no such token')
+            self.access.audit.record(
+                person, 'sign_in', False, 'too many tries' if slow else 'no such token'
+            )
             raise tornado.web.HTTPError(429 if slow else 401)
         self._end(session)  # another page of this browser may have signed in meanwhile
         session = self._begin(identity)
-        self.access.audit.record(Person(person.client, session.short, *identity), 'sign_in', True,
-                                 '')
+        self.access.audit.record(
+            Person(person.client, session.short, *identity), 'sign_in', True, ''
+        )
         self._answer(session)
 
     def delete(self) -> None:
@@ -177,21 +196,31 @@ class SessionHandler(CheckedHandler):
             self._close(session)
             self.access.audit.record(
                 Person(self.request.remote_ip or '', session.short, session.role, session.name),
-                'sign_out', True, '')
+                'sign_out',
+                True,
+                '',
+            )
 
     def _begin(self, identity: Optional[Identity]) -> BrowserSession:
         session = sessions.new_session(identity)
-        self.set_secure_cookie(self.access.cookie, sessions.to_text(session), expires_days=None,
-                               httponly=True, samesite='Strict',
-                               secure=self.access.settings.scheme == 'https')
+        self.set_secure_cookie(
+            self.access.cookie,
+            sessions.to_text(session),
+            expires_days=None,
+            httponly=True,
+            samesite='Strict',
+            secure=self.access.settings.scheme == 'https',
+        )
         return session
 
     def _answer(self, session: BrowserSession) -> None:
         identity = self.access.identity(session)
         known: Dict[str, Any] = {
-            'signed_in': identity is not None, 'role': identity.role if identity else '',
-            'name': identity.name if identity else '', 'tokens': self.access.settings.tokens
-            is not None, 'xsrf': sessions.xsrf_token(session, self.access.secret)
+            'signed_in': identity is not None,
+            'role': identity.role if identity else '',
+            'name': identity.name if identity else '',
+            'tokens': self.access.settings.tokens is not None,
+            'xsrf': sessions.xsrf_token(session, self.access.secret),
         }
         self.set_header('Content-Type', 'application/json')
         self.set_header('Cache-Control', 'no-store')

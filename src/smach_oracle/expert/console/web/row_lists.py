@@ -2,6 +2,7 @@
 
 A list is a section whose `trials` are rows, each with an id.
 """
+
 import json
 import threading
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
@@ -34,8 +35,9 @@ class RowLists:
     def get(self, name: str) -> Any:
         """Return a list as it is now, None where there is none."""
         found = self.now().get(name)
-        return found and dict(json.loads(found.rest), **{
-            ROWS: [json.loads(row) for row in found.rows.values()]})
+        return found and dict(
+            json.loads(found.rest), **{ROWS: [json.loads(row) for row in found.rows.values()]}
+        )
 
     def now(self) -> Dict[str, RowList]:
         """Return all lists as they are now."""
@@ -75,9 +77,12 @@ def _change(old: Optional[RowList], new: RowList) -> str:
     if old == new:
         return ''
     changed = {key: row for key, row in new.rows.items() if old.rows.get(key) != row}
-    return _change_text(False, None if old.rest == new.rest else new.rest,
-                        _placed(changed, new.rows), [key for key in old.rows
-                                                     if key not in new.rows])
+    return _change_text(
+        False,
+        None if old.rest == new.rest else new.rest,
+        _placed(changed, new.rows),
+        [key for key in old.rows if key not in new.rows],
+    )
 
 
 def _moved(old: Dict[str, str], new: Dict[str, str]) -> bool:
@@ -91,10 +96,12 @@ def _placed(changed: Dict[str, str], rows: Dict[str, str]) -> List[Tuple[str, st
     return [(before[key], row) for key, row in changed.items()]
 
 
-def _change_text(whole: bool, rest: Optional[str], rows: Sequence[Tuple[str, str]],
-                 gone: List[str]) -> str:
-    parts = ['"rows":[{}]'.format(','.join('[{},{}]'.format(_text(before), row)
-                                           for before, row in rows))]
+def _change_text(
+    whole: bool, rest: Optional[str], rows: Sequence[Tuple[str, str]], gone: List[str]
+) -> str:
+    parts = [
+        '"rows":[{}]'.format(','.join('[{},{}]'.format(_text(before), row) for before, row in rows))
+    ]
     if whole:
         parts.append('"all":true')
     if rest is not None:

@@ -2,6 +2,7 @@
 
 A section is sent whole when it has changed, its newest version only.
 """
+
 import json
 import threading
 from typing import Any, Dict, List, NamedTuple, Tuple
@@ -58,14 +59,18 @@ class PageSections:
         :returns: each section's name and JSON.
         """
         with self._lock:
-            changed = [(name, section.text) for name, section in self._sections.items()
-                       if section.version > version and (version or section.text != 'null')]
+            changed = [
+                (name, section.text)
+                for name, section in self._sections.items()
+                if section.version > version and (version or section.text != 'null')
+            ]
             return self._version, changed
 
     def _forget_gone(self) -> None:
         """Forget some of very many that are gone, with the lock held."""
         gone = [name for name, section in self._sections.items() if section.text == 'null']
         if len(gone) > _MOST_GONE:
-            for name in sorted(gone,
-                               key=lambda each: self._sections[each].version)[:_MOST_GONE // 2]:
+            for name in sorted(gone, key=lambda each: self._sections[each].version)[
+                : _MOST_GONE // 2
+            ]:
                 del self._sections[name]

@@ -1,4 +1,5 @@
 """Sessions of browsers: a signed cookie, and a token against forged requests. Pure."""
+
 import hashlib
 import hmac
 import json
@@ -63,5 +64,6 @@ def xsrf_token(session: BrowserSession, secret: str) -> str:
 
 def same(one: str, other: str) -> bool:
     """Compare in constant time."""
-    return hmac.compare_digest(one.encode('utf-8', 'backslashreplace'),
-                               other.encode('utf-8', 'backslashreplace'))
+    return hmac.compare_digest(
+        one.encode('utf-8', 'backslashreplace'), other.encode('utf-8', 'backslashreplace')
+    )

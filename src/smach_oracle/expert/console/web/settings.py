@@ -1,4 +1,5 @@
 """Settings of the console, from the node's private parameters."""
+
 import os
 import socket
 from types import MappingProxyType
@@ -50,18 +51,25 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
         raise SettingsError('~address', address, 'a loopback address, unless ~allow_remote is true')
     if remote and not token_file:
         raise SettingsError(
-            '~token_file', NONE,
+            '~token_file',
+            NONE,
             'a file of tokens where others can reach the console; one that is not '
-            'there yet is made')
+            'there yet is made',
+        )
     certificate, key = _path(get, 'certificate'), _path(get, 'private_key')
     if bool(certificate) != bool(key):
         raise SettingsError('~certificate', certificate or NONE, 'together with ~private_key')
-    return ConsoleSettings(address, _port('~port', get('port', DEFAULT_PORT)),
-                           load_tokens(token_file) if token_file else None,
-                           AllowedHosts(_hosts(get, remote), addresses=remote), certificate, key,
-                           _paths('~bags', get('bags', []), 'folders'),
-                           _paths('~stores', get('stores', []), 'files'),
-                           _cameras(get('cameras', {})))
+    return ConsoleSettings(
+        address,
+        _port('~port', get('port', DEFAULT_PORT)),
+        load_tokens(token_file) if token_file else None,
+        AllowedHosts(_hosts(get, remote), addresses=remote),
+        certificate,
+        key,
+        _paths('~bags', get('bags', []), 'folders'),
+        _paths('~stores', get('stores', []), 'files'),
+        _cameras(get('cameras', {})),
+    )
 
 
 def _hosts(get: GetParameter, remote: bool) -> List[str]:
@@ -77,8 +85,9 @@ def _hosts(get: GetParameter, remote: bool) -> List[str]:
 def _paths(name: str, value: object, what: str) -> Tuple[str, ...]:
     paths = value.split(os.pathsep) if isinstance(value, str) else value
     if not isinstance(paths, list) or not all(isinstance(path, str) for path in paths):
-        raise SettingsError(name, value, '{} separated by {}, or a list of {}'.format(
-            what, os.pathsep, what))
+        raise SettingsError(
+            name, value, '{} separated by {}, or a list of {}'.format(what, os.pathsep, what)
+        )
     return tuple(os.path.abspath(path_of(path)) for path in paths if path not in ('', NONE))
 
 
@@ -91,8 +100,11 @@ def _cameras(value: object) -> Dict[str, Tuple[str, ...]]:
     found = {}
     for robot, topics in value.items():
         names = topics.split() if isinstance(topics, str) else topics
-        if not isinstance(robot, str) or not isinstance(names, list) or not all(
-                isinstance(name, str) and name.startswith('/') for name in names):
+        if (
+            not isinstance(robot, str)
+            or not isinstance(names, list)
+            or not all(isinstance(name, str) and name.startswith('/') for name in names)
+        ):
             raise SettingsError('~cameras', value, allowed + ', with their whole names')
         found['/' + robot.strip('/')] = tuple(names)
     return found

@@ -1,6 +1,7 @@
 """Claims of people whose pages are there are renewed, whichever robot hangs; of closed questions
 they are forgotten.
 """
+
 import threading
 
 import pytest
@@ -39,8 +40,14 @@ class Front:
     def __init__(self, robots):
         self.servers = {robot: Server() for robot in robots}
         self.open = {
-            robot: ListedQuestion(robot, to_goal(make_question('q'), robot, asked=rospy.Time(1)),
-                                  OpenQuery.PENDING, '', 0.0, 1e9)
+            robot: ListedQuestion(
+                robot,
+                to_goal(make_question('q'), robot, asked=rospy.Time(1)),
+                OpenQuery.PENDING,
+                '',
+                0.0,
+                1e9,
+            )
             for robot in robots
         }
 
@@ -52,7 +59,6 @@ class Front:
 
 
 class Silent:
-
     def record(self, *_):
         """Nobody listens."""
 
@@ -97,8 +103,11 @@ def test_a_question_that_is_closed_is_forgotten_and_one_whose_server_is_restarte
     front.open['/b'] = restarted
     for _ in range(MOST_MISSED + 1):
         made.claims.renew()
-    assert [renewals(front, robot)
-            for robot in ('/a', '/b', '/c')] == [0, MOST_MISSED + 1, MOST_MISSED + 2]
+    assert [renewals(front, robot) for robot in ('/a', '/b', '/c')] == [
+        0,
+        MOST_MISSED + 1,
+        MOST_MISSED + 2,
+    ]
     assert (closed.key, 'ann') not in made.claims.held and len(made.claims.held) == 2
 
 

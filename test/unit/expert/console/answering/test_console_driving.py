@@ -1,6 +1,7 @@
 """Driving through the console: what is said is checked, what is late stops the hand, one page has
 the wheel.
 """
+
 import json
 
 import console_case
@@ -20,8 +21,15 @@ from smach_oracle.expert.console.commands.commands import CommandError, parse
 from smach_oracle.expert.console.web.audit import Person
 
 DRIVE = {
-    'do': 'drive', 'question': 'q', 'held': True, 'frame': 'tool', 'linear': [1, 0, -0.5],
-    'angular': [0, 0, 0], 'gripper': '', 'sent': 12.5, 'arm': 'right'
+    'do': 'drive',
+    'question': 'q',
+    'held': True,
+    'frame': 'tool',
+    'linear': [1, 0, -0.5],
+    'angular': [0, 0, 0],
+    'gripper': '',
+    'sent': 12.5,
+    'arm': 'right',
 }
 
 
@@ -31,18 +39,43 @@ def text(**fields):
 
 def test_a_driving_command_is_taken_apart():
     info = parse(text(**DRIVE)).arguments
-    assert (info['held'], info['linear'], info['sent'], info['arm']) == (True, (1.0, 0.0, -0.5),
-                                                                         12.5, 'right')
+    assert (info['held'], info['linear'], info['sent'], info['arm']) == (
+        True,
+        (1.0, 0.0, -0.5),
+        12.5,
+        'right',
+    )
 
 
 @pytest.mark.parametrize(
     'wrong',
-    [{'held': 1}, {'held': 'true'}, {'held': None}, {'frame': 'map'}, {'frame': 'base_footprint'},
-     {'frame': ['tool']}, {'linear': [2, 0, 0]}, {'linear': [0, 0]}, {'linear': [0, 0, 0, 0]},
-     {'linear': [True, 0, 0]}, {'linear': ['1', 0, 0]}, {'linear': {'x': 1}}, {'linear': None},
-     {'angular': [0, 0, -1.01]}, {'gripper': 0.05}, {'gripper': 'crush'}, {'sent': -1},
-     {'sent': '0'}, {'sent': 1e13}, {'arm': 3}, {'arm': 'x' * 101}, {'operator': 'bob'},
-     {'topic': '/cmd_vel'}, {'gripper_effort': 500}])
+    [
+        {'held': 1},
+        {'held': 'true'},
+        {'held': None},
+        {'frame': 'map'},
+        {'frame': 'base_footprint'},
+        {'frame': ['tool']},
+        {'linear': [2, 0, 0]},
+        {'linear': [0, 0]},
+        {'linear': [0, 0, 0, 0]},
+        {'linear': [True, 0, 0]},
+        {'linear': ['1', 0, 0]},
+        {'linear': {'x': 1}},
+        {'linear': None},
+        {'angular': [0, 0, -1.01]},
+        {'gripper': 0.05},
+        {'gripper': 'crush'},
+        {'sent': -1},
+        {'sent': '0'},
+        {'sent': 1e13},
+        {'arm': 3},
+        {'arm': 'x' * 101},
+        {'operator': 'bob'},
+        {'topic': '/cmd_vel'},
+        {'gripper_effort': 500},
+    ],
+)
 def test_anything_else_is_refused(wrong):
     with pytest.raises(CommandError):
         parse(text(**dict(DRIVE, **wrong)))
@@ -102,16 +135,17 @@ def test_a_camera_s_axes_are_right_down_forward():
 
 
 class TestDriving(console_case.ConsoleCase):
-
     @tornado.testing.gen_test
     async def test_it_needs_the_role_and_the_wheel(self):
         page = await self.open_page(*await self.signed('operator'))
         for command in (DRIVE, {'do': 'take_wheel', 'question': 'q'}):
             reply = await self.say(page, 2, **command)
-            assert (reply['ok'],
-                    reply['message']) == (False,
-                                          'operators may not {} (sign in as teleoperator)'.format(
-                                              command['do'].replace('_', ' ')))
+            assert (reply['ok'], reply['message']) == (
+                False,
+                'operators may not {} (sign in as teleoperator)'.format(
+                    command['do'].replace('_', ' ')
+                ),
+            )
         page = await self.open_page(*await self.signed('teleoperator'))
         assert (await self.say(page, 2, **DRIVE))['message'] == 'Take the wheel first.'
         assert self.teleoperation.relayed == []

@@ -1,4 +1,5 @@
 """What is too old for an answer, and what the pages are told of it."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -59,9 +60,14 @@ def test_nothing_is_refused_while_all_are_heard(everybody):
     assert refusal(everybody, seen=NOW_S - 5.0) == ''
 
 
-@pytest.mark.parametrize('who, told', [('master_s', 'The ROS master has been silent for 7 s'),
-                                       ('server_s', '/robot/expert_query has been silent for 7 s'),
-                                       ('node_s', '/robot has been silent for 7 s')])
+@pytest.mark.parametrize(
+    'who, told',
+    [
+        ('master_s', 'The ROS master has been silent for 7 s'),
+        ('server_s', '/robot/expert_query has been silent for 7 s'),
+        ('node_s', '/robot has been silent for 7 s'),
+    ],
+)
 def test_an_answer_to_who_is_silent_is_refused_with_the_reason(everybody, who, told):
     setattr(everybody, who, NOW_S - 7.0)
     assert refusal(everybody).startswith(told)
@@ -88,8 +94,11 @@ def test_the_pages_are_told_the_ages_and_a_beat(everybody):
     sections = PageSections()
     made_of(everybody, {'/other': ['/a', '/b']}).write_sections(sections)
     assert sections.get('heard') == {
-        'beat': NOW_S, 'master': 2.0, 'servers': {'/robot/expert_query': 0.0},
-        'robots': {'/robot': None, '/other': None}}
+        'beat': NOW_S,
+        'master': 2.0,
+        'servers': {'/robot/expert_query': 0.0},
+        'robots': {'/robot': None, '/other': None},
+    }
     assert everybody.followed == {'/robot', '/a', '/b'}
 
 

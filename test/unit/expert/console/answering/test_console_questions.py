@@ -1,4 +1,5 @@
 """What the page is told of questions; what values that people type become."""
+
 import json
 import math
 
@@ -23,22 +24,32 @@ from smach_oracle.ros.userdata_codec import decode_all
 
 def goal(**changes):
     import rospy
+
     return to_goal(make_question(**changes), '/robot', rospy.Time(1))
 
 
 def view(**changes):
-    listed = ListedQuestion('/robot/expert_query', goal(**changes), OpenQuery.CLAIMED, 'ann', 10.0,
-                    math.inf)
+    listed = ListedQuestion(
+        '/robot/expert_query', goal(**changes), OpenQuery.CLAIMED, 'ann', 10.0, math.inf
+    )
     return question_view(
-        listed, 1000.0, lambda target: RecoveryCounts(2, 3)
-        if target == 'DETECT' else RecoveryCounts(0, 0))
+        listed,
+        1000.0,
+        lambda target: RecoveryCounts(2, 3) if target == 'DETECT' else RecoveryCounts(0, 0),
+    )
 
 
 def test_a_question_is_told_whole():
     shown = view()
     assert json.loads(json.dumps(shown, allow_nan=False)) == shown
-    assert (shown['key'], shown['state'], shown['asked'], shown['deadline'], shown['holder'],
-            shown['status']) == ('/robot/expert_query q1', 'PICK', 1010.0, None, 'ann', 'claimed')
+    assert (
+        shown['key'],
+        shown['state'],
+        shown['asked'],
+        shown['deadline'],
+        shown['holder'],
+        shown['status'],
+    ) == ('/robot/expert_query q1', 'PICK', 1010.0, None, 'ann', 'claimed')
     detect, pick, place = shown['choices']
     assert detect['helped'] == [2, 3] and pick['missing'] == ['grasp'] and place['blocked']
     assert pick['preconditions'] == ['MOVE_ARMS_ASIDE', 'view_is_clear']
@@ -48,8 +59,9 @@ def test_a_question_is_told_whole():
 
 
 def test_a_question_says_what_would_come_again_and_that_nothing_failed():
-    choices = (StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT'),
-                           runs_again=('LEFT',)),)
+    choices = (
+        StateChoice('POUR', 0.9, 1, 1, (), (), repeats=('POUR', 'ARM/CUT'), runs_again=('LEFT',)),
+    )
     held_back = view(failure_kind=FailureKind.HELD_BACK, choices=choices)
     assert held_back['choices'][0]['repeats'] == ['POUR', 'ARM/CUT']
     assert held_back['choices'][0]['runs_again'] == ['LEFT']
@@ -65,17 +77,30 @@ class FakeFrontEnd:
         self.asked = {}
 
     def questions(self):
-        return sorted((ListedQuestion('/robot/expert_query', goal(query_id=name), OpenQuery.PENDING,
-                                      '', asked_s, math.inf)
-                       for name, asked_s in self.asked.items()), key=lambda listed: listed.asked_s)
+        return sorted(
+            (
+                ListedQuestion(
+                    '/robot/expert_query',
+                    goal(query_id=name),
+                    OpenQuery.PENDING,
+                    '',
+                    asked_s,
+                    math.inf,
+                )
+                for name, asked_s in self.asked.items()
+            ),
+            key=lambda listed: listed.asked_s,
+        )
 
 
 def test_questions_of_one_second_keep_their_places_though_each_list_tells_their_ages_anew():
     front_end, sections = FakeFrontEnd(), PageSections()
     board = QuestionSections(front_end, TrialLog())
-    for front_end.asked in ({'q1': 10.0,
-                             'q2': 10.1}, {'q1': 10.2,
-                                           'q2': 10.1}, {'q1': 10.2, 'q2': 9.9, 'q3': 9.0}):
+    for front_end.asked in (
+        {'q1': 10.0, 'q2': 10.1},
+        {'q1': 10.2, 'q2': 10.1},
+        {'q1': 10.2, 'q2': 9.9, 'q3': 9.0},
+    ):
         board.write_sections(sections)
         shown = [
             view['key'].split()[1] for view in json.loads(dict(sections.since(0)[1])['questions'])
@@ -99,9 +124,14 @@ def test_userdata_is_shown_by_kind():
     point.header.frame_id = 'base_link'
     shown = {
         item['key']: item
-        for item in view(userdata={
-            'plain': {'a': 1}, 'point': point, 'points': [point, point], 'image': object()
-        })['userdata']
+        for item in view(
+            userdata={
+                'plain': {'a': 1},
+                'point': point,
+                'points': [point, point],
+                'image': object(),
+            }
+        )['userdata']
     }
     assert shown['plain']['value'] == '{"a": 1}' and shown['image']['note'] == 'not sent'
     assert 'frame_id: "base_link"' in shown['point']['value']
@@ -117,19 +147,33 @@ def test_markup_and_odd_numbers_are_data_like_any_other():
 def test_typed_values_become_userdata_messages_among_them():
     asked = goal(userdata={'point': PointStamped(), 'points': [PointStamped()]})
     decoded = decode_all(
-        items([
-            TypedOutput('a', [1, None], ''),
-            TypedOutput('b', {'point': {'x': 1.5}}, 'geometry_msgs/PointStamped'),
-            TypedOutput('c', [{}, {}], 'geometry_msgs/PointStamped[]')
-        ], asked))
+        items(
+            [
+                TypedOutput('a', [1, None], ''),
+                TypedOutput('b', {'point': {'x': 1.5}}, 'geometry_msgs/PointStamped'),
+                TypedOutput('c', [{}, {}], 'geometry_msgs/PointStamped[]'),
+            ],
+            asked,
+        )
+    )
     assert decoded['a'] == [1, None] and decoded['b'].point.x == 1.5 and len(decoded['c']) == 2
 
 
-@pytest.mark.parametrize('value, kind', [
-    ({}, 'std_msgs/String'), ({}, 'os/path'), ({'nothing': 1}, 'geometry_msgs/PointStamped'),
-    (5, 'geometry_msgs/PointStamped'), ({'point': {'x': 'text'}}, 'geometry_msgs/PointStamped'),
-    ([], 'geometry_msgs/PointStamped[]'), ({}, 'geometry_msgs/PointStamped[]')])
+@pytest.mark.parametrize(
+    'value, kind',
+    [
+        ({}, 'std_msgs/String'),
+        ({}, 'os/path'),
+        ({'nothing': 1}, 'geometry_msgs/PointStamped'),
+        (5, 'geometry_msgs/PointStamped'),
+        ({'point': {'x': 'text'}}, 'geometry_msgs/PointStamped'),
+        ([], 'geometry_msgs/PointStamped[]'),
+        ({}, 'geometry_msgs/PointStamped[]'),
+    ],
+)
 def test_a_value_that_fits_no_message_of_the_question_is_refused(value, kind):
     with pytest.raises(OutputError, match='output a'):
-        items([TypedOutput('a', value, kind)],
-              goal(userdata={'point': PointStamped(), 'points': [PointStamped()]}))
+        items(
+            [TypedOutput('a', value, kind)],
+            goal(userdata={'point': PointStamped(), 'points': [PointStamped()]}),
+        )

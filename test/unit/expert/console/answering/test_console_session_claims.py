@@ -1,6 +1,7 @@
 """A claim belongs to one browser: another one of the same name neither shares it nor answers by
 it.
 """
+
 import pytest
 import rospy
 from expert_fixtures import make_question
@@ -33,8 +34,13 @@ class Robot:
 
     def listed(self):
         found = self.questions.listing()
-        return ListedQuestion('/server', found[0].query, found[0].status, found[0].claimed_by, 0.0,
-                              1e9) if found else None
+        return (
+            ListedQuestion(
+                '/server', found[0].query, found[0].status, found[0].claimed_by, 0.0, 1e9
+            )
+            if found
+            else None
+        )
 
     def find(self, key):
         return self.listed()
@@ -50,7 +56,6 @@ class Robot:
 
 
 class Silent:
-
     def record(self, *_):
         """Nobody listens."""
 
@@ -69,15 +74,23 @@ def give(console, command, person, page=1, **arguments):
 
 
 def answer(console, person):
-    return give(console, 'answer', person, kind='goto', name='PICK', container='', outputs=[],
-                why='', seen=None)
+    return give(
+        console,
+        'answer',
+        person,
+        kind='goto',
+        name='PICK',
+        container='',
+        outputs=[],
+        why='',
+        seen=None,
+    )
 
 
 def test_two_people_of_one_name_do_not_hold_one_claim(console):
     assert give(console, 'claim', DESK).ok
     refused = give(console, 'claim', PHONE, 2)
-    assert (refused.ok, refused.message) == (
-        False, 'ann works on this question in another browser')
+    assert (refused.ok, refused.message) == (False, 'ann works on this question in another browser')
     made, robot = console
     assert made.sessions.session_of(robot.listed()) == 'desk'
 
@@ -88,7 +101,9 @@ def test_an_answer_needs_the_claim_of_the_very_browser(console):
     for person in (PHONE, BOB):
         refused = answer(console, person)
         assert (refused.ok, refused.message) == (
-            False, 'ann works on this question; take it over first')
+            False,
+            'ann works on this question; take it over first',
+        )
     assert answer(console, DESK).ok
     assert console[1].listed() is None, 'it is settled'
 
@@ -115,8 +130,11 @@ def test_who_does_not_hold_it_gives_nothing_back(console):
 def test_a_claim_that_has_run_out_is_none(console, monkeypatch):
     assert give(console, 'claim', DESK).ok
     made, robot = console
-    monkeypatch.setattr(robot, 'listed', lambda: ListedQuestion(
-        '/server', ExpertQueryGoal(query_id='q'), 1, '', 0.0, 1e9))
+    monkeypatch.setattr(
+        robot,
+        'listed',
+        lambda: ListedQuestion('/server', ExpertQueryGoal(query_id='q'), 1, '', 0.0, 1e9),
+    )
     made._front_end.find = lambda key: robot.listed()
     assert made.sessions.holds(DESK, robot.listed()), 'its server may not have told of it yet'
     later_s = session_claims.time.monotonic() + session_claims.TOLD_WITHIN_S

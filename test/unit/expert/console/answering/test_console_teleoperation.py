@@ -1,6 +1,7 @@
 """A hand as the console drives it: arms, frames, and no more commands than a world in lock-step can
 take.
 """
+
 import time
 
 import pytest
@@ -16,13 +17,17 @@ from smach_oracle.msg import TeleopState
 
 ARMS = {'left': {'tool': 'l_tool'}, 'right': {'tool': 'r_tool'}}
 SAID = {
-    'question': 'q', 'held': True, 'frame': 'tool', 'linear': (1.0, 0.0, 0.0),
-    'angular': (0.0, 0.0, 0.0), 'gripper': '', 'arm': ''
+    'question': 'q',
+    'held': True,
+    'frame': 'tool',
+    'linear': (1.0, 0.0, 0.0),
+    'angular': (0.0, 0.0, 0.0),
+    'gripper': '',
+    'arm': '',
 }
 
 
 class FakePublisher:
-
     made = None  # the last
 
     def __init__(self, *_, **__):
@@ -32,13 +37,11 @@ class FakePublisher:
 
 
 class Silent:
-
     def record(self, *_):
         """Nobody listens."""
 
 
 class NoQuestions:
-
     def questions(self):
         return []
 
@@ -49,9 +52,12 @@ class NoQuestions:
 @pytest.fixture(name='make')
 def make_hands(monkeypatch):
     """Hands with one of two arms, at the wheel of which is page 1."""
+
     def make(**parameters):
-        known = dict({'/hand/arms': ARMS, '/hand/camera_frame': 'eye'},
-                     **{'/hand/' + name: value for name, value in parameters.items()})
+        known = dict(
+            {'/hand/arms': ARMS, '/hand/camera_frame': 'eye'},
+            **{'/hand/' + name: value for name, value in parameters.items()},
+        )
         monkeypatch.setattr(rospy, 'get_param', lambda name, default=None: known.get(name, default))
         monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
         monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
@@ -61,8 +67,10 @@ def make_hands(monkeypatch):
         client = made._clients['q'] = teleop_client.TeleopClient('/hand')
         client.state = TeleopState(arm='right')
         client.control.take(
-            DrivingSession('q', 1, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0)
+            DrivingSession('q', 1, Person('', '', 'teleoperator', 'ann'), None, 0.0), 0.0
+        )
         return made, client, FakePublisher.made.sent
+
     return make
 
 
@@ -76,7 +84,9 @@ def test_the_arm_is_the_interface_s_own_choice_until_another_is_named(make):
     made, _, sent = make()
     assert drive(made).ok and drive(made, arm='left').ok
     assert [(each.arm, each.header.frame_id, each.dead_man) for each in sent] == [
-        ('right', 'r_tool', True), ('left', 'l_tool', True)]
+        ('right', 'r_tool', True),
+        ('left', 'l_tool', True),
+    ]
 
 
 @pytest.mark.parametrize('parameters, gap', [({}, GRIPPER_OPEN), ({'gripper_open': 0.07}, 0.07)])
@@ -94,8 +104,9 @@ def test_an_arm_that_is_not_there_stops_the_hand(make):
 
 
 def stop(made, page=9):
-    return made.stop(PageCommand(1, 'stop_hand', {'question': 'q'}),
-                     Person('', '', 'viewer', 'vera'), page)
+    return made.stop(
+        PageCommand(1, 'stop_hand', {'question': 'q'}), Person('', '', 'viewer', 'vera'), page
+    )
 
 
 def test_whoever_sees_a_hand_stops_it_and_its_driver_has_lost_the_wheel(make):
@@ -112,8 +123,9 @@ def test_the_record_of_the_driver_says_who_has_stopped_the_hand(make, monkeypatc
     told = []
     monkeypatch.setattr(Silent, 'record', lambda _, *facts: told.append(facts))
     made, _, _ = make()
-    made.stop(PageCommand(1, 'stop_hand', {'question': 'q'}),
-              Person('10.0.0.7', 's', 'viewer', name), 9)
+    made.stop(
+        PageCommand(1, 'stop_hand', {'question': 'q'}), Person('10.0.0.7', 's', 'viewer', name), 9
+    )
     assert told[0][1] == 'leave_wheel' and told[0][3] == who + ' has stopped the hand'
 
 
@@ -137,7 +149,8 @@ def test_another_page_drives_nothing(make):
 
 
 def test_a_world_in_lock_step_gets_the_next_command_when_it_has_carried_out_the_last(
-        make, monkeypatch):
+    make, monkeypatch
+):
     made, client, sent = make(lock_step=True)
     for _ in range(5):
         drive(made)
@@ -146,8 +159,9 @@ def test_a_world_in_lock_step_gets_the_next_command_when_it_has_carried_out_the_
     drive(made)
     drive(made)
     drive(made, held=False)
-    assert [(each.seq, each.dead_man) for each in sent] == [(1, True), (2, True),
-                                                            (3, False)], 'a release never waits'
+    assert [(each.seq, each.dead_man) for each in sent] == [(1, True), (2, True), (3, False)], (
+        'a release never waits'
+    )
     later_s = time.monotonic() + teleop_client.ANSWER_S
     monkeypatch.setattr(time, 'monotonic', lambda: later_s)
     drive(made)
@@ -177,8 +191,11 @@ def test_settings_that_are_none_take_nobody_else_s_hand_away(make, monkeypatch):
     made, client, _ = make()
     monkeypatch.setattr(rospy, 'logerr_throttle', lambda *_: None)
     known = rospy.get_param
-    monkeypatch.setattr(rospy, 'get_param', lambda name, default=None: (
-        'no arms' if name == '/evil/arms' else known(name, default)))
+    monkeypatch.setattr(
+        rospy,
+        'get_param',
+        lambda name, default=None: 'no arms' if name == '/evil/arms' else known(name, default),
+    )
     made._begin('e', '/evil')
     made._begin('r', '/hand')
     assert sorted(made._clients) == ['q', 'r'] and made._clients['q'] is client

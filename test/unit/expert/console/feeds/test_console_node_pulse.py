@@ -1,4 +1,5 @@
 """Nodes are asked whether they live; one that hangs holds up no other."""
+
 import threading
 
 import pytest
@@ -24,6 +25,7 @@ class Nodes:
                 self.go_on.wait(20.0)
             if node in self.dead:
                 raise ConnectionRefusedError(node)
+
         link = type('Link', (), {})()
         link.ask = ask
         return link
@@ -73,7 +75,6 @@ def test_its_address_is_looked_up_again_once_it_does_not_answer(monkeypatch):
     uris, asked = iter(['http://old', 'http://new']), []
 
     class Proxy:
-
         def __init__(self, uri):
             self._uri = uri
 
@@ -84,6 +85,7 @@ def test_its_address_is_looked_up_again_once_it_does_not_answer(monkeypatch):
 
         def lookupNode(self, caller, node):
             return 1, '', next(uris)
+
     monkeypatch.setattr(node_pulse, '_proxy', Proxy)
     link = node_pulse.NodeLink('/robot')
     link.ask()
@@ -95,12 +97,12 @@ def test_its_address_is_looked_up_again_once_it_does_not_answer(monkeypatch):
 
 def test_a_node_that_the_master_does_not_know_is_none(monkeypatch):
     class Proxy:
-
         def __init__(self, uri):
             pass
 
         def lookupNode(self, caller, node):
             return -1, 'unknown node', ''
+
     monkeypatch.setattr(node_pulse, '_proxy', Proxy)
     with pytest.raises(node_pulse.NodeUnknownError, match='unknown node'):
         node_pulse.NodeLink('/robot').ask()

@@ -1,4 +1,5 @@
 """Machines that are down are changed as pages command: by the code of oracle_state, and logged."""
+
 import json
 import threading
 
@@ -36,9 +37,17 @@ class Down:
 
     @staticmethod
     def moment():
-        return NewMoment(7.0, 1, 'STATE_START', 'TASK', 'PICK', tuple(
-            Fact('TASK', name, Codecs().encode(value)) for name, value in (
-                ('at', ['PICK', 'in']), ('key:cups', 2))))
+        return NewMoment(
+            7.0,
+            1,
+            'STATE_START',
+            'TASK',
+            'PICK',
+            tuple(
+                Fact('TASK', name, Codecs().encode(value))
+                for name, value in (('at', ['PICK', 'in']), ('key:cups', 2))
+            ),
+        )
 
     def record(self, person, command, ok, message, arguments=None):
         self.records.append((person.expert, command, ok, message))
@@ -91,14 +100,17 @@ def test_a_dropped_trial_is_down_no_longer(down):
     assert [what for _, what in down.log()] == ['trial 1: dropped']
 
 
-@pytest.mark.parametrize('name, arguments, why', [
-    ('goto_stored', {'label': 'WASH'}, "there is no state 'WASH'; there are PICK, PLACE"),
-    ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': 'cup'}, "'cup' is no JSON"),
-    ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': '[' * 30000}, 'is no JSON'),
-    ('edit_stored', {'container': 'IN', 'key': 'cups', 'json': '1'}, "no container 'IN'"),
-    ('drop_stored', {'down': '/etc/passwd#1'}, 'There is no machine /etc/passwd#1 here'),
-    ('drop_stored', {'moment': 9}, 'look at it again'),
-])
+@pytest.mark.parametrize(
+    'name, arguments, why',
+    [
+        ('goto_stored', {'label': 'WASH'}, "there is no state 'WASH'; there are PICK, PLACE"),
+        ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': 'cup'}, "'cup' is no JSON"),
+        ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': '[' * 30000}, 'is no JSON'),
+        ('edit_stored', {'container': 'IN', 'key': 'cups', 'json': '1'}, "no container 'IN'"),
+        ('drop_stored', {'down': '/etc/passwd#1'}, 'There is no machine /etc/passwd#1 here'),
+        ('drop_stored', {'moment': 9}, 'look at it again'),
+    ],
+)
 def test_anything_else_is_refused_with_the_reason(down, name, arguments, why):
     reply = down.do(name, **arguments)
     assert not reply.ok
@@ -107,9 +119,14 @@ def test_anything_else_is_refused_with_the_reason(down, name, arguments, why):
     assert down.records == [('ann', name, False, reply.message)]
 
 
-@pytest.mark.parametrize('name, more', [
-    ('goto_stored', {'label': 'PLACE'}), ('drop_stored', {}),
-    ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': '3'})])
+@pytest.mark.parametrize(
+    'name, more',
+    [
+        ('goto_stored', {'label': 'PLACE'}),
+        ('drop_stored', {}),
+        ('edit_stored', {'container': 'TASK', 'key': 'cups', 'json': '3'}),
+    ],
+)
 def test_what_a_program_holds_is_not_changed(down, name, more):
     lock = MachineLock(down.path, 'TASK')
     lock.take()

@@ -1,4 +1,5 @@
 """Machines that are down, as the console reads them in stores."""
+
 import os
 
 import pytest
@@ -14,8 +15,14 @@ from smach_oracle.store.store_file import NewTrial, StoreFile
 
 
 def moment(at, *facts):
-    return NewMoment(at, int(at), 'STATE_START', 'TASK', 'PICK', tuple(
-        Fact('TASK', name, Codecs().encode(value)) for name, value in facts))
+    return NewMoment(
+        at,
+        int(at),
+        'STATE_START',
+        'TASK',
+        'PICK',
+        tuple(Fact('TASK', name, Codecs().encode(value)) for name, value in facts),
+    )
 
 
 @pytest.fixture
@@ -40,7 +47,7 @@ def down(machines, sections):
 
 def test_a_stopped_machine_is_told_with_all_that_is_stored(path, store):
     sections = PageSections()
-    row, = down(DownMachines([path], sections), sections)
+    (row,) = down(DownMachines([path], sections), sections)
     assert (row['machine'], row['since'], row['problem']) == ('TASK', 7.0, '')
     assert row['stood'] == ['TASK/PICK was under way']
     assert row['userdata'] == [['TASK', 'cup', '"<b>red</b>"']]
@@ -70,8 +77,10 @@ def test_what_is_stored_later_is_seen_and_an_ended_trial_is_not_down(path, store
 def test_a_store_that_cannot_be_read_is_told(path, store, tmp_path):
     (tmp_path / 'notes.txt').write_text('These are my notes, and no store of a machine. ' * 20)
     sections = PageSections()
-    rows = down(DownMachines([str(tmp_path / 'none.db'), str(tmp_path / 'notes.txt'), path],
-                             sections), sections)
+    rows = down(
+        DownMachines([str(tmp_path / 'none.db'), str(tmp_path / 'notes.txt'), path], sections),
+        sections,
+    )
     assert [bool(row['problem']) for row in rows] == [True, True, False]
     assert 'there is no such store' in rows[0]['problem']
     assert 'is damaged, or no store' in rows[1]['problem']

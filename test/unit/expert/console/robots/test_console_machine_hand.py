@@ -1,4 +1,5 @@
 """Machines are held as pages command: stops wait for nothing, and what goes on must be heard."""
+
 import asyncio
 import threading
 
@@ -39,8 +40,13 @@ class Held:
     def __init__(self):
         self.calls, self.records, self.called = Calls(), [], []
         self.silent = ''
-        self.hand = MachineHand(lambda: {'/alpha': ['TASK', 'TASK/IN']}, self,
-                                lambda robot, seen: self.silent, self.calls, self.call)
+        self.hand = MachineHand(
+            lambda: {'/alpha': ['TASK', 'TASK/IN']},
+            self,
+            lambda robot, seen: self.silent,
+            self.calls,
+            self.call,
+        )
 
     def record(self, person, command, ok, message, arguments=None):
         self.records.append((person.expert, command, ok))
@@ -51,16 +57,27 @@ class Held:
 
     def stop(self, *paths, robot='/alpha', person=NOBODY):
         """Replies to stops that are sent one right after the other."""
+
         async def all_of_them():
-            return await asyncio.gather(*(self.hand.stop(
-                PageCommand(1, 'stop_machine', {'robot': robot, 'path': path}), person)
-                for path in paths))
+            return await asyncio.gather(
+                *(
+                    self.hand.stop(
+                        PageCommand(1, 'stop_machine', {'robot': robot, 'path': path}), person
+                    )
+                    for path in paths
+                )
+            )
+
         return asyncio.run(all_of_them())
 
     def start(self, name='resume_machine', **arguments):
         return self.hand.carry_out(
-            PageCommand(1, name, dict({'robot': '/alpha', 'path': 'TASK', 'seen': 1.0},
-                                      **arguments)), ANN, 1)
+            PageCommand(
+                1, name, dict({'robot': '/alpha', 'path': 'TASK', 'seen': 1.0}, **arguments)
+            ),
+            ANN,
+            1,
+        )
 
 
 @pytest.fixture(name='held')
@@ -71,7 +88,7 @@ def make_held():
 def test_a_stop_needs_no_name_and_no_robot_that_is_heard(held):
     held.silent = 'silent'
     held.calls.free.set()
-    reply, = held.stop('TASK')
+    (reply,) = held.stop('TASK')
     assert (reply.ok, reply.message) == (True, 'it is asked to stop')
     assert held.calls.asked == [('/alpha/oracle/preempt', 'TASK', 'somebody at ::1')]
     assert held.records == [('', 'stop_machine', True)]
@@ -137,7 +154,6 @@ class Direct(Proxy):
 
 class Master:
     address = 'rosrpc://here:1'
-
 
     def lookupService(self, service):
         if service != '/alpha/oracle/preempt':

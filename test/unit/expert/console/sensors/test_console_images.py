@@ -1,6 +1,7 @@
 """Images, clouds and joints as a browser gets them: what is shown, and what a hostile or broken
 message does.
 """
+
 import struct
 
 import cv2
@@ -49,8 +50,9 @@ def test_depth_tells_its_range_and_shows_near_in_red_and_far_in_blue():
     depth[:, :20], depth[:5] = 0.5, np.nan
     encoded = encode_image(depth_image(depth, HEADER), 320)
     assert encoded.content_type == 'image/png' and encoded.facts['range'] == [0.5, 3.0]
-    near, far, nothing = (shown(encoded)[row, column].astype(int)
-                          for row, column in ((20, 5), (20, 50), (2, 30)))
+    near, far, nothing = (
+        shown(encoded)[row, column].astype(int) for row, column in ((20, 5), (20, 50), (2, 30))
+    )
     assert near[0] > near[2] + 50 and far[2] > far[0] + 50 and set(nothing) == {40}
 
 
@@ -64,20 +66,26 @@ def test_a_depth_image_without_any_depth_is_shown_all_the_same():
 def test_a_compressed_image_is_made_anew_and_not_passed_on(suffix):
     data = bytes(cv2.imencode(suffix, blue()[:, :, ::-1].copy())[1]) + b'<script>'
     encoded = encode_image(CompressedImage(format='jpeg', data=data), 640)
-    assert np.abs(shown(encoded).astype(int) -
-                  blue()).max() < 10 and b'<script>' not in encoded.body
+    assert (
+        np.abs(shown(encoded).astype(int) - blue()).max() < 10 and b'<script>' not in encoded.body
+    )
 
 
-@pytest.mark.parametrize('kind, header, stored, metres',
-                         [('16UC1; compressedDepth', (0, 0.0, 0.0), 1500, 1.5),
-                          ('32FC1; compressedDepth png', (0, 100.0, 50.0), 100, 2.0)])
+@pytest.mark.parametrize(
+    'kind, header, stored, metres',
+    [
+        ('16UC1; compressedDepth', (0, 0.0, 0.0), 1500, 1.5),
+        ('32FC1; compressedDepth png', (0, 100.0, 50.0), 100, 2.0),
+    ],
+)
 def test_compressed_depth_is_unpacked(kind, header, stored, metres):
     values = np.full((10, 12), stored, np.uint16)
     values[0] = 0
     data = struct.pack('<iff', *header) + bytes(cv2.imencode('.png', values)[1])
     encoded = encode_image(CompressedImage(format=kind, data=data), 640)
     assert encoded.facts['kind'] == 'depth' and encoded.facts['range'] == pytest.approx(
-        [metres, metres])
+        [metres, metres]
+    )
 
 
 def test_a_bayer_mosaic_is_shown_in_colours():
@@ -94,18 +102,21 @@ def huge_png():
     return data[:16] + struct.pack('>II', 40000, 40000) + data[24:]
 
 
-@pytest.mark.parametrize('message', [
-    Image(),
-    Image(height=2**30, width=2**30, encoding='rgb8', step=3, data=b'xxx'),
-    Image(height=2, width=2, encoding='rgb8', step=6, data=b'short'),
-    Image(height=2, width=2, encoding='<b>', step=6, data=b'x' * 12),
-    CompressedImage(),
-    CompressedImage(format='png', data=b'GIF89a'),
-    CompressedImage(format='png', data=huge_png()),
-    CompressedImage(format='compressedDepth', data=b'x'),
-    CompressedImage(format='compressedDepth', data=b'x' * 40),
-    CompressedImage(format='jpeg', data=bytes(MOST_BYTES + 1))
-])
+@pytest.mark.parametrize(
+    'message',
+    [
+        Image(),
+        Image(height=2**30, width=2**30, encoding='rgb8', step=3, data=b'xxx'),
+        Image(height=2, width=2, encoding='rgb8', step=6, data=b'short'),
+        Image(height=2, width=2, encoding='<b>', step=6, data=b'x' * 12),
+        CompressedImage(),
+        CompressedImage(format='png', data=b'GIF89a'),
+        CompressedImage(format='png', data=huge_png()),
+        CompressedImage(format='compressedDepth', data=b'x'),
+        CompressedImage(format='compressedDepth', data=b'x' * 40),
+        CompressedImage(format='jpeg', data=bytes(MOST_BYTES + 1)),
+    ],
+)
 def test_what_is_no_image_is_refused_with_a_reason(message):
     with pytest.raises(ImageError) as error:
         encode_image(message, 640)
@@ -115,8 +126,10 @@ def test_what_is_no_image_is_refused_with_a_reason(message):
 def unpacked(encoded):
     count, data = encoded.facts['count'], encoded.body
     places = np.frombuffer(data, '<u2', 3 * count).reshape(count, 3) / 65535.0
-    return (places * encoded.facts['scale'] + encoded.facts['offset'],
-            np.frombuffer(data, np.uint8, 3 * count, 6 * count).reshape(count, 3))
+    return (
+        places * encoded.facts['scale'] + encoded.facts['offset'],
+        np.frombuffer(data, np.uint8, 3 * count, 6 * count).reshape(count, 3),
+    )
 
 
 def test_a_cloud_comes_back_as_it_was_with_its_colours():
@@ -130,8 +143,11 @@ def test_a_large_organised_cloud_is_thinned_and_its_holes_are_left_out():
     points = np.random.default_rng(3).uniform(-1, 1, (480, 640, 3))
     points[::2] = np.nan
     encoded = encode_cloud(cloud_message(points, HEADER))
-    assert encoded.facts['count'] == 20000 and encoded.facts['of'] == 480 * 640 and len(
-        encoded.body) == 9 * 20000
+    assert (
+        encoded.facts['count'] == 20000
+        and encoded.facts['of'] == 480 * 640
+        and len(encoded.body) == 9 * 20000
+    )
     assert np.isfinite(unpacked(encoded)[0]).all()
 
 
@@ -154,15 +170,25 @@ def lying(**fields):
     return message
 
 
-@pytest.mark.parametrize('message', [
-    PointCloud2(width=1, height=1), lying(width=2 ** 31, height=2 ** 31), lying(data=b'short'),
-    lying(row_step=1), lying(point_step=2), lying(point_step=0, row_step=0), lying(fields=[])])
+@pytest.mark.parametrize(
+    'message',
+    [
+        PointCloud2(width=1, height=1),
+        lying(width=2**31, height=2**31),
+        lying(data=b'short'),
+        lying(row_step=1),
+        lying(point_step=2),
+        lying(point_step=0, row_step=0),
+        lying(fields=[]),
+    ],
+)
 def test_what_is_no_cloud_is_refused(message):
     with pytest.raises(CloudError):
         thinned(message)
 
 
 def test_joints_are_told_with_what_there_is_of_them():
-    joints = encode_joints(JointState(name=['a', 'b'], position=[1.0, float('nan')],
-                                      velocity=[2.0])).facts['joints']
+    joints = encode_joints(
+        JointState(name=['a', 'b'], position=[1.0, float('nan')], velocity=[2.0])
+    ).facts['joints']
     assert joints == [['a', 1.0, 2.0, None], ['b', None, None, None]]

@@ -1,6 +1,7 @@
 """What cameras saw when questions were put, and how preconditions stand: kept, bounded, of whom
 they are.
 """
+
 import numpy as np
 import pytest
 from expert_fixtures import make_question
@@ -37,13 +38,16 @@ def no_master(monkeypatch):
 def listed(monkeypatch, robot='/alpha', asked_s=100.0, query_id='q1', stamp_s=1):
     monkeypatch.setattr(question_images.time, 'monotonic', lambda: 100.5)
     goal = to_goal(make_question(query_id), robot, asked=question_images.rospy.Time(stamp_s))
-    return ListedQuestion(robot + '/expert_query', goal, OpenQuery.PENDING, '', asked_s,
-                          float('inf'))
+    return ListedQuestion(
+        robot + '/expert_query', goal, OpenQuery.PENDING, '', asked_s, float('inf')
+    )
 
 
 def picture(level=100, stamp_s=0.0):
-    return colour_image(np.full((48, 64, 3), level, np.uint8), Header(
-        frame_id='camera', stamp=question_images.rospy.Time.from_sec(stamp_s)))
+    return colour_image(
+        np.full((48, 64, 3), level, np.uint8),
+        Header(frame_id='camera', stamp=question_images.rospy.Time.from_sec(stamp_s)),
+    )
 
 
 def seen(*topics):
@@ -64,8 +68,9 @@ def test_the_console_takes_the_first_frame_after_the_question(monkeypatch):
     assert shown(board, question) == []
     found.on('/alpha/head/rgb/image_raw').take(picture())
     first = shown(board, question)
-    assert [(each['topic'], each['late'], each['size'])
-            for each in first] == [('/alpha/head/rgb/image_raw', 0.5, [64, 48])]
+    assert [(each['topic'], each['late'], each['size']) for each in first] == [
+        ('/alpha/head/rgb/image_raw', 0.5, [64, 48])
+    ]
     found.on('/alpha/head/rgb/image_raw').take(picture(200))
     assert shown(board, question) == first, 'one frame, and it stays'
 
@@ -104,8 +109,9 @@ def test_bytes_of_a_robot_reach_nobody_as_they_came(monkeypatch):
     evil = CompressedImage(format='jpeg', data=b'<script>window.hacked = 1</script>')
     good = compressed(picture())
     good.data = good.data + b'<script>'
-    board.taker('/alpha')(FailureFrames(query_id='q1', topics=['/evil', '/good'],
-                                        images=[evil, good]))
+    board.taker('/alpha')(
+        FailureFrames(query_id='q1', topics=['/evil', '/good'], images=[evil, good])
+    )
     question = listed(monkeypatch)
     assert [each['topic'] for each in shown(board, question)] == ['/good']
     kept = files.find(shown(board, question)[0]['id'])
@@ -126,17 +132,24 @@ def test_files_are_bounded_in_number_and_bytes(monkeypatch):
 
 def test_preconditions_are_kept_by_question_and_robot(monkeypatch):
     board, sections, question = PreconditionStatuses(), PageSections(), listed(monkeypatch)
-    checks = [PreconditionCheck('PICK', 'free', PreconditionCheck.HOLDS, 'yes', 2.0),
-              PreconditionCheck('PICK', 'door', PreconditionCheck.UNKNOWN, '', -1.0)]
+    checks = [
+        PreconditionCheck('PICK', 'free', PreconditionCheck.HOLDS, 'yes', 2.0),
+        PreconditionCheck('PICK', 'door', PreconditionCheck.UNKNOWN, '', -1.0),
+    ]
     monkeypatch.setattr(precondition_sections.time, 'time', lambda: 1000.0)
     board.taker('/beta')(PreconditionChecks(query_id='q1', checks=checks))
     board.write_sections(sections, [question])
     assert sections.get('preconditions') == {}
     board.taker('/alpha')(PreconditionChecks(query_id='q1', checks=checks))
     board.write_sections(sections, [question])
-    assert sections.get('preconditions') == {question.key: {'PICK': [
-        {'name': 'free', 'holds': True, 'text': 'yes', 'checked': 998.0},
-        {'name': 'door', 'holds': None, 'text': '', 'checked': None}]}}
+    assert sections.get('preconditions') == {
+        question.key: {
+            'PICK': [
+                {'name': 'free', 'holds': True, 'text': 'yes', 'checked': 998.0},
+                {'name': 'door', 'holds': None, 'text': '', 'checked': None},
+            ]
+        }
+    }
 
 
 def test_an_image_is_as_late_as_its_stamp_says_not_as_it_came(monkeypatch):
@@ -160,8 +173,9 @@ def test_an_image_without_a_stamp_says_when_it_came(monkeypatch):
 
 
 @pytest.mark.parametrize('before_s, late', [(0.4, None), (7.0, -7.0)])
-def test_the_robot_s_own_image_is_of_the_failure_where_its_stamp_says_so(monkeypatch, before_s,
-                                                                         late):
+def test_the_robot_s_own_image_is_of_the_failure_where_its_stamp_says_so(
+    monkeypatch, before_s, late
+):
     board, question = QuestionImages(ImageStore(), seen()), listed(monkeypatch, stamp_s=9000)
     image = compressed(picture(stamp_s=9000.0 - before_s))
     board.taker('/alpha')(FailureFrames(query_id='q1', topics=['/wrist'], images=[image]))

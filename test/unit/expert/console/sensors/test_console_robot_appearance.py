@@ -1,6 +1,7 @@
 """Robots as the browser draws them: which files are read, what is sent, where clouds are; and what
 would do harm.
 """
+
 import json
 import os
 import struct
@@ -34,12 +35,12 @@ from smach_oracle.geometry.meshes import MeshError
 from smach_oracle.ros.images import ImageError, cloud_message, colour_image, depth_image
 
 OBJ = b'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n'
-ROBOT = '''<robot name="arm">
+ROBOT = """<robot name="arm">
 <link name="base"><visual><geometry><box size="1 2 4"/></geometry></visual></link>
 <link name="hand"><visual><geometry><mesh filename="{}"/></geometry></visual>
 <collision><geometry><sphere radius="0.5"/></geometry></collision></link>
 <joint name="slide" type="prismatic">
-<parent link="base"/><child link="hand"/><axis xyz="1 0 0"/></joint></robot>'''
+<parent link="base"/><child link="hand"/><axis xyz="1 0 0"/></joint></robot>"""
 BALL_HANDED = ROBOT.format('none')  # its mesh is missing
 
 
@@ -69,36 +70,46 @@ def files(tmp_path):
 
 
 def unpacked(body):
-    length, = struct.unpack('<I', body[:4])
+    (length,) = struct.unpack('<I', body[:4])
     assert length % 4 == 0
-    return json.loads(body[4:4 + length]), body[4 + length:]
+    return json.loads(body[4 : 4 + length]), body[4 + length :]
 
 
 def test_meshes_are_found_in_packages_and_at_absolute_paths(files, tmp_path):
     absolute = str(tmp_path / 'arm' / 'hand.obj')
-    for name in ('package://arm/hand.obj', 'package://arm/big%20hand.OBJ', absolute,
-                 'file://' + absolute):
+    for name in (
+        'package://arm/hand.obj',
+        'package://arm/big%20hand.OBJ',
+        absolute,
+        'file://' + absolute,
+    ):
         assert len(files.mesh(name).triangles) == 1
 
 
-@pytest.mark.parametrize('name, info', [('package://arm/../secret.obj', 'stay within'),
-                                        ('package://arm/%2e%2e/secret.obj', 'stay within'),
-                                        ('package://arm//etc/passwd', 'stay within'),
-                                        ('package://../arm/hand.obj', 'stay within'),
-                                        ('package://arm', 'stay within'),
-                                        ('package://other/hand.obj', 'no package other'),
-                                        ('package://arm/passwd', 'ends with'),
-                                        ('package://arm/broken.stl', 'no STL'),
-                                        ('package://arm/pipe.stl', 'no plain file'),
-                                        ('package://arm/gone.obj', 'No such file'),
-                                        ('/etc/passwd', 'ends with'), ('/dev/zero', 'ends with'),
-                                        ('file:///etc/../etc/shadow', 'ends with'),
-                                        ('hand.obj', 'neither'),
-                                        ('http://evil.example/x.stl', 'neither'),
-                                        ('package://arm/hand.obj\0.stl', 'no file name'),
-                                        ('package://arm/hand%00.obj', 'stay within'),
-                                        ('', 'neither'),
-                                        ('package://arm/' + 'x' * 5000, 'no file name')])
+@pytest.mark.parametrize(
+    'name, info',
+    [
+        ('package://arm/../secret.obj', 'stay within'),
+        ('package://arm/%2e%2e/secret.obj', 'stay within'),
+        ('package://arm//etc/passwd', 'stay within'),
+        ('package://../arm/hand.obj', 'stay within'),
+        ('package://arm', 'stay within'),
+        ('package://other/hand.obj', 'no package other'),
+        ('package://arm/passwd', 'ends with'),
+        ('package://arm/broken.stl', 'no STL'),
+        ('package://arm/pipe.stl', 'no plain file'),
+        ('package://arm/gone.obj', 'No such file'),
+        ('/etc/passwd', 'ends with'),
+        ('/dev/zero', 'ends with'),
+        ('file:///etc/../etc/shadow', 'ends with'),
+        ('hand.obj', 'neither'),
+        ('http://evil.example/x.stl', 'neither'),
+        ('package://arm/hand.obj\0.stl', 'no file name'),
+        ('package://arm/hand%00.obj', 'stay within'),
+        ('', 'neither'),
+        ('package://arm/' + 'x' * 5000, 'no file name'),
+    ],
+)
 def test_names_that_lead_elsewhere_are_refused_without_a_word_of_what_is_there(files, name, info):
     with pytest.raises(MeshError) as error:
         files.mesh(name)
@@ -108,42 +119,58 @@ def test_names_that_lead_elsewhere_are_refused_without_a_word_of_what_is_there(f
 def test_a_robot_is_sent_with_its_geometry(files):
     appearance = RobotAppearance(ROBOT.format('package://arm/hand.obj'), files)
     shown, data = unpacked(appearance.encoded().body)
-    assert (shown['name'], shown['links'], shown['missing'],
-            shown['root']) == ('arm', ['base', 'hand'], [], 'base')
+    assert (shown['name'], shown['links'], shown['missing'], shown['root']) == (
+        'arm',
+        ['base', 'hand'],
+        [],
+        'base',
+    )
     (link, geometry, place, colour), hand = shown['parts']
     assert (link, place[0], place[5], place[10]) == (0, 1, 2, 4) and hand[0] == 1
     box = shown['geometries'][geometry]
-    corners = np.frombuffer(data, '<u2', 3 * box['corners']).reshape(
-        -1, 3) / 65535.0 * box['scale'] + box['offset']
+    corners = (
+        np.frombuffer(data, '<u2', 3 * box['corners']).reshape(-1, 3) / 65535.0 * box['scale']
+        + box['offset']
+    )
     np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], [[-0.5] * 3, [0.5] * 3])
-    assert len(data) == sum(6 * each['corners'] + 6 * each['triangles']
-                            for each in shown['geometries'])
+    assert len(data) == sum(
+        6 * each['corners'] + 6 * each['triangles'] for each in shown['geometries']
+    )
     np.testing.assert_allclose(
-        appearance.places({'slide': 0.25})[1].reshape(3, 4)[:, 3], [0.25, 0, 0])
+        appearance.places({'slide': 0.25})[1].reshape(3, 4)[:, 3], [0.25, 0, 0]
+    )
 
 
 def test_where_a_mesh_is_missing_stands_what_the_link_collides_with(files):
     shown, _ = unpacked(
-        RobotAppearance(ROBOT.format('package://arm/../secret.obj'), files).encoded().body)
+        RobotAppearance(ROBOT.format('package://arm/../secret.obj'), files).encoded().body
+    )
     assert shown['lost'] == 1 and 'stay within' in shown['missing'][0] and len(shown['parts']) == 2
     assert shown['geometries'][1]['triangles'] == len(
-        robot_appearance._PRIMITIVES['sphere'].triangles)
+        robot_appearance._PRIMITIVES['sphere'].triangles
+    )
 
 
 def test_the_triangles_of_all_links_together_are_limited(files, monkeypatch):
     assert robot_appearance._share([10] * 10) == robot_appearance.MOST_TRIANGLES
-    counts = [100] * 20 + [10 ** 6] * 30
+    counts = [100] * 20 + [10**6] * 30
     most = robot_appearance._share(counts)
-    assert sum(min(count, most)
-               for count in counts) <= robot_appearance.MOST_TRIANGLES < 30 * (most + 70)
+    assert (
+        sum(min(count, most) for count in counts)
+        <= robot_appearance.MOST_TRIANGLES
+        < 30 * (most + 70)
+    )
 
 
 def test_a_robot_of_very_many_round_parts_is_drawn_of_boxes(files):
     balls = '<visual><geometry><sphere radius="1"/></geometry></visual>' * (
-        robot_appearance.MOST_ROUND + 1)
+        robot_appearance.MOST_ROUND + 1
+    )
     shown, _ = unpacked(
-        RobotAppearance(
-            '<robot name="r"><link name="l">{}</link></robot>'.format(balls)).encoded().body)
+        RobotAppearance('<robot name="r"><link name="l">{}</link></robot>'.format(balls))
+        .encoded()
+        .body
+    )
     assert [each['triangles'] for each in shown['geometries']] == [12]
     assert len(shown['parts']) == robot_appearance.MOST_ROUND + 1
 
@@ -190,11 +217,16 @@ def test_a_robot_is_seen_before_its_joints_speak_and_moves_with_them(quiet):
     assert np.frombuffer(encoded.body, '<f4')[15] == 0.5 and json.loads(facts)['joints'] == 2
 
 
-@pytest.mark.parametrize('make, topics',
-                         [(lambda: RobotStream(1, '/robot_description', lambda _: BALL_HANDED), 2),
-                          (lambda: DepthCloudStream(1, DepthCamera('/d', '/info', '/colour')), 3)])
+@pytest.mark.parametrize(
+    'make, topics',
+    [
+        (lambda: RobotStream(1, '/robot_description', lambda _: BALL_HANDED), 2),
+        (lambda: DepthCloudStream(1, DepthCamera('/d', '/info', '/colour')), 3),
+    ],
+)
 def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(
-        quiet, monkeypatch, make, topics):
+    quiet, monkeypatch, make, topics
+):
     sensor = make()
     sensor.update_subscription(True)
     assert Silent.alive == 0
@@ -208,8 +240,9 @@ def test_nothing_is_listened_to_unless_somebody_looks_and_not_for_longer(
     assert Silent.alive == 0 and sensor.newer(0) is None
 
 
-@pytest.mark.parametrize('urdf, info', [('<robot', 'not XML'), (7, 'holds no text'),
-                                        ('<!DOCTYPE a>', 'not allowed')])
+@pytest.mark.parametrize(
+    'urdf, info', [('<robot', 'not XML'), (7, 'holds no text'), ('<!DOCTYPE a>', 'not allowed')]
+)
 def test_a_description_that_is_none_is_told_in_a_sentence(quiet, urdf, info):
     robot = looked_at(urdf=urdf)
     for _ in range(2):
@@ -231,28 +264,33 @@ def test_a_cloud_is_placed_at_its_robot_by_its_links_and_those_of_a_namespace(qu
 
 def test_robots_are_found_by_the_names_of_their_descriptions():
     assert robots_in(
-        ['/robot_description', '/a/robot_description', '/robot_description_semantic',
-         '/x']) == ['/a/robot_description', '/robot_description']
+        ['/robot_description', '/a/robot_description', '/robot_description_semantic', '/x']
+    ) == ['/a/robot_description', '/robot_description']
 
 
-PUBLISHED = [['/cam/depth/image_raw', 'sensor_msgs/Image'],
-             ['/cam/depth/camera_info', 'sensor_msgs/CameraInfo'],
-             ['/cam/rgb/image_raw', 'sensor_msgs/Image'],
-             ['/cam/rgb/camera_info', 'sensor_msgs/CameraInfo']]
+PUBLISHED = [
+    ['/cam/depth/image_raw', 'sensor_msgs/Image'],
+    ['/cam/depth/camera_info', 'sensor_msgs/CameraInfo'],
+    ['/cam/rgb/image_raw', 'sensor_msgs/Image'],
+    ['/cam/rgb/camera_info', 'sensor_msgs/CameraInfo'],
+]
 
 
 def test_cameras_with_depth_and_calibration_but_no_cloud_are_found():
     assert depth_cameras(PUBLISHED) == [
         DepthCamera('/cam/depth/image_raw', '/cam/depth/camera_info', None)
     ]
-    registered = [[topic.replace('/depth/image', '/depth_registered/image'), kind]
-                  for topic, kind in PUBLISHED]
+    registered = [
+        [topic.replace('/depth/image', '/depth_registered/image'), kind]
+        for topic, kind in PUBLISHED
+    ]
     assert depth_cameras(registered) == [
         DepthCamera('/cam/depth_registered/image_raw', '/cam/rgb/camera_info', '/cam/rgb/image_raw')
     ]
     assert depth_cameras(PUBLISHED + [['/cam/depth/points', 'sensor_msgs/PointCloud2']]) == []
-    assert depth_cameras(PUBLISHED[:1] +
-                         PUBLISHED[2:3]) == [], 'without a calibration there is no cloud'
+    assert depth_cameras(PUBLISHED[:1] + PUBLISHED[2:3]) == [], (
+        'without a calibration there is no cloud'
+    )
 
 
 def calibration(focal=100.0):
@@ -268,16 +306,19 @@ def test_depth_becomes_points_with_the_colours_of_the_same_moment():
     np.testing.assert_allclose(cloud.points[0], [0.0, -0.48, 2.0])
     later = cloud_of_depth(depth_image(depth, Header(stamp=rospy.Time(6))), calibration(), colour)
     assert not (later.colours == 9).all(), 'colours of another moment are not those of these points'
-    large = cloud_of_depth(depth_image(np.full((480, 640), 2.0), Header()), calibration(),
-                           most=1000)
+    large = cloud_of_depth(
+        depth_image(np.full((480, 640), 2.0), Header()), calibration(), most=1000
+    )
     assert len(large.points) == 1000
-    np.testing.assert_allclose(np.ptp(large.points[:, 0]), 1.27, atol=0.03,
-                               err_msg='scaled with the calibration')
+    np.testing.assert_allclose(
+        np.ptp(large.points[:, 0]), 1.27, atol=0.03, err_msg='scaled with the calibration'
+    )
 
 
 def test_depth_without_a_calibration_or_of_another_kind_is_told(quiet):
-    sensor = DepthCloudStream(3, DepthCamera('/cam/depth/image_raw', '/cam/depth/camera_info',
-                                             None))
+    sensor = DepthCloudStream(
+        3, DepthCamera('/cam/depth/image_raw', '/cam/depth/camera_info', None)
+    )
     sensor.newer(0)
     sensor.update_subscription(True)
     sensor.take(depth_image(np.ones((4, 4)), Header()))
@@ -296,35 +337,52 @@ def test_depth_without_a_calibration_or_of_another_kind_is_told(quiet):
 
 @pytest.mark.usefixtures('quiet')
 class TestModels(console_case.ConsoleCase):
-
     def setUp(self):
         super().setUp()
-        self.sensors.follow([['/points', 'sensor_msgs/PointCloud2']], [
-            DerivedStream('/robot_description', robot_stream.DESCRIPTION,
-                          lambda number: looked_at(number=number))
-        ])
-        self.cloud, self.robot = (self.sensors.on(topic)
-                                  for topic in ('/points', '/robot_description'))
+        self.sensors.follow(
+            [['/points', 'sensor_msgs/PointCloud2']],
+            [
+                DerivedStream(
+                    '/robot_description',
+                    robot_stream.DESCRIPTION,
+                    lambda number: looked_at(number=number),
+                )
+            ],
+        )
+        self.cloud, self.robot = (
+            self.sensors.on(topic) for topic in ('/points', '/robot_description')
+        )
         self.number = self.robot.number
         self.cookie, self.info = self.sign_in('viewer')
 
     def get(self, path, **headers):
-        return self.ask(path, **dict({'Cookie': self.cookie, 'X_Xsrf': self.info['xsrf']},
-                                     **headers))
+        return self.ask(
+            path, **dict({'Cookie': self.cookie, 'X_Xsrf': self.info['xsrf']}, **headers)
+        )
 
     def test_a_model_is_told_to_those_who_are_signed_in(self):
         path = '/model/{}'.format(self.number)
         answer = self.get(path)
         assert (answer.code, unpacked(answer.body)[0]['name']) == (200, 'arm')
-        for headers, code in (({'Cookie': None}, 401), ({'X_Xsrf': None}, 403),
-                              ({'Host': 'evil.example'}, 421), ({'Origin': 'http://evil.example'},
-                                                                403)):
+        for headers, code in (
+            ({'Cookie': None}, 401),
+            ({'X_Xsrf': None}, 403),
+            ({'Host': 'evil.example'}, 421),
+            ({'Origin': 'http://evil.example'}, 403),
+        ):
             assert self.get(path, **headers).code == code, headers
 
     def test_no_file_and_no_parameter_can_be_named(self):
-        for path in ('/model/robot_description', '/model/..%2f..%2fetc%2fpasswd', '/model/99',
-                     '/model/-1', '/model/', '/model/{}'.format(self.cloud.number), '/mesh/1',
-                     '/model/1/hand.obj'):
+        for path in (
+            '/model/robot_description',
+            '/model/..%2f..%2fetc%2fpasswd',
+            '/model/99',
+            '/model/-1',
+            '/model/',
+            '/model/{}'.format(self.cloud.number),
+            '/mesh/1',
+            '/model/1/hand.obj',
+        ):
             assert self.get(path).code == 404, path
 
     def test_a_model_that_cannot_be_drawn_is_told_as_text(self):
@@ -337,13 +395,33 @@ class TestModels(console_case.ConsoleCase):
         self.robot.appearance()
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='hand')))
         path = '/sample/{}?robot={}'.format(self.cloud.number, self.number)
-        assert json.loads(
-            self.get(path).headers['X-Facts'])['place'] == [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0]
+        assert json.loads(self.get(path).headers['X-Facts'])['place'] == [
+            1,
+            0,
+            0,
+            0,
+            0,
+            1,
+            0,
+            0,
+            0,
+            0,
+            1,
+            0,
+        ]
         self.cloud.take(cloud_message(np.ones((5, 3)), Header(frame_id='nowhere')))
-        assert json.loads(
-            self.get(path).headers['X-Facts'])['astray'] == 'No transform from nowhere to base.'
-        for robot, code in ((self.cloud.number, 404), (99, 404), ('x', 400), ('1&robot=1', 400),
-                            ('-1', 400)):
-            assert self.get('/sample/{}?robot={}'.format(self.cloud.number,
-                                                        robot)).code == code, robot
+        assert (
+            json.loads(self.get(path).headers['X-Facts'])['astray']
+            == 'No transform from nowhere to base.'
+        )
+        for robot, code in (
+            (self.cloud.number, 404),
+            (99, 404),
+            ('x', 400),
+            ('1&robot=1', 400),
+            ('-1', 400),
+        ):
+            assert self.get('/sample/{}?robot={}'.format(self.cloud.number, robot)).code == code, (
+                robot
+            )
         assert isinstance(self.cloud._sample.message, PointCloud2)

@@ -1,4 +1,5 @@
 """Whose camera it is, and how old its image, by the clock of the robot whose it is."""
+
 from types import SimpleNamespace
 
 import pytest
@@ -11,8 +12,13 @@ from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.console.web.settings import read_settings
 from smach_oracle.oracle.errors import SettingsError
 
-TOPICS = ('/head/rgb/image_raw', '/alpha/cam/image_raw', '/fleet/beta/cam/rgb/image_raw',
-          '/fleet/beta/cam/depth/image_raw', '/fleet/cam/image_raw')
+TOPICS = (
+    '/head/rgb/image_raw',
+    '/alpha/cam/image_raw',
+    '/fleet/beta/cam/rgb/image_raw',
+    '/fleet/beta/cam/depth/image_raw',
+    '/fleet/cam/image_raw',
+)
 
 
 def cameras(**chosen):
@@ -35,15 +41,23 @@ def test_a_namespace_is_of_those_in_it_and_not_of_their_neighbours():
     sections = PageSections()
     made.write_sections(sections, ['/fleet/beta', '/fleet/delta', '/gamma'])
     assert sections.get('cameras') == {
-        '/fleet/beta': ['/fleet/beta/cam/rgb/image_raw'], '/fleet/delta': ['/fleet/cam/image_raw'],
-        '/gamma': []}
+        '/fleet/beta': ['/fleet/beta/cam/rgb/image_raw'],
+        '/fleet/delta': ['/fleet/cam/image_raw'],
+        '/gamma': [],
+    }
 
 
 def test_its_failure_cameras_are_its_own_and_come_first():
     made = cameras()
     made.write_sections(PageSections(), ['/fleet/beta', '/fleet/delta'])
-    made.declare({'/gamma': ['head/rgb/image_raw', '/gone/image_raw'], '/alpha': 'nonsense',
-                  '/fleet/delta': ['cam/image_raw'], '/alpha2': [1]})
+    made.declare(
+        {
+            '/gamma': ['head/rgb/image_raw', '/gone/image_raw'],
+            '/alpha': 'nonsense',
+            '/fleet/delta': ['cam/image_raw'],
+            '/alpha2': [1],
+        }
+    )
     assert topics(made, '/gamma') == ['/head/rgb/image_raw']
     assert topics(made, '/fleet/delta') == ['/fleet/cam/image_raw'], 'as the node resolves it'
     assert topics(made, '/alpha') == ['/alpha/cam/image_raw']
@@ -59,8 +73,11 @@ def test_the_setting_goes_before_all_else():
 def test_the_setting_is_read_and_checked():
     def read(value):
         return read_settings(lambda name, default: value if name == 'cameras' else default).cameras
+
     assert read({'alpha': ['/head'], '/beta': '/a /b'}) == {
-        '/alpha': ('/head',), '/beta': ('/a', '/b')}
+        '/alpha': ('/head',),
+        '/beta': ('/a', '/b'),
+    }
     assert read('none') == read({}) == {}
     for wrong in ('/head', ['/head'], {'alpha': 3}, {'alpha': ['head']}, {3: ['/head']}):
         with pytest.raises(SettingsError, match='~cameras'):

@@ -1,6 +1,7 @@
 """The closed set of sensors, and paced frames over real connections: refused, forged, flooded,
 slow.
 """
+
 import json
 import time
 
@@ -16,8 +17,12 @@ from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
 from smach_oracle.expert.console.web.access import ClientRateLimits
 from smach_oracle.ros.images import colour_image
 
-PUBLISHED = [['/camera/image', 'sensor_msgs/Image'], ['/joint_states', 'sensor_msgs/JointState'],
-             ['/cmd_vel', 'geometry_msgs/Twist'], ['/secret', 'std_msgs/String']]
+PUBLISHED = [
+    ['/camera/image', 'sensor_msgs/Image'],
+    ['/joint_states', 'sensor_msgs/JointState'],
+    ['/cmd_vel', 'geometry_msgs/Twist'],
+    ['/secret', 'std_msgs/String'],
+]
 
 
 class FakeSubscriber:
@@ -50,7 +55,9 @@ def known():
 
 def test_topics_of_the_types_that_can_be_shown_are_known_and_no_others():
     assert [(each['topic'], each['kind']) for each in known().view()] == [
-        ('/camera/image', 'image'), ('/joint_states', 'joints')]
+        ('/camera/image', 'image'),
+        ('/joint_states', 'joints'),
+    ]
 
 
 def test_a_topic_that_changes_its_type_is_another_sensor_and_one_that_is_gone_is_forgotten():
@@ -108,7 +115,6 @@ def test_the_newest_frame_alone_is_kept_and_encoded_once_for_all():
 
 
 class TestSamples(console_case.ConsoleCase):
-
     def setUp(self):
         super().setUp()
         self.sensors.follow(PUBLISHED)
@@ -124,28 +130,51 @@ class TestSamples(console_case.ConsoleCase):
         self.camera.take(picture(2))
         answer = self.sample()
         assert (answer.code, answer.headers['Content-Type']) == (200, 'image/jpeg')
-        assert answer.headers['Cache-Control'] == 'no-store' and answer.headers[
-            'X-Content-Type-Options'] == 'nosniff'
+        assert (
+            answer.headers['Cache-Control'] == 'no-store'
+            and answer.headers['X-Content-Type-Options'] == 'nosniff'
+        )
         facts = json.loads(answer.headers['X-Facts'])
         assert (facts['sequence'], facts['size'], facts['stamp']) == (2, [64, 48], '0.000000000')
 
     def test_without_a_session_its_token_or_the_page_nothing_is_told(self):
         self.camera.take(picture())
-        for headers, code in (({'Cookie': None}, 401), ({'Cookie': self.begin()[0]},
-                                                        401), ({'X_Xsrf': None}, 403),
-                              ({'X_Xsrf': '0' * 64}, 403), ({'Origin': 'http://evil.example'},
-                                                            403), ({'Host': 'evil.example'}, 421)):
+        for headers, code in (
+            ({'Cookie': None}, 401),
+            ({'Cookie': self.begin()[0]}, 401),
+            ({'X_Xsrf': None}, 403),
+            ({'X_Xsrf': '0' * 64}, 403),
+            ({'Origin': 'http://evil.example'}, 403),
+            ({'Host': 'evil.example'}, 421),
+        ):
             answer = self.sample(**headers)
             assert answer.code == code and 'X-Facts' not in answer.headers, headers
 
     def test_no_topic_can_be_named(self):
-        for path in ('/sample/cmd_vel', '/sample//cmd_vel', '/sample/%2fsecret', '/sample/99',
-                     '/sample/-1', '/sample/0x1', '/sample/1/../2', '/sample/',
-                     '/sample/12345678901'):
+        for path in (
+            '/sample/cmd_vel',
+            '/sample//cmd_vel',
+            '/sample/%2fsecret',
+            '/sample/99',
+            '/sample/-1',
+            '/sample/0x1',
+            '/sample/1/../2',
+            '/sample/',
+            '/sample/12345678901',
+        ):
             assert self.sample(path).code == 404, path
         path = '/sample/{}?'.format(self.camera.number)
-        for query in ('topic=/secret', 'after=-1', 'after=x', 'after=1&after=2', 'width=100000',
-                      'width=1e3', 'width=', 'after=' + '9' * 30, 'after=%c2%b2'):
+        for query in (
+            'topic=/secret',
+            'after=-1',
+            'after=x',
+            'after=1&after=2',
+            'width=100000',
+            'width=1e3',
+            'width=',
+            'after=' + '9' * 30,
+            'after=%c2%b2',
+        ):
             assert self.sample(path + query).code == 400, query
         assert FakeSubscriber.alive == 0
 
@@ -154,8 +183,10 @@ class TestSamples(console_case.ConsoleCase):
         self.io_loop.call_later(0.3, self.camera.take, picture(9))
         begun_s = time.monotonic()
         answer = self.sample('/sample/{}?after=1'.format(self.camera.number))
-        assert json.loads(
-            answer.headers['X-Facts'])['sequence'] == 2 and time.monotonic() - begun_s >= 0.25
+        assert (
+            json.loads(answer.headers['X-Facts'])['sequence'] == 2
+            and time.monotonic() - begun_s >= 0.25
+        )
 
     def test_where_nothing_comes_the_answer_is_empty(self):
         sample_handlers.WAIT_S, before = 0.1, sample_handlers.WAIT_S
@@ -184,8 +215,17 @@ class TestSamples(console_case.ConsoleCase):
 
     def test_changing_methods_do_nothing(self):
         for method in ('POST', 'PUT', 'DELETE'):
-            assert self.ask('/sample/{}'.format(self.camera.number), method, '', Origin=self.origin,
-                            Cookie=self.cookie, X_Xsrf=self.info['xsrf']).code == 405
+            assert (
+                self.ask(
+                    '/sample/{}'.format(self.camera.number),
+                    method,
+                    '',
+                    Origin=self.origin,
+                    Cookie=self.cookie,
+                    X_Xsrf=self.info['xsrf'],
+                ).code
+                == 405
+            )
 
     @tornado.testing.gen_test
     async def test_only_so_many_wait_at_a_time(self):
@@ -193,11 +233,16 @@ class TestSamples(console_case.ConsoleCase):
         shared = self._app_room()
         shared.waiting['127.0.0.1'] = sample_handlers.MOST_WAITING_EACH
         answer = await self.http_client.fetch(
-            url, headers={'Cookie': self.cookie, 'X-Xsrf': self.info['xsrf']}, raise_error=False)
-        assert answer.code == 503 and shared.waiting[
-            '127.0.0.1'] == sample_handlers.MOST_WAITING_EACH
+            url, headers={'Cookie': self.cookie, 'X-Xsrf': self.info['xsrf']}, raise_error=False
+        )
+        assert (
+            answer.code == 503 and shared.waiting['127.0.0.1'] == sample_handlers.MOST_WAITING_EACH
+        )
 
     def _app_room(self):
         rules = self._app.default_router.rules[0].target.rules
-        return next(rule.target_kwargs['shared'] for rule in rules
-                    if rule.target is sample_handlers.SampleHandler)
+        return next(
+            rule.target_kwargs['shared']
+            for rule in rules
+            if rule.target is sample_handlers.SampleHandler
+        )

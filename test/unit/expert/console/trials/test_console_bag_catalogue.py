@@ -1,6 +1,7 @@
 """Bags in the console: counted as the analysis counts them, bounded, broken ones named, and served
 by numbers alone.
 """
+
 import json
 import os
 import shutil
@@ -53,8 +54,10 @@ def test_they_are_counted_as_the_analysis_counts_them(folder):
     group = count_variants(found)[0]
     row = section()['table'][0]
     assert (row['experiment'], row['arm'], row['trials']) == (group.experiment, group.name, TRIALS)
-    assert row['counts']['recoveries'] == {'trials': group.of('oracle recoveries').trials,
-                                           'events': group.of('oracle recoveries').events}
+    assert row['counts']['recoveries'] == {
+        'trials': group.of('oracle recoveries').trials,
+        'events': group.of('oracle recoveries').events,
+    }
     assert row['endings']['failure'] == group.of('ended in failure').trials
     assert row['unwell_s'] == sum(each.unwell_s for each in found)
     assert {each['id'] for each in section()['trials']} == {each.trial_id for each in found}
@@ -72,8 +75,9 @@ def test_nothing_of_where_they_lie_is_told_and_broken_ones_are_named(folder, tmp
     (tmp_path / 'now.bag.active').write_bytes(b'#ROSBAG V2.0\n')
     _, section = catalogue_of(str(tmp_path), str(tmp_path / 'nowhere'))
     broken = {each['name']: each['reason'] for each in section()['broken']}
-    assert sorted(broken) == ['deep/torn.bag', 'empty.bag',
-                              'old.bag.active'], 'one that is being written is not broken'
+    assert sorted(broken) == ['deep/torn.bag', 'empty.bag', 'old.bag.active'], (
+        'one that is being written is not broken'
+    )
     assert all(reason for reason in broken.values())
     assert 'no such folder' in section()['note']
     assert len(section()['trials']) == TRIALS
@@ -109,12 +113,14 @@ def test_number_and_size_are_bounded(folder, monkeypatch):
     monkeypatch.setattr(bag_catalogue, 'SHOWN_TRIALS', 3)
     _, section = catalogue_of(folder)
     assert section()['table'][0]['trials'] == 5 and len(section()['trials']) == 3
-    assert section(
-    )['note'] == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
+    assert (
+        section()['note']
+        == 'Of 12 bags the newest 5 are read. Of 5 trials the latest 3 are listed.'
+    )
     monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 10)
     _, section = catalogue_of(folder)
     assert not section()['trials'] and 'at most' in section()['broken'][0]['reason']
-    monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 2 ** 30)
+    monkeypatch.setattr(bag_catalogue, 'MOST_BYTES', 2**30)
     monkeypatch.setattr(bag_catalogue, 'MOST_EVENTS', 10)
     _, section = catalogue_of(folder)
     assert 'more than 10 events' in section()['broken'][0]['reason']
@@ -148,9 +154,14 @@ def test_long_trials_are_cut_and_too_large_ones_refused(folder, monkeypatch):
     monkeypatch.setattr(recorded_trials, 'MOST_EVENTS', 7)
     catalogue, section = catalogue_of(folder)
     number = section()['trials'][0]['number']
-    assert len(
-        json.loads(RecordedTrials(catalogue, LayoutWorker(),
-                                  ImageStore()).text(number))['events']) == 7
+    assert (
+        len(
+            json.loads(RecordedTrials(catalogue, LayoutWorker(), ImageStore()).text(number))[
+                'events'
+            ]
+        )
+        == 7
+    )
     monkeypatch.setattr(recorded_trials, 'MOST_BYTES', 1000)
     with pytest.raises(RecordedTrialError, match='too large'):
         RecordedTrials(catalogue, LayoutWorker(), ImageStore()).text(number)
@@ -169,7 +180,6 @@ def test_one_that_a_recorder_writes_is_left_alone(tmp_path):
 
 
 class TestServed(console_case.ConsoleCase):
-
     def folders(self):
         self.place = tempfile.mkdtemp()
         self.addCleanup(shutil.rmtree, self.place)
@@ -197,9 +207,17 @@ class TestServed(console_case.ConsoleCase):
             assert self.get(path, xsrf=False).code == 403
 
     def test_a_browser_can_name_neither_path_nor_anything_but_a_number(self):
-        for path in ('/recorded/../{}'.format(self.place), '/recorded/' + self.place,
-                     '/recorded/1e3', '/recorded/-1', '/recorded/', '/recorded/%2e%2e%2fetc',
-                     '/recorded/12345678901', '/image/a', '/image/1/2'):
+        for path in (
+            '/recorded/../{}'.format(self.place),
+            '/recorded/' + self.place,
+            '/recorded/1e3',
+            '/recorded/-1',
+            '/recorded/',
+            '/recorded/%2e%2e%2fetc',
+            '/recorded/12345678901',
+            '/image/a',
+            '/image/1/2',
+        ):
             assert self.get(path).code == 404, path
         assert self.get('/recorded/1?path=/etc/passwd').code == 400
         answer = self.get('/recorded/999')

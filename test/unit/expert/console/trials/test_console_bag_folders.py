@@ -1,6 +1,7 @@
 """Bags that attack their reader: only plain files inside the folders are read, by a process with
 limits, and what is refused is named.
 """
+
 import math
 import os
 import resource
@@ -62,9 +63,11 @@ def test_a_pipe_a_socket_and_a_folder_are_named_and_hold_nobody_up(folder):
     with socket.socket(socket.AF_UNIX) as bound:
         bound.bind(str(folder / 'socket.bag'))
         broken = broken_in(folder)
-    assert broken == {'pipe.bag': 'no plain file, but a named pipe',
-                      'old.bag.active': 'no plain file, but a named pipe',
-                      'socket.bag': 'no plain file, but a socket'}
+    assert broken == {
+        'pipe.bag': 'no plain file, but a named pipe',
+        'old.bag.active': 'no plain file, but a named pipe',
+        'socket.bag': 'no plain file, but a socket',
+    }
 
 
 def test_a_file_that_has_become_a_pipe_since_it_was_found_is_not_opened(folder):
@@ -77,6 +80,7 @@ def test_a_file_that_has_become_a_pipe_since_it_was_found_is_not_opened(folder):
         with pytest.raises(BagReadError) as refused:
             read_bags(BagFolders([str(folder)]), BagRequest([str(path)], []))
         told.append(str(refused.value))
+
     threading.Thread(target=read, daemon=True).start()
     assert wait_for(lambda: told), 'it waits for who writes'
     assert told == ['no plain file, but a named pipe']
@@ -88,8 +92,10 @@ def test_a_link_that_leads_out_is_named_and_one_inside_is_the_bag_itself(folder,
     (folder / 'device.bag').symlink_to('/dev/zero')
     (folder / 'nowhere.bag').symlink_to(tmp_path / 'nothing.bag')
     (folder / 'inside.bag').symlink_to(folder / 'good.bag')
-    assert broken_in(folder) == {'out.bag': 'a link that leads out of the folder',
-                                 'device.bag': 'a link that leads out of the folder'}
+    assert broken_in(folder) == {
+        'out.bag': 'a link that leads out of the folder',
+        'device.bag': 'a link that leads out of the folder',
+    }
 
 
 def test_a_file_that_has_become_a_link_since_it_was_found_is_not_read(folder, tmp_path):
@@ -147,13 +153,16 @@ def test_a_bag_whose_events_have_no_time_does_not_end_the_scan(folder):
 
 def test_what_may_not_be_opened_is_named(folder, monkeypatch):
     real = os.open
+
     def denied(path, *more, **named):
         if str(path).endswith('good.bag'):
             raise PermissionError(13, 'Permission denied', path)
         return real(path, *more, **named)
+
     monkeypatch.setattr(os, 'open', denied)
     assert scanned(folder)['broken'] == [
-        {'name': 'good.bag', 'reason': 'it cannot be opened: Permission denied'}]
+        {'name': 'good.bag', 'reason': 'it cannot be opened: Permission denied'}
+    ]
 
 
 def test_the_commands_hang_at_no_pipe_either(folder):
@@ -169,13 +178,15 @@ def test_very_many_bags_of_one_trial_are_bounded(folder, monkeypatch):
     sections = PageSections()
     catalogue = BagCatalogue([str(folder)], sections)
     catalogue.scan()
-    trial, = sections.get('bags')['trials']
+    (trial,) = sections.get('bags')['trials']
     assert len(catalogue.find(trial['number']).summary.bags) == 3
 
 
 def test_what_the_words_of_an_event_tell_comes_out_of_the_reader(folder):
     told = {'to': 'KITCHEN/PICK', 'decided_by': 'policy', 'userdata': {'secret': 1}}
     (folder / 'jump.bag').write_bytes(crafted_bag(event(kind=EventKind.JUMP, data=told)))
-    reply = read_bags(BagFolders([str(folder)]),
-                      BagRequest([str(folder / 'jump.bag')], ['crafted'], shown_events=9))
+    reply = read_bags(
+        BagFolders([str(folder)]),
+        BagRequest([str(folder / 'jump.bag')], ['crafted'], shown_events=9),
+    )
     assert [each.data for each in reply.events] == [{'to': 'KITCHEN/PICK', 'decided_by': 'policy'}]

@@ -1,6 +1,7 @@
 """Trials as a console counts them: as the analysis of their bags does, bounded, and with what has
 helped.
 """
+
 import itertools
 import json
 import random
@@ -40,9 +41,9 @@ class SomeExpert(Expert):
     def ask(self, question, cancelled, progress):
         kind = self._draw.choice(['goto', 'supersede', 'give_up', 'none'])
         return {
-            'goto': Answer(AnswerKind.GOTO, state='A',
-                           by='ann'), 'give_up': Answer(AnswerKind.GIVE_UP, by='ann'),
-            'supersede': Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann')
+            'goto': Answer(AnswerKind.GOTO, state='A', by='ann'),
+            'give_up': Answer(AnswerKind.GIVE_UP, by='ann'),
+            'supersede': Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann'),
         }.get(kind)
 
 
@@ -79,9 +80,21 @@ def count(events):
 def test_a_trial_is_counted_as_the_analysis_of_its_bag_counts_it(share):
     for events in run_trials(25, share):
         counter, summary = count(events), summarise(events[::-1])
-        for name in ('experiment', 'outcome', 'failures', 'recoveries', 'questions', 'answered',
-                     'ending', 'lost_events', 'recovers', 'failures_by_state', 'start_time',
-                     'duration_s', 'settings'):
+        for name in (
+            'experiment',
+            'outcome',
+            'failures',
+            'recoveries',
+            'questions',
+            'answered',
+            'ending',
+            'lost_events',
+            'recovers',
+            'failures_by_state',
+            'start_time',
+            'duration_s',
+            'settings',
+        ):
             assert getattr(counter, name) == getattr(summary, name), name
 
 
@@ -92,14 +105,31 @@ def test_what_the_log_shows_of_a_trial_is_what_the_analysis_of_its_bag_counts():
     for row, summary in zip(log.overview()['trials'][::-1], map(summarise, trials)):
         assert {
             key: row[key]
-            for key in ('id', 'experiment', 'start', 'ending', 'outcome', 'oracle', 'failures',
-                        'recoveries', 'questions', 'answered', 'lost')
+            for key in (
+                'id',
+                'experiment',
+                'start',
+                'ending',
+                'outcome',
+                'oracle',
+                'failures',
+                'recoveries',
+                'questions',
+                'answered',
+                'lost',
+            )
         } == {
-            'id': summary.trial_id, 'experiment': summary.experiment, 'start': summary.start_time,
-            'ending': summary.ending.value, 'outcome': summary.outcome, 'oracle': summary.recovers,
-            'failures': summary.failures, 'recoveries': summary.recoveries,
-            'questions': summary.questions, 'answered': summary.answered,
-            'lost': summary.lost_events
+            'id': summary.trial_id,
+            'experiment': summary.experiment,
+            'start': summary.start_time,
+            'ending': summary.ending.value,
+            'outcome': summary.outcome,
+            'oracle': summary.recovers,
+            'failures': summary.failures,
+            'recoveries': summary.recoveries,
+            'questions': summary.questions,
+            'answered': summary.answered,
+            'lost': summary.lost_events,
         }
         assert row['end'] == summary.start_time + summary.duration_s
 
@@ -116,16 +146,20 @@ def test_a_trial_whose_bag_is_played_counts_once():
 
 def test_the_table_counts_trials_in_which_it_happened_and_how_often():
     trials = run_trials(40)
-    row, = counts_table(map(count, trials))
+    (row,) = counts_table(map(count, trials))
     of_bags = [summarise(events) for events in trials]
     assert row['trials'] == 40
     for name in ('failures', 'recoveries', 'questions', 'answered'):
         numbers = [getattr(summary, name) for summary in of_bags]
-        assert row['counts'][name] == {'trials': sum(map(bool, numbers)),
-                                       'events': sum(numbers)}, name
+        assert row['counts'][name] == {'trials': sum(map(bool, numbers)), 'events': sum(numbers)}, (
+            name
+        )
     assert row['counts']['answered']['trials'] > 0
-    assert row['endings']['failure'] == sum(summary.ending.value == 'failure'
-                                            for summary in of_bags) > 0
+    assert (
+        row['endings']['failure']
+        == sum(summary.ending.value == 'failure' for summary in of_bags)
+        > 0
+    )
 
 
 def test_the_table_lists_the_time_in_which_trials_waited_until_the_robot_was_well():
@@ -134,8 +168,9 @@ def test_the_table_lists_the_time_in_which_trials_waited_until_the_robot_was_wel
         at_s = events[-1].wall_time
         events[-1:-1] = [
             events[-1]._replace(kind=EventKind.HEALTH_WAIT_START),
-            events[-1]._replace(kind=EventKind.HEALTH_WAIT_END, wall_time=at_s + waited_s)]
-    row, = counts_table(map(count, trials))
+            events[-1]._replace(kind=EventKind.HEALTH_WAIT_END, wall_time=at_s + waited_s),
+        ]
+    (row,) = counts_table(map(count, trials))
     assert row['unwell_s'] == 6.5
 
 
@@ -149,7 +184,7 @@ def test_a_trial_that_runs_is_not_in_the_table_and_one_heard_of_late_says_so():
 def test_a_trial_whose_start_was_not_heard_counts_as_one_with_an_oracle():
     late = count([event(EventKind.STATE_START), event(EventKind.TRIAL_END, outcome='succeeded')])
     assert late.recovers is None and has_oracle(late)
-    row, = counts_table([late])
+    (row,) = counts_table([late])
     assert row['oracle'] is True and row['trials'] == 1
 
 
@@ -172,32 +207,68 @@ FAILED, JUMPED = event(EventKind.FAILURE), event(EventKind.JUMP, target='DETECT'
 
 @pytest.mark.parametrize(
     'events, recovery_counts',
-    [([FAILED, JUMPED], (0, 0)),
-     ([FAILED, JUMPED,
-       event(EventKind.TRANSITION, 'DETECT'),
-       event(EventKind.TRANSITION)], (1, 1)), ([FAILED, JUMPED, FAILED], (0, 1)),
-     ([FAILED, JUMPED, FAILED, JUMPED, event(EventKind.TRANSITION)], (1, 2)),
-     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
-     ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
-     ([
-         FAILED, JUMPED,
-         event(EventKind.TRANSITION, path='OTHER'),
-         event(EventKind.TRANSITION, trial='u')
-     ], (0, 0)),
-     ([
-         FAILED,
-         event(EventKind.SUPERSEDE), JUMPED,
-         event(EventKind.CONTAINER_END, '', outcome='succeeded')
-     ], (0, 0)), ([event(EventKind.TRANSITION)], (0, 0)),
-     # the author's own way from a failure while the robot was not well
-     ([FAILED, JUMPED, event(EventKind.TRANSITION, data={'not_counted': True})], (0, 0)),
-     ([FAILED, JUMPED, event(EventKind.HEALTH_WAIT_START), event(EventKind.HEALTH_WAIT_END),
-       event(EventKind.TRANSITION)], (1, 1)),
-     # asked while it still ran: wait on, and taken out
-     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PICK'),
-       event(EventKind.TRANSITION)], (1, 1)),
-     ([FAILED, JUMPED, event(EventKind.QUERY_ANSWERED, outcome='goto', target='PLACE'),
-       event(EventKind.TRANSITION)], (0, 1))])
+    [
+        ([FAILED, JUMPED], (0, 0)),
+        (
+            [FAILED, JUMPED, event(EventKind.TRANSITION, 'DETECT'), event(EventKind.TRANSITION)],
+            (1, 1),
+        ),
+        ([FAILED, JUMPED, FAILED], (0, 1)),
+        ([FAILED, JUMPED, FAILED, JUMPED, event(EventKind.TRANSITION)], (1, 2)),
+        ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='succeeded')], (1, 1)),
+        ([FAILED, JUMPED, event(EventKind.CONTAINER_END, '', outcome='aborted')], (0, 1)),
+        (
+            [
+                FAILED,
+                JUMPED,
+                event(EventKind.TRANSITION, path='OTHER'),
+                event(EventKind.TRANSITION, trial='u'),
+            ],
+            (0, 0),
+        ),
+        (
+            [
+                FAILED,
+                event(EventKind.SUPERSEDE),
+                JUMPED,
+                event(EventKind.CONTAINER_END, '', outcome='succeeded'),
+            ],
+            (0, 0),
+        ),
+        ([event(EventKind.TRANSITION)], (0, 0)),
+        # the author's own way from a failure while the robot was not well
+        ([FAILED, JUMPED, event(EventKind.TRANSITION, data={'not_counted': True})], (0, 0)),
+        (
+            [
+                FAILED,
+                JUMPED,
+                event(EventKind.HEALTH_WAIT_START),
+                event(EventKind.HEALTH_WAIT_END),
+                event(EventKind.TRANSITION),
+            ],
+            (1, 1),
+        ),
+        # asked while it still ran: wait on, and taken out
+        (
+            [
+                FAILED,
+                JUMPED,
+                event(EventKind.QUERY_ANSWERED, outcome='goto', target='PICK'),
+                event(EventKind.TRANSITION),
+            ],
+            (1, 1),
+        ),
+        (
+            [
+                FAILED,
+                JUMPED,
+                event(EventKind.QUERY_ANSWERED, outcome='goto', target='PLACE'),
+                event(EventKind.TRANSITION),
+            ],
+            (0, 1),
+        ),
+    ],
+)
 def test_going_somewhere_has_helped_if_the_state_then_succeeds(events, recovery_counts):
     assert scored(*events) == recovery_counts
 
@@ -222,8 +293,13 @@ def test_a_trial_that_runs_keeps_its_events_longer_than_those_that_are_over(monk
     for number in range(4):
         for kind in (EventKind.STATE_START, EventKind.TRIAL_END):
             log.add('/fast', event(kind, trial=str(number), outcome='succeeded'))
-    assert [each['detailed']
-            for each in log.overview()['trials']] == [True, False, False, False, True]
+    assert [each['detailed'] for each in log.overview()['trials']] == [
+        True,
+        False,
+        False,
+        False,
+        True,
+    ]
     assert len(log.events('waits', 0)) == 1
 
 
@@ -233,8 +309,10 @@ def test_a_trial_whose_events_were_forgotten_is_not_told_from_the_middle(monkeyp
     for trial in ('long', 'short', 'long'):
         log.add('/robot', event(EventKind.STATE_START, trial=trial))
     assert log.events('long', 0) == []
-    assert [(each['id'], each['detailed'])
-            for each in log.overview()['trials']] == [('short', True), ('long', False)]
+    assert [(each['id'], each['detailed']) for each in log.overview()['trials']] == [
+        ('short', True),
+        ('long', False),
+    ]
 
 
 def test_events_are_kept_in_little_memory_and_read_from_any_position():
@@ -247,7 +325,7 @@ def test_events_are_kept_in_little_memory_and_read_from_any_position():
         if seq % 37 == 0:
             assert log.events('long', 0) == lines
     for start, most in ((0, 5), (60, 10), (64, 64), (130, 500), (959, 3), (958, 100), (1000, 5)):
-        assert log.events('long', start, most) == lines[start:start + most]
+        assert log.events('long', start, most) == lines[start : start + most]
     assert log.bytes_kept < sum(map(len, lines)) / 5
 
 
@@ -257,8 +335,10 @@ def test_the_events_of_all_trials_have_a_limit_in_bytes(monkeypatch):
     for number in range(6):
         for seq in range(100):
             text = '{:0200x}'.format(draw.getrandbits(800))
-            log.add('/robot', event(EventKind.TRANSITION, trial=str(number))._replace(
-                seq=seq, text=text))
+            log.add(
+                '/robot',
+                event(EventKind.TRANSITION, trial=str(number))._replace(seq=seq, text=text),
+            )
             assert log.bytes_kept <= 100000
     kept = [len(log.events(str(number), 0)) for number in range(6)]
     assert kept[0] == 0 and kept[-1] == 100 and log.overview()['heard'] == 6
@@ -269,8 +349,9 @@ def test_scores_of_robots_that_come_and_go_are_bounded(monkeypatch):
     scores = RecoveryStatistics()
     for number in range(6):
         for kind in (EventKind.FAILURE, EventKind.JUMP, EventKind.TRANSITION):
-            scores.add('/robot_{}'.format(number), Event(kind, 't', 0, 0.0, 'TASK', 'A',
-                                                         target='B'), False)
+            scores.add(
+                '/robot_{}'.format(number), Event(kind, 't', 0, 0.0, 'TASK', 'A', target='B'), False
+            )
     tried = [
         scores.recovery_counts(('/robot_{}'.format(number), 'TASK', 'A'), 'B').tried
         for number in range(6)

@@ -1,4 +1,5 @@
 """Attacks on the console that take more than one request, or one that no browser would send."""
+
 import hmac
 import json
 import socket
@@ -18,26 +19,54 @@ from smach_oracle.expert.console.web import sessions
 from smach_oracle.expert.console.web.access import ROLES, AccessTokens, ClientRateLimits
 
 ARGUMENTS = {
-    'question': 'q', 'kind': 'goto', 'name': 'x', 'held': True, 'frame': 'tool',
-    'linear': [0, 0, 0], 'angular': [0, 0, 0], 'gripper': '', 'sent': 1.0, 'xsrf': 'x',
-    'trial': 't', 'outcome': 'succeeded', 'stamp': '1.000000000', 'region': [[0, 0], [9, 0],
-                                                                             [9, 9]], 'strokes': [],
-    'robot': '/r', 'path': '', 'pattern': 'A', 'remove': False,
-    'down': 'd', 'moment': 1, 'label': 'A', 'container': 'M', 'key': 'k', 'json': '1'
+    'question': 'q',
+    'kind': 'goto',
+    'name': 'x',
+    'held': True,
+    'frame': 'tool',
+    'linear': [0, 0, 0],
+    'angular': [0, 0, 0],
+    'gripper': '',
+    'sent': 1.0,
+    'xsrf': 'x',
+    'trial': 't',
+    'outcome': 'succeeded',
+    'stamp': '1.000000000',
+    'region': [[0, 0], [9, 0], [9, 9]],
+    'strokes': [],
+    'robot': '/r',
+    'path': '',
+    'pattern': 'A',
+    'remove': False,
+    'down': 'd',
+    'moment': 1,
+    'label': 'A',
+    'container': 'M',
+    'key': 'k',
+    'json': '1',
 }
 FRAMES = {'use_frame': 'fresh', 'drive': 'tool'}
 
 
 def test_no_time_tells_how_much_of_a_token_is_right(monkeypatch):
-    tokens = AccessTokens('\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items()),
-                          'file')
+    tokens = AccessTokens(
+        '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items()), 'file'
+    )
     compared = []
     real = hmac.compare_digest
-    monkeypatch.setattr(hmac, 'compare_digest', lambda one, other: compared.append(
-        (one, other)) or real(one, other))
+    monkeypatch.setattr(
+        hmac, 'compare_digest', lambda one, other: compared.append((one, other)) or real(one, other)
+    )
     right = TOKENS['operator']
-    for guess in ('', 'x', right[:-1], right + 'x', right, TOKENS['viewer'],
-                  TOKENS['teleoperator']):
+    for guess in (
+        '',
+        'x',
+        right[:-1],
+        right + 'x',
+        right,
+        TOKENS['viewer'],
+        TOKENS['teleoperator'],
+    ):
         compared.clear()
         tokens.identify(guess)
         assert len(compared) == len(TOKENS), 'all of them, whichever it is'
@@ -45,11 +74,11 @@ def test_no_time_tells_how_much_of_a_token_is_right(monkeypatch):
 
 
 class TestOdd(console_case.ConsoleCase):
-
     def raw(self, *lines, body=b'', limit_s=40.0):
         """The status of a request written by hand, 0 where the connection is closed."""
         answer = self.io_loop.run_sync(
-            lambda: self.io_loop.run_in_executor(None, self._talk, lines, body), timeout=limit_s)
+            lambda: self.io_loop.run_in_executor(None, self._talk, lines, body), timeout=limit_s
+        )
         return int(answer.split()[1]) if answer else 0
 
     def _talk(self, lines, body):
@@ -66,24 +95,39 @@ class TestOdd(console_case.ConsoleCase):
         assert self.raw('GET /session HTTP/1.1', own, 'Host: evil.example') in (400, 421, 0)
         assert self.raw('GET /session HTTP/1.1', 'Host: evil.example', own) in (400, 421, 0)
         assert self.raw('GET /session HTTP/1.0') in (400, 421, 0)
-        assert self.raw('GET http://evil.example/session HTTP/1.1',
-                        'Host: evil.example') in (400, 404, 421, 0)
+        assert self.raw('GET http://evil.example/session HTTP/1.1', 'Host: evil.example') in (
+            400,
+            404,
+            421,
+            0,
+        )
 
     def test_what_is_too_large_is_not_even_read(self):
         own = 'Host: 127.0.0.1:{}'.format(self.get_http_port())
-        assert self.raw('POST /session HTTP/1.1', own,
-                        'Content-Length: 1000000000') in (400, 413, 0)
+        assert self.raw('POST /session HTTP/1.1', own, 'Content-Length: 1000000000') in (
+            400,
+            413,
+            0,
+        )
         assert self.raw('GET /session HTTP/1.1', own, 'X-Long: ' + 'x' * 70000) in (400, 431, 0)
-        assert self.raw('POST /session HTTP/1.1', own, 'Transfer-Encoding: chunked',
-                        body=b'fffff\r\n' + b'x' * 0xfffff) in (400, 413, 0)
+        assert self.raw(
+            'POST /session HTTP/1.1',
+            own,
+            'Transfer-Encoding: chunked',
+            body=b'fffff\r\n' + b'x' * 0xFFFFF,
+        ) in (400, 413, 0)
         assert self.raw('GET /session HTTP/1.1', own) == 200, 'it is still there'
 
     def test_nobody_gets_another_share_by_calling_himself_somebody_else(self):
         self.access.requests = ClientRateLimits(rate=0.0, burst=2.0, for_all=5.0)
         codes = [
-            self.ask('/session', X_Forwarded_For='10.0.0.{}'.format(number),
-                     X_Real_Ip='10.1.0.{}'.format(number),
-                     Forwarded='for=10.2.0.{}'.format(number)).code for number in range(4)
+            self.ask(
+                '/session',
+                X_Forwarded_For='10.0.0.{}'.format(number),
+                X_Real_Ip='10.1.0.{}'.format(number),
+                Forwarded='for=10.2.0.{}'.format(number),
+            ).code
+            for number in range(4)
         ]
         assert codes == [200, 200, 429, 429]
 
@@ -98,8 +142,14 @@ class TestOdd(console_case.ConsoleCase):
 
     def tried(self, token, session):
         cookie, info = session
-        return self.ask('/session', 'POST', json.dumps({'token': token}), Cookie=cookie,
-                        Origin=self.origin, X_Xsrf=info['xsrf']).code
+        return self.ask(
+            '/session',
+            'POST',
+            json.dumps({'token': token}),
+            Cookie=cookie,
+            Origin=self.origin,
+            X_Xsrf=info['xsrf'],
+        ).code
 
     def test_wrong_tokens_shut_nobody_out(self):
         mine, theirs = self.begin(), self.begin()
@@ -113,8 +163,9 @@ class TestOdd(console_case.ConsoleCase):
         self.access.requests = ClientRateLimits(rate=0.0, burst=150.0, for_all=5.0)
         self.access.files = ClientRateLimits(rate=0.0, burst=1500.0, for_all=5.0)
         for limits, all_had in ((self.access.requests, 750), (self.access.files, 7500)):
-            had = sum(limits.take('10.0.0.{}'.format(number))
-                      for _ in range(1000) for number in range(20))
+            had = sum(
+                limits.take('10.0.0.{}'.format(number)) for _ in range(1000) for number in range(20)
+            )
             assert had == all_had * 1.4, 'with a tenth of a share of each'
         files = sum(path.is_file() for path in STATIC.rglob('*'))
         assert all(self.access.files.take('192.168.0.9') for _ in range(files)), 'a page is loaded'
@@ -123,36 +174,48 @@ class TestOdd(console_case.ConsoleCase):
 
     def cookie_of(self, secret, clock=time.time, text=None):
         text = text or sessions.to_text(
-            sessions.BrowserSession('known-to-the-attacker', time.time(), 'teleoperator'))
+            sessions.BrowserSession('known-to-the-attacker', time.time(), 'teleoperator')
+        )
         value = tornado.web.create_signed_value(secret, self.access.cookie, text, clock=clock)
         return '{}={}'.format(self.access.cookie, value.decode())
 
     def test_a_cookie_of_other_tokens_or_of_yesterday_is_none(self):
-        assert self.begin(Cookie=self.cookie_of(
-            self.access.secret))[1]['signed_in'] is True, 'as it would be made'
+        assert self.begin(Cookie=self.cookie_of(self.access.secret))[1]['signed_in'] is True, (
+            'as it would be made'
+        )
         assert self.begin(Cookie=self.cookie_of('another secret'))[1]['signed_in'] is False
-        assert self.begin(Cookie=self.cookie_of(
-            self.access.secret, lambda: time.time() - 13 * 3600))[1]['signed_in'] is False
+        assert (
+            self.begin(Cookie=self.cookie_of(self.access.secret, lambda: time.time() - 13 * 3600))[
+                1
+            ]['signed_in']
+            is False
+        )
 
     def test_a_session_counts_from_its_own_beginning_and_one_that_says_none_is_none(self):
-        for text in (sessions.to_text(
-                sessions.BrowserSession('x',
-                                        time.time() - 13 * 3600,
-                                        'teleoperator')), '["x", "teleoperator", ""]'):
+        for text in (
+            sessions.to_text(sessions.BrowserSession('x', time.time() - 13 * 3600, 'teleoperator')),
+            '["x", "teleoperator", ""]',
+        ):
             answer = self.ask('/session', Cookie=self.cookie_of(self.access.secret, text=text))
-            assert json.loads(
-                answer.body)['signed_in'] is False and 'Set-Cookie' in answer.headers, text
+            assert (
+                json.loads(answer.body)['signed_in'] is False and 'Set-Cookie' in answer.headers
+            ), text
 
     def test_a_session_that_an_attacker_has_begun_is_not_the_one_that_is_signed_in(self):
         planted, info = self.begin()
-        answer = self.ask('/session', 'POST', json.dumps({'token': TOKENS['operator']}),
-                          Cookie=planted, Origin=self.origin, X_Xsrf=info['xsrf'])
+        answer = self.ask(
+            '/session',
+            'POST',
+            json.dumps({'token': TOKENS['operator']}),
+            Cookie=planted,
+            Origin=self.origin,
+            X_Xsrf=info['xsrf'],
+        )
         assert answer.code == 200
         assert self.begin(Cookie=planted)[1]['signed_in'] is False
 
 
 class TestPages(console_case.ConsoleCase):
-
     @tornado.testing.gen_test
     async def test_no_role_gives_a_command_of_a_higher_one(self):
         for role in ROLES:
@@ -165,7 +228,8 @@ class TestPages(console_case.ConsoleCase):
                     info['frame'] = FRAMES[name]
                 reply = await self.say(page, 5, do=name, **info)
                 words = '{}s may not {} (sign in as {})'.format(
-                    role, name.replace('_', ' '), spec.role)
+                    role, name.replace('_', ' '), spec.role
+                )
                 assert (reply['ok'], reply['message']) == (False, words)
         assert self.question_commands.done == [] and self.teleoperation.relayed == []
         assert not self.teleoperation.drivers
@@ -238,7 +302,15 @@ class TestPages(console_case.ConsoleCase):
         page = await self.open_page(*await self.signed('operator'))
         await page.write_message(b'\x00\xff' * 100, binary=True)
         await page.write_message('[' * 30000)
-        assert not (await self.say(page, 6, do='answer', question='q', kind='goto', name='x',
-                                   outputs=[{'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}
-                                            ]))['ok']
+        assert not (
+            await self.say(
+                page,
+                6,
+                do='answer',
+                question='q',
+                kind='goto',
+                name='x',
+                outputs=[{'key': 'a', 'value': json.loads('[' * 40 + ']' * 40)}],
+            )
+        )['ok']
         assert self.question_commands.done == []

@@ -1,4 +1,5 @@
 """The audit of commands: the first who listens hears also what was said right before."""
+
 import time
 
 import rospy
@@ -65,11 +66,17 @@ def test_each_command_is_told_with_who_gave_it_and_never_at_length(monkeypatch):
     monkeypatch.setattr(rospy, 'is_shutdown', lambda: False)
     monkeypatch.setattr(audit, 'ros_now', rospy.Time)
     made = Audit()
-    made.record(Person('10.0.0.7', 'abc', 'viewer', 'bob'), 'answer', False, 'x' * 9000,
-                {'why': 'y' * 9000})
-    record, = FakePublisher.made['~audit'].sent
+    made.record(
+        Person('10.0.0.7', 'abc', 'viewer', 'bob'), 'answer', False, 'x' * 9000, {'why': 'y' * 9000}
+    )
+    (record,) = FakePublisher.made['~audit'].sent
     assert (record.client, record.session, record.role, record.expert, record.ok) == (
-        '10.0.0.7', 'abc', 'viewer', 'bob', False)
+        '10.0.0.7',
+        'abc',
+        'viewer',
+        'bob',
+        False,
+    )
     assert len(record.message) == 1000 and len(record.arguments) == audit.LONGEST_ARGUMENTS
 
 
@@ -77,8 +84,9 @@ def test_beside_servers_that_are_gone_nothing_is_advertised_any_more(monkeypatch
     monkeypatch.setattr(rospy, 'Publisher', FakePublisher)
     made = Audit()
     made.prepare(['/a/expert_query', '/b/expert_query'])
-    first, second = (FakePublisher.made[audit_topic(name)]
-                     for name in ('/a/expert_query', '/b/expert_query'))
+    first, second = (
+        FakePublisher.made[audit_topic(name)] for name in ('/a/expert_query', '/b/expert_query')
+    )
     made.prepare(['/b/expert_query'])
     assert FakePublisher.made[audit_topic('/b/expert_query')] is second
     assert second.there and not first.there

@@ -1,4 +1,5 @@
 """Idle connections of strangers take neither all files nor anybody's place."""
+
 import asyncio
 import contextlib
 import json
@@ -33,7 +34,6 @@ class Held(contextlib.ExitStack):
 
 
 class TestFiles(tornado.testing.AsyncTestCase):
-
     def test_where_files_run_out_a_stranger_goes_for_each_that_comes(self):
         with Held() as held:
             first, second = held.stream(), held.stream()
@@ -45,7 +45,6 @@ class TestFiles(tornado.testing.AsyncTestCase):
 
 
 class CrowdCase(console_case.ConsoleCase):
-
     async def crowd(self, count, address='127.0.0.1'):
         """OpenConnections that ask for nothing."""
         made = []
@@ -54,15 +53,20 @@ class CrowdCase(console_case.ConsoleCase):
             self.addCleanup(made[-1].close)
             made[-1].bind((address, 0))
             made[-1].setblocking(False)
-            await asyncio.get_running_loop().sock_connect(made[-1],
-                                                          ('127.0.0.1', self.get_http_port()))
+            await asyncio.get_running_loop().sock_connect(
+                made[-1], ('127.0.0.1', self.get_http_port())
+            )
         return made
 
     async def asked(self, line, cookie=''):
         """Status of a request on a connection."""
         loop = asyncio.get_running_loop()
-        await loop.sock_sendall(line, 'GET /session HTTP/1.1\r\nHost: localhost\r\nCookie: {}\r\n'
-                                '\r\n'.format(cookie).encode())
+        await loop.sock_sendall(
+            line,
+            'GET /session HTTP/1.1\r\nHost: localhost\r\nCookie: {}\r\n\r\n'.format(
+                cookie
+            ).encode(),
+        )
         return int((await loop.sock_recv(line, 65536)).split()[1])
 
     async def claims(self, page):
@@ -85,7 +89,6 @@ def is_open(line):
 
 
 class TestCrowd(CrowdCase):
-
     @tornado.testing.gen_test
     async def test_an_address_has_a_few_and_who_has_a_token_keeps_his_own(self):
         page = await self.open_page(*await self.signed('operator'))
@@ -116,7 +119,7 @@ class TestCrowd(CrowdCase):
 
     @tornado.testing.gen_test
     async def test_one_that_asks_stays_longer_than_those_that_do_not(self):
-        asking, = await self.crowd(1)
+        (asking,) = await self.crowd(1)
         idle = await self.crowd(connections.MOST_OF_A_NETWORK - 1)
         assert await self.asked(asking) == 200
         await self.crowd(5)
@@ -126,8 +129,10 @@ class TestCrowd(CrowdCase):
     @tornado.testing.gen_test
     async def test_a_browser_has_a_number_too_and_takes_none_from_others(self):
         cookie, _ = await self.signed('viewer')
-        codes = [await self.asked((await self.crowd(1))[0], cookie)
-                 for _ in range(connections.MOST_OF_A_SESSION + 2)]
+        codes = [
+            await self.asked((await self.crowd(1))[0], cookie)
+            for _ in range(connections.MOST_OF_A_SESSION + 2)
+        ]
         assert codes == [200] * connections.MOST_OF_A_SESSION + [503] * 2
         assert await self.claims(await self.open_page(*await self.signed('operator')))
 
@@ -138,8 +143,9 @@ class TestWithoutTokens(CrowdCase):
     @tornado.testing.gen_test
     async def test_idle_connections_close_no_page(self):
         answer = await self.http_client.fetch(self.get_url('/session'))
-        page = await self.open_page(answer.headers['Set-Cookie'].split(';')[0],
-                                    json.loads(answer.body))
+        page = await self.open_page(
+            answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body)
+        )
         made = await self.crowd(100)
         await self.until(lambda: open_of(made) <= connections.MOST_OF_A_NETWORK)
         assert await self.claims(page)

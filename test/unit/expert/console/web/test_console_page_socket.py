@@ -1,4 +1,5 @@
 """What the limits of a page's socket let through, and the list of trials that all pages share."""
+
 import asyncio
 import json
 import threading
@@ -31,9 +32,11 @@ class Socket(page_socket.PageSocket):
 
 def test_a_stop_is_carried_out_before_the_socket_is_closed_for_too_many_commands():
     question, machine = {'question': 'q'}, {'robot': '/r', 'path': ''}
-    for command, arguments, done in (('stop_hand', question, ['stop_hand']),
-                                     ('stop_machine', machine, ['stop_machine']),
-                                     ('claim', question, [])):
+    for command, arguments, done in (
+        ('stop_hand', question, ['stop_hand']),
+        ('stop_machine', machine, ['stop_machine']),
+        ('claim', question, []),
+    ):
         socket = Socket()
         message = json.dumps(dict(arguments, id=1, do=command))
         asyncio.run(socket.on_message(message))

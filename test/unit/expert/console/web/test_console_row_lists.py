@@ -1,6 +1,7 @@
 """Of long lists a page gets what has changed, while it looks: and puts it together rightly, by its
 own script.
 """
+
 import json
 import random
 import re
@@ -16,14 +17,14 @@ from smach_oracle.expert.console.server import STATIC
 from smach_oracle.expert.console.web.row_lists import RowLists, SentLists
 
 NODE = shutil.which('node')
-PUT_TOGETHER = '''
+PUT_TOGETHER = """
 const steps = JSON.parse(require("fs").readFileSync(0));
 let list;
 const found = steps.map((step) => {
   if (step.trials !== undefined) list = step.trials && changed(list, step.trials);
   return list;
 });
-process.stdout.write(JSON.stringify(found));'''
+process.stdout.write(JSON.stringify(found));"""
 
 
 def looking():
@@ -39,12 +40,13 @@ def drawn_lists(count=200, seed=3):
     for _ in range(count):
         for _ in range(draw.randrange(4)):
             number += 1
-            rows.insert(draw.choice((0, draw.randint(0, len(rows)))),
-                        {'id': str(number), 'failures': 0})
+            rows.insert(
+                draw.choice((0, draw.randint(0, len(rows)))), {'id': str(number), 'failures': 0}
+            )
         for row in draw.sample(rows, min(len(rows), draw.randrange(3))):
             row['failures'] += 1
         if draw.random() < 0.3:
-            del rows[draw.randrange(5, 30):]
+            del rows[draw.randrange(5, 30) :]
         if draw.random() < 0.05:
             draw.shuffle(rows)
         yield {'heard': number, 'trials': [dict(row) for row in rows]}
@@ -59,8 +61,13 @@ def test_the_page_puts_together_what_the_server_has():
         steps.append(json.loads(page.changes(lists) or '{}'))
     script = (STATIC / 'js/page/row_lists.js').read_text(encoding='utf-8')
     script = re.sub(r'^import .*|^export ', '', script, flags=re.MULTILINE)
-    done = subprocess.run([NODE, '-e', script + PUT_TOGETHER], input=json.dumps(steps).encode(),
-                          stdout=subprocess.PIPE, check=True, timeout=60)
+    done = subprocess.run(
+        [NODE, '-e', script + PUT_TOGETHER],
+        input=json.dumps(steps).encode(),
+        stdout=subprocess.PIPE,
+        check=True,
+        timeout=60,
+    )
     assert json.loads(done.stdout.decode()) == whole
     sent = sum(len(json.dumps(step)) for step in steps)
     assert sent < 0.6 * sum(len(json.dumps(each)) for each in whole)
@@ -84,7 +91,6 @@ def test_a_list_that_is_not_there_is_told_once():
 
 
 class TestPages(console_case.ConsoleCase):
-
     async def batch(self, page):
         """What the next push sends, besides sections."""
         self.pages.write_trials()

@@ -1,6 +1,5 @@
 """Sections are sent as they change."""
 
-
 from smach_oracle.expert.console.web import sections as sections_module
 from smach_oracle.expert.console.web.sections import PageSections
 

@@ -1,6 +1,7 @@
 """How the console's sessions end by themselves, and by another one: what a browser was signed in as
 is over then.
 """
+
 import json
 import time
 
@@ -14,39 +15,51 @@ from smach_oracle.expert.console.web import sessions
 
 
 class TestAnother(console_case.ConsoleCase):
-
     @tornado.testing.gen_test
     async def test_signing_in_once_more_ends_what_that_browser_was_signed_in_as(self):
         cookie, info = await self.signed('teleoperator')
         page = await self.open_page(cookie, info)
         answer = await self.http_client.fetch(
-            self.get_url('/session'), method='POST', body=json.dumps({'token': TOKENS['viewer']}),
-            headers={'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': info['xsrf']})
+            self.get_url('/session'),
+            method='POST',
+            body=json.dumps({'token': TOKENS['viewer']}),
+            headers={'Cookie': cookie, 'Origin': self.origin, 'X-Xsrf': info['xsrf']},
+        )
         assert json.loads(answer.body)['role'] == 'viewer'
         assert await page.read_message() is None and page.close_code == page_socket.SIGNED_OUT
         assert await self.refused(cookie) == 401, 'a copy of its cookie is good for nothing'
-        assert [record[:3] for record in self.audit.records
-                if record[0].startswith('sign')] == [('sign_in', True, 'teleoperator'),
-                                                     ('sign_out', True, 'teleoperator'),
-                                                     ('sign_in', True, 'viewer')]
+        assert [record[:3] for record in self.audit.records if record[0].startswith('sign')] == [
+            ('sign_in', True, 'teleoperator'),
+            ('sign_out', True, 'teleoperator'),
+            ('sign_in', True, 'viewer'),
+        ]
         await self.open_page(answer.headers['Set-Cookie'].split(';')[0], json.loads(answer.body))
 
     def test_a_wrong_token_ends_nothing(self):
         cookie, info = self.sign_in('operator')
-        assert self.ask('/session', 'POST', json.dumps({'token': 'no such token'}), Cookie=cookie,
-                        Origin=self.origin, X_Xsrf=info['xsrf']).code == 401
+        assert (
+            self.ask(
+                '/session',
+                'POST',
+                json.dumps({'token': 'no such token'}),
+                Cookie=cookie,
+                Origin=self.origin,
+                X_Xsrf=info['xsrf'],
+            ).code
+            == 401
+        )
         assert self.begin(Cookie=cookie)[1]['role'] == 'operator'
 
 
 class TestAge(console_case.ConsoleCase):
-
     @tornado.testing.gen_test
     async def test_a_page_is_closed_as_soon_as_its_session_is_too_old(self):
         page = await self.open_page(*await self.signed('operator'))
-        socket, = self.pages.open
+        (socket,) = self.pages.open
         began_s = time.monotonic()
-        socket.session = socket.session._replace(began_s=time.time() - 3600.0 * sessions.HOURS +
-                                                 0.5)
+        socket.session = socket.session._replace(
+            began_s=time.time() - 3600.0 * sessions.HOURS + 0.5
+        )
         socket._look_at_age()
         assert await page.read_message() is None
         assert page.close_code == page_socket.TOO_OLD and time.monotonic() - began_s > 0.45
@@ -77,7 +90,6 @@ class TestAge(console_case.ConsoleCase):
 
 
 class TestWithoutTokens(console_case.ConsoleCase):
-
     tokens = False
 
     @tornado.testing.gen_test
@@ -87,12 +99,13 @@ class TestWithoutTokens(console_case.ConsoleCase):
         page = await self.open_page(cookie, json.loads(answer.body))
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sessions, 'HOURS', 0)
-            socket, = self.pages.open
+            (socket,) = self.pages.open
             check_age, again = socket._look_at_age, []
             patch.setattr(socket, '_look_at_age', lambda: again.append(True))
             check_age()
-            assert (await self.say(page, 9, do='watch',
-                                   trial=''))['ok'], 'a hand that it drives goes on'
+            assert (await self.say(page, 9, do='watch', trial=''))['ok'], (
+                'a hand that it drives goes on'
+            )
             assert not again
             assert await self.refused(cookie) == 401, 'a request gets a new session'
 
@@ -101,13 +114,27 @@ def test_a_session_survives_its_cookie_and_nothing_else_becomes_one():
     session = sessions.new_session()
     assert sessions.from_text(sessions.to_text(session).encode()) == session
     assert sessions.from_text(b'["a",1.0,"operator",""]') == sessions.BrowserSession(
-        'a', 1.0, 'operator')
-    for text in (None, b'', b'{', b'[]', b'[1,2,3,4]', b'["a",1.0,"root",""]', b'{"id": 1}',
-                 b'["a",1.0,"operator"]', b'["a","operator",""]', b'["a","1.0","operator",""]',
-                 b'["a",true,"operator",""]', b'["a",null,"operator",""]',
-                 b'["a",NaN,"operator",""]', b'["a",Infinity,"operator",""]',
-                 b'["a",1e999,"operator",""]', b'[["a"],1.0,"operator",""]',
-                 b'["a",1.0,["operator"],""]'):
+        'a', 1.0, 'operator'
+    )
+    for text in (
+        None,
+        b'',
+        b'{',
+        b'[]',
+        b'[1,2,3,4]',
+        b'["a",1.0,"root",""]',
+        b'{"id": 1}',
+        b'["a",1.0,"operator"]',
+        b'["a","operator",""]',
+        b'["a","1.0","operator",""]',
+        b'["a",true,"operator",""]',
+        b'["a",null,"operator",""]',
+        b'["a",NaN,"operator",""]',
+        b'["a",Infinity,"operator",""]',
+        b'["a",1e999,"operator",""]',
+        b'[["a"],1.0,"operator",""]',
+        b'["a",1.0,["operator"],""]',
+    ):
         assert sessions.from_text(text) is None, text
     assert sessions.xsrf_token(session, 'a') != sessions.xsrf_token(session, 'b')
     assert session.id not in session.short
