@@ -7,10 +7,11 @@ import pytest
 from pinned import held
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 
 pytest.importorskip('rospy')
 from smach_oracle.ros.introspection.container_watch import ContainerTree
+from smach_oracle.ros.introspection.introspection_server import structure_fields
 
 OUTCOMES = ['succeeded', 'aborted']
 
@@ -81,3 +82,25 @@ def shown(wrapped):
 
 def test_a_viewer_is_shown_the_same_as_ever():
     assert shown(OracleContainer.wrap(tree(), name='TOP')) == held('viewer')
+
+
+def test_a_viewer_receives_the_same_structure_as_ever_at_rest_and_while_it_runs():
+    """The fields of each container's SmachContainerStructure behind its path."""
+    wrapped = OracleContainer.wrap(tree(), name='TOP')
+
+    def lines(path, container):
+        children, outcomes, starts, ends, results = map(list, structure_fields(container))
+        yield '{}: {} | {}'.format(path, ', '.join(children), ', '.join(sorted(results)))
+        yield from sorted('  {} --{}--> {}'.format(*edge) for edge in zip(starts, outcomes, ends))
+        for label, child in container.get_children().items():
+            if isinstance(child, smach.Container):
+                yield from lines('{}/{}'.format(path, label), child)
+
+    seen = {}
+    oracle_of(wrapped).events.observers.append(
+        lambda event: seen.setdefault(event.kind.name, list(lines('/TOP', wrapped)))
+    )
+    expected = held('structure_messages')
+    assert list(lines('/TOP', wrapped)) == expected
+    assert wrapped.execute() == 'succeeded'
+    assert len(seen) > 6 and [kind for kind, told in seen.items() if told != expected] == []
