@@ -130,7 +130,7 @@ class Container(State):
         """Raise InvalidStateError or InvalidTransitionError if the container cannot run,
         overridden.
         """
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def _is_consistent(self) -> bool:
         try:
@@ -143,29 +143,29 @@ class Container(State):
     # -- what outsiders may ask, overridden by each kind
 
     def __getitem__(self, key: str) -> State:
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def get_children(self) -> Dict[str, State]:
         """Return the states of this container by label."""
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def get_initial_states(self) -> List[str]:
         """Return the labels at which execution begins."""
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def set_initial_state(self, initial_states: List[str], userdata: Any) -> None:
         """Begin at these labels from now on, with the keys of ``userdata`` added to the
         container's.
         """
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def get_active_states(self) -> List[str]:
         """Return the labels of the states that are being executed."""
-        raise NotImplementedError()
+        raise NotImplementedError
 
     def get_internal_edges(self) -> List[Edge]:
         """Return all transitions, as (outcome, from label, to label or container outcome)."""
-        raise NotImplementedError()
+        raise NotImplementedError
 
     # -- callbacks
 

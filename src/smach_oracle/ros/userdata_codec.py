@@ -75,7 +75,7 @@ def encode_all(values: Mapping[str, Any], limit_bytes: int = TRANSFER_BYTES) -> 
 
     A key that is no string (SMACH does not mind) is named, and its value UNSENT.
     """
-    items = sorted(list(values.items()), key=lambda item: text_of(item[0]))
+    items = sorted(values.items(), key=lambda item: text_of(item[0]))
     return [
         encode(key, value, limit_bytes)
         if isinstance(key, str)

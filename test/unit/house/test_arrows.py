@@ -222,19 +222,6 @@ def test_a_circle_of_imports_is_noticed():
     assert circle_in({'a': {'b'}, 'b': {'c'}, 'c': {'b'}, 'd': set()}) == ['a', 'b', 'c']
 
 
-def test_the_executive_imports_at_the_top_of_its_files_alone():
-    late = [
-        '{}:{}'.format(shown(path), node.lineno)
-        for path in python_files('src/smach_oracle/oracle')
-        for function in ast.walk(parse(path))
-        if isinstance(function, (ast.FunctionDef, ast.Lambda))
-        for node in ast.walk(function)
-        if isinstance(node, (ast.Import, ast.ImportFrom))
-    ]
-    # the lazy names of the package itself keep its pure parts free of smach
-    assert [place.split(':')[0] for place in late] == ['src/smach_oracle/oracle/__init__.py']
-
-
 @without_stdlib_names
 def test_the_executive_needs_smach_and_python_alone():
     outside = {name.split('.')[0] for name in imported_by('oracle')} - STDLIB

@@ -30,7 +30,7 @@ def both(**branches):
     concurrence = smach.Concurrence(
         outcomes=OUTCOMES,
         default_outcome='aborted',
-        outcome_map={'done': {label: 'done' for label in branches}},
+        outcome_map={'done': dict.fromkeys(branches, 'done')},
     )
     with concurrence:
         for label, branch in branches.items():

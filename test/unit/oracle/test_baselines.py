@@ -304,7 +304,7 @@ def test_the_second_trial_draws_as_the_first_one_under_the_next_seed():
 
 def test_each_action_is_as_likely():
     policy = policy_named('random')
-    counts = {action: 0 for action in policy.actions}
+    counts = dict.fromkeys(policy.actions, 0)
     for number in range(3000):
         counts[policy.decide(situation(place='TOP/B {}'.format(number)))] += 1
     assert min(counts.values()) > 900

@@ -95,7 +95,7 @@ def test_it_stands_still_for_one_branch_of_a_concurrence(clock):
     both = smach.Concurrence(
         outcomes=['done', 'aborted'],
         default_outcome='aborted',
-        outcome_map={'done': {label: 'done' for label in branches}},
+        outcome_map={'done': dict.fromkeys(branches, 'done')},
     )
     with both:
         for label, branch in branches.items():

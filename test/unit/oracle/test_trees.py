@@ -35,7 +35,7 @@ def concurrence_of(**children):
     concurrence = smach.Concurrence(
         outcomes=['done', 'aborted'],
         default_outcome='aborted',
-        outcome_map={'done': {label: 'done' for label in children}},
+        outcome_map={'done': dict.fromkeys(children, 'done')},
     )
     with concurrence:
         for label, child in children.items():

@@ -61,7 +61,7 @@ def test_a_light_that_stays_is_waited_for_only_so_long(eyes):
 @pytest.mark.parametrize('gap, holds', [(0.0, False), (0.01, False), (0.05, True), (0.09, False)])
 def test_fingers_that_something_keeps_apart_may_hold_it(eyes, gap, holds):
     made = eyes(0)
-    made.senses.joints = lambda: {name: gap / 2 for name in FINGER_JOINTS['right']}
+    made.senses.joints = lambda: dict.fromkeys(FINGER_JOINTS['right'], gap / 2)
     assert checks.right_hand_may_hold(None) == holds
     made.senses.joints = lambda: made.senses.see('', '')
     made.senses.broken = True

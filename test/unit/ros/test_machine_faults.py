@@ -30,7 +30,7 @@ def machine(**states):
 
 
 def around(inner):
-    return machine(INNER=(inner, {outcome: 'done' for outcome in inner.get_registered_outcomes()}))
+    return machine(INNER=(inner, dict.fromkeys(inner.get_registered_outcomes(), 'done')))
 
 
 def concurrence(outcome_map, **states):

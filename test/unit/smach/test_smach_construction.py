@@ -47,7 +47,7 @@ def test_an_error_inside_a_with_block_closes_the_container(said):
     sm = smach.StateMachine(['done'])
     with pytest.raises(ZeroDivisionError):
         with sm:
-            raise ZeroDivisionError()
+            raise ZeroDivisionError
     assert not sm.is_opened()
     assert any('Traceback' in text for text in said('err'))
 

@@ -90,7 +90,7 @@ class Pr2Body:
         self._changed = set(range(len(infos)))
         self._read_more = np.zeros(len(infos))  # what encoders read too much
         self._limp: Set[int] = set()  # joints whose motors are off
-        self._grips = {arm: (2 * JAW_OPEN, GRIP) for arm in ARMS}
+        self._grips = dict.fromkeys(ARMS, (2 * JAW_OPEN, GRIP))
         self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
         self._stand(start)
         for arm in ARMS:

@@ -48,7 +48,7 @@ TSC = shutil.which('tsc')
 
 def taken():
     """The names of commands and of their arguments."""
-    return {name: {argument: True for argument in spec.checks} for name, spec in COMMANDS.items()}
+    return {name: dict.fromkeys(spec.checks, True) for name, spec in COMMANDS.items()}
 
 
 def compile_samples(folder, samples):

@@ -134,7 +134,7 @@ def test_renamed_states_go_on_wherever_it_was_killed(folder):
         assert told.get('outcome') == 'succeeded', (point, told)
         begun, ended = after.diary.count('begins'), after.diary.count('ends')
         # A fails the first time in each process, and may be in doubt
-        most = {name: 2 for name in begun}
+        most = dict.fromkeys(begun, 2)
         most['A'] = 4
         assert all(begun[name] <= most[name] for name in begun), (point, begun)
         assert set(ended) == {'A', 'LOOK', 'PICK', 'LEFT', 'M1', 'M2', 'Z'}, point

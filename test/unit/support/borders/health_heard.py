@@ -99,9 +99,9 @@ _by_diagnostics = st.tuples(
 
 def _heard(condition: Dict[str, Any], topic: str, messages: List[Any]) -> str:
     conditions = checked_health([dict(condition, name='robot')])
-    types = {name: rospy.AnyMsg for name in ('/health', *health_topics.DIAGNOSTICS)}
+    types = dict.fromkeys(('/health', *health_topics.DIAGNOSTICS), rospy.AnyMsg)
     with fake_ros() as offered, mock.patch.multiple(
-        health_topics, types_at_master=lambda: types, types_in_process=lambda: {}
+        health_topics, types_at_master=lambda: types, types_in_process=dict
     ), mock.patch.object(threading, 'Timer', mock.Mock()):
         port = TopicHealth(conditions, health_topics.HealthTopics())
         for each in messages:

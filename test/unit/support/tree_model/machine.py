@@ -148,7 +148,7 @@ class MachinePart(Part, Recovering):
     def end_naturally(self, failed: Failed) -> Way:
         """Go as without an oracle."""
         if failed.ending is None:
-            raise Raised()
+            raise Raised
         self.tell('TRANSITION', failed.label, failed.outcome, failed.ending.target)
         return failed.ending
 

@@ -129,7 +129,7 @@ class Model:
     def _count(self) -> None:
         self.entries += 1
         if self.entries > MOST_ENTRIES:
-            raise Cut()
+            raise Cut
 
     def enter(self, path: str, label: str, seen: Dict[str, Any]) -> None:
         """Note what a leaf sees when it is executed."""

@@ -115,7 +115,7 @@ class LeafPart(Part):
         number = self._executions
         self._executions += 1
         value = '{}/{}#{}'.format(self.path, self.label, number)
-        view.copy_from(plan.writes, {key: value for key in plan.writes})
+        view.copy_from(plan.writes, dict.fromkeys(plan.writes, value))
         action = self.run.plan.action(self.path, plan, number)
         if action.kind == 'preempt' and self.run.takes_preempt():
             self.run.top.request_preempt()
@@ -123,7 +123,7 @@ class LeafPart(Part):
             self.flag = False
             return action.outcome if action.kind == 'preempt' else 'preempted'
         if action.kind == 'raise':
-            raise Raised()
+            raise Raised
         return action.outcome
 
     def _seen(self, view: View) -> Dict[str, Any]:

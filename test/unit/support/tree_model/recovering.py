@@ -47,7 +47,7 @@ class Recovering:
         if 'preempted' in self.plan.outcomes:
             return Way('preempted', False)
         if failed.ending is None:
-            raise Raised()
+            raise Raised
         return failed.ending
 
     def _by_itself(self: Any, label: str, decision: Decision) -> Way:
@@ -267,7 +267,7 @@ class Recovering:
         )
         if ending is None:
             self.settled = True
-            raise Raised()
+            raise Raised
         if ending.is_state:
             self.tell('JUMP', failed.label, '', ending.target, self.missing(ending.target), 'keep')
         else:

@@ -66,7 +66,7 @@ class InterfaceCommands:
     @property
     def commands(self) -> Mapping[str, CommandWorker]:
         """Return the commands by name, for QuestionCommands."""
-        return {name: self.carry_out for name in self._carry_out}
+        return dict.fromkeys(self._carry_out, self.carry_out)
 
     def carry_out(
         self, command: PageCommand, person: Person, listed: ListedQuestion

@@ -11,11 +11,11 @@ from typing import Any, Dict, List, NamedTuple, Union
 # before cv2 is there: small files of huge images
 os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2**26))
 
-import numpy as np  # noqa: E402
-from sensor_msgs.msg import CompressedImage, Image  # noqa: E402
+import numpy as np
+from sensor_msgs.msg import CompressedImage, Image
 
-from smach_oracle.packages import optional  # noqa: E402
-from smach_oracle.ros.images import ImageError, colour_of, depth_of  # noqa: E402
+from smach_oracle.packages import optional
+from smach_oracle.ros.images import ImageError, colour_of, depth_of
 
 cv2 = optional('cv2')  # without it the page has everything but pictures
 NO_PICTURES = (
