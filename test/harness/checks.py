@@ -56,10 +56,11 @@ def _command(name: str, command: List[str], bench: Bench, timeout_s: float = 300
 
 
 def lint_checks(root: Path) -> Dict[str, Check]:
-    """Linters, types and of the page's scripts, pages, Python 3.8, catkin_lint, launches."""
+    """Linters, imports, types, pages, words, Python 3.8, catkin_lint, launches."""
     checks = {
         'ruff': ['ruff', 'check', '--no-cache', '--output-format', 'concise', '.'],
         'format': ['ruff', 'format', '--no-cache', '--check', '.'],
+        'imports': ['env', 'PYTHONPATH=src', 'lint-imports', '--no-cache'],
         'mypy': [sys.executable, '-m', 'mypy', '--cache-dir', os.devnull],
         'python 3.8': [sys.executable, '-c', VERMIN, '--target=3.8-', '--no-tips', '--violations']
         + PYTHON_SOURCES,

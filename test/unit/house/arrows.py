@@ -1,7 +1,10 @@
-"""Who may import whom in src/smach_oracle: the tables, and how an import is read against them."""
+"""Which room may import which in src/smach_oracle, and how an import is read against the tables.
+
+The layers within a room are contracts of import-linter, in pyproject.toml.
+"""
 
 import re
-from typing import Dict, FrozenSet, Iterable, Iterator, List, Set, Tuple, Union
+from typing import Dict, Iterable, Iterator, List, Set, Tuple
 
 from house import ROOT, imports, python_files, shown
 
@@ -106,106 +109,6 @@ INSIDE = {
     'oracle.places',
     'oracle.machine',
 }
-Layer = Union[str, Set[str]]
-# the packages and modules of a room that has packages, from the top down. Each may import those
-# below it alone: names in one set do not know each other.
-LAYERS: Dict[str, List[Layer]] = {
-    'oracle': [
-        'prospects',
-        'operator_hand',
-        'container',
-        'question',
-        'execution',
-        'checkpoint',
-        'branches',
-        'recovery',
-        'places',
-        'machine',
-        'control',
-        'asking',
-        'records',
-        'settings',
-        'decision',
-        'number_checks',
-        'background',
-        'waiting',
-        'identity',
-        'errors',
-    ],
-    'ros': [
-        'oracle_run',
-        'container',
-        'attachment',
-        {'recorder', 'expert', 'publishers', 'health', 'hand', 'waiting', 'diagnostics'},
-        {'recording', 'interfaces', 'goal_link', 'disk', 'loaded_settings', 'stored'},
-        'senders',
-        {
-            'event_messages',
-            'userdata_codec',
-            'images',
-            'connections',
-            'shutdown',
-            'parameters',
-            'command_line',
-            'service_calls',
-            'introspection',
-            'main_thread',
-            'machine_names',
-            'goal_tracking',
-        },
-        {'sendable_text', 'strict_json', 'master_watch', 'reading', 'signals', 'log'},
-    ],
-    'expert': [
-        {'console', 'terminal', 'scripted_expert'},
-        'front_end',
-        'claims',
-        {'followed_server', 'interface_outputs', 'rules', 'wording', 'interface_goal'},
-        {'robot_topics', 'stop_calls', 'repeating'},
-    ],
-    'expert/console': [
-        'server',
-        'page_socket',
-        {'answering', 'robots'},
-        'trials',
-        'sensors',
-        {'graphs', 'feeds', 'commands', 'web'},
-    ],
-    'interfaces': [{'perception', 'manipulation'}, {'interface_goal', 'priority'}],
-    'store': [
-        'state_command',
-        {'stopped_trial', 'store_writer'},
-        'thinning',
-        'retention',
-        'store_file',
-        'opening',
-        'accepting',
-        'holding',
-        'tables',
-        'soundness',
-        'renaming',
-        'rows',
-        'codecs',
-        {'object_parts', 'errors', 'names'},
-    ],
-    'pr2': [
-        'nodes',
-        {'skills', 'ros_robot', 'checks'},
-        {'planning', 'pose_teller', 'ros_senses', 'ros_time'},
-        {'perception', 'fingers'},
-        {'model', 'robot', 'kitchen'},
-        'work_costs',
-    ],
-    'testing': [
-        {'script_run', 'soak'},
-        {'bench', 'recorded', 'soak_report'},
-        'observed_trial',
-        {'injection', 'node_side', 'trial_text', 'script'},
-        {'faults', 'places'},
-        'errors',
-    ],
-    'simulation': [{'rehearsal', 'node'}, 'pictures', 'physics', 'scenes'],
-    'inspection_robot': [{'nodes', 'checks'}, {'world', 'robot'}, {'rays', 'site'}],
-}
 # what runs where no ROS is installed
 ROS_FREE = [
     'oracle',
@@ -270,10 +173,3 @@ def needs_ros(name: str) -> bool:
 def needs_engine(name: str) -> bool:
     """Whether a dotted name is a module of SMACH."""
     return bool(ENGINE.fullmatch(name.split('.')[0]))
-
-
-def members(layers: Iterable[Layer]) -> FrozenSet[str]:
-    """All names of some layers."""
-    return frozenset(
-        name for layer in layers for name in ({layer} if isinstance(layer, str) else layer)
-    )

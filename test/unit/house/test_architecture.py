@@ -8,8 +8,9 @@ import subprocess
 import sys
 
 import pytest
-from arrows import INSIDE, LAYERS, ROOMS, below, found, needs_engine, needs_ros, told
+from arrows import INSIDE, ROOMS, below, found, needs_engine, needs_ros, told
 from house import ROOT, imports
+from layers import LAYERS
 
 SOURCES = ROOT / 'src/smach_oracle'
 PAGE = (ROOT / 'doc/architecture.md').read_text(encoding='utf-8')
@@ -239,4 +240,6 @@ def test_the_page_says_what_the_inside_is():
 
 def test_the_executive_has_the_layers_of_the_page():
     table = PAGE[PAGE.index('Inside `oracle`') :].split('\n\n')[1]
-    assert re.findall(r'^\| `(\w+)(?:\.py)?` \|', table, re.MULTILINE) == LAYERS['oracle']
+    assert (
+        re.findall(r'^\| `(\w+)(?:\.py)?` \|', table, re.MULTILINE) == LAYERS['smach_oracle.oracle']
+    )

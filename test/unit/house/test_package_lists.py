@@ -10,6 +10,8 @@ OF_DEVELOPERS = {
     'mypy',
     'ruff',
     'vermin',
+    'import-linter',
+    'grimp',
     'catkin-lint',
     'catkin_lint',
     'chromium',
