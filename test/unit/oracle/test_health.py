@@ -155,7 +155,8 @@ def test_userdata_is_what_it_was_when_the_state_was_entered(health):
     assert contents(machine.machine.userdata) == {'count': 1}
 
 
-def test_one_notice_stands_for_all_branches_and_levels(health, log):
+def both_branches_wait(health, log):
+    """A machine in whose Concurrence both branches failed while unwell, and its run."""
     both = threading.Barrier(2)
 
     def fails(state, ud):
@@ -166,7 +167,7 @@ def test_one_notice_stands_for_all_branches_and_levels(health, log):
     split = smach.Concurrence(
         outcomes=['done', 'aborted'],
         default_outcome='aborted',
-        outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}},
+        outcome_map={'done': {'RIGHT': 'done'}},
     )
     with split:
         smach.Concurrence.add('LEFT', chain_of(Scripted(fails)))
@@ -177,11 +178,27 @@ def test_one_notice_stands_for_all_branches_and_levels(health, log):
     machine = Watched(outer, health=health, settings=SETTINGS)
     run = in_thread(machine.run)
     assert wait_for(lambda: [text for _, text in log if text.endswith('; it waits, too')], 10)
+    return machine, run
+
+
+def test_one_notice_stands_for_all_branches_and_levels(health, log):
+    machine, run = both_branches_wait(health, log)
     assert healthy_again(machine, health, run) == 'done'
     start, end = notices(machine)
     assert end.data['states'] == ['SM_ROOT/SPLIT/LEFT/A', 'SM_ROOT/SPLIT/RIGHT/A']
     assert not machine.of(EventKind.FAILURE)
     assert len([text for level, text in log if level == 'warn']) == 1
+
+
+def test_a_branch_that_waits_no_more_leaves_the_other_waiting(health, log):
+    machine, run = both_branches_wait(health, log)
+    left = 'SM_ROOT/SPLIT/LEFT'
+    machine.machine['SPLIT']['LEFT'].request_preempt()
+    ends = (EventKind.CONTAINER_END,)
+    assert wait_for(lambda: [each for each in machine.of(*ends) if each.path == left], 10)
+    assert [each.kind for each in notices(machine)] == [EventKind.HEALTH_WAIT_START]
+    assert healthy_again(machine, health, run) == 'done'
+    assert [each.outcome for each in notices(machine)] == ['', 'well']
 
 
 def test_a_wait_ends_once_health_has_been_good_for_the_settle_time(health):
