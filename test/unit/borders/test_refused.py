@@ -150,7 +150,7 @@ def test_json_that_is_nested_too_deep_is_not_put_into_a_store(store, capsys, giv
 
 @pytest.mark.parametrize('field', ['data.\u00b2', 'data.' + '9' * 5000])
 def test_a_field_that_is_almost_a_place_in_a_list_is_none(field):
-    (condition,) = checked_health({'topic': '/t', 'field': field})
+    (condition,) = checked_health('healthy', {'topic': '/t', 'field': field})
     assert why_unwell_by_message(condition, Bool(True)) == '/t has no field ' + field
 
 
@@ -158,7 +158,7 @@ def test_a_field_that_is_almost_a_place_in_a_list_is_none(field):
     'wanted, ends', [({'at_least': 0}, "x00' is no number"), ({'equals': 'on'}, "x00'")]
 )
 def test_of_a_field_that_is_a_whole_image_only_head_and_tail_are_told(wanted, ends):
-    (condition,) = checked_health(dict(wanted, topic='/t'))
+    (condition,) = checked_health('healthy', dict(wanted, topic='/t'))
     why = why_unwell_by_message(condition, SimpleNamespace(data=bytes(100000)))
     assert LEFT_OUT in why and why.endswith(ends)
     assert len(why) < 300

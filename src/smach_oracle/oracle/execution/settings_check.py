@@ -8,11 +8,10 @@ from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
 from ..machine.tree_node import TreeNode
 from ..places.fitness import allowed_for, why_unfit
-from ..settings.close_names import did_you_mean
 from ..settings.on_resume import STATE
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec
-from ..settings.unfit_names import UnfitKind, UnfitName
+from ..settings.unfit_names import UnfitKind, UnfitName, did_you_mean
 
 # settings that keep a state from being run where, or for longer than, its author wants
 PROTECTIONS = ('on_retry', 'preconditions', 'time_limit_s')

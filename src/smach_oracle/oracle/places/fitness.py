@@ -6,7 +6,7 @@ import smach
 
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
-from ..settings.close_names import did_you_mean
+from ..settings.unfit_names import did_you_mean
 from .handing_over import links_to
 from .place import Place, place_named
 

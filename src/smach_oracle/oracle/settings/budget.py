@@ -1,18 +1,14 @@
 """The budget of a whole trial: what the oracle may spend, over all containers. Pure."""
 
 import math
-from typing import Any, Dict, NamedTuple, Optional
+from dataclasses import dataclass
+from typing import Optional
 
 from ..errors import SettingsError
 from . import checks as values
+from .setting import checked, setting, settings_of
 
-
-class Budget(NamedTuple):
-    """The most that all containers of a machine may spend in one trial. None means no limit."""
-
-    recoveries: Optional[int] = None  # decisions of the oracle's own that led to a state
-    minutes: Optional[float] = None  # of monotonic time, from the beginning of the trial
-    questions: Optional[int] = None  # failures that the expert is asked about
+_COUNT = values.optional(values.whole(0, 'a whole number from 0'))
 
 
 def _minutes(key: str, value: object) -> float:
@@ -23,11 +19,17 @@ def _minutes(key: str, value: object) -> float:
     return minutes
 
 
-_CHECKS: Dict[str, values.Check] = {
-    'recoveries': values.whole(0, 'a whole number from 0'),
-    'minutes': _minutes,
-    'questions': values.whole(0, 'a whole number from 0'),
-}
+@dataclass(frozen=True)
+class Budget:
+    """The most that all containers of a machine may spend in one trial. None means no limit."""
+
+    recoveries: Optional[int] = setting(
+        None, _COUNT, "decisions of the oracle's own that led to a state"
+    )
+    minutes: Optional[float] = setting(
+        None, values.optional(_minutes), 'of monotonic time, from the beginning of the trial'
+    )
+    questions: Optional[int] = setting(None, _COUNT, 'failures that the expert is asked about')
 
 
 def checked_budget(key: str, given: object) -> Budget:
@@ -35,13 +37,5 @@ def checked_budget(key: str, given: object) -> Budget:
 
     :raises SettingsError: naming key, value and what is allowed.
     """
-    if isinstance(given, Budget):
-        given = given._asdict()
-    limits: Dict[str, Any] = {}
-    for name, value in values.mapping(key, given).items():
-        if name not in _CHECKS:
-            raise SettingsError(
-                '{}.{}'.format(key, name), value, 'one of the keys ' + ', '.join(_CHECKS)
-            )
-        limits[name] = values.optional(_CHECKS[name])('{}.{}'.format(key, name), value)
-    return Budget(**limits)
+    limits = vars(given) if isinstance(given, Budget) else given
+    return Budget(**checked(Budget, key + '.', values.section(key, limits, settings_of(Budget))))

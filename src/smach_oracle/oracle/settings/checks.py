@@ -4,7 +4,7 @@ Each takes the dotted key and the value, and returns the value or raises Setting
 """
 
 import math
-from typing import Any, Callable, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Collection, Mapping, Optional, Sequence, Tuple
 
 from ..errors import SettingsError
 from ..identity import attribute_of
@@ -147,6 +147,19 @@ def mapping(key: str, value: object) -> Mapping[str, Any]:
     return value
 
 
+def section(key: str, value: object, allowed: Collection[str]) -> Mapping[str, Any]:
+    """Check for a mapping that has none but these keys.
+
+    :raises SettingsError: as `mapping`, or naming the first other key.
+    """
+    found = mapping(key, value)
+    for name in found:
+        if name not in allowed:
+            keys = 'one of the keys ' + ', '.join(allowed)
+            raise SettingsError('{}.{}'.format(key, name), found[name], keys)
+    return found
+
+
 def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     """Check for a fallback.
 
@@ -178,12 +191,8 @@ def on_no_answer(key: str, value: object) -> Tuple[str, str]:
     )
 
 
-def deadline(key: str, value: object) -> float:
-    """Check for a deadline in seconds. 0 waits without end.
-
-    :raises SettingsError: for anything else.
-    """
-    return float(number(0, math.inf, 'seconds from 0; 0 waits without end')(key, value))
+deadline = number(0, math.inf, 'seconds from 0; 0 waits without end')
+_limit = optional(number(0, math.inf, 'seconds from 0; 0 is no limit'))
 
 
 def time_limit(key: str, value: object) -> Optional[float]:
@@ -191,5 +200,4 @@ def time_limit(key: str, value: object) -> Optional[float]:
 
     :raises SettingsError: for anything else.
     """
-    limit_s = optional(number(0, math.inf, 'seconds from 0; 0 is no limit'))(key, value)
-    return limit_s or None
+    return _limit(key, value) or None

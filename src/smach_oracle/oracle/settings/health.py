@@ -57,7 +57,7 @@ _KEYS = {
 
 
 def checked_health(
-    given: object, resolver: Optional[Resolver] = None
+    key: str, given: object, resolver: Optional[Resolver] = None
 ) -> Tuple[HealthCondition, ...]:
     """Check the conditions. `resolver` turns 'python:module:attribute' into that object.
 
@@ -66,11 +66,11 @@ def checked_health(
     if as_value(given) is None:
         return ()
     if isinstance(given, Mapping):
-        return (_condition('healthy', given, resolver),)
+        return (_condition(key, given, resolver),)
     if not isinstance(given, (list, tuple)):
-        raise SettingsError('healthy', given, 'a list of conditions, or one')
+        raise SettingsError(key, given, 'a list of conditions, or one')
     return tuple(
-        _condition('healthy[{}]'.format(index), entry, resolver)
+        _condition('{}[{}]'.format(key, index), entry, resolver)
         for index, entry in enumerate(given)
     )
 
@@ -85,11 +85,7 @@ def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthC
     if len(kinds) != 1:
         raise SettingsError(key, dict(entry), _ALLOWED)
     kind = kinds[0]
-    for name in entry:
-        if name not in _KEYS[kind]:
-            raise SettingsError(
-                '{}.{}'.format(key, name), entry[name], 'one of the keys ' + ', '.join(_KEYS[kind])
-            )
+    values.section(key, entry, _KEYS[kind])
     prefix = key + '.'
     make = {HealthKind.TOPIC: _topic, HealthKind.DIAGNOSTICS: _diagnostics}.get(kind)
     made = make(prefix, entry) if make else _function(prefix, entry, resolver)

@@ -41,18 +41,15 @@ class InterfaceOffer(NamedTuple):
 Offers = Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...]
 
 
-def checked_interfaces(given: object) -> Offers:
+def checked_interfaces(key: str, given: object) -> Offers:
     """Return each offer with the states it serves, () for all of them.
 
     :raises SettingsError: naming key, value and what is allowed.
     """
     offers = []
-    for name, entry in values.mapping('interfaces', given).items():
-        prefix = 'interfaces.{}.'.format(name)
-        entry = values.mapping(prefix[:-1], entry)
-        for key in entry:
-            if key not in _KEYS:
-                raise SettingsError(prefix + key, entry[key], 'one of the keys ' + ', '.join(_KEYS))
+    for name, entry in values.mapping(key, given).items():
+        prefix = '{}.{}.'.format(key, name)
+        entry = values.section(prefix[:-1], entry, _KEYS)
         if 'action' not in entry:
             raise SettingsError(prefix + 'action', None, 'the name of a SharedAutonomy action')
         offer = InterfaceOffer(

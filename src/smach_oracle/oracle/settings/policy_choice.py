@@ -40,13 +40,9 @@ def checked_policy(key: str, given: object) -> PolicyChoice:
     name = _NAMED(key + '.name', given['name'])
     allowed = POLICIES[name].parameters
     parameters: Dict[str, Any] = {}
-    for parameter, value in values.mapping(key, given).items():
-        if parameter == 'name':
-            continue
-        dotted = '{}.{}'.format(key, parameter)
-        if parameter not in allowed:
-            raise SettingsError(dotted, value, 'one of the keys ' + ', '.join(['name', *allowed]))
-        checked = _CHECKS[parameter](dotted, value)
-        if checked != allowed[parameter]:
-            parameters[parameter] = checked
+    for parameter, value in values.section(key, given, ['name', *allowed]).items():
+        if parameter != 'name':
+            checked = _CHECKS[parameter]('{}.{}'.format(key, parameter), value)
+            if checked != allowed[parameter]:
+                parameters[parameter] = checked
     return PolicyChoice(name, parameters)

@@ -9,90 +9,88 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
+from ..decision.policy import POLICIES
 from ..errors import SettingsError
-from ..settings.interfaces import InterfaceOffer
 from . import checks as values
 from .budget import Budget, checked_budget
-from .close_names import did_you_mean
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
-from .interfaces import checked_interfaces
+from .interfaces import START_LIMIT_S, InterfaceOffer, checked_interfaces
 from .on_resume import checked_on_resume, checked_resume_map
 from .patterns import Nested, check_name, checked_nested, exactness, matches
 from .policy_choice import checked_policy
 from .preconditions import PreconditionSpec, parse_preconditions
 from .python_names import Resolver
+from .setting import checked, setting, settings_of
+from .unfit_names import did_you_mean
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
 RUN, ANNOUNCE, CONFIRM_FIRST = 'run', 'announce', 'confirm'  # autonomy
 AUTONOMY_LEVELS = (RUN, ANNOUNCE, CONFIRM_FIRST)
 _MAX_HISTORY = 1000000  # visits. Each question carries them all
 _RATE = values.number(0, 1, 'a failure rate from 0 to 1')
+_RESULTS = values.whole(1, 'a whole number of results from 1')
+_COUNT = values.whole(0, 'a whole number from 0')
+_VISITS = values.whole(
+    1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY
+)
+_MOMENT = values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62)
+_SECONDS = values.number(0, math.inf, 'seconds from 0')
+_MINUTE = values.number(0, 60, 'seconds from 0 to 60')
+_HOUR = values.number(0, 3600, 'seconds from 0 to 3600')
 
 
 @dataclass(frozen=True)
 class StateSettings:
     """The settings of one state: the machine's defaults, unless set for the state."""
 
-    memory: int = 10  # results
-    prior: float = 0.1  # failure rate, 0 to 1
-    moderate_from: float = 0.4  # failure rate from which a state is MODERATE
-    high_from: float = 0.75  # and HIGH
-    estimator: str = 'window'
-    max_recoveries: int = 5  # per trial. Beyond it the oracle asks
-    on_retry: str = ALLOW  # whether it may be repeated
-    autonomy: str = RUN  # whether it is entered by itself
-    failure_outcomes: Tuple[str, ...] = ()  # outcomes that are failures whatever they lead to
-    author_recoveries: str = 'keep'
-    time_limit_s: Optional[float] = None  # of each execution. None means no limit
-    grace_period_s: float = 2.0  # between the preempt after an overrun and abandonment
-    preconditions: Tuple[PreconditionSpec, ...] = ()
-
-
-_STATE_CHECKS: Dict[str, values.Check] = {
-    'memory': values.whole(1, 'a whole number of results from 1'),
-    'prior': _RATE,
-    'moderate_from': _RATE,
-    'high_from': _RATE,
-    'estimator': values.choice(sorted(ESTIMATORS)),
-    'max_recoveries': values.whole(0, 'a whole number from 0'),
-    'on_retry': values.choice((ALLOW, CONFIRM, NEVER)),
-    'autonomy': values.choice(AUTONOMY_LEVELS),
-    'failure_outcomes': values.words,
-    'author_recoveries': values.choice(('keep', 'override')),
-    'time_limit_s': values.time_limit,
-    'grace_period_s': values.number(0, math.inf, 'seconds from 0'),
-}
-_TOP_KEYS = ('states', 'interfaces', 'healthy')
-_MACHINE_CHECKS: Dict[str, values.Check] = {
-    'policy': checked_policy,
-    'budget': checked_budget,
-    'failing_outcomes': values.words,
-    'userdata': values.choice(('restore', 'keep')),
-    'deep_copy_keys': values.words,
-    'deadline_s': values.deadline,
-    'on_no_answer': values.on_no_answer,
-    'escalate': values.flag,
-    'step_back_across': values.flag,
-    'still_running_s': values.number(0, math.inf, 'seconds from 0'),
-    'still_running_factor': values.number(1, math.inf, 'a number from 1'),
-    'watch_preconditions': values.flag,
-    'history_length': values.whole(
-        1, 'a whole number of visits from 1 to {}'.format(_MAX_HISTORY), _MAX_HISTORY
-    ),
-    'rates_file': values.file,
-    'checkpoint': values.file,
-    'checkpoint_wait_s': values.number(0, 60, 'seconds from 0 to 60'),
-    'on_resume': checked_on_resume,
-    'resume_from': values.whole(0, 'the number of a stored moment, 0: the last one', 1 << 62),
-    'resume_map': checked_resume_map,
-    'resume_repeat': values.words,
-    'checkpoint_synchronous': values.choice(('FULL', 'NORMAL', 'OFF')),
-    'oracle_label': values.label,
-    'nested': checked_nested,
-    'health_settle_s': values.number(0, 60, 'seconds from 0 to 60'),
-    'after_preempt_s': values.number(0, 3600, 'seconds from 0 to 3600'),
-}
+    memory: int = setting(10, _RESULTS, "how many of a state's latest results enter its rate")
+    prior: float = setting(0.1, _RATE, 'failure rate that a state starts with, 0 to 1')
+    moderate_from: float = setting(0.4, _RATE, 'failure rate from which a state is MODERATE')
+    high_from: float = setting(0.75, _RATE, 'failure rate from which a state is HIGH')
+    estimator: str = setting(
+        'window',
+        values.choice(sorted(ESTIMATORS)),
+        'how a rate is made of the results: `window` counts the latest `memory` of them, '
+        '`exponential` gives later ones more weight',
+    )
+    max_recoveries: int = setting(
+        5, _COUNT, 'recoveries of a state in a trial; after them the expert is asked'
+    )
+    on_retry: str = setting(
+        ALLOW,
+        values.choice((ALLOW, CONFIRM, NEVER)),
+        'whether a state that the trial has done [is repeated]'
+        '(limits.md#states-that-are-not-repeated): `allow` repeats it, `confirm` asks an expert '
+        'first, `never` does not repeat it at all',
+    )
+    autonomy: str = setting(
+        RUN,
+        values.choice(AUTONOMY_LEVELS),
+        'how a state [is entered](control.md#autonomy): `run` enters it by itself, `announce` '
+        'tells it, `confirm` waits for an operator',
+    )
+    failure_outcomes: Tuple[str, ...] = setting(
+        (), values.words, 'outcomes of states that are failures whatever they lead to'
+    )
+    author_recoveries: str = setting(
+        'keep',
+        values.choice(('keep', 'override')),
+        "`keep`: an author's own transition from a failure stays; `override`: the oracle recovers",
+    )
+    time_limit_s: Optional[float] = setting(
+        None, values.time_limit, 's that each execution of a state may take; 0: no limit'
+    )
+    grace_period_s: float = setting(
+        2.0, _SECONDS, 's from the preempt after an overrun until the state is abandoned'
+    )
+    preconditions: Tuple[PreconditionSpec, ...] = setting(
+        (),
+        parse_preconditions,
+        'what must hold before the state is entered ([preconditions.md](preconditions.md)); below '
+        '`states` only',
+        names_objects=True,
+    )
 
 
 @dataclass(frozen=True)
@@ -103,47 +101,163 @@ class Settings:
     """
 
     defaults: StateSettings = StateSettings()
-    policy: str = 'prose'
-    failing_outcomes: Tuple[str, ...] = DEFAULT_FAILING_OUTCOMES
-    userdata: str = 'restore'
-    deep_copy_keys: Tuple[str, ...] = ()
-    deadline_s: float = 300.0  # 0: waits without end
-    on_no_answer: Tuple[str, str] = ('stop', '')
-    escalate: bool = False
-    # whether callables among them may be called while a question is open
-    watch_preconditions: bool = True
-    history_length: int = 50  # visits
-    rates_file: str = ''
-    oracle_label: str = 'ORACLE'
-    # whether, or at which paths (patterns), containers and branches have oracles of their own
-    nested: Nested = True
+    policy: str = setting(
+        'prose',
+        checked_policy,
+        'how it decides ([policies.md](policies.md)): {}; with parameters a mapping with its '
+        '`name`'.format(', '.join(POLICIES)),
+    )
+    failing_outcomes: Tuple[str, ...] = setting(
+        DEFAULT_FAILING_OUTCOMES,
+        values.words,
+        'outcomes of containers that [are failures](executive.md#what-is-a-failure): whole, or as '
+        'a suffix',
+    )
+    userdata: str = setting(
+        'restore',
+        values.choice(('restore', 'keep')),
+        'the userdata [after a jump](executive.md#userdata-on-a-jump): `restore`: as it was when '
+        'the target was last entered; `keep`: as it is',
+    )
+    deep_copy_keys: Tuple[str, ...] = setting(
+        (),
+        values.words,
+        'userdata keys whose values are changed in place, and so are copied for the restore',
+    )
+    deadline_s: float = setting(
+        300.0,
+        values.deadline,
+        's until the fallback, for all questions about one failure; 0: waits without end',
+    )
+    on_no_answer: Tuple[str, str] = setting(
+        ('stop', ''),
+        values.on_no_answer,
+        'the fallback: `stop`, `{goto: LABEL}` or `{give_up: OUTCOME}`',
+    )
+    escalate: bool = setting(
+        False,
+        values.flag,
+        'an oracle that would ask [lets the one above decide first](trees.md#escalate)',
+    )
+    watch_preconditions: bool = setting(
+        True,
+        values.flag,
+        'call functions among the preconditions while a question is open, to tell if they hold '
+        '([expert.md](expert.md))',
+    )
+    history_length: int = setting(50, _VISITS, 'visits that a question shows')
+    rates_file: str = setting(
+        '',
+        values.file,
+        "keep [learned rates](#the-file-of-learned-rates) across runs in this file; '': in none",
+    )
+    oracle_label: str = setting('ORACLE', values.label, 'name of the meta state')
+    nested: Nested = setting(
+        True,
+        checked_nested,
+        'nested machines, and plain states of Iterators and Concurrences, have oracles of their '
+        'own; or a list of [paths and patterns](trees.md#settings-by-patterns): '
+        '`[ARM, ARM/**, ALL/EACH]`',
+    )
     # offer, states it serves ((): all)
-    interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = ()
-    states: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    budget: Budget = Budget()  # of a whole trial
-    healthy: Tuple[HealthCondition, ...] = ()  # what must hold for the robot to be well
-    # how long it must hold after a failure and at the end of a wait
-    health_settle_s: float = 0.5
-    # a state that the oracle has entered is asked about when it takes so long, and so many times as
-    # long as before; 0 s: never
-    still_running_s: float = 60.0
-    still_running_factor: float = 10.0
-    # whether a step back may lead to what ran before in the container above
-    step_back_across: bool = False
+    interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = setting(
+        (),
+        checked_interfaces,
+        'shared-autonomy interfaces that the expert may choose, by name: `action`, `description`, '
+        '`states`; to have it started `launch` or `node`, with `args` and `start_limit_s` ({:g}) '
+        '([shared_autonomy.md](shared_autonomy.md))'.format(START_LIMIT_S),
+    )
+    states: Mapping[str, Mapping[str, Any]] = setting(
+        {},
+        values.mapping,
+        'the settings with a * and `preconditions`, by LABEL (everywhere), PATH/LABEL (relative '
+        'to the top machine; wins) or a [pattern](trees.md#settings-by-patterns), such as `ARM/*` '
+        'or `**/PICK`',
+    )
+    budget: Budget = setting(
+        Budget(),
+        checked_budget,
+        'limits of [a whole trial](limits.md#the-budget-of-a-trial), over all machines in it: '
+        '`{recoveries: 20, minutes: 30, questions: 5}`, or some of these',
+    )
+    healthy: Tuple[HealthCondition, ...] = setting(
+        (),
+        checked_health,
+        'what must hold for the robot [to be well](limits.md#health): a list, or one',
+        names_objects=True,
+    )
+    health_settle_s: float = setting(
+        0.5,
+        _MINUTE,
+        's from 0 to 60: how long the oracle watches the health after a failure, and how long all '
+        'must hold before the machine goes on',
+    )
+    still_running_s: float = setting(
+        60.0,
+        _SECONDS,
+        's after which a person is asked about a state that the oracle has entered, that has no '
+        'time limit, and that [still runs](limits.md#still-running); 0: never',
+    )
+    still_running_factor: float = setting(
+        10.0,
+        values.number(1, math.inf, 'a number from 1'),
+        'the state must also take so many times as long as it ever did',
+    )
+    step_back_across: bool = setting(
+        False,
+        values.flag,
+        'where nothing was visited before the failed state in its container, a step back leads to '
+        'what ran before in the one above '
+        '([trees.md](trees.md#preconditions-and-steps-back-across-containers))',
+    )
     # those that are not the policy's defaults
     policy_parameters: Mapping[str, float] = field(default_factory=dict)
-    checkpoint: str = ''  # the store of the trials. '' means nothing is stored
-    checkpoint_wait_s: float = 1.0  # for its disk, at each moment that is stored
-    checkpoint_synchronous: str = 'FULL'
-    # what is done about a stored trial that was not finished, and for STATE the path of a state
-    on_resume: Tuple[str, str] = ('ask', '')
-    resume_from: int = 0  # number of the stored moment, 0: the last one of a trial
-    # paths of states by those that they had in the script that was stopped
-    resume_map: Mapping[str, str] = field(default_factory=dict)
-    # how long states behind a preempt may run after Ctrl-C or SIGTERM, under oracle_run
-    after_preempt_s: float = 0.0
-    # paths of states that may be repeated as the trial goes on, whatever `on_retry` says
-    resume_repeat: Tuple[str, ...] = ()
+    checkpoint: str = setting(
+        '',
+        values.file,
+        'keep where the machine stands in this [store](survive.md), to go on from it after a '
+        "crash; '': in none",
+    )
+    checkpoint_wait_s: float = setting(
+        1.0, _MINUTE, "s from 0 to 60 that the machine waits for the store's disk"
+    )
+    checkpoint_synchronous: str = setting(
+        'FULL',
+        values.choice(('FULL', 'NORMAL', 'OFF')),
+        '`FULL`: a power cut loses nothing that was stored; `NORMAL`: it may lose the last '
+        'moments; `OFF`: it may damage the store',
+    )
+    # and for STATE the path of a state
+    on_resume: Tuple[str, str] = setting(
+        ('ask', ''),
+        checked_on_resume,
+        'what is done about a stored trial that was not finished: `ask`, `recover`, `restart` or '
+        '`state:LABEL`',
+    )
+    resume_from: int = setting(
+        0,
+        _MOMENT,
+        'number of the stored moment to go on from, once (table `moments` of the store); 0: the '
+        'last one of the trial',
+    )
+    resume_map: Mapping[str, str] = setting(
+        {},
+        checked_resume_map,
+        'where the script has [changed](survive.md#a-script-that-has-changed): paths of states by '
+        'those that they had, such as `{OLD: NEW, KITCHEN/OLD: COOK/NEW}`',
+    )
+    after_preempt_s: float = setting(
+        0.0,
+        _HOUR,
+        's from 0 to 3600 that the states behind a preempt may run after Ctrl-C or SIGTERM, '
+        '[under `oracle_run`](limits.md#after-ctrl-c); 0: not at all',
+    )
+    resume_repeat: Tuple[str, ...] = setting(
+        (),
+        values.words,
+        'states that the trial that goes on may [repeat](survive.md#what-is-not-repeated) once, '
+        'whatever `on_retry` says. Give it on the command line, as `--repeat`, rather than here',
+    )
 
     @classmethod
     def from_dict(
@@ -157,25 +271,14 @@ class Settings:
         :raises SettingsError: naming key, value and what is allowed.
         """
         given = values.mapping('settings', given)
-        allowed = sorted([*_STATE_CHECKS, *_MACHINE_CHECKS, *_TOP_KEYS])
-        _refuse_unknown('', given, allowed)
-        defaults = _checked_defaults(given)
-        machine = {
-            key: check(key, given[key]) for key, check in _MACHINE_CHECKS.items() if key in given
-        }
-        if 'policy' in machine:
-            machine['policy'], machine['policy_parameters'] = machine['policy']
-        states = {
-            name: _checked_state(name, overrides, defaults, resolver)
-            for name, overrides in values.mapping('states', given.get('states')).items()
-        }
-        return cls(
-            defaults=defaults,
-            interfaces=checked_interfaces(given.get('interfaces')),
-            states=states,
-            healthy=checked_health(given.get('healthy'), resolver),
-            **machine,
-        )
+        names = sorted({*settings_of(StateSettings), *settings_of(cls)} - {'preconditions'})
+        _refuse_unknown('', given, names)
+        defaults = StateSettings(**_checked_state('', given, StateSettings(), resolver))
+        found = checked(cls, '', given, resolver)
+        if 'policy' in found:
+            found['policy'], found['policy_parameters'] = found['policy']
+        states = found.pop('states', {})
+        return cls(defaults=defaults, **found).with_states(states, resolver)
 
     def for_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state.
@@ -197,9 +300,12 @@ class Settings:
         :raises SettingsError: naming key, value and what is allowed.
         """
         merged = {name: dict(overrides) for name, overrides in self.states.items()}
-        for name, overrides in states.items():
+        for name, given in states.items():
+            prefix = 'states.{}.'.format(check_name('states', name))
+            overrides = values.mapping(prefix[:-1], given)
+            _refuse_unknown(prefix, overrides, sorted(settings_of(StateSettings)))
             merged.setdefault(name, {}).update(
-                _checked_state(name, overrides, self.defaults, resolver)
+                _checked_state(prefix, overrides, self.defaults, resolver)
             )
         return replace(self, states=merged)
 
@@ -231,42 +337,19 @@ def _hint(prefix: str, key: str, allowed: List[str]) -> str:
     """Say where the key belongs, or which one may be meant."""
     if not prefix and key == 'preconditions':
         return ' here (it belongs to a state: below states: LABEL:)'
-    if prefix and (key in _MACHINE_CHECKS or key in _TOP_KEYS):
+    if prefix and key in settings_of(Settings):
         return ' of a state (it holds for the whole machine: move it to the top of the settings)'
     return did_you_mean(key, allowed)
 
 
-def _checked_defaults(given: Mapping[str, Any]) -> StateSettings:
-    defaults = StateSettings(
-        **{key: check(key, given[key]) for key, check in _STATE_CHECKS.items() if key in given}
-    )
-    _check_thresholds('', defaults, given)
-    return defaults
-
-
 def _checked_state(
-    name: str, overrides: object, defaults: StateSettings, resolver: Optional[Resolver]
+    prefix: str, given: Mapping[str, Any], defaults: StateSettings, resolver: Optional[Resolver]
 ) -> Dict[str, Any]:
-    prefix = 'states.{}.'.format(check_name('states', name))
-    overrides = values.mapping(prefix[:-1], overrides)
-    _refuse_unknown(prefix, overrides, sorted(list(_STATE_CHECKS) + ['preconditions']))
-    checked = {
-        key: check(prefix + key, overrides[key])
-        for key, check in _STATE_CHECKS.items()
-        if key in overrides
-    }
-    if 'preconditions' in overrides:
-        checked['preconditions'] = parse_preconditions(
-            prefix + 'preconditions', overrides['preconditions'], resolver
-        )
-    _check_thresholds(prefix, replace(defaults, **checked), checked)
-    return checked
-
-
-def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, Any]) -> None:
-    """Blame the threshold that was given, not the default of the other."""
+    found = checked(StateSettings, prefix, given, resolver)
+    settings = replace(defaults, **found)
     if settings.moderate_from > settings.high_from:
-        if 'moderate_from' not in given:
+        # blame the threshold that was given, not the default of the other
+        if 'moderate_from' not in found:
             raise SettingsError(
                 prefix + 'high_from',
                 settings.high_from,
@@ -277,6 +360,7 @@ def _check_thresholds(prefix: str, settings: StateSettings, given: Mapping[str, 
             settings.moderate_from,
             'at most high_from, which is {}'.format(settings.high_from),
         )
+    return found
 
 
 SettingsLike = Union[Settings, Mapping[str, Any], None]
@@ -288,11 +372,11 @@ def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Set
 
     :raises SettingsError: naming key, value and what is allowed.
     """
-    checked = settings if isinstance(settings, Settings) else Settings.from_dict(settings)
+    found = settings if isinstance(settings, Settings) else Settings.from_dict(settings)
     if preconditions is None:
-        return checked
+        return found
     if not isinstance(preconditions, Mapping):
         raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
-    return checked.with_states(
+    return found.with_states(
         {label: {'preconditions': given} for label, given in preconditions.items()}
     )

@@ -1,7 +1,8 @@
-"""Names in the settings that stand for nothing in a machine, and who decides about them. Pure."""
+"""Names in the settings that stand for nothing, who decides about them, and what is meant. Pure."""
 
+from difflib import get_close_matches
 from enum import Enum
-from typing import Callable, NamedTuple, Union
+from typing import Callable, Iterable, NamedTuple, Union
 
 from ..errors import SettingsError
 
@@ -29,3 +30,9 @@ class UnfitName(NamedTuple):
 
 # True: such a name is an error. False: it is a warning. A function decides about each one
 Strictness = Union[bool, Callable[[UnfitName], None]]
+
+
+def did_you_mean(name: str, names: Iterable[str]) -> str:
+    """Return ' (did you mean NAME?)' with the closest of these names, or '' where none is close."""
+    close = get_close_matches(name, sorted(set(names)), 1)
+    return ' (did you mean {}?)'.format(close[0]) if close else ''

@@ -15,7 +15,7 @@ NAN = float('nan')
 
 
 def condition(**given):
-    return checked_health(given)[0]
+    return checked_health('healthy', given)[0]
 
 
 @pytest.mark.parametrize(

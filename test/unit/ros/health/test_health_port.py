@@ -40,7 +40,7 @@ def now(monkeypatch):
 
 
 def port_of(topics, *given):
-    return health_port.TopicHealth(checked_health(list(given)), topics)
+    return health_port.TopicHealth(checked_health('healthy', list(given)), topics)
 
 
 def test_what_was_never_heard_of_is_well_and_warned_of_once(warnings):

@@ -98,7 +98,7 @@ _by_diagnostics = st.tuples(
 
 
 def _heard(condition: Dict[str, Any], topic: str, messages: List[Any]) -> str:
-    conditions = checked_health([dict(condition, name='robot')])
+    conditions = checked_health('healthy', [dict(condition, name='robot')])
     types = dict.fromkeys(('/health', *health_topics.DIAGNOSTICS), rospy.AnyMsg)
     with fake_ros() as offered, mock.patch.multiple(
         health_topics, types_at_master=lambda: types, types_in_process=dict

@@ -17,8 +17,8 @@ from smach_oracle.interfaces.manipulation.joy_teleoperation import JoySettings
 from smach_oracle.interfaces.manipulation.settings import TeleoperationSettings
 from smach_oracle.interfaces.perception.output_templates import OUTPUT_PARTS, templates_from
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings import settings as executive
-from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.setting import settings_of
+from smach_oracle.oracle.settings.settings import Settings, StateSettings
 from smach_oracle.ros import loaded_settings, parameters
 from smach_oracle.ros.expert import server
 from smach_oracle.scripted_operator.state_plans import MEANS, StatePlans
@@ -35,49 +35,46 @@ _PRECONDITION = st.one_of(
     st.just('python:checks:near'),
     mapping_of({'check': names, 'achieve': names}, ['check', 'achieve']),
 )
-_EACH_STATE = {
-    'memory': counts,
+# of the settings whose defaults do not tell what else they may be
+_OF_KEY = {
+    'policy': words('prose', 'algorithm1', 'retry'),
+    'budget': mapping_of({'recoveries': counts, 'minutes': seconds, 'questions': counts}),
+    'on_no_answer': words('stop', 'goto:A', 'give_up:aborted'),
+    'time_limit_s': seconds,
+    'still_running_factor': st.floats(1, 9),
+    'on_resume': words('ask', 'recover', 'restart', 'state:A'),
+    'resume_map': st.dictionaries(names, names, max_size=2),
+    'oracle_label': names,
+    'nested': st.one_of(flags, lists),
+    'preconditions': st.lists(_PRECONDITION, max_size=2),
     'prior': shares,
     'moderate_from': shares,
     'high_from': shares,
-    'estimator': words('window', 'exponential'),
-    'max_recoveries': counts,
-    'on_retry': words('allow', 'confirm', 'never'),
-    'autonomy': words('run', 'announce', 'confirm'),
-    'failure_outcomes': lists,
-    'author_recoveries': words('keep', 'override'),
-    'time_limit_s': seconds,
-    'grace_period_s': seconds,
 }
-_MACHINE = {
-    'policy': words('prose', 'algorithm1', 'retry'),
-    'budget': mapping_of({'recoveries': counts, 'minutes': seconds, 'questions': counts}),
-    'failing_outcomes': lists,
-    'userdata': words('restore', 'keep'),
-    'deep_copy_keys': lists,
-    'deadline_s': seconds,
-    'on_no_answer': words('stop', 'goto:A', 'give_up:aborted'),
-    'escalate': flags,
-    'step_back_across': flags,
-    'still_running_s': seconds,
-    'still_running_factor': st.floats(1, 9),
-    'watch_preconditions': flags,
-    'history_length': counts,
-    'rates_file': texts,
-    'checkpoint': texts,
-    'checkpoint_wait_s': seconds,
-    'on_resume': words('ask', 'recover', 'restart', 'state:A'),
-    'resume_from': counts,
-    'resume_map': st.dictionaries(names, names, max_size=2),
-    'resume_repeat': lists,
-    'after_preempt_s': seconds,
-    'checkpoint_synchronous': words('FULL', 'OFF'),
-    'oracle_label': names,
-    'nested': st.one_of(flags, lists),
-    'health_settle_s': seconds,
-}
-assert set(_EACH_STATE) == set(executive._STATE_CHECKS)
-assert set(_MACHINE) == set(executive._MACHINE_CHECKS)
+_OF_TYPE = {bool: flags, int: counts, float: seconds, tuple: lists}
+
+
+def _drawn(group: Any, *without: str) -> Dict[str, Any]:
+    """Strategies for the settings of a dataclass."""
+    return {
+        key: _strategy(key, type(getattr(group, key)), facts['check'])
+        for key, facts in settings_of(type(group)).items()
+        if key not in without
+    }
+
+
+def _strategy(key: str, kind: type, check: Callable[[str, Any], Any]) -> Any:
+    if key in _OF_KEY:
+        return _OF_KEY[key]
+    if kind in _OF_TYPE:
+        return _OF_TYPE[kind]
+    try:
+        check(key, '\0')
+    except SettingsError as err:  # a choice
+        return words(*err.allowed.split(', '))
+    return texts
+
+
 _OFFER = mapping_of(
     {
         'action': names,
@@ -107,13 +104,9 @@ _HEALTHY = st.one_of(
 )
 settings_given = mapping_of(
     {
-        **_EACH_STATE,
-        **_MACHINE,
-        'states': st.dictionaries(
-            names,
-            mapping_of(dict(_EACH_STATE, preconditions=st.lists(_PRECONDITION, max_size=2))),
-            max_size=2,
-        ),
+        **_drawn(StateSettings(), 'preconditions'),
+        **_drawn(Settings()),
+        'states': st.dictionaries(names, mapping_of(_drawn(StateSettings())), max_size=2),
         'interfaces': st.dictionaries(names, _OFFER, max_size=2),
         'healthy': st.one_of(st.lists(_HEALTHY, max_size=2), _HEALTHY),
     }
