@@ -6,8 +6,8 @@
 
     Oven(**checked(Oven, 'oven.', {'heat': 200}))
 
-The text is a line of Markdown. doc/write_settings.py makes launch/oracle.yaml and doc/settings.md
-of the settings of the executive.
+The text is a line of Markdown, if a page is made of the settings: doc/write_settings.py makes
+launch/oracle.yaml and doc/settings.md of those of the executive.
 """
 
 from dataclasses import field, fields
@@ -16,7 +16,9 @@ from typing import Any, Callable, Dict, Mapping, TypeVar
 T = TypeVar('T')
 
 
-def setting(default: T, check: Callable[..., Any], text: str, names_objects: bool = False) -> T:
+def setting(
+    default: T, check: Callable[..., Any], text: str = '', names_objects: bool = False
+) -> T:
     """Return the field of a setting. `names_objects`: the check also takes what imports these."""
     facts = {'check': check, 'text': text, 'names_objects': names_objects}
     value: Any = {'default_factory': dict} if isinstance(default, dict) else {'default': default}
