@@ -2,6 +2,26 @@
 
 `OracleContainer` is the ROS-attached one where rospy is installed, else the bare one. It is looked
 up on first use, so that `smach_oracle.analysis` needs neither ROS nor SMACH.
+
+Errors that you may catch, in addition to those of the executive in `smach_oracle.oracle.errors`:
+
+    OracleError
+    +-- AnswerError
+    |     +-- QuestionRefusedError: a server does not take a question (ros.expert.open_questions)
+    +-- BagError: a bag cannot be used (analysis.bag_events)
+    |     +-- BagReadError: of several bags, this one cannot be used (analysis.bag_worker)
+    +-- BagFormatError: the bytes are no bag (ros.recording.bag_format)
+    +-- FaultError (also a ValueError): a fault does not fit the machine (testing.errors)
+    +-- InterfaceGoalError (also a ValueError): a goal cannot end so (interfaces.interface_goal)
+    +-- ServerGoneError: a server is not reached or does not answer (ros.service_calls)
+    +-- UserdataCodecError (also a ValueError): an item is malformed (ros.userdata_codec)
+    AssertionError
+    +-- ScriptError: a question does not go with the expert's script (testing.errors)
+    +-- TrialLimitError: a trial did not end in time (testing.errors)
+    Exception
+    +-- StoreError: a store cannot be opened, read or written (store.errors)
+          +-- StoreDamaged: its content cannot be read (store.errors)
+          +-- Held: another process holds the machine (store.holding)
 """
 
 from typing import Any

@@ -10,17 +10,12 @@ from typing import Any, Callable, Dict, Iterable
 import rosgraph
 import rospy
 
-from smach_oracle.oracle.errors import OracleError
 from smach_oracle.ros.master_watch import timed_master
-from smach_oracle.ros.service_calls import NOT_REACHED, call_where_it_was
+from smach_oracle.ros.service_calls import NOT_REACHED, ServerGoneError, call_where_it_was
 from smach_oracle.srv import CommandMachine, CommandMachineRequest, CommandMachineResponse
 
 PREEMPT = '/oracle/preempt'
 LOOK_UP_PERIOD_S = 1.5
-
-
-class StopError(OracleError):
-    """A service that stops could not be reached. The text says why."""
 
 
 class StopCalls:
@@ -47,12 +42,12 @@ class StopCalls:
     ) -> CommandMachineResponse:
         """Call it where it was found last, else where the master says it is.
 
-        :raises StopError: where it cannot be reached.
+        :raises ServerGoneError: where it cannot be reached.
         """
         try:
             return call_where_it_was(self.address_of(robot), service, CommandMachine, request)
         except NOT_REACHED as err:
-            raise StopError('{} cannot be reached: {}'.format(service, err)) from err
+            raise ServerGoneError('{} cannot be reached: {}'.format(service, err)) from err
 
 
 def in_thread(work: Callable[[], Any]) -> 'Future[Any]':

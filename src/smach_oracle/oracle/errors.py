@@ -1,4 +1,4 @@
-"""Errors of the executive.
+"""Errors of the executive. The docstring of the package draws those of the other rooms.
 
 Their tree:
 
@@ -16,7 +16,7 @@ import warnings
 
 
 class OracleError(Exception):
-    """The root of all errors that smach_oracle raises."""
+    """The root of the errors of the executive, and of most others of the package."""
 
 
 class SettingsError(OracleError, ValueError):

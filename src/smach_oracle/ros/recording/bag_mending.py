@@ -1,8 +1,6 @@
 """Writes a new bag of what can be read of a damaged one, and reads it back.
 
 The damaged one stays.
-
-    MendError (an OSError): the mended bag does not hold what was found
 """
 
 import os
@@ -17,10 +15,6 @@ from .bag_writer import MAX_CHUNK_BYTES, BagWriter
 from .event_packing import event_number
 
 _NANOSECONDS = 10**9
-
-
-class MendError(OSError):
-    """The mended bag does not hold what was found."""
 
 
 class Saved(NamedTuple):
@@ -64,13 +58,12 @@ def mend(source: BinaryIO, target: str) -> Saved:
 def read_back(path: str, saved: Saved) -> None:
     """Check that a mended bag is sound and holds what was saved.
 
-    :raises MendError: where it does not.
-    :raises OSError: where the disk cannot be read.
+    :raises OSError: where it does not, or the disk cannot be read.
     """
     with open(path, 'rb') as bag:
         found = contents(bag)
         if found.losses() or found[:2] != saved[:2]:
-            raise MendError(
+            raise OSError(
                 '{} does not hold what was written: {} messages of {}{}'.format(
                     path,
                     found.messages,
@@ -81,7 +74,7 @@ def read_back(path: str, saved: Saved) -> None:
         try:
             _check_index(bag, saved.messages)
         except BagFormatError as err:
-            raise MendError('the index of {} is wrong: {}'.format(path, err)) from err
+            raise OSError('the index of {} is wrong: {}'.format(path, err)) from err
 
 
 def contents(bag: BinaryIO) -> Saved:

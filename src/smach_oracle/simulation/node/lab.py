@@ -13,10 +13,6 @@ from ..scenes.scene import Scene
 from .settings import WorldSettings
 
 
-class LabFileError(ValueError):
-    """The file of a lab cannot be used. The text says why."""
-
-
 class Lab:
     """The run, the hour, and how the last trial has left the lab."""
 
@@ -56,7 +52,7 @@ class Lab:
 def read_lab(settings: WorldSettings) -> Lab:
     """Return the lab that the settings name.
 
-    :raises LabFileError: where its file cannot be read, or is not a lab file.
+    :raises ValueError: where its file cannot be read, or is not a lab file.
     """
     try:
         data = json.loads(Path(settings.lab).read_text(encoding='utf-8'))
@@ -68,5 +64,5 @@ def read_lab(settings: WorldSettings) -> Lab:
             )
         state = state_from(left) if isinstance(left, Mapping) else None
     except (OSError, ValueError, KeyError, TypeError) as err:
-        raise LabFileError('~lab: {}: {!r}'.format(settings.lab, err)) from err
+        raise ValueError('~lab: {}: {!r}'.format(settings.lab, err)) from err
     return Lab(LabRun(seed, float(slot_h)), state, settings)

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from smach_oracle.simulation.node.lab import LabFileError, read_lab
+from smach_oracle.simulation.node.lab import read_lab
 from smach_oracle.simulation.node.settings import WorldSettings
 from smach_oracle.simulation.physics.judge import TrialVerdict
 from smach_oracle.simulation.physics.world import World
@@ -46,7 +46,7 @@ def test_a_lab_that_is_read_anew_goes_on_as_the_one_that_was_kept(tmp_path):
     ],
 )
 def test_a_file_that_is_none_is_refused_with_its_name(tmp_path, content):
-    with pytest.raises(LabFileError, match='lab.json'):
+    with pytest.raises(ValueError, match='lab.json'):
         read_lab(settings(tmp_path, content))
 
 

@@ -15,7 +15,7 @@ from smach_oracle.srv import (
     SetBreakpointRequest,
 )
 
-from ...stop_calls import StopCalls, StopError, in_thread
+from ...stop_calls import StopCalls, in_thread
 from ..commands.commands import CommandReply, PageCommand
 from ..commands.holding import MACHINE_STARTS
 from ..web.audit import Audit, Person
@@ -77,7 +77,7 @@ class MachineHand:
             response = await asyncio.wait_for(
                 asyncio.shield(asyncio.wrap_future(self._begin(command, by))), CALL_LIMIT_S
             )
-        except StopError as err:
+        except ServerGoneError as err:
             return CommandReply(False, str(err))
         except asyncio.TimeoutError:
             return CommandReply(False, NO_ANSWER.format(robot, CALL_LIMIT_S))

@@ -12,8 +12,9 @@ from smach_oracle.expert.console.commands.commands import PageCommand
 from smach_oracle.expert.console.robots import machine_hand
 from smach_oracle.expert.console.robots.machine_hand import MachineHand
 from smach_oracle.expert.console.web.audit import Person
-from smach_oracle.expert.stop_calls import StopCalls, StopError
+from smach_oracle.expert.stop_calls import StopCalls
 from smach_oracle.ros import service_calls
+from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.srv import CommandMachineRequest, CommandMachineResponse
 
 ANN, NOBODY = Person('::1', 's', 'operator', 'ann'), Person('::1', 's', 'viewer', '')
@@ -104,7 +105,7 @@ def test_a_robot_that_hangs_is_told_and_asked_no_more_than_some_times_at_once(he
 
 def test_what_cannot_be_reached_and_what_is_not_there_is_told(held):
     held.calls.free.set()
-    held.calls.error = StopError('gone')
+    held.calls.error = ServerGoneError('gone')
     assert held.stop('TASK')[0].message == 'gone'
     assert held.stop('OTHER')[0].message == 'There is no machine OTHER of /alpha here.'
     assert 'no robot /beta' in held.stop('', robot='/beta')[0].message
@@ -171,7 +172,7 @@ def test_a_stop_needs_no_master_once_it_is_known_where_the_robot_is(monkeypatch)
     monkeypatch.setattr(Proxy, 'master_is_there', False)
     request = CommandMachineRequest()
     calls.call('/alpha', '/alpha/oracle/pause', request)
-    with pytest.raises(StopError, match='unable to contact master'):
+    with pytest.raises(ServerGoneError, match='unable to contact master'):
         calls.call('/beta', '/beta/oracle/pause', request)
     monkeypatch.setattr(Proxy, 'master_is_there', True)
     monkeypatch.setattr(Master, 'address', 'rosrpc://elsewhere:1')
