@@ -117,6 +117,22 @@ def test_a_port_for_topics_is_made_once(health, log):
     assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'motors: off'
 
 
+def test_topics_alone_are_looked_at_until_the_robot_has_been_well_for_the_settle_time(health):
+    class Port:
+        def why_unwell(self, since_s=None):
+            return health()
+
+    machine = watched(
+        Scripted('aborted'),
+        settings={'healthy': {'topic': '/motors_on'}, 'health_settle_s': 0.3},
+    )
+    oracle_of(machine.machine).listen_to_health(lambda conditions: Port())
+    health.said = ['motors: off', '', 'motors: off']
+    assert in_thread(machine.run).result() == 'done'
+    start, end = machine.of(EventKind.HEALTH_WAIT_START, EventKind.HEALTH_WAIT_END)
+    assert (end.outcome, end.data['waited_s'] >= 0.3, health.said) == ('well', True, [])
+
+
 def test_wrapping_again_keeps_the_function_unless_another_is_given(health):
     machine = chain_of(Scripted())
     OracleContainer.wrap(machine, health=health)

@@ -129,6 +129,7 @@ def test_a_failing_outcome_that_is_mapped_to_a_good_one_is_the_authors():
     )
     assert machine.run() == 'done'
     assert each.tried == [1, 2] and not machine.of(EventKind.DECISION)
+    assert not machine.of(EventKind.WARNING), 'no item was passed over'
 
 
 def test_a_failing_outcome_that_is_mapped_to_another_failure_is_the_oracles():

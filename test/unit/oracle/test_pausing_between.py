@@ -5,6 +5,7 @@ import pickle
 import pytest
 from held_machines import Gate, Held
 from machines import Scripted, chain_of
+from waiting import stays
 
 import smach
 from smach_oracle.oracle import OracleContainer, unwrap
@@ -122,3 +123,19 @@ def test_a_function_among_the_preconditions_waits_too_and_a_preempt_ends_that() 
         held.machine.request_preempt()
         assert held.end() == 'preempted'
     assert not called
+
+
+def test_from_before_a_precondition_a_machine_goes_nowhere_else() -> None:
+    gate = Gate('aborted')
+    first = Scripted()
+    held = Held(chain_of(first, Scripted(gate), Scripted()), preconditions={'B': ['A']})
+    with held.begin():
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/A')
+        assert held.hand.go_to('', 'C') == 'SM_ROOT goes to C once ORACLE has ended'
+        assert stays(lambda: first.runs == 1, 0.3)
+        held.hand.resume()
+        assert held.end() == 'done'
+    assert (first.runs, held.visits()[-1]) == (2, 'C')

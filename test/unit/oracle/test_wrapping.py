@@ -396,6 +396,14 @@ def test_settings_of_a_state_need_an_oracle_container():
             OracleContainer.add('A', Scripted(outcomes=('ok',)), {'ok': 'done'}, prior=0.2)
 
 
+def test_settings_of_a_state_that_it_lacks_are_refused_as_of_a_wrapped_machine():
+    machine = OracleContainer(['done'], settings={'states': {'NOWHERE': {'prior': 0.2}}})
+    with machine:
+        smach.StateMachine.add('A', Scripted(outcomes=('ok',)), {'ok': 'done'})
+    with pytest.raises(SettingsError, match='NOWHERE'):
+        machine.execute()
+
+
 def test_a_prior_out_of_range_is_refused_where_it_is_given():
     machine = OracleContainer(outcomes=['done'])
     with pytest.raises(SettingsError, match='states.A.prior: 2'):
