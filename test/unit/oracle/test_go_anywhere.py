@@ -64,6 +64,17 @@ def test_up_to_a_state_of_a_level_above():
     assert jumps(watched) == [('TOP', 'PICK', 'A', 'TOP/PICK/ARM/GRASP', None)]
 
 
+def test_a_container_that_is_left_counts_with_the_outcome_that_it_had():
+    machine = chain(A=Scripted(), PICK=chain(GRASP=Scripted('aborted')), C=Scripted())
+    watched, _, _ = run(machine, to('TOP', 'A'))
+    counts = [
+        (row.outcome, row.to, row.count)
+        for row in watched.machine.transition_counts()
+        if row.state == 'PICK'
+    ]
+    assert sorted(counts) == [('done', 'C', 1), ('preempted', 'ORACLE', 1)]
+
+
 def test_down_into_the_middle_of_another_machine():
     machine = chain(
         PICK=chain(B=Scripted(), C=chain(D=Scripted(), E=Scripted())), PLACE=Scripted('aborted')

@@ -45,6 +45,17 @@ def test_an_item_that_fails_is_done_again_and_no_other_one():
     assert machine.rate('EACH').failures == 2
 
 
+def test_items_that_are_set_anew_are_those_of_the_next_execution():
+    each, items = Item(), [1, 2]
+    iterator = iterator_over(each, items)
+    machine = watched(iterator)
+    assert machine.run() == 'done'
+    with iterator:
+        smach.Iterator.set_iteritems([7, 8], 'item')
+    assert machine.run() == 'done'
+    assert each.tried == [1, 2, 7, 8]
+
+
 def test_what_a_failed_try_wrote_is_taken_back_before_the_next():
     def writes(state, ud):
         ud.done = ud.done + ['half']
