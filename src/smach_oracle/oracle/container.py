@@ -310,10 +310,9 @@ class OracleContainer(smach.StateMachine):
         if node.engine.stepped:
             node.begin_execution()
         how = ''
-        if node.entry and node.entry in self._states:
-            self._set_current_state(node.entry)
+        if node.execution.starts_in in self._states:
+            self._set_current_state(node.execution.starts_in)
             how = 'starting'
-        node.entry = ''
         if node.resuming is not None:
             entry, node.resuming = node.resuming, None
             entry.enter(node)
@@ -328,7 +327,7 @@ class OracleContainer(smach.StateMachine):
 
     def _tell_start(self) -> None:
         """Log where it starts. Upstream's engine does not ask."""
-        if self._oracle.resuming is None and self._oracle.entry not in self._states:
+        if self._oracle.resuming is None and self._oracle.execution.starts_in not in self._states:
             super()._tell_start()
 
     def _update_once(self) -> Optional[str]:

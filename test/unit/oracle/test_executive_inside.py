@@ -156,12 +156,12 @@ def test_an_execution_leaves_no_snapshot_and_no_entry_behind(row, options, tmp_p
             (node.path, name)
             for name, is_left in (
                 ('running', machine.is_running()),
-                ('entry', node.entry),
+                ('start below', node.execution._starts_below),
                 ('resuming', node.resuming),
                 ('asked', node.asked_next),
                 ('ended', node.ended_before),
                 ('precondition', node.as_preconditions),
-                ('runs around', node.runs_around),
+                ('runs around', node.execution.runs_around),
             )
             if is_left
         ]

@@ -17,12 +17,12 @@ from typing import (
 )
 
 import smach
-from smach_oracle.foreign import error_text
 
 from ..identity import own_mark
+from ..machine.execution import why_no_outcome
 from ..machine.nesting import BORDER, machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine, node_of
-from ..records.events import NO_OUTCOME, EventKind
+from ..records.events import EventKind
 from ..records.facts import BRANCHES
 from ..settings.failing_outcomes import is_preempted
 from .branch import loops
@@ -149,10 +149,9 @@ class Border:
         """Tell that the container has ended, with an outcome or an error."""
         nodes = self.nodes()
         if nodes:
-            why = error_text(error) if error is not None else NO_OUTCOME if outcome is None else ''
             nodes[0].emit(
                 EventKind.CONTAINER_END,
-                text=why,
+                text=why_no_outcome(outcome, error),
                 outcome=outcome if isinstance(outcome, str) else '',
             )
 
@@ -411,7 +410,7 @@ def _forget_given_up(container: smach.Container) -> None:
     for _, machine in machines_below(container):
         node = node_of(machine)
         if node is not None:
-            node.gave_up = False
+            node.execution.forget_unrecovered()
 
 
 def _forget(outcome: object) -> None:

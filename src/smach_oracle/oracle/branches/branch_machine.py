@@ -4,6 +4,7 @@ from typing import Mapping, Optional
 
 import smach
 
+from ..machine.execution import Execution
 from ..machine.tree_node import WrappedMachine
 from ..recovery.failure import outcome_of_early_end
 
@@ -49,7 +50,8 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     where its oracle gives up.
     """
     node = machine._oracle
-    if not node.look_around():
+    run = Execution(node, is_whole=False)
+    if not run.look_around():
         smach.logwarn(
             '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
         )
@@ -57,22 +59,11 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     if node.ended_before is not None:
         outcome, node.ended_before = node.ended_before, None
         return outcome
-    node.engine.begin_execution()
-    node.preempt_told = node.gave_up = False
-    node.departure = None
     try:
-        return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
+        with run:
+            return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
     except smach.InvalidUserCodeError as err:
         raised = err
-    except (SystemExit, KeyboardInterrupt) as err:
-        node.tree.early_end.of_program = err
-        raise
-    finally:
-        dropped = node.tree.control.leave(node.engine, node.key)
-        if dropped is not None:
-            node.warn('has ended before it could be sent to {}'.format(dropped.state))
-        node.runs_around = ()
-        node.records.drop_snapshots()
     if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):
         raise raised.__cause__  # as bare: the container says what state it was
     raise raised

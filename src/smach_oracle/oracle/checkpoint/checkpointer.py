@@ -226,7 +226,11 @@ class Checkpointer:
             path = '{}/{}'.format(node.key, label)
             is_container = isinstance(node.machine._states.get(label), smach.Container)
             below = self._below(path) if is_container else []
-            sent_to = [Place(each, each.entry).path for each in below if each.entry]
+            sent_to = [
+                Place(each, start).path
+                for each, start in ((each, each.start_from_above()) for each in below)
+                if start
+            ]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
             if is_container and not (
                 any(_goes_on(each) for each in below)

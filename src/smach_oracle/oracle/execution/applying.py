@@ -131,7 +131,8 @@ class Applying:
     def _give_up(self, verdict: GiveUp) -> Optional[str]:
         ending, text, node = verdict.ending, verdict.text, self._node
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
-        node.gave_up = ending.state is None
+        if ending.state is None:
+            node.execution.give_up()
         node.emit(
             EventKind.GIVE_UP,
             state=self._record.label,
@@ -150,7 +151,7 @@ class Applying:
     def _preempted(self, verdict: Preempted) -> Optional[str]:
         ending = verdict.ending
         if self._machine.preempt_requested():
-            self._node.tell_preempt()
+            self._node.execution.tell_preempt()
         if ending.state is not None:
             if ending.obeys:  # the author's own transition: the request goes on with it
                 obey_preempt(self._node, self._meta)

@@ -130,7 +130,7 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
     outcome = PREEMPTED if PREEMPTED in registered else failing[0]
     label = str(machine._current_label)
     if machine.preempt_requested():
-        node.tell_preempt()
+        node.execution.tell_preempt()
     for state in (machine._preempted_state, machine._current_state):
         if state is not None:
             recall_preempts(state)

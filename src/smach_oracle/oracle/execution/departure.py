@@ -146,12 +146,13 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
     """
     with departure.arrives_at.tree.departures_lock:
         first = next(
-            (index for index, each in enumerate(nodes) if each.departure is not None), len(nodes)
+            (index for index, each in enumerate(nodes) if each.execution.departure is not None),
+            len(nodes),
         )
         others = nodes[first:]
-        leaving = others[0].departure if others else departure
+        leaving = others[0].execution.departure if others else departure
         for each in nodes[:first]:
-            each.departure = leaving
+            each.execution.depart_by(leaving)
     for each in nodes[1:first]:
         record = each.records.by_label.get(each.machine._current_label or '')
         if record is not None:
@@ -168,7 +169,7 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
     :param others: the last ones of `nodes`, which the other departure leaves.
     """
     inner = nodes[: -len(others)]
-    other = cast(Optional[Departure], others[0].departure)
+    other = cast(Optional[Departure], others[0].execution.departure)
     if not inner or other is None:
         return None
     path = others[0].path
@@ -181,8 +182,8 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
 
 def take_departure(node: TreeNode) -> Optional[Departure]:
     """Return the departure that the end of the present state is part of, once."""
-    departure = cast(Optional[Departure], node.departure)
-    node.departure = None
+    departure = cast(Optional[Departure], node.execution.departure)
+    node.execution.depart_by(None)
     if departure is None:
         return None
     stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
@@ -206,7 +207,9 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
         for machine in below
         if isinstance(machine, node.tree.container_class)
     ]
-    settled = failure.kind is not FailureKind.TIME_LIMIT and any(each.gave_up for each in nodes)
+    settled = failure.kind is not FailureKind.TIME_LIMIT and any(
+        each.execution.unrecovered for each in nodes
+    )
     for each in nodes:
-        each.gave_up = False
+        each.execution.forget_unrecovered()
     return settled

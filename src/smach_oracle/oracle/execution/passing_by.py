@@ -31,7 +31,7 @@ def pass_by(node: TreeNode) -> Optional[Stop]:
     if not route.target:
         return None
     state = machine._states[label]
-    node.tell_preempt()
+    node.execution.tell_preempt()
     forget_resumed(node)
     record = node.record(label)
     record.forget_entry()  # it may have been led to, and is not entered

@@ -94,8 +94,3 @@ def _why_not(way: Optional[Way], jump: Jump) -> str:
     if unconfirmed and not prospect.why_not:
         return 'it may repeat {}, which nobody has confirmed'.format(', '.join(unconfirmed))
     return prospect.why_not
-
-
-def tell_dropped(node: TreeNode, jump: Jump) -> None:
-    """Tell that a container has ended before it could be sent anywhere."""
-    node.warn('has ended before it could be sent to {}'.format(jump.named()))

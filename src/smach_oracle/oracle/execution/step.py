@@ -9,6 +9,7 @@ from smach_oracle.foreign import repr_of
 from ..asking.question import AnswerKind
 from ..branches.passed_over import tell_passed_over
 from ..decision.policy import FailureContext
+from ..machine.execution import ends_program
 from ..machine.repeats import note_visit
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_gate import UserdataGate
@@ -25,7 +26,6 @@ from ..recovery.failure import (
     Failure,
     Route,
     author_recovers,
-    ends_program,
     leaving_outcome,
     natural_ending,
     preempted_ending,
@@ -79,12 +79,12 @@ def _heed_preempt(node: TreeNode) -> None:
 
 def _pass_preempt_on(node: TreeNode) -> None:
     machine = node.machine
-    node.tell_preempt()
+    node.execution.tell_preempt()
     last = machine._preempted_state
     if last is not None and not last.preempt_requested():
         machine._preempt_requested = False
         machine._preempted_state = machine._preempted_label = None
-        node.preempt_told = False
+        node.execution.note_no_preempt()
         return
     if last is not None:
         last.recall_preempt()
@@ -129,8 +129,8 @@ class Step:
             why_not = note_visit(node, record)
             if why_not:
                 return HeldBack(why_not)
-        for place in way_down:  # before STATE_START, with which a checkpoint stores it
-            place.node.entry = place.label
+        if way_down:
+            node.execution.start_below(way_down)  # before STATE_START, with which it is stored
         try:
             node.emit(EventKind.STATE_START, state=record.label)
             blocked = node.tree.workers.blocked(state) if node.abandoned else ''
@@ -153,8 +153,8 @@ class Step:
                 ):
                     record.longest_s = took_s
         finally:
-            for place in way_down:
-                place.node.entry = ''
+            if way_down:
+                node.execution.start_below(())
 
     def _execute_limited(self, state: smach.State, limit_s: float) -> object:
         """Execute a state in a worker, as `execute` does."""
@@ -193,13 +193,13 @@ class Step:
         if error is not None:
             too_deep = too_deep_below(error) or too_deep_here(node, error)
             if too_deep is not None:
-                node.gave_up = True  # upstream's Concurrence drops what its states raise
+                node.execution.give_up()  # upstream's Concurrence drops what its states raise
                 raise too_deep.with_traceback(None) from None
         node.tree.early_end.note_end_of_state(smach.is_shutdown)
         if node.is_left_behind():
             stop_left_behind(node)
             return None
-        if node.departure is not None:
+        if node.execution.departure is not None:
             departure = take_departure(node)
             if departure is not None:
                 return self._left(departure, outcome, error)
@@ -212,7 +212,7 @@ class Step:
             return self._unfinished(judged, outcome)
         stopping = self._machine.preempt_requested() or smach.is_shutdown() or ends_program(error)
         if self._machine.preempt_requested():
-            node.tell_preempt()
+            node.execution.tell_preempt()
             note_end_under_preempt(
                 node, record.label, outcome if isinstance(judged, Route) else None
             )
@@ -372,7 +372,8 @@ class Step:
     def _end_settled(self, failure: Failure) -> Optional[str]:
         """End the container by a failure that has had its account further below."""
         ending = self._natural_ending(failure)
-        self._node.gave_up = ending.state is None
+        if ending.state is None:
+            self._node.execution.give_up()
         return self._end_unrecovered(ending, failure)
 
     def _taken_out(self, taken: TakenOut) -> Optional[str]:

@@ -5,26 +5,24 @@ Also what one execution of any container begins and ends.
 
 import functools
 import time
-from types import TracebackType
-from typing import Any, Callable, Dict, List, Optional, Tuple, Type
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import smach
-from smach_oracle.foreign import error_text
 from smach_oracle.forking import in_child
 
 from ..checkpoint.resuming import Resumption, tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
+from ..machine.execution import Execution, ends_program, why_no_outcome
 from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
-from ..records.events import NO_OUTCOME, EventKind
+from ..records.events import EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
-from ..recovery.failure import ends_program, outcome_of_early_end
-from .sending import tell_dropped
+from ..recovery.failure import outcome_of_early_end
 from .starting_over import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
@@ -47,19 +45,22 @@ def run_container(
     is_top = not node.has_running_ancestor()
     if is_top:
         node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
-    if not node.look_around():
+    run = Execution(node)
+    if not run.look_around():
         smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
         return outcome_of_early_end(node, None)
     if is_top:
-        return _begin_trial(machine, functools.partial(execute, *args, **kwargs))
+        return _begin_trial(machine, run, functools.partial(execute, *args, **kwargs))
     outcome, node.ended_before = node.ended_before, None
     if outcome is None:
-        with _Execution(node) as run:
+        with run:
             outcome = run.outcome = execute(*args, **kwargs)
     return outcome_of_early_end(node, outcome)
 
 
-def _begin_trial(machine: WrappedMachine, execute: Callable[[], Optional[str]]) -> Optional[str]:
+def _begin_trial(
+    machine: WrappedMachine, run: Execution, execute: Callable[[], Optional[str]]
+) -> Optional[str]:
     node = machine._oracle
     adopt(machine)
     for each in nodes_of(machine):
@@ -79,11 +80,12 @@ def _begin_trial(machine: WrappedMachine, execute: Callable[[], Optional[str]]) 
     node.tree.budget.begin(node.settings.budget)
     if store is not None:
         store.begin_trial(resumed)
-    return _run_trial(node, execute, store, resumed)
+    return _run_trial(node, run, execute, store, resumed)
 
 
 def _run_trial(
     node: TreeNode,
+    run: Execution,
     execute: Callable[[], Optional[str]],
     store: Optional[TrialStore],
     resumed: Optional[Resumption],
@@ -105,7 +107,7 @@ def _run_trial(
     try:
         _running.append(node)
         try:
-            with _Execution(node) as run:
+            with run:
                 outcome = run.outcome = execute()
         finally:
             _running.remove(node)
@@ -133,7 +135,7 @@ def _end_trial(
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',
-        text=_why(outcome, error),
+        text=why_no_outcome(outcome, error),
         data={ENDED_BY: why.value, **_learned(node)},
     )
     save_rates(node)
@@ -177,53 +179,6 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
     if outcome is not None:
         return TrialEnd.OUTCOME
     return TrialEnd.SHUTDOWN if node.engine.stepped else TrialEnd.INCONSISTENT
-
-
-class _Execution:
-    """One execution of a container. `outcome`: with which it has ended."""
-
-    __slots__ = ('_node', 'outcome')
-
-    def __init__(self, node: TreeNode) -> None:
-        self._node = node
-        self.outcome: Optional[str] = None
-
-    def __enter__(self) -> '_Execution':
-        node = self._node
-        node.begin_execution()
-        begins_in = node.entry if node.resuming is None else node.resuming.label
-        node.emit(
-            EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
-        )
-        return self
-
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        node = self._node
-        if error is not None:
-            # also after what no engine cleans up after, such as Ctrl-C
-            node.machine._is_running = False
-            if ends_program(error):
-                node.tree.early_end.of_program = error
-        dropped = node.tree.control.leave(node.engine, node.key)
-        if dropped is not None:
-            tell_dropped(node, dropped)
-        node.emit(
-            EventKind.CONTAINER_END, outcome=self.outcome or '', text=_why(self.outcome, error)
-        )
-        node.runs_around = ()
-        node.records.drop_snapshots()
-
-
-def _why(outcome: Optional[str], error: Optional[BaseException]) -> str:
-    """Return why an execution has no outcome, '' where it has one."""
-    if error is not None:
-        return error_text(error)
-    return NO_OUTCOME if outcome is None else ''
 
 
 def _leave_to_parent() -> None:

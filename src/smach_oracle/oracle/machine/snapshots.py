@@ -1,10 +1,14 @@
-"""Userdata as it was: snapshots, and their restore."""
+"""Userdata as it was: snapshots and their restore, and what was written since."""
 
 import copy
 import pickle
-from typing import Any, Callable, Dict, Iterable, Mapping, Optional
+from typing import Any, Callable, Dict, Iterable, Mapping, NamedTuple, Optional, Set
 
 from smach_oracle.foreign import ends_program, error_text
+
+from ..identity import own_mark
+from .protocols import Machine
+from .userdata_gate import UserdataGate
 
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
@@ -68,3 +72,91 @@ def fingerprint(value: object) -> Optional[bytes]:
         if ends_program(err):
             raise
         return None
+
+
+class UserdataMark(NamedTuple):
+    """Userdata at a moment.
+
+    `copies` and `prints` (fingerprints) are those of the deep-copied keys.
+    """
+
+    data: Dict[str, Any]
+    copies: Dict[str, Any]
+    prints: Dict[str, Optional[bytes]]
+
+
+class WriteWatch:
+    """Finds the keys of a container's userdata that change, whoever writes them.
+
+    It compares the moment when it is made with that of `written`.
+
+    Writes through the gate are recorded. Writes past it (a precondition that holds the machine
+    itself) show as another object under the key. Changes in place show for `deep_copy_keys`, by
+    a fingerprint.
+    """
+
+    def __init__(self, machine: Machine, deep_copy_keys: Iterable[str]) -> None:
+        self._machine = machine
+        self._deep = tuple(deep_copy_keys)
+        self.gate = UserdataGate(machine)
+        self._kept: Set[str] = set()  # written through the gate before `begin`
+        self._before = dict(machine.userdata._data)
+        self._prints = {
+            key: fingerprint(self._before[key]) for key in self._deep if key in self._before
+        }
+
+    def begin(self) -> UserdataMark:
+        """Begin with what may be taken back."""
+        data = dict(self._machine.userdata._data)
+        copies = {key: copied(data[key]) for key in self._deep if key in data}
+        self._kept.update(self.gate.written)
+        self.gate.written.clear()  # the set itself: branches of the gate have it, too
+        return UserdataMark(data, copies, {key: fingerprint(data[key]) for key in copies})
+
+    def take_back(self, begun: UserdataMark) -> None:
+        """Make the userdata what it was. It no longer counts as written.
+
+        Objects that were changed inside stay changed, except the deep-copied keys.
+        """
+        data = self._machine.userdata._data
+        if own_mark(self._machine, 'shares_userdata'):
+            self.take_back_own(begun)
+            return
+        for key, value in begun.data.items():
+            if key in begun.prints and fingerprint(value) != begun.prints[key]:
+                if self._before.get(key) is value and self._prints.get(key) == begun.prints[key]:
+                    self._before[key] = begun.copies[key]
+                value = begun.copies[key]
+            data[key] = value
+        for key in set(data).difference(begun.data):
+            del data[key]
+        self.gate.written.clear()
+
+    def take_back_own(self, begun: UserdataMark) -> None:
+        """Take back what passed the gate alone: others write the userdata at the same time."""
+        data = self._machine.userdata._data
+        for key in self.gate.written:
+            if key in begun.data:
+                data[key] = begun.data[key]
+            else:
+                data.pop(key, None)
+        self.gate.written.clear()
+
+    def written_in(self, machine: Machine) -> Set[str]:
+        """Return the keys of this machine's userdata that were written: none of another machine."""
+        return self.written() if machine is self._machine else set()
+
+    def written(self) -> Set[str]:
+        """Return the keys set, deleted or changed so far."""
+        now = dict(self._machine.userdata._data)
+        keys = self._kept.union(self.gate.written)
+        keys.update(
+            key for key in now if key not in self._before or now[key] is not self._before[key]
+        )
+        keys.update(key for key in self._before if key not in now)
+        keys.update(
+            key
+            for key, seen in self._prints.items()
+            if key in now and fingerprint(now[key]) != seen
+        )
+        return keys

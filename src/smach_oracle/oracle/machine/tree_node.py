@@ -16,7 +16,7 @@ from ..settings.unfit_names import Strictness
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
-from .limited_run import LimitedRun, runs_of_thread
+from .execution import Execution
 from .protocols import Labels, Machine
 from .snapshots import NOT_COPIED, take_snapshot
 from .tree import Tree
@@ -82,14 +82,6 @@ class BranchPort(Protocol):
         """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
 
 
-class DeparturePort(Protocol):
-    """A verdict that leaves containers for a level above (`execution.departure`)."""
-
-    @property
-    def arrives_at(self) -> 'TreeNode':
-        """The level to which it leads."""
-
-
 class EntryPort(Protocol):
     """The place where a container goes on whose program was stopped (`checkpoint.resuming`)."""
 
@@ -110,7 +102,8 @@ class TreeNode:
     `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
     that lead here from the parent, those of a Concurrence or Iterator in between included.
     `in_force`: its settings. `records`: what it has learned and remembers. `engine`: how its engine
-    steps. `branch`: of a plain state of a Concurrence or an Iterator, else None.
+    steps. `execution`: the present one, or the latest. `branch`: of a plain state of a Concurrence
+    or an Iterator, else None.
     """
 
     branch: Optional[BranchPort] = None
@@ -128,20 +121,15 @@ class TreeNode:
         self.records = ContainerRecords(settings.history_length)
         self.engine = EngineProbe()
         self.checked_states = -1  # number of states for which the settings were last checked
-        self.preempt_told = False
-        self.runs_around: Tuple[LimitedRun, ...] = ()  # of the present or latest execution
-        # where a verdict from below or here ends the present state
-        self.departure: Optional[DeparturePort] = None
-        self.entry = ''  # the state in which the next execution begins. '' means its initial one
         self.resuming: Optional[EntryPort] = None  # at the next execution
         # outcome of the next execution, which was over before the program was stopped
         self.ended_before: Optional[str] = None
         # before its next state, where nothing is to move unasked
         self.asked_next: Optional[AskedOnce] = None
-        self.gave_up = False  # the latest execution ended so
         # the states that are executed as preconditions now
         self.as_preconditions: Tuple[smach.State, ...] = ()
         self.join(tree)
+        self.execution = Execution(self)
 
     def take_name(self, name: str) -> None:
         """Go by this name, unless it is empty."""
@@ -200,12 +188,20 @@ class TreeNode:
                 yield above
             above = above.parent
 
+    def start_from_above(self, take: bool = False) -> str:
+        """Return the state in which a container around this one has it begin, '' for none.
+
+        `take`: it does so once.
+        """
+        starts = (each.execution.start_of(self, take) for each in self.running_around())
+        return next(filter(None, starts), '')
+
     def is_left_behind(self) -> bool:
         """Whether this container is to stop without an outcome, as nobody waits for one.
 
         It executes inside a state that was abandoned, or its trial has ended early.
         """
-        return self.tree.early_end.why is not None or any(run.abandoned for run in self.runs_around)
+        return self.execution.is_left_behind()
 
     def why_left_behind(self) -> str:
         """Say why, where it is left behind."""
@@ -223,32 +219,6 @@ class TreeNode:
                 return True
             node = node.parent
         return False
-
-    def look_around(self) -> bool:
-        """Find out inside which executions this one is about to begin.
-
-        Return whether it still may.
-        """
-        self.runs_around = self._find_runs_around()
-        for run in self.runs_around:
-            run.hold(self.engine)
-        return not self.is_left_behind()
-
-    def _find_runs_around(self) -> Tuple[LimitedRun, ...]:
-        """Return the watched executions inside which this container executes.
-
-        Those of its thread, and, as a Concurrence has threads of its own, those of the states
-        above it.
-        """
-        found = list(runs_of_thread())
-        under_way = self.tree.workers.under_way
-        node = self
-        while under_way and node.parent is not None:
-            run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
-            if run is not None and run not in found:
-                found.append(run)
-            node = node.parent
-        return tuple(found)
 
     def wraps(self, below: Labels) -> bool:
         """Whether what these labels below this container lead to has an oracle of its own."""
@@ -347,12 +317,6 @@ class TreeNode:
         """Say that a key of `deep_copy_keys` is kept as it is."""
         self.warn_once('copy of ' + key, NOT_COPIED.format(key, why))
 
-    def tell_preempt(self) -> None:
-        """Emit PREEMPT, once for each request."""
-        if not self.preempt_told:
-            self.preempt_told = True
-            self.emit(EventKind.PREEMPT, state=self.machine._current_label or '')
-
     def begin_trial(self, trial_id: str) -> None:
         """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
@@ -364,8 +328,7 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.preempt_told = self.gave_up = False
-        self.departure = None
+        self.execution.renew()
         self.engine.begin_execution()
         self.records.drop_snapshots()
         if self.resuming is not None:
@@ -400,6 +363,7 @@ class TreeNode:
         """
         twin = copy.copy(self)
         twin.machine = machine
+        twin.execution = Execution(twin)
         twin.records = self.records.twin()
         twin.in_force = copy.copy(self.in_force)
         twin.in_force.given_with_add = dict(self.in_force.given_with_add)

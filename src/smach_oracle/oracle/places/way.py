@@ -4,9 +4,9 @@ from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
 from ..identity import own_mark
 from ..machine.repeats import repeated_by_going_to, why_closed
+from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
-from ..machine.write_watch import WriteWatch
 from .handing_over import links_to
 from .levels import levels_above
 from .place import Place

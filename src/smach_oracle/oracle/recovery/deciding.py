@@ -5,8 +5,8 @@ from typing import Any, Callable, List, Optional, Tuple
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, goes, going_would_repeat
 from ..machine.repeats import has_visited
+from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
-from ..machine.write_watch import WriteWatch
 from ..places.levels import levels_above
 from ..places.place import Place, place_named
 from ..places.way import Way, closed_in_words, repeated_on, way_to

@@ -218,16 +218,6 @@ def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str
     return leaving_outcome(node.machine, node.in_force.failing, None)
 
 
-def ends_program(error: Optional[BaseException]) -> bool:
-    """Whether sys.exit or Ctrl-C is behind an error: the program is to end, and nothing failed.
-
-    In a thread of a Concurrence both become an error of SMACH, which has them as its cause.
-    """
-    while isinstance(error, (smach.InvalidStateError, smach.InvalidUserCodeError)):
-        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
-    return isinstance(error, (SystemExit, KeyboardInterrupt))
-
-
 def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
     """Return the error with which a machine passes on what a state raised.
 

@@ -5,8 +5,8 @@ from typing import Callable, Optional
 import smach
 
 from ..asking.question import Answer, AnswerKind
+from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
-from ..machine.write_watch import WriteWatch
 from ..places.levels import levels_above
 from ..places.place import place_at
 from ..places.way import Way, way_to

@@ -17,7 +17,7 @@ Stopped = Callable[[], bool]
 @contextlib.contextmanager
 def clocks_stand_still(node: TreeNode) -> Iterator[None]:
     """Let the time limits around a container stand still, and the minutes of its trial."""
-    with standing_still(node.runs_around), node.tree.budget.stands_still():
+    with standing_still(node.execution.runs_around), node.tree.budget.stands_still():
         yield
 
 

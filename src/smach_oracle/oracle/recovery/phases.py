@@ -302,7 +302,7 @@ def _ask(recovering: Recovering, expert: Expert) -> Optional[Verdict]:
     node, budget = recovering.node, recovering.budget
     deadline_s, recovering.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
-    with standing_still(node.runs_around), early_end.asking():
+    with standing_still(node.execution.runs_around), early_end.asking():
         reply = Inquiry(recovering, expert, deadline_s).run()
     if recovering.stopped():
         if early_end.end_at_shutdown(bool(smach.is_shutdown())):

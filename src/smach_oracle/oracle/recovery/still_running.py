@@ -144,7 +144,7 @@ class WatchedVisit:
     def _inquire(self, expert: Expert) -> Reply:
         # the state runs on, and so do the time limits around it. Whoever looks whether a state
         # around still runs has its answer in this question
-        watched = [run for run in self._node.runs_around if isinstance(run, WatchedRun)]
+        watched = [run for run in self._node.execution.runs_around if isinstance(run, WatchedRun)]
         with standing_still(watched), self._node.tree.early_end.asking():
             return Inquiry(self, expert, self._budget.within(0.0)[0]).run()
 

@@ -107,7 +107,7 @@ class RecoveryStop:
 
     def has_waited(self, seconds: float) -> bool:
         """Let time pass. Return False where something has ended the recovery meanwhile."""
-        with standing_still(self._node.runs_around):
+        with standing_still(self._node.execution.runs_around):
             self._node.tree.waiting.wait(seconds, 'waiting', self.is_over, self.cancelled.wait)
         return not self.is_over()
 
@@ -126,7 +126,7 @@ class RecoveryStop:
 
     def wait_until_well(self, what: str, why: str) -> bool:
         """Wait until the robot is well. Return False where something has ended the recovery."""
-        with standing_still(self._node.runs_around):
+        with standing_still(self._node.execution.runs_around):
             is_well = self._node.tree.health.wait_until_well(
                 self._node, self._record.label, what, why, self.is_over, self.cancelled.wait
             )

@@ -1,0 +1,185 @@
+"""One execution of a container: what is true from its begin to its end, and no longer."""
+
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Dict, Iterable, Optional, Protocol, Tuple, Type
+
+import smach
+from smach_oracle.foreign import error_text
+
+from ..records.events import NO_OUTCOME, EventKind
+from .limited_run import LimitedRun, runs_of_thread
+
+if TYPE_CHECKING:
+    from .tree_node import TreeNode
+
+
+class DeparturePort(Protocol):
+    """A verdict that leaves containers for a level above (`execution.departure`)."""
+
+    @property
+    def arrives_at(self) -> 'TreeNode':
+        """The level to which it leads."""
+
+
+class Execution:
+    """One execution of a container: the present one, or the latest.
+
+    It begins and ends as a context. `outcome`: with which it has ended. `runs_around`: the watched
+    executions inside which it takes place. `departure`: the verdict from below, or from here, that
+    ends the present state. `unrecovered`: whether the oracle has given up, and so ended it.
+
+    The thread of the container calls its methods, but for `depart_by`, `start_of` and
+    `forget_unrecovered`, which belong to the threads of other containers.
+    """
+
+    __slots__ = (
+        '_node',
+        '_is_whole',
+        'outcome',
+        'runs_around',
+        'departure',
+        'unrecovered',
+        'starts_in',
+        '_starts_below',
+        '_is_preempt_told',
+    )
+
+    def __init__(self, node: 'TreeNode', is_whole: bool = True) -> None:
+        """`is_whole`: it is told of, and begins a history. What holds a branch does so for it."""
+        self._node = node
+        self._is_whole = is_whole
+        self.outcome: Optional[str] = None
+        self.runs_around: Tuple[LimitedRun, ...] = ()
+        self.renew()
+
+    def renew(self) -> None:
+        """Begin once more, as an engine may do. What is around it stays."""
+        self.departure: Optional[DeparturePort] = None
+        self.unrecovered = False
+        self.starts_in = ''  # '': its initial state
+        self._starts_below: Dict[int, str] = {}  # by the id of a node in the present state
+        self._is_preempt_told = False
+
+    # -- what is around it
+
+    def look_around(self) -> bool:
+        """Find out inside which executions this one is about to begin.
+
+        Return whether it still may.
+        """
+        found = list(runs_of_thread())  # and, as a Concurrence has threads of its own, those above
+        node, under_way = self._node, self._node.tree.workers.under_way
+        while under_way and node.parent is not None:
+            run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
+            if run is not None and run not in found:
+                found.append(run)
+            node = node.parent
+        self.runs_around = tuple(found)
+        for run in found:
+            run.hold(self._node.engine)
+        return not self.is_left_behind()
+
+    def is_left_behind(self) -> bool:
+        """Whether the container is to stop without an outcome, as nobody waits for one.
+
+        It executes inside a state that was abandoned, or its trial has ended early.
+        """
+        return self._node.tree.early_end.why is not None or any(
+            run.abandoned for run in self.runs_around
+        )
+
+    # -- its begin and its end
+
+    def __enter__(self) -> 'Execution':
+        node = self._node
+        node.execution = self
+        if not self._is_whole:
+            node.engine.begin_execution()
+            return self
+        node.begin_execution()
+        self.starts_in = node.start_from_above(take=True)
+        begins_in = self.starts_in if node.resuming is None else node.resuming.label
+        node.emit(
+            EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
+        )
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        node = self._node
+        if error is not None:
+            # also after what no engine cleans up after, such as Ctrl-C
+            node.machine._is_running = False
+            if ends_program(error):
+                node.tree.early_end.of_program = error
+        dropped = node.tree.control.leave(node.engine, node.key)
+        if dropped is not None:
+            node.warn('has ended before it could be sent to {}'.format(dropped.named()))
+        if self._is_whole:
+            node.emit(
+                EventKind.CONTAINER_END,
+                outcome=self.outcome or '',
+                text=why_no_outcome(self.outcome, error),
+            )
+        self.runs_around = ()
+        node.records.drop_snapshots()
+
+    # -- where the containers in the present state begin
+
+    def start_below(self, places: Iterable[Tuple['TreeNode', str]]) -> None:
+        """Have containers in the present state begin in these states, each once. None: no more."""
+        self._starts_below = {id(node): label for node, label in places}
+
+    def start_of(self, node: 'TreeNode', take: bool) -> str:
+        """Return the state in which a container below is to begin, '' where nobody says so."""
+        starts = self._starts_below
+        return starts.pop(id(node), '') if take else starts.get(id(node), '')
+
+    # -- how it goes on
+
+    def depart_by(self, departure: Optional[DeparturePort]) -> None:
+        """Have the present state end by a verdict. To be called under `departures_lock`."""
+        self.departure = departure
+
+    def give_up(self) -> None:
+        """Note that the oracle ends the container: the failure has had its account."""
+        self.unrecovered = True
+
+    def forget_unrecovered(self) -> None:
+        """Note that a container above goes on behind that."""
+        self.unrecovered = False
+
+    def tell_preempt(self) -> None:
+        """Emit PREEMPT, once for each request."""
+        if not self._is_preempt_told:
+            self._is_preempt_told = True
+            self._node.emit(EventKind.PREEMPT, state=self._node.machine._current_label or '')
+
+    def note_no_preempt(self) -> None:
+        """Note that a request was serviced: the next one is another."""
+        self._is_preempt_told = False
+
+    def __reduce__(self) -> Tuple[Any, ...]:
+        """A copied or pickled machine is not being executed."""
+        return Execution, (self._node,)
+
+
+def why_no_outcome(outcome: object, error: Optional[BaseException]) -> str:
+    """Return why an execution has no outcome, '' where it has one."""
+    if error is not None:
+        return error_text(error)
+    return NO_OUTCOME if outcome is None else ''
+
+
+def ends_program(error: Optional[BaseException]) -> bool:
+    """Whether sys.exit or Ctrl-C is behind an error: the program is to end, and nothing failed.
+
+    In a thread of a Concurrence both become an error of SMACH, which has them as its cause.
+    """
+    while isinstance(error, (smach.InvalidStateError, smach.InvalidUserCodeError)):
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return isinstance(error, (SystemExit, KeyboardInterrupt))
