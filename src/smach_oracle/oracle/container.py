@@ -313,8 +313,8 @@ class OracleContainer(smach.StateMachine):
         if node.execution.starts_in in self._states:
             self._set_current_state(node.execution.starts_in)
             how = 'starting'
-        if node.resuming is not None:
-            entry, node.resuming = node.resuming, None
+        entry = node.tree.resumed.take_entry(node)
+        if entry is not None:
             entry.enter(node)
             how = 'going on'
         if how:
@@ -327,7 +327,9 @@ class OracleContainer(smach.StateMachine):
 
     def _tell_start(self) -> None:
         """Log where it starts. Upstream's engine does not ask."""
-        if self._oracle.resuming is None and self._oracle.execution.starts_in not in self._states:
+        node = self._oracle
+        is_led = node.execution.starts_in in self._states
+        if not is_led and node.tree.resumed.entry_of(node) is None:
             super()._tell_start()
 
     def _update_once(self) -> Optional[str]:

@@ -332,12 +332,13 @@ class IteratorBorder(Border):
 
     def _begin_item(self) -> None:
         machine = self.machines.get(self.container._state_label)
-        record = (
-            None
-            if machine is None
-            else machine._oracle.records.by_label.get(self.container._state_label)
-        )
-        self._userdata.begin_item(record, self._deep_copy_keys(), self._warn_not_copied)
+        node = None if machine is None else machine._oracle
+        record = None if node is None else node.records.by_label.get(self.container._state_label)
+        unfinished = None
+        if node is not None and record is not None:
+            unfinished = node.tree.resumed.unfinished(record)
+        begun = None if unfinished is None else unfinished.snapshot
+        self._userdata.begin_item(begun, self._deep_copy_keys(), self._warn_not_copied)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""

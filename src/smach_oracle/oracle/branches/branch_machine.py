@@ -56,8 +56,8 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
             '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
         )
         return outcome_of_early_end(node, None)
-    if node.ended_before is not None:
-        outcome, node.ended_before = node.ended_before, None
+    outcome = node.tree.resumed.take_outcome(node)
+    if outcome is not None:
         return outcome
     try:
         with run:

@@ -5,7 +5,6 @@ from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 import smach
 
 from ..machine.snapshots import restore, take_snapshot
-from ..records.state_record import StateRecord
 
 Warn = Callable[[str, str], None]
 
@@ -22,17 +21,14 @@ class ItemUserdata:
         self._at_item: Optional[Dict[str, Any]] = None
 
     def begin_item(
-        self, record: Optional[StateRecord], deep_copy_keys: Sequence[str], warn: Warn
+        self, begun: Optional[Mapping[str, Any]], deep_copy_keys: Sequence[str], warn: Warn
     ) -> None:
         """Note that an item begins.
 
-        `record`: of its state, where that has an oracle of its own. A visit that was begun before
-        the program was stopped has written already.
+        `begun`: the userdata with which its state was begun before the program was stopped. That
+        visit has written already.
         """
-        data: Mapping[str, Any] = self._iterator.userdata._data
-        unfinished = record.unfinished if record is not None else None
-        if unfinished is not None and unfinished.snapshot is not None:
-            data = unfinished.snapshot
+        data = self._iterator.userdata._data if begun is None else begun
         self._at_item = take_snapshot(data, deep_copy_keys, warn)
 
     def begin(

@@ -121,7 +121,7 @@ class Checkpointer:
             self._ran.setdefault(node.key, set()).add(event.state)
             if event.kind in _HAS_RUN:
                 self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
-        if event.kind is EventKind.CONTAINER_START and node.resuming is None:
+        if event.kind is EventKind.CONTAINER_START and not self._enters_again(node):
             pending += self._facts_of(node).begin_execution()
         if _enters(event, node):
             self._entered.setdefault(_begins_line(node), []).append(node)
@@ -191,7 +191,7 @@ class Checkpointer:
         pending = self._pending_of(self._top)
         for node in self._nodes.values():
             pending += self._facts_of(node).all_states()
-        if self._top.resuming is None:
+        if not self._enters_again(self._top):
             pending += self._collected(self._top, all_keys=True)
         for goal_id, server in GOALS.running().items():
             self._goals.add(goal_id)
@@ -217,6 +217,10 @@ class Checkpointer:
             )
         return facts
 
+    def _enters_again(self, node: TreeNode) -> bool:
+        """Whether a container is to go on where it stood: it has not the stored userdata yet."""
+        return self._top.tree.resumed.entry_of(node) is not None
+
     # -- what a moment has
 
     def _where(self, event: Event, node: TreeNode) -> Iterator[Fact]:
@@ -233,11 +237,13 @@ class Checkpointer:
             ]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
             if is_container and not (
-                any(_goes_on(each) for each in below)
+                any(self._top.tree.resumed.goes_on(each) for each in below)
                 or any(border.is_resumed for _, border in borders_in(node, label))
             ):
                 yield from self._not_begun_below(path)
-        elif kind is EventKind.CONTAINER_START and node is self._top and node.resuming is None:
+        elif (
+            kind is EventKind.CONTAINER_START and node is self._top and not self._enters_again(node)
+        ):
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
             event.target in node.machine._states and not node.is_oracle(event.target)
@@ -333,8 +339,8 @@ class Checkpointer:
         """Yield what is new of a container."""
         labels = self._ran.pop(node.key, set())
         yield from self._facts_of(node).changed(list(labels))
-        if node.resuming is not None:
-            return  # it does not have the stored userdata yet
+        if self._enters_again(node):
+            return
         reached = (
             None
             if all_keys
@@ -404,15 +410,6 @@ def _enters(event: Event, node: TreeNode) -> bool:
     """Whether a container, or the state of a branch, begins at an event."""
     return event.kind is (
         EventKind.CONTAINER_START if node.branch is None else EventKind.STATE_START
-    )
-
-
-def _goes_on(node: TreeNode) -> bool:
-    """Whether a container is to go on where it stood before the program was stopped."""
-    return (
-        node.resuming is not None
-        or node.ended_before is not None
-        or any(record.unfinished is not None for record in node.records.by_label.values())
     )
 
 

@@ -13,14 +13,14 @@ from ..branches.items import can_be_indexed
 from ..errors import SettingsError
 from ..machine.nesting import borders_below, nodes_of
 from ..machine.repeats import leave_unconfirmed, why_held_back
+from ..machine.resumed import NOT_BEGUN, Unfinished
 from ..machine.tree_node import TreeNode, node_of
 from ..places.place import Place, place_named, places_of
 from ..places.way import Way, way_to
-from ..records.asked_once import NOT_BEGUN, AskedOnce
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
-from ..records.state_record import StateRecord, Unfinished
+from ..records.state_record import StateRecord
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_container import StoredContainer
 from .stored_marks import Marks, let_repeat, take_over_marks
@@ -170,11 +170,11 @@ def forget_resumed(node: TreeNode) -> None:
 
 
 def _forget(node: TreeNode) -> None:
+    resumed = node.tree.resumed
     for each in nodes_of(node.machine):
         if each is not node:
-            each.resuming = each.ended_before = each.asked_next = None
-        for record in each.records.by_label.values():
-            record.forget_unfinished()
+            resumed.forget(each)
+        resumed.forget_states(each)
         for _, container in borders_below(each.machine):
             border = border_of(container)
             if border is not None:
@@ -211,7 +211,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         leave_unconfirmed(top, way.first)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
     if resumption.begins_at and way is not None:
-        top.resuming = EntryPoint(stood, way.down[1:])
+        top.tree.resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
         _Setting(resumption, nodes).ask_at(way.down)
     else:
         _Setting(resumption, nodes).set_container(top)
@@ -238,6 +238,7 @@ class _Setting:
 
     def __init__(self, resumption: Resumption, nodes: List[TreeNode]) -> None:
         self._resumption, self._nodes = resumption, nodes
+        self._resumed = nodes[0].tree.resumed
 
     def activate(self, node: TreeNode) -> bool:
         """Set a container that was under way, and what is in its state.
@@ -253,13 +254,13 @@ class _Setting:
             self._ask_at_beginning(node, stored, stored.label)
             return True
         if node.branch is None:
-            node.resuming = EntryPoint(stored, self._way_down(node, stored))
+            self._resumed.enter_at(node, EntryPoint(stored, self._way_down(node, stored)))
         record = node.record(stored.label)
         # a question of an earlier moment may have been answered since: it is asked again
         if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
-            record.open_question = stored.asked[1]
-        if stored.phase == FAILED or record.open_question:
-            record.resume(self._unfinished(node, stored))
+            self._resumed.reopen(record, stored.asked[1])
+        if stored.phase == FAILED or self._resumed.has_question(record):
+            self._resumed.go_on_with(record, self._unfinished(node, stored))
         elif stored.phase == IN:
             self._go_on_in(node, stored, record)
         else:
@@ -270,7 +271,7 @@ class _Setting:
         """Set what is in a state that was under way, or say that it is in doubt."""
         inside = self._inside(node, stored.label)
         if inside is None:
-            record.resume(self._unfinished(node, stored))
+            self._resumed.go_on_with(record, self._unfinished(node, stored))
             return
         for path, border in borders_in(node, stored.label):
             if self._has_begun(path):
@@ -286,13 +287,12 @@ class _Setting:
         That is the next item of an Iterator, or a state of the container or of one above it.
         """
         around = [*_up_from(node), node.top()]
-        asked = AskedOnce(
+        self._resumed.ask_before_next(
+            around + inside,
             _why(self._resumption),
             [node.record(label)]
             + [each.parent.record(each.below[0]) for each in around if each.parent is not None],
         )
-        for each in around + inside:
-            each.asked_next = asked
 
     def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[Place]:
         """Return the rest of a jump: below, nothing has begun yet. Empty for no jump."""
@@ -316,7 +316,7 @@ class _Setting:
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():
-                node.ended_before = stored.label
+                self._resumed.had_ended(node, stored.label)
                 return False
             self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
@@ -347,16 +347,16 @@ class _Setting:
             return
         stood = self._resumption.tree.container(top.key)
         stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at[3]
-        top.resuming = EntryPoint(stood, way.down[1:])
+        self._resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
         there = StoredContainer()
         there.at = at
         record = place.node.record(place.label)
         if asked and asked[0] == place.label and not self._resumption.is_earlier:
-            record.open_question = asked[1]
+            self._resumed.reopen(record, asked[1])
         if there.phase == IN:
             self._go_on_in(place.node, there, record)
         elif there.phase == FAILED or self._resumption.asks:
-            record.resume(self._unfinished(place.node, there))
+            self._resumed.go_on_with(record, self._unfinished(place.node, there))
 
     def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
         """Have a person asked before a container begins that stood where it cannot go on."""
@@ -367,34 +367,33 @@ class _Setting:
             return
         stored.at, stored.asked = [label, BEFORE], []
         if node.branch is None:
-            node.resuming = EntryPoint(stored)
-        node.record(label).resume(
-            Unfinished(
-                FailureKind.INTERRUPTED, '', GONE.format(gone), _why(self._resumption), keeps=True
-            )
-        )
+            self._resumed.enter_at(node, EntryPoint(stored))
+        self._interrupt(node, label, GONE.format(gone))
 
     def ask_at(self, down: Sequence[Place]) -> None:
         """Have a person asked at states that are not to come again, or where nothing is to move."""
         for node, label in down:
             why = why_held_back(node, node.record(label))
             if why and node.tree.numbers_visits:
-                node.record(label).resume(
-                    Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True)
+                self._resumed.go_on_with(
+                    node.record(label), Unfinished(FailureKind.HELD_BACK, '', why, why, keeps=True)
                 )
         self._ask_before(*down[-1])
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
         if self._resumption.asks and label in node.machine._states:
-            node.record(label).resume(
-                Unfinished(
-                    FailureKind.INTERRUPTED, '', NOT_BEGUN, _why(self._resumption), keeps=True
-                )
-            )
+            self._interrupt(node, label, NOT_BEGUN)
+
+    def _interrupt(self, node: TreeNode, label: str, text: str) -> None:
+        """Have a person asked in place of the coming visit of a state."""
+        self._resumed.go_on_with(
+            node.record(label),
+            Unfinished(FailureKind.INTERRUPTED, '', text, _why(self._resumption), keeps=True),
+        )
 
     def _unfinished(self, node: TreeNode, stored: StoredContainer) -> Unfinished:
-        is_open = node.record(stored.label).open_question
+        is_open = self._resumed.has_question(node.record(stored.label))
         why = _why(self._resumption) if self._resumption.asks or is_open else ''
         # a branch has the userdata of the Concurrence or Iterator that holds it
         snapshots = self._resumption.tree.container(node.path).snapshots

@@ -71,4 +71,5 @@ def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
     if not isinstance(state, node.tree.container_class):
         return None
     inner = cast(WrappedMachine, state)._oracle
-    return inner if inner.parent is node and inner.resuming is None else None
+    goes_on = node.tree.resumed.entry_of(inner) is not None
+    return inner if inner.parent is node and not goes_on else None

@@ -11,14 +11,15 @@ from ..branches.passed_over import tell_passed_over
 from ..decision.policy import FailureContext
 from ..machine.execution import ends_program
 from ..machine.repeats import note_visit
+from ..machine.resumed import Unfinished
+from ..machine.snapshots import UserdataGate
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import UserdataGate
 from ..machine.userdata_view import view_behind
 from ..machine.workers import recall_preempts
 from ..places.stepping_back import failure_context
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
-from ..records.state_record import StateRecord, Unfinished
+from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery import occasions
 from ..recovery.failure import (
@@ -114,12 +115,10 @@ class Step:
         when the state overruns, in place of `userdata`.
         """
         node, record = self._node, self._record
-        if record.unfinished is not None:
-            return record.take_unfinished()
-        if node.asked_next is not None:
-            asked = node.asked_next.take(record)
-            if asked is not None:
-                return asked
+        if node.tree.is_resumed:
+            unfinished = node.tree.resumed.take_unfinished(node, record)
+            if unfinished is not None:
+                return unfinished
         entered_by_oracle, way_down = record.entered_by_oracle, record.way_down
         if entered_by_oracle or way_down:
             record.forget_entry()
@@ -359,7 +358,7 @@ class Step:
             return self._end_unrecovered(self._natural_ending(failure), failure)
         if is_settled(node, failure):
             return self._end_settled(failure)
-        asked = None if node.asked_next is None else node.asked_next.take(record)
+        asked = node.tree.resumed.take_asked(node, record) if node.tree.is_resumed else None
         if asked is not None:
             return self._recover(occasions.interrupted(failure, context, asked, continuous))
         if why_unwell:

@@ -51,7 +51,7 @@ def run_container(
         return outcome_of_early_end(node, None)
     if is_top:
         return _begin_trial(machine, run, functools.partial(execute, *args, **kwargs))
-    outcome, node.ended_before = node.ended_before, None
+    outcome = node.tree.resumed.take_outcome(node)
     if outcome is None:
         with run:
             outcome = run.outcome = execute(*args, **kwargs)

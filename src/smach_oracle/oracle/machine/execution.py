@@ -98,7 +98,8 @@ class Execution:
             return self
         node.begin_execution()
         self.starts_in = node.start_from_above(take=True)
-        begins_in = self.starts_in if node.resuming is None else node.resuming.label
+        entry = node.tree.resumed.entry_of(node)
+        begins_in = self.starts_in if entry is None else entry.label
         node.emit(
             EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
         )

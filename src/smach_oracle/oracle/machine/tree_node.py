@@ -7,7 +7,6 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 import smach
 
 from ..identity import own_mark
-from ..records.asked_once import AskedOnce
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..settings.patterns import Nested, is_nested_at
@@ -82,20 +81,6 @@ class BranchPort(Protocol):
         """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
 
 
-class EntryPort(Protocol):
-    """The place where a container goes on whose program was stopped (`checkpoint.resuming`)."""
-
-    @property
-    def label(self) -> str:
-        """The state in which it goes on."""
-
-    def take_over_records(self, node: 'TreeNode') -> None:
-        """Have the visits of the execution that was stopped."""
-
-    def enter(self, node: 'TreeNode') -> None:
-        """Have the userdata as it was, and the state in which it goes on as the current one."""
-
-
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
@@ -121,11 +106,6 @@ class TreeNode:
         self.records = ContainerRecords(settings.history_length)
         self.engine = EngineProbe()
         self.checked_states = -1  # number of states for which the settings were last checked
-        self.resuming: Optional[EntryPort] = None  # at the next execution
-        # outcome of the next execution, which was over before the program was stopped
-        self.ended_before: Optional[str] = None
-        # before its next state, where nothing is to move unasked
-        self.asked_next: Optional[AskedOnce] = None
         # the states that are executed as preconditions now
         self.as_preconditions: Tuple[smach.State, ...] = ()
         self.join(tree)
@@ -320,7 +300,7 @@ class TreeNode:
     def begin_trial(self, trial_id: str) -> None:
         """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
-        self.resuming = self.ended_before = self.asked_next = None  # of one that ended early
+        self.tree.resumed.forget(self)
         self.records.begin_trial()
 
     def begin_execution(self) -> None:
@@ -331,8 +311,9 @@ class TreeNode:
         self.execution.renew()
         self.engine.begin_execution()
         self.records.drop_snapshots()
-        if self.resuming is not None:
-            self.resuming.take_over_records(self)
+        entry = self.tree.resumed.entry_of(self)
+        if entry is not None:
+            entry.take_over_records(self)
 
     def begin_stepping(self) -> None:
         """Find out at the first state of an execution what the engine is like."""

@@ -6,8 +6,8 @@ import smach
 
 from ..identity import own_mark
 from .protocols import Machine
+from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
-from .userdata_gate import UserdataGate, behind
 
 
 def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:

@@ -17,7 +17,7 @@ from smach_oracle.foreign import repr_of
 from ..background import BackgroundCall
 from ..identity import attribute_of, own_mark
 from .limited_run import LimitedRun, enter
-from .userdata_gate import UserdataGate
+from .snapshots import UserdataGate
 
 _STOP_PERIOD_S = 0.05  # how soon a function that runs is left behind at a preempt or a shutdown
 

@@ -1,24 +1,12 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
 import threading
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Protocol, Tuple
 
 from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
 from ..decision.merged_rates import base_of, merged
-from ..records.events import FailureKind
 from ..records.visits import Visit
 from ..settings.settings import StateSettings
-
-
-class Unfinished(NamedTuple):
-    """The progress of a state when the program was stopped, in place of an execution."""
-
-    kind: FailureKind
-    outcome: str
-    text: str
-    asks: str  # why a person is asked at once, '' where nobody is
-    snapshot: Optional[Mapping[str, Any]] = None  # userdata with which it began
-    keeps: bool = False  # where nobody answers, the trial is kept
 
 
 class FastEdge:
@@ -94,8 +82,6 @@ class StateRecord:
         'longest_s',
         'entered_by_oracle',
         'way_down',
-        'unfinished',
-        'open_question',
         '_is_special',
         '_estimator',
         '_lock',
@@ -124,8 +110,6 @@ class StateRecord:
         self.entered_by_oracle = False  # at the coming visit
         # at the coming visit: the state in which each container below it begins
         self.way_down: Tuple[Any, ...] = ()
-        self.unfinished: Optional[Unfinished] = None  # in place of the coming visit
-        self.open_question = ''  # id of one that was open when the program was stopped
         self._learned = 0  # successes by way of edges that the estimator knows
         # what of it the rates file has, as `base_of` tells it
         self.shared: Dict[str, Any] = {}
@@ -154,12 +138,7 @@ class StateRecord:
     def be_special(self, special: bool) -> None:
         """Have more done than to execute the state, which a time limit wants in any case."""
         self._is_special = special or self.settings.time_limit_s is not None
-        self.special = (
-            self._is_special
-            or self.entered_by_oracle
-            or bool(self.way_down)
-            or self.unfinished is not None
-        )
+        self.special = self._is_special or self.entered_by_oracle or bool(self.way_down)
 
     def enter_by_oracle(self) -> None:
         """Note that the oracle leads to the state, which is visited next."""
@@ -169,28 +148,6 @@ class StateRecord:
         """Note in which state each container below begins at the visit that is next."""
         self.way_down = way_down
         self.special = self.special or bool(way_down)
-
-    def resume(self, unfinished: Unfinished) -> None:
-        """Note that the coming visit is one that was begun before the program was stopped."""
-        self.unfinished, self.special = unfinished, True
-
-    def forget_unfinished(self) -> None:
-        """Let the coming visit be a new one, whatever was under way as the program was stopped."""
-        self.unfinished, self.open_question = None, ''
-        self.be_special(self._is_special)
-
-    def take_question(self) -> str:
-        """Return the id of the question that is open again, once, or '' where none is."""
-        question, self.open_question = self.open_question, ''
-        return question
-
-    def take_unfinished(self) -> Optional[Unfinished]:
-        """Return what stands in place of the coming visit, once."""
-        unfinished, self.unfinished = self.unfinished, None
-        if unfinished is not None and unfinished.snapshot is not None:
-            self.snapshot = dict(unfinished.snapshot)
-        self.be_special(self._is_special)
-        return unfinished
 
     def go_on(self, counts: List[int], longest_s: Optional[float]) -> None:
         """Go on counting: visits, recoveries, fallbacks, and repeats while not well, of the trial.
@@ -284,8 +241,7 @@ class StateRecord:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self._tried = '', 0
-        self.forget_unfinished()  # of a trial that ended before the visit
-        self.forget_entry()
+        self.forget_entry()  # of a trial that ended before the visit
         self._visits_before = self._visits + self._by_edges()
 
     @property
@@ -332,7 +288,7 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=_NO_VIEW, way_down=(), unfinished=None)
+        state.update(snapshot=None, view=_NO_VIEW, way_down=())
         del state['_lock']
         return state
 

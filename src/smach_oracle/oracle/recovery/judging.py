@@ -7,9 +7,10 @@ import smach
 from smach_oracle.foreign import error_text, repr_of
 
 from ..machine.nesting import items_under_way
+from ..machine.resumed import Unfinished
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
-from ..records.state_record import StateRecord, Unfinished
+from ..records.state_record import StateRecord
 from .failure import (
     Failure,
     Route,

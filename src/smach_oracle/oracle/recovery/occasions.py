@@ -8,7 +8,7 @@ from typing import Callable, NamedTuple, Optional
 
 from ..asking.question import Answer
 from ..decision.policy import FailureContext
-from ..records.state_record import Unfinished
+from ..machine.resumed import Unfinished
 from .failure import Failure
 from .verdict import Verdict
 

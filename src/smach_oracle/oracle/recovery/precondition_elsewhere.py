@@ -7,9 +7,8 @@ down through the input keys of the containers around the failed state.
 
 from typing import Any, Dict, List, Tuple
 
-from ..machine.snapshots import WriteWatch
+from ..machine.snapshots import UserdataGate, WriteWatch
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import UserdataGate
 from ..places.handing_over import hand_down, hand_on, hand_up, links_to
 from ..places.place import Place
 from ..places.way import Way, way_to

@@ -11,8 +11,8 @@ from smach_oracle.foreign import repr_of
 
 from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..identity import truth_of
+from ..machine.snapshots import UserdataGate, behind
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import UserdataGate, behind
 from ..places.place import place_named
 from ..records.short_text import shortened
 from ..records.visits import VisitResult

@@ -13,9 +13,8 @@ from smach_oracle.foreign import repr_of
 from ..control.hold import HeldPlace
 from ..identity import truth_of
 from ..machine.repeats import note_precondition, repeated_by_running
-from ..machine.snapshots import WriteWatch
+from ..machine.snapshots import UserdataGate, WriteWatch, behind
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_gate import UserdataGate, behind
 from ..machine.userdata_view import constants_of, view_behind, write_constants
 from ..places.fitness import why_unfit
 from ..places.place import place_named

@@ -34,7 +34,7 @@ def make_question(
     machine = node.machine
     state = machine._states[record.label]
     return Question(
-        question_id=record.take_question() or node.tree.next_question_id(),
+        question_id=node.tree.resumed.take_question(record) or node.tree.next_question_id(),
         trial_id=node.tree.trial_id,
         container_path=node.path,
         failed_state=record.label,
