@@ -68,6 +68,23 @@ def test_an_iterator_that_was_left_goes_on_whatever_its_author_makes_of_its_end(
     assert machine.visits() == ['ALL', 'A', 'A', 'ALL', 'A', 'A'], 'items 1, 2 and 2, 3'
 
 
+def test_an_item_that_ends_under_a_preempt_is_done_again_where_the_iterator_goes_on():
+    def fails_when_asked_to_stop(state, ud):
+        machine.request_preempt()
+        return 'aborted'
+
+    each = Item(item2=[fails_when_asked_to_stop])
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('LOOK', Scripted('ok', 'aborted'), {'ok': 'ALL'})
+        items = iterator_over(each, loop_outcomes=['ok', 'aborted'])
+        smach.StateMachine.add('ALL', items, {'done': 'done', 'aborted': 'LOOK'})
+    watched = Watched(machine, name='TOP', expert=FakeExpert(goto('ALL')), settings=ASKS)
+    assert watched.run() == 'done'
+    assert each.tried == [1, 2, 2, 3, 4]
+
+
 def test_what_is_left_of_one_item_is_not_gone_on_with_in_the_next():
     done = []
     columns = each_of(Notes(done, _1_2='aborted'), 'column', (1, 2, 3))
