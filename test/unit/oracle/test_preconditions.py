@@ -147,6 +147,24 @@ def test_a_precondition_that_never_ends_is_ended_by_a_preempt():
     assert machine.machine.preempt_requested() is False
 
 
+def test_a_precondition_that_is_left_behind_in_a_preempt_is_still_asked_to_stop():
+    begun, go = threading.Event(), threading.Event()
+
+    def hangs(state, ud):
+        begun.set()
+        assert go.wait(20)
+        return 'ok'
+
+    state = Scripted(hangs)
+    machine = machine_with(state, time_limit_s=0.2, grace_period_s=0.1)
+    run = in_thread(machine.run)
+    assert begun.wait(10)
+    machine.machine.request_preempt()
+    assert run.result() == 'preempted'
+    assert state.preempt_requested()
+    go.set()
+
+
 def test_a_preempt_between_two_preconditions_lets_no_more_begin():
     second = Scripted()
     holder = []

@@ -171,7 +171,7 @@ def test_outputs_of_an_answer_are_written_once_the_state_has_ended():
     assert machine.run() == 'done' and seen == ['whole']
 
 
-@pytest.mark.parametrize('end', ['ok', ValueError('broken by the preempt')])
+@pytest.mark.parametrize('end', ['ok', None, ValueError('broken by the preempt')])
 def test_whatever_the_state_ends_with_is_replaced(end, log):
     def ends(state, ud):
         assert wait_for(state.preempt_requested)
@@ -182,6 +182,8 @@ def test_whatever_the_state_ends_with_is_replaced(end, log):
     machine = asked(Scripted('aborted', ends), Scripted(), Scripted(), expert=FakeExpert(goto('C')))
     assert machine.run() == 'done'
     assert machine.visits() == ['A', 'A', 'C'] and failures(machine) == ['A']
+    left_with = machine.of(EventKind.TRANSITION)[1].outcome
+    assert left_with == (end if isinstance(end, str) else '')
     assert (machine.rate('A').successes, machine.rate('A').failures) == (0, 1)
     assert any('broken by the preempt' in text for _, text in log) is isinstance(end, Exception)
 
