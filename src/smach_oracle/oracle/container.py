@@ -46,6 +46,18 @@ class OracleContainer(smach.StateMachine):
 
     It is built like any state machine, or made of one with `wrap`. All its own data
     is in one attribute, `_oracle`, so that it hides no name of a subclass.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import OracleContainer
+    >>> results = iter(['aborted', 'succeeded'])
+    >>> pick = smach.CBState(lambda userdata: next(results), outcomes=['succeeded', 'aborted'])
+    >>> machine = OracleContainer(['succeeded', 'aborted'], settings={'max_recoveries': 3})
+    >>> with machine:
+    ...     _ = OracleContainer.add('PICK', pick, prior=0.2)
+    >>> machine.execute()  # PICK fails, and the oracle enters it again
+    'succeeded'
+    >>> [(row.state, row.successes, row.failures) for row in machine.rates()]
+    [('PICK', 1, 1)]
     """
 
     _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none, never written
@@ -100,6 +112,18 @@ class OracleContainer(smach.StateMachine):
         With `recover=False` it is only observed. Wrapping again gives new
         settings.
 
+        >>> import smach
+        >>> from smach_oracle.oracle import OracleContainer
+        >>> results = iter(['aborted', 'succeeded'])
+        >>> pick = smach.CBState(lambda userdata: next(results), outcomes=['succeeded', 'aborted'])
+        >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+        >>> with sm:
+        ...     _ = smach.StateMachine.add('PICK', pick)
+        >>> OracleContainer.wrap(sm, settings={'deadline_s': 60}) is sm
+        True
+        >>> sm.execute()  # PICK fails, and the oracle enters it again
+        'succeeded'
+
         :raises SettingsError: naming key, value and what is allowed.
         """
         checked = as_settings(settings, preconditions)
@@ -133,6 +157,17 @@ class OracleContainer(smach.StateMachine):
         The rest is as with `smach.StateMachine.add`.
 
         Settings of the container for the same state win.
+
+        >>> import smach
+        >>> from smach_oracle.oracle import OracleContainer
+        >>> look = smach.CBState(lambda userdata: 'seen', outcomes=['seen'])
+        >>> pick = smach.CBState(lambda userdata: 'picked', outcomes=['picked', 'aborted'])
+        >>> machine = OracleContainer(['picked', 'aborted'])
+        >>> with machine:
+        ...     _ = OracleContainer.add('LOOK', look, {'seen': 'PICK'})
+        ...     _ = OracleContainer.add('PICK', pick, preconditions=['LOOK'], time_limit_s=30)
+        >>> machine.execute()
+        'picked'
 
         :raises SettingsError: for a setting that is not allowed. `StateMachine.add` may raise other
             errors.

@@ -50,6 +50,23 @@ class OperatorHand:
 
     Each command returns its effect as a sentence, and publishes it as an event. `by` is the name
     of the operator.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import OperatorHand, OracleContainer
+    >>> sm = smach.StateMachine(['succeeded'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add(
+    ...         'PICK', smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded'])
+    ...     )
+    >>> hand = OperatorHand(OracleContainer.wrap(sm, name='task'))
+    >>> hand.pause(by='eva')
+    'task does not run; it will wait before its first state'
+    >>> hand.status().paused, hand.status().paused_by
+    (True, 'eva')
+    >>> hand.resume(by='eva')
+    'task does not run; it will not wait'
+    >>> hand.set_breakpoint('PICK', by='eva')
+    'task pauses before task/PICK'
     """
 
     def __init__(self, machine: object) -> None:

@@ -406,6 +406,12 @@ CODECS = Codecs(OFFERED)
 def register_codec(of: Type[Any], encode: Encode, decode: Decode, name: str = '') -> None:
     """Store values of a type in every store of this program. See `Codecs.register`.
 
+    >>> from smach_oracle.oracle import register_codec
+    >>> class Cup:
+    ...     def __init__(self, size):
+    ...         self.size = size
+    >>> register_codec(Cup, encode=lambda cup: {'size': cup.size}, decode=lambda data: Cup(**data))
+
     :raises TypeError: where `of` is no type, or one of the functions cannot be called.
     """
     CODECS.register(of, encode, decode, name)

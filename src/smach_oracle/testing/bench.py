@@ -44,6 +44,20 @@ class Bench:
 
     The machine is wrapped when the bench is made, where it is not wrapped already, and comes out of
     it at `close` or the end of a `with` block. Faults are in it during a trial alone.
+
+    >>> import smach
+    >>> from smach_oracle.testing import Bench, expert, fail, supersede
+    >>> pick = smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded', 'aborted'])
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add('PICK', pick)
+    >>> with Bench(sm, [fail('PICK', visit=1)]) as bench:
+    ...     trial = bench.run().assert_recovered('PICK').assert_not_asked()
+    >>> trial.outcome, trial.failures()
+    ('succeeded', ['PICK'])
+    >>> with Bench(sm, [fail('PICK')], expert=expert(supersede('succeeded'))) as bench:
+    ...     bench.run().asked_about()
+    ['PICK']
     """
 
     __test__ = False  # for pytest, which collects classes by their names

@@ -215,6 +215,16 @@ def faults(machine: smach.StateMachine, given: Iterable[Fault]) -> Iterator[Inje
     Visits are counted from the beginning of the block. The machine is restored at its end, and a
     state that hangs is let go.
 
+    >>> import smach
+    >>> from smach_oracle.testing import fail, faults
+    >>> pick = smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded', 'aborted'])
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add('PICK', pick)
+    >>> with faults(sm, [fail('PICK')]):
+    ...     sm.execute()
+    'aborted'
+
     :raises FaultError: where a state is not there, or has not registered an outcome. Nothing has
         been changed then.
     """

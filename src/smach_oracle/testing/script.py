@@ -252,6 +252,11 @@ def expert(*replies: Union[Reply, List[Reply]]) -> AnswerScript:
     question to one of them. A single function answers all questions. A question more than there are
     replies is an error of the test, which the trial raises.
 
+    >>> from smach_oracle.testing import expert, goto, no_answer
+    >>> script = expert(goto('LOOK', about='PICK'), no_answer())
+    >>> script.left
+    2
+
     :raises ScriptError: for what is no reply.
     """
     given: List[Reply] = []

@@ -59,6 +59,18 @@ def soak(
     that the machine has now. States may keep something in themselves from one trial to the next. A
     function that builds the machine is called for each trial, so its states keep nothing.
 
+    >>> import smach
+    >>> from smach_oracle.testing import soak
+    >>> pick = smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded', 'aborted'])
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add('PICK', pick)
+    >>> print(soak(sm, trials=20))
+    20 trials with one fault each, seed 0: 20 recovered, 0 did not.
+    Always recovered:
+      PICK: exception: 9 of 9 recovered
+      PICK: outcome 'aborted': 11 of 11 recovered
+
     :param machine: a machine, or a function that builds one.
     :param kinds: of faults. HANG is of use for states with a time limit alone.
     :param states: which fail, LABEL or PATH/LABEL. Default: all that hold no states themselves.

@@ -148,6 +148,23 @@ class Expert:
     """The port through which a machine asks. Derive from it to answer questions yourself.
 
     ros/ implements it with the ExpertQuery action. Tests implement it in a few lines.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import Answer, AnswerKind, Expert, OracleContainer
+    >>> class Supervisor(Expert):
+    ...     def ask(self, question, cancelled, progress):
+    ...         print(question.failed_state, 'ended in', question.outcome)
+    ...         return Answer(AnswerKind.GOTO, state='PICK', by='supervisor')
+    >>> results = iter(['aborted', 'succeeded'])
+    >>> pick = smach.CBState(lambda userdata: next(results), outcomes=['succeeded', 'aborted'])
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add('PICK', pick)
+    >>> OracleContainer.wrap(
+    ...     sm, settings={'policy': 'always_ask'}, expert=Supervisor()
+    ... ).execute()
+    PICK ended in aborted
+    'succeeded'
     """
 
     def ask(

@@ -50,6 +50,13 @@ class FailureRate:
 
     rate = (failures in the window + prior * (memory - n)) / memory, with n results seen and n <
     memory. `successes` and `failures` count all results ever added.
+
+    >>> from smach_oracle.oracle import FailureRate
+    >>> rate = FailureRate(memory=4, prior=0.2)
+    >>> for failed in (True, False, False):
+    ...     rate.add(failed)
+    >>> round(rate.rate, 2), rate.successes, rate.failures
+    (0.3, 2, 1)
     """
 
     kind = 'window'
@@ -151,6 +158,13 @@ class ExponentialFailureRate:
     Each result replaces a share 1/memory of the estimate.
 
     It agrees with `FailureRate` on the first result and forgets gradually instead of all at once.
+
+    >>> from smach_oracle.oracle import ExponentialFailureRate
+    >>> rate = ExponentialFailureRate(memory=4, prior=0.2)
+    >>> for failed in (True, False, False):
+    ...     rate.add(failed)
+    >>> round(rate.rate, 3)
+    0.225
     """
 
     kind = 'exponential'

@@ -62,6 +62,14 @@ class Situation(NamedTuple):
 class Policy:
     """The base of the policies. They hold no state.
 
+    >>> from smach_oracle.oracle import FailureClass
+    >>> from smach_oracle.oracle.decision.policy import Preconditions, Situation, policy_named
+    >>> often = Situation(FailureClass.HIGH, Preconditions.NONE, continuous=True)
+    >>> policy_named('prose').decide(often).value
+    'ask'
+    >>> policy_named('retry', {'times': 5}).decide(often).value
+    'revisit'
+
     `asks`: whether it may ask. A policy that may not ask ends the container where others would ask.
     `parameters`: the values that may be set, with their defaults.
     """

@@ -21,6 +21,18 @@ def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
     It stays the same object. Its learned rates are lost. A nested machine that was wrapped
     separately stays wrapped.
 
+    >>> import smach
+    >>> from smach_oracle.oracle import OracleContainer, unwrap
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add(
+    ...         'PICK', smach.CBState(lambda userdata: 'aborted', outcomes=['succeeded', 'aborted'])
+    ...     )
+    >>> unwrap(OracleContainer.wrap(sm)) is sm
+    True
+    >>> sm.execute()  # nothing recovers from the failure
+    'aborted'
+
     :raises TrialError: for a machine that was not wrapped, that runs, or that was wrapped together
         with a machine around it.
     """

@@ -61,6 +61,31 @@ class Oracle:
 
     A container has the same attributes itself, but a user's class may have taken their names for
     its own ends.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import OracleContainer, oracle_of
+    >>> results = iter(['aborted', 'succeeded'])
+    >>> pick = smach.CBState(lambda userdata: next(results), outcomes=['succeeded', 'aborted'])
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add('PICK', pick)
+    >>> oracle = oracle_of(OracleContainer.wrap(sm, name='task'))
+    >>> oracle.events.observers.append(lambda event: print(event.seq, event.kind.name, event.text))
+    >>> sm.execute()
+    0 TRIAL_START
+    1 CONTAINER_START
+    2 STATE_START
+    3 FAILURE
+    4 TRANSITION
+    5 DECISION PICK failed (its first result): trying it again
+    6 JUMP
+    7 STATE_START
+    8 TRANSITION
+    9 CONTAINER_END
+    10 TRIAL_END
+    'succeeded'
+    >>> oracle.path, [round(row.rate, 2) for row in oracle.rates()]
+    ('task', [0.18])
     """
 
     def __init__(self, node: TreeNode) -> None:

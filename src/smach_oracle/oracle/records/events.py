@@ -4,6 +4,20 @@ An observer is a callable that takes one `Event`. It is called in the thread in 
 happened, in the order of the sequence numbers, before the machine goes on: an observer that blocks
 holds the machine back, which is how a recorder loses nothing. An observer that raises does not stop
 the machine. The log names it once. It gets the events that follow.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import OracleContainer
+    >>> sm = smach.StateMachine(['succeeded'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add(
+    ...         'PICK', smach.CBState(lambda userdata: 'succeeded', outcomes=['succeeded'])
+    ...     )
+    >>> seen = []
+    >>> OracleContainer.wrap(sm).events.observers.append(seen.append)
+    >>> sm.execute()
+    'succeeded'
+    >>> [event.kind.name for event in seen if event.state == 'PICK' and event.outcome]
+    ['TRANSITION']
 """
 
 import threading

@@ -98,6 +98,15 @@ class Settings:
     """The settings of a wrapped machine.
 
     `states` holds what is set for single states, by LABEL or PATH/LABEL, or by a pattern of them.
+
+    >>> from smach_oracle.oracle import Settings
+    >>> settings = Settings.from_dict({'memory': 20, 'states': {'PICK': {'memory': 5}}})
+    >>> settings.for_state('', 'PICK').memory, settings.for_state('', 'LOOK').memory
+    (5, 20)
+    >>> Settings.from_dict({'states': {'PICK': {'memory': 0}}})
+    Traceback (most recent call last):
+    smach_oracle.oracle.errors.SettingsError: states.PICK.memory: 0 is not allowed;
+    allowed: a whole number of results from 1
     """
 
     defaults: StateSettings = StateSettings()
