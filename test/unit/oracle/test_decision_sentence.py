@@ -7,6 +7,7 @@ import smach
 from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.decision.sentence import (
     DecisionFacts,
+    cause_of,
     decision_sentence,
     going_would_repeat,
     ran_in_words,
@@ -104,7 +105,7 @@ def facts(action, **fields):
     ],
 )
 def test_a_decision_is_told_in_a_sentence(given, sentence):
-    assert decision_sentence(given) == sentence
+    assert decision_sentence(given, cause_of(given)) == sentence
 
 
 def test_each_failure_after_the_first_says_what_was_tried_before():

@@ -27,9 +27,9 @@ class DecisionFacts(NamedTuple):
     tried: str = ''  # what was done after its failure before, where it has not succeeded since
 
 
-def decision_sentence(facts: DecisionFacts) -> str:
-    """Return the sentence, without a full stop."""
-    return '{}: {}'.format(cause_of(facts), _does(facts))
+def decision_sentence(facts: DecisionFacts, cause: str) -> str:
+    """Return the sentence, without a full stop. `cause`: that of the facts."""
+    return '{}: {}'.format(cause, _does(facts))
 
 
 def cause_of(facts: DecisionFacts) -> str:

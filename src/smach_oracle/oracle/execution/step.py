@@ -293,13 +293,8 @@ class Step:
         if self._machine.preempt_requested() or smach.is_shutdown():
             return self._end_unrecovered(self._preempted_ending(failure), failure)
         if failure.kind is FailureKind.INTERRUPTED:
-            node.emit(
-                EventKind.FAILURE,
-                state=failure.state,
-                failure_kind=int(failure.kind),
-                failure_class=int(record.failure_class),
-                rate=record.rate,
-                text=failure.text,
+            node.emit_rated(
+                EventKind.FAILURE, record, failure_kind=int(failure.kind), text=failure.text
             )
         return self._recover(occasions.interrupted(failure, self._context(), before))
 
@@ -341,13 +336,11 @@ class Step:
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)
         # rate and class are those before this failure is counted
-        node.emit(
+        node.emit_rated(
             EventKind.FAILURE,
-            state=failure.state,
+            record,
             outcome=failure.outcome,
             failure_kind=int(failure.kind),
-            failure_class=int(record.failure_class),
-            rate=record.rate,
             continuous=continuous,
             text=failure.text,
         )

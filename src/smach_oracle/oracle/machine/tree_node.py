@@ -283,6 +283,18 @@ class TreeNode:
         if self.events.observers:
             self.events.emit(kind, self.path, self.trial_id, **fields)
 
+    def emit_rated(self, kind: EventKind, record: StateRecord, **fields: Any) -> None:
+        """Tell the observers of what happens to a state, with its failure rate and class."""
+        if self.events.observers:
+            standing = record.standing()
+            self.emit(
+                kind,
+                state=record.label,
+                failure_class=int(standing.failure_class),
+                rate=standing.rate,
+                **fields,
+            )
+
     def warn(self, text: str, label: str = '') -> None:
         """Log what the operator should know, and tell the observers."""
         smach.logwarn('{}{}: {}'.format(self.path, '/' + label if label else '', text))

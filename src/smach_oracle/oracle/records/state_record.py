@@ -9,6 +9,15 @@ from ..records.visits import Visit
 from ..settings.settings import StateSettings
 
 
+class Standing(NamedTuple):
+    """What the results of a state say of it, read at one moment."""
+
+    rate: float  # 0 to 1, the learned failure rate
+    recent: Tuple[int, int]  # failures among the latest results, and their number. 0, 0: not known
+    failure_class: FailureClass
+    tried: str  # what the oracle did after its latest failure, '' where it has succeeded since
+
+
 class FastEdge:
     """A transition to another state without any failure, with all that its next use needs."""
 
@@ -169,11 +178,11 @@ class StateRecord:
 
         It is to be called with the lock held.
         """
-        by_edges = self._by_edges()
+        estimator, by_edges = self._estimator, self._by_edges()
         if by_edges != self._learned:
-            self._estimator.add_successes(by_edges - self._learned)
+            estimator.add_successes(by_edges - self._learned)
             self._learned = by_edges
-        return self._estimator
+        return estimator
 
     def learn(self, failed: bool) -> None:
         """Learn the result of a visit that took no FastEdge."""
@@ -215,15 +224,21 @@ class StateRecord:
             return self._up_to_date().rate
 
     @property
-    def recent(self) -> Tuple[int, int]:
-        """Failures among the latest results, and their number; 0, 0 where that is not known."""
-        with self._lock:
-            return self._up_to_date().recent
-
-    @property
     def failure_class(self) -> FailureClass:
         """Return the class by the learned rate."""
-        return classify(self.rate, self.settings.moderate_from, self.settings.high_from)
+        return self._class_of(self.rate)
+
+    def _class_of(self, rate: float) -> FailureClass:
+        return classify(rate, self.settings.moderate_from, self.settings.high_from)
+
+    def standing(self) -> Standing:
+        """Return what the results so far say."""
+        with self._lock:
+            estimator = self._up_to_date()
+            rate, recent = estimator.rate, estimator.recent
+            what, successes = self._tried
+            tried = what if successes == estimator.successes else ''
+        return Standing(rate, recent, self._class_of(rate), tried)
 
     @property
     def totals(self) -> Tuple[int, int]:
@@ -253,12 +268,6 @@ class StateRecord:
         """Note what the oracle does after a failure."""
         self._tried = what, self.totals[0]
 
-    @property
-    def tried(self) -> str:
-        """Return what the oracle did after its latest failure, '' where it has succeeded since."""
-        what, successes = self._tried
-        return what if what and successes == self.totals[0] else ''
-
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""
         self._edges[outcome, target] = self._edges.get((outcome, target), 0) + 1
@@ -283,7 +292,8 @@ class StateRecord:
             self._up_to_date().restore(learned)
 
     def _by_edges(self) -> int:
-        return self._retired + sum([edge.count for edge in list(self.fast.values())])
+        edges = self.fast
+        return self._retired + sum([edge.count for edge in list(edges.values())] if edges else ())
 
     def __getstate__(self) -> Dict[str, Any]:
         """Without what belongs to an execution under way."""

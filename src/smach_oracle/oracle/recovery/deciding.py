@@ -182,15 +182,16 @@ class Deciding:
     def facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""
         record = self._record
+        standing = record.standing()
         return DecisionFacts(
             record.label,
-            record.recent,
-            record.rate,
+            standing.recent,
+            standing.rate,
             self._continuous,
             action,
             met=self._met,
             not_met=self._not_met,
-            tried=record.tried,
+            tried=standing.tried,
             not_failed=self.failure.why_none,
             **fields,
         )

@@ -187,7 +187,7 @@ class OuterLevel:
         record = self._record
         if way_to(self._below, Place(self._node, record.label)) is None:
             return None
-        rate, failure_class = record.rate, record.failure_class
+        standing = record.standing()
         record.learn(True)
         decider, facts = self._deciding.decide(self._foreseen)
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
@@ -198,23 +198,23 @@ class OuterLevel:
             self.tried.append('{}: {}: asks too'.format(self._node.path, cause_of(facts)))
             return None
         self._node.records.note_failure(record)
-        sentence = decision_sentence(facts)
+        sentence = decision_sentence(facts, cause_of(facts))
         smach.loginfo('{}/{}'.format(self._node.path, sentence))
-        self._emit(
+        self._node.emit(
             EventKind.FAILURE,
+            state=record.label,
             outcome=self._failure.outcome,
             failure_kind=int(self._failure.kind),
-            failure_class=int(failure_class),
-            rate=rate,
+            failure_class=int(standing.failure_class),
+            rate=standing.rate,
             continuous=self._continuous,
             text=self._failure.text,
         )
-        self._emit(
+        self._node.emit_rated(
             EventKind.DECISION,
+            record,
             outcome=facts.action.value,
             target=facts.target,
-            failure_class=int(record.failure_class),
-            rate=record.rate,
             continuous=self._continuous,
             text=sentence,
             data={DECIDED_BY: decider.value},
@@ -238,6 +238,3 @@ class OuterLevel:
             ),
         )
         return foreseen.text if foreseen is not None else ''
-
-    def _emit(self, kind: EventKind, **fields: object) -> None:
-        self._node.emit(kind, state=self._record.label, **fields)

@@ -177,14 +177,13 @@ def _wait_and_jump(recovering: Recovering, wait_s: float, jump: JumpTo) -> Verdi
 
 def _tell_decision(recovering: Recovering, decided: Decided) -> None:
     decider, facts = decided
-    record, sentence = recovering.record, decision_sentence(facts)
-    smach.loginfo('{}/{}'.format(recovering.node.path, sentence))
-    recovering.emit(
+    node, sentence = recovering.node, decision_sentence(facts, recovering.cause)
+    smach.loginfo('{}/{}'.format(node.path, sentence))
+    node.emit_rated(
         EventKind.DECISION,
+        recovering.record,
         outcome=facts.action.value,
         target=facts.target,
-        failure_class=int(record.failure_class),
-        rate=record.rate,
         continuous=recovering.occasion.continuous,
         text=sentence,
         data={DECIDED_BY: decider.value},
