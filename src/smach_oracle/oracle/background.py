@@ -1,8 +1,34 @@
 """Calls a function in a thread of its own, so that nobody has to wait for its end."""
 
 import contextvars
+import functools
+import queue
 import threading
 from typing import Callable, Optional
+
+
+class KeptThread:
+    """A thread that makes one call after another, since to start one costs more than most calls.
+
+    One caller has it at a time, and hands the next call over once the one before has ended.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._calls: 'queue.SimpleQueue[Optional[Callable[[], None]]]' = queue.SimpleQueue()
+        self.thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self.thread.start()
+
+    def begin(self, call: Callable[[], None]) -> None:
+        """Begin a call in the thread."""
+        self._calls.put(call)
+
+    def end(self) -> None:
+        """Let the thread end after the call that it makes now, if any."""
+        self._calls.put(None)
+
+    def _work(self) -> None:
+        for call in iter(self._calls.get, None):
+            call()
 
 
 class BackgroundCall:
@@ -17,7 +43,9 @@ class BackgroundCall:
         function: Callable[[], object],
         name: str,
         on_late_end: Optional[Callable[[], None]] = None,
+        kept: Optional[KeptThread] = None,
     ) -> None:
+        """`kept`: the thread that makes the call. None means a new one of that name."""
         self.result: object = None
         self.error: Optional[BaseException] = None
         self.done = threading.Event()
@@ -25,13 +53,19 @@ class BackgroundCall:
         self._function = function
         self._on_late_end = on_late_end
         self._lock = threading.Lock()
-        self._thread = threading.Thread(
-            target=contextvars.copy_context().run, args=(self._work,), name=name, daemon=True
+        in_context = functools.partial(contextvars.copy_context().run, self._work)
+        self._thread = (
+            threading.Thread(target=in_context, name=name, daemon=True)
+            if kept is None
+            else kept.thread
+        )
+        self._start = (
+            self._thread.start if kept is None else functools.partial(kept.begin, in_context)
         )
 
     def start(self) -> None:
         """Begin the call in its thread."""
-        self._thread.start()
+        self._start()
 
     def leave(self) -> bool:
         """Leave the thread to itself. Return False where it has ended after all."""

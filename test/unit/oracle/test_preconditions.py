@@ -202,6 +202,7 @@ class Hanging:
 
     def __call__(self, ud):
         self.calls += 1
+        self.thread = threading.current_thread()
         self.entered.set()
         assert self.let_go.wait(20)
         ud.late = 'too late'
@@ -298,6 +299,36 @@ def test_a_function_is_called_with_the_context_of_the_machine():
     machine = machine_with(lambda ud: variable.get() == 'set')
     machine.run()
     assert ends(machine)[0][1] == 'met'
+
+
+def test_functions_share_a_thread_that_ends_with_the_trial():
+    threads = []
+
+    def look(ud):
+        threads.append(threading.current_thread())
+        return True
+
+    machine = machine_with(look, lambda ud: look(ud))
+    assert machine.run() == 'done'
+    assert threads[0] is threads[1] and threads[0] is not threading.current_thread()
+    for thread in threads:
+        thread.join(20)
+        assert not thread.is_alive()
+
+
+def test_a_function_that_was_left_behind_keeps_its_thread_to_itself():
+    hanging, others = Hanging(), []
+
+    def look(ud):
+        others.append(threading.current_thread())
+        return True
+
+    machine = machine_with((hanging, look), **BRIEF)
+    assert in_thread(machine.run).result() == 'aborted'
+    assert hanging.thread.is_alive() and others[0] is not hanging.thread
+    hanging.leave()
+    hanging.thread.join(20)
+    assert not hanging.thread.is_alive()
 
 
 def test_a_state_has_the_time_limit_of_the_state_whose_precondition_it_is():

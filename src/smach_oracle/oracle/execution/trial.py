@@ -127,6 +127,7 @@ def _end_trial(
     store: Optional[TrialStore],
 ) -> None:
     node.tree.control.end_trial()
+    node.tree.workers.end_idle_threads()
     why = _trial_end(node, outcome, error)
     if why is TrialEnd.KEPT:
         node.machine.service_preempt()

@@ -14,13 +14,14 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional
 import smach
 from smach_oracle.foreign import repr_of
 
-from ..background import BackgroundCall
+from ..background import BackgroundCall, KeptThread
 from ..identity import attribute_of, own_mark
 from .limited_run import LimitedRun, enter
 from .snapshots import UserdataGate
 
 _STOP_PERIOD_S = 0.05  # how soon a function that runs is left behind at a preempt or a shutdown
 
+_FUNCTION = 'smach_oracle function'  # name of its thread
 _LATE = 'still runs since it overran its time limit'
 _STOPPED = 'still runs since a preempt or a shutdown'
 
@@ -50,9 +51,12 @@ class Workers:
         # states with a time limit whose thread lives, and those that are asked about if they take
         # long
         self.under_way: Dict[int, LimitedRun] = {}
+        self._idle: List[KeptThread] = []  # of functions that have ended, for the next ones
 
     def blocked(self, target: object) -> str:
         """Return why a state or a function cannot be entered now, '' where it can."""
+        if not self.abandoned:
+            return ''
         with self._lock:
             left = self.abandoned.get(id(target))
             if left is None:
@@ -137,8 +141,10 @@ class Workers:
         behind then. `gate` is what `userdata` writes through. What the function raises is told in
         the result, not raised.
         """
-        call = BackgroundCall(functools.partial(function, userdata), 'smach_oracle function')
+        thread = self._take_thread()
+        call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
         call.start()
+        is_free = False
         end = time.monotonic() + (math.inf if limit_s is None else limit_s)
         why = ''
         try:
@@ -150,14 +156,35 @@ class Workers:
                 elif stopped():
                     why = 'was stopped by a preempt or a shutdown'
             if not why:
+                is_free = True
                 return LimitedResult(call.result, call.error)
             gate.shut()
             wait(call.done, grace_s)
         except BaseException:
             self._abandon(function, call, gate, _STOPPED)
             raise
+        finally:
+            if is_free and not self.abandoned:
+                self._idle.append(thread)
+            else:
+                thread.end()
         late = self._abandon(function, call, gate, _STOPPED if stopped() else _LATE)
         return LimitedResult(overrun=why + (' and was left behind' if late else ''))
+
+    def _take_thread(self) -> KeptThread:
+        """Return a thread for a function: an idle one, or a new one."""
+        with self._lock:
+            while self._idle:
+                thread = self._idle.pop()
+                if thread.thread.is_alive():  # it is not where the process was forked
+                    return thread
+        return KeptThread(_FUNCTION)
+
+    def end_idle_threads(self) -> None:
+        """Let the threads end that were kept for further functions."""
+        with self._lock:
+            while self._idle:
+                self._idle.pop().end()
 
     def _leave_state(
         self,
