@@ -110,6 +110,7 @@ class Random(Baseline):
     """
 
     name = 'random'
+    draws = True
     parameters: Mapping[str, float] = {'seed': 0}
     actions = (Action.REVISIT, Action.STEP_BACK, Action.ASK)
 

@@ -46,7 +46,7 @@ class Past(NamedTuple):
 
     recoveries: int = 0  # by the oracle itself, from failures of this state
     restarts: int = 0  # of the top machine
-    place: str = ''  # path of the state, and how often it was visited in this trial
+    place: str = ''  # path of the state, and its visits in this trial, for a policy that draws
     trial: int = 0  # how many trials the machine has begun before this one
 
 
@@ -71,12 +71,14 @@ class Policy:
     'revisit'
 
     `asks`: whether it may ask. A policy that may not ask ends the container where others would ask.
-    `parameters`: the values that may be set, with their defaults.
+    `draws`: whether it wants to know the place of the failure (`Past.place`). `parameters`: the
+    values that may be set, with their defaults.
     """
 
     name = ''
     asks = True
     restarts = False  # whether it may start the script over
+    draws = False
     parameters: Mapping[str, float] = {}
 
     def with_parameters(self, given: Mapping[str, float]) -> 'Policy':

@@ -197,6 +197,8 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     overrun of the state is a failure of its own.
     """
     state = node.machine._states[failure.state]
+    if not isinstance(state, smach.Container):
+        return False
     below = (
         [state]
         if isinstance(state, smach.StateMachine)

@@ -47,8 +47,9 @@ def missing_for(way: Way, written: Collection[str]) -> Tuple[str, ...]:
 
     :param written: keys of the container that holds the whole way, written for it.
     """
+    missing = missing_on(way, written)
     node, label = way.down[-1]
-    if node is not way.meets:
-        return missing_on(way, written)  # keys of its own may have the same names
+    if not missing or node is not way.meets:  # keys of its own may have the same names
+        return missing
     remapping = node.machine._remappings.get(label) or {}
-    return tuple(key for key in missing_on(way, written) if remapping.get(key, key) not in written)
+    return tuple(key for key in missing if remapping.get(key, key) not in written)

@@ -1,5 +1,7 @@
 """An Iterator that the oracle enters again goes on with the item that was not finished."""
 
+import smach
+
 from ..branches.border import IteratorBorder, border_of
 from ..machine.tree_node import TreeNode
 from ..recovery.failure import Failure
@@ -13,7 +15,7 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
     Any other Iterator of the container begins again when it is entered.
     """
     for label, state in list(node.machine._states.items()):
-        border = border_of(state)
+        border = border_of(state) if isinstance(state, smach.Container) else None
         if isinstance(border, IteratorBorder):
             border.ask_to_go_on(label == target and has_stopped_early(node, label, border))
 

@@ -9,7 +9,6 @@ from typing import Any, Iterator, Tuple
 import smach
 
 from ..branches.border import border_of
-from ..control.hold import HeldPlace
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
@@ -30,10 +29,9 @@ class ItemGate:
         if not (node.tree.control.is_set or node.in_force.limits_autonomy()):
             return
         label = next(iter(self._container.get_children()), '')
-        path = '/'.join((node.path,) + self._below)
         relative = '/'.join(filter(None, (node.relative_path,) + self._below))
         autonomy = node.in_force.of_state(relative, label).autonomy
-        wait_for_operator(node, HeldPlace(path, label), autonomy, self._container.preempt_requested)
+        wait_for_operator(node, self._below, label, autonomy, self._container.preempt_requested)
 
 
 def place_gates(node: TreeNode) -> None:

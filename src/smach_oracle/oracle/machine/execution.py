@@ -84,9 +84,10 @@ class Execution:
 
         It executes inside a state that was abandoned, or its trial has ended early.
         """
-        return self._node.tree.early_end.why is not None or any(
-            run.abandoned for run in self.runs_around
-        )
+        if self._node.tree.early_end.why is not None:
+            return True
+        around = self.runs_around
+        return bool(around) and any(run.abandoned for run in around)
 
     # -- its begin and its end
 

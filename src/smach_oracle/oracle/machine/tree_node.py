@@ -128,6 +128,8 @@ class TreeNode:
     @property
     def path(self) -> str:
         """Return the path: the top machine's name and the labels below it, joined by '/'."""
+        if self.parent is None:
+            return self.name
         labels, top = self._labels_from_top()
         return '/'.join((top.name,) + labels)
 
@@ -241,11 +243,15 @@ class TreeNode:
 
     def is_oracle(self, label: str) -> bool:
         """Whether `label` is the meta state's."""
-        return self.tree.recover and label == self.settings.oracle_label
+        return self.tree.recover and label == self.in_force.of_machine.oracle_label
 
     def labels(self) -> Iterator[str]:
         """Yield the labels of the container's states, the meta state not among them."""
         return (label for label in list(self.machine._states) if not self.is_oracle(label))
+
+    def has(self, label: str) -> bool:
+        """Whether the container has a state of that label, the meta state not among them."""
+        return label in self.machine._states and not self.is_oracle(label)
 
     def record(self, label: str) -> StateRecord:
         """Return the record of a state, made when it is first needed.

@@ -32,7 +32,7 @@ def place_at(node: TreeNode, container: str, label: str) -> Optional[Place]:
     :param container: path of its container, '' for the container itself.
     """
     for each in nodes_of_tree(node):
-        if each.path == (container or node.path) and label in each.labels():
+        if each.path == (container or node.path) and each.has(label):
             return Place(each, label)
     return None
 
@@ -44,11 +44,11 @@ def place_named(node: TreeNode, name: str, at_rest: bool = False) -> Optional[Pl
         which may begin with '/'.
     :param at_rest: whether the whole tree is looked through, and not what is being executed.
     """
-    if name in node.labels():
+    if node.has(name):
         return Place(node, name)
     path = name[1:] if name.startswith('/') else name
     for each in nodes_of(node.top().machine) if at_rest else nodes_of_tree(node):
         above = each.relative_path + '/' if each.relative_path else ''
-        if path.startswith(above) and path[len(above) :] in each.labels():
+        if path.startswith(above) and each.has(path[len(above) :]):
             return Place(each, path[len(above) :])
     return None

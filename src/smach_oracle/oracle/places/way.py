@@ -42,6 +42,8 @@ def way_to(node: TreeNode, place: Place) -> Optional[Way]:
 
     None means there is none.
     """
+    if place.node is node:
+        return Way((), node, (place,))
     levels = [node, *levels_above(node)]
     down: List[Place] = [place]
     while not any(down[0].node is level for level in levels):
@@ -85,10 +87,12 @@ def missing_on(way: Way, written: Iterable[str]) -> Tuple[str, ...]:
 
     :param written: keys of the container `meets` that survive a restore.
     """
+    node, label = way.down[-1]
+    if not node.machine._states[label].get_registered_input_keys():
+        return ()
     keys = set(keys_after_jump(way.meets, way.first, tuple(written)))
     for below in way.down[1:]:
         keys = _keys_below(below.node, keys)
-    node, label = way.down[-1]
     return missing_keys(node.machine, label, keys)
 
 

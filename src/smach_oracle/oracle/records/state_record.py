@@ -1,7 +1,7 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
 import threading
-from typing import Any, Dict, List, Mapping, Optional, Protocol, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
 from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
 from ..decision.merged_rates import base_of, merged

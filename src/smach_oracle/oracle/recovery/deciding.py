@@ -108,13 +108,11 @@ class Deciding:
         return decider, facts
 
     def _past(self) -> Past:
-        record, tree = self._record, self._node.tree
-        return Past(
-            record.recoveries,
-            tree.restarts.count,
-            '{}/{} {}'.format(self._node.path, record.label, record.visits),
-            tree.trials - 1,
-        )
+        node, record = self._node, self._record
+        place = ''
+        if node.in_force.policy.draws:
+            place = '{}/{} {}'.format(node.path, record.label, record.visits)
+        return Past(record.recoveries, node.tree.restarts.count, place, node.tree.trials - 1)
 
     def _place_of(self, action: Action) -> Tuple[str, Optional[Place]]:
         """Return where a decision leads, by name and as a place.

@@ -8,6 +8,7 @@ import smach
 from ..control.hold import HeldPlace, LetGo
 from ..control.holding import Wait, wait_until_let_go
 from ..machine.limited_run import standing_still
+from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..settings.settings import CONFIRM_FIRST
 
@@ -21,15 +22,20 @@ def clocks_stand_still(node: TreeNode) -> Iterator[None]:
         yield
 
 
-def wait_for_operator(node: TreeNode, place: HeldPlace, autonomy: str, stopped: Stopped) -> None:
+def wait_for_operator(
+    node: TreeNode, below: Labels, name: str, autonomy: str, stopped: Stopped
+) -> None:
     """Wait before something begins, where an operator holds it.
 
+    :param below: labels of a Concurrence or an Iterator in the container, of which it is a part.
+    :param name: its label, or that of a function.
     :param autonomy: of what begins, by its settings.
     :param stopped: ends the wait, as a preempt does.
     """
     control = node.tree.control
     if not control.is_set and autonomy != CONFIRM_FIRST:
         return
+    place = HeldPlace('/'.join((node.path, *below)), name)
     confirms = control.level_of(place, autonomy) == CONFIRM_FIRST
     hold = control.hold_before(place, confirms, not stopped())
     if hold is None:

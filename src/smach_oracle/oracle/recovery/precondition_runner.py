@@ -10,7 +10,6 @@ from typing import Any, Iterator, List, NamedTuple, Optional
 import smach
 from smach_oracle.foreign import repr_of
 
-from ..control.hold import HeldPlace
 from ..identity import truth_of
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.snapshots import UserdataGate, WriteWatch, behind
@@ -98,7 +97,7 @@ class PreconditionRunner:
     def _wait_for_operator(self, node: TreeNode, name: str, label: str = '') -> None:
         """Wait where an operator holds the tree. `label`: of a state of the container."""
         autonomy = node.settings_of(label).autonomy if label else RUN
-        wait_for_operator(node, HeldPlace(node.path, name), autonomy, self._stopped)
+        wait_for_operator(node, (), name, autonomy, self._stopped)
 
     def _call(self, spec: PreconditionSpec) -> None:
         self._wait_for_operator(self._node, spec.name)

@@ -1,7 +1,7 @@
 """Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
 
 import threading
-from typing import Optional
+from typing import Optional, Sequence
 
 import smach
 
@@ -34,7 +34,11 @@ def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None
 
 def _is_stop(node: TreeNode) -> bool:
     """Whether the outermost container is asked to stop, and not a part of it, which is left."""
-    return bool([node, *node.running_around()][-1].machine.preempt_requested())
+    return _asks_for_stop([node, *node.running_around()])
+
+
+def _asks_for_stop(around: Sequence[TreeNode]) -> bool:
+    return bool(around[-1].machine.preempt_requested())
 
 
 def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -> None:
@@ -67,8 +71,9 @@ def winds_down(node: TreeNode) -> bool:
 
     The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
     """
-    is_stop = _is_stop(node)
-    for each in (node, *node.running_around()):
+    around = [node, *node.running_around()]
+    is_stop = _asks_for_stop(around)
+    for each in around:
         if is_stop and each.machine.preempt_requested():
             return True
         if each.records.has_obeyed:
