@@ -54,14 +54,13 @@ class BackgroundCall:
         self._on_late_end = on_late_end
         self._lock = threading.Lock()
         in_context = functools.partial(contextvars.copy_context().run, self._work)
-        self._thread = (
-            threading.Thread(target=in_context, name=name, daemon=True)
-            if kept is None
-            else kept.thread
-        )
-        self._start = (
-            self._thread.start if kept is None else functools.partial(kept.begin, in_context)
-        )
+        self._start: Callable[[], object]
+        if kept is None:
+            self._thread = threading.Thread(target=in_context, name=name, daemon=True)
+            self._start = self._thread.start
+        else:
+            self._thread = kept.thread
+            self._start = functools.partial(kept.begin, in_context)
 
     def start(self) -> None:
         """Begin the call in its thread."""
