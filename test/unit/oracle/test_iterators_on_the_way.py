@@ -3,7 +3,7 @@
 import pytest
 from branch_machines import Item, inside, iterator_over
 from guarded_machines import chain
-from machines import FakeExpert, Scripted, Watched, goto
+from machines import FakeExpert, Scripted, Watched, give_up, goto
 
 import smach
 from smach_oracle.oracle.records.events import EventKind
@@ -143,3 +143,20 @@ def test_items_that_are_repeated_on_the_authors_way_are_told(log, back_to, told)
     assert machine.run() == 'done'
     assert machine.visits().count('A') == (6 if told else 4)
     assert [text for level, text in log if 'that had ended' in text] == told
+
+
+def test_what_was_given_up_in_one_trial_settles_no_failure_of_the_next():
+    def items():
+        if expert.questions:
+            raise ValueError('nothing on the table')
+        return [1]
+
+    machine = chain(ALL=each_of(chain(A=Scripted('aborted')), 'item', ()))
+    with machine['ALL']:
+        smach.Iterator.set_iteritems(items, 'item')
+    expert = FakeExpert(give_up('aborted'), nothing)
+    watched = Watched(machine, name='TOP', expert=expert, settings=ASKS)
+    assert watched.run() == 'aborted'
+    with pytest.raises(smach.InvalidUserCodeError):
+        watched.run()
+    assert [question.failed_state for question in expert.questions] == ['A', 'ALL']

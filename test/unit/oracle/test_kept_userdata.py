@@ -108,3 +108,21 @@ def test_within_its_container_what_a_precondition_wrote_survives():
     machine = chain(FIND=finding(seen), GRASP=grasp('aborted', 'aborted'))
     run(machine, states={'GRASP': {'preconditions': [achieve]}}, memory=1000)
     assert seen == ['at the start', 'achieved']
+
+
+def test_a_value_that_a_precondition_leaves_as_it_is_counts_as_written_after_the_next_one():
+    def confirms(ud):
+        ud.x = ud.x
+        return True
+
+    def looks(ud):
+        return True
+
+    def writes(state, ud):
+        seen.append(ud.x)
+        ud.x = 'written'
+        return 'aborted' if len(seen) == 1 else 'ok'
+
+    seen = []
+    run(chain(A=Scripted(writes, writes, **IO)), preconditions={'A': [confirms, looks]})
+    assert seen == ['at the start', 'written']
