@@ -174,7 +174,7 @@ def _event(event: Event) -> List[Any]:
 
 
 def _shortened(events: Sequence[Event]) -> List[Event]:
-    """With long texts without their middle, the longer the fewer events there are."""
+    """Return the events, with long texts cut in the middle. Fewer events keep longer texts."""
     longest = max(200, MOST_TEXT // max(1, len(events)))
     return [
         event if len(event.text) <= longest else event._replace(text=shortened(event.text, longest))

@@ -12,7 +12,7 @@ Happened = Callable[[TrialRow], bool]
 
 
 class PairedCounts(NamedTuple):
-    """In how many trials something happened under both of two variants, under one, under none."""
+    """Counts of trials in which something happened under both of two variants, one, or none."""
 
     both: int
     first_alone: int

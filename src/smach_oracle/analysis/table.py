@@ -148,7 +148,7 @@ def as_data(
 
 
 def _variant_data(variant: VariantCounts) -> Dict[str, Any]:
-    """With `arm` and `runs`, the older names of `variant` and `trials`."""
+    """Return plain data, with `arm` and `runs`, the older names of `variant` and `trials`."""
     data = dict(variant._asdict(), counts=[item._asdict() for item in variant.counts])
     name = data.pop('name')
     return dict(data, variant=name, arm=name, runs=variant.trials)

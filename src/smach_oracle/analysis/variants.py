@@ -41,7 +41,7 @@ SettingsKey = Tuple[Tuple[str, float, str], ...]
 
 
 class Count(NamedTuple):
-    """In how many trials of a variant something happened, and how often."""
+    """The number of trials of a variant in which something happened, and how often."""
 
     name: str
     trials: int

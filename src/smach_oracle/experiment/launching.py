@@ -105,7 +105,7 @@ def environment_of(folder: Path, port: int) -> Dict[str, str]:
 
 
 def size_of(log: Path) -> int:
-    """Bytes, or 0 where there is none."""
+    """Return the size of a log in bytes, or 0 where there is none."""
     try:
         return log.stat().st_size
     except OSError:

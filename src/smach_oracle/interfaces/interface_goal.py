@@ -152,7 +152,7 @@ class InterfaceGoal:
             self._action.stop()
 
     def _asker_missing_s(self, handle: actionlib.ServerGoalHandle) -> float:
-        """For how long (s, wall time) the asker's own connection has been gone.
+        """Return for how long (s, wall time) the asker's own connection has been gone.
 
         Another connection of the same name belongs to another process.
         """

@@ -26,7 +26,7 @@ LOOKS_AGAIN_S = (0.05, 0.2)
 
 
 class Opening:
-    """How one store is opened."""
+    """The way in which one store is opened."""
 
     def __init__(
         self, path: str, where: str, read_only: bool, accepts: str, begin: Callable[[Content], None]

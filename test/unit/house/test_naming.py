@@ -110,8 +110,10 @@ def test_errors_are_documented_in_one_style():
 
 # openings that say nothing: the thing itself is the better subject, or what it does
 EMPTY = re.compile(
-    r'The (?:part|parts|thing|things|data) (?:that|which|of which)\b|Of '
+    r'The (?:part|parts|thing|things|data) (?:that|which|of which)\b'
     r'|Returns? (?:by|of|in) '
+    # a fragment without a subject and a verb
+    r'|(?:As|By|For|How|In|Of|That|Those|Where|Which|With|Without) '
 )
 
 

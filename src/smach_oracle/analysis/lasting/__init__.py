@@ -1,1 +1,1 @@
-"""Which causes of a trial were still there when its failed state was tried again."""
+"""Finds the causes of a trial that were still there when its failed state was tried again."""

@@ -1,4 +1,4 @@
-"""Which causes of a trial last, checked by the world's log at the tries of the state that failed.
+"""Checks by the world's log which causes of a trial last until the failed state is tried again.
 
 A cause lasts in a trial if it was still there at the second try of the state that failed first, and
 at that state again after the script was started over. A trial in which no state failed, or in which

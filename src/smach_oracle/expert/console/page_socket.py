@@ -286,7 +286,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         return None
 
     async def _in_turn(self, command: PageCommand) -> None:
-        """In the order in which the page has sent them: a release and a claim do not overtake."""
+        """Obey in the order in which the page has sent: a release and a claim do not overtake."""
         try:
             async with self._turn:
                 if self._person is not None and not self._gone:
@@ -295,7 +295,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._at_work -= 1
 
     async def _stop_machine(self, command: PageCommand) -> None:
-        """Without its turn: it waits for no other command."""
+        """Obey before its turn: it waits for no other command."""
         if self._person is not None:
             self._answer(command, await self._pages.machine_hand.stop(command, self._person))
 

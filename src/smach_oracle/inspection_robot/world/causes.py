@@ -136,7 +136,7 @@ def _looking(rng: np.random.Generator) -> Errand:
 
 
 def _there_and_back(where: Tuple[float, float], begins_s: float, stands_s: float) -> Errand:
-    """From the nearest corner, where they can walk straight, and back."""
+    """Return an errand from the nearest corner, from where they can walk straight, and back."""
     corner = min(CORNERS, key=lambda each: math.hypot(each[0] - where[0], each[1] - where[1]))
     return Errand(max(0.0, float(begins_s)), (corner, where, corner), (0.0, float(stands_s), 0.0))
 

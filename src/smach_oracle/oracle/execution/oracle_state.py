@@ -76,7 +76,7 @@ class OracleState(smach.State):
             recovering.cancel()
 
     def __getstate__(self) -> Dict[str, Any]:
-        """Without what belongs to a recovery: neither that nor a lock travels with a machine."""
+        """Leave out what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
         state.update(_lock=None, _recovering=None, _verdict=None)
         return state

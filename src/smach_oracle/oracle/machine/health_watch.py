@@ -42,7 +42,7 @@ class Teller(Protocol):
 
 
 class _UnwellPhase:
-    """From the first container that waits to the last. `tell` is the first's."""
+    """The time from the first container that waits to the last. `teller` is the first's."""
 
     def __init__(self, teller: Teller, state: str, why: str) -> None:
         self.teller = teller

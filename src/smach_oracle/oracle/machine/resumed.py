@@ -1,4 +1,4 @@
-"""Where the containers and the states of a trial go on whose program was stopped."""
+"""The places where a trial goes on whose program was stopped, in its containers and states."""
 
 from typing import (
     TYPE_CHECKING,

@@ -192,7 +192,7 @@ class EventSource:
         )
 
     def __getstate__(self) -> Dict[str, Any]:
-        """Without the lock and the observers: neither can travel with a pickled machine."""
+        """Leave out the lock and the observers: neither can travel with a pickled machine."""
         return {'trial_id': self.trial_id, '_seq': self._seq, '_log_error': self._log_error}
 
     def __setstate__(self, state: Dict[str, Any]) -> None:

@@ -296,7 +296,7 @@ class StateRecord:
         return self._retired + sum([edge.count for edge in list(edges.values())] if edges else ())
 
     def __getstate__(self) -> Dict[str, Any]:
-        """Without what belongs to an execution under way."""
+        """Leave out what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
         state.update(snapshot=None, view=_NO_VIEW, way_down=())
         del state['_lock']

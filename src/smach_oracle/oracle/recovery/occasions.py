@@ -24,7 +24,7 @@ class FirstStep(enum.Enum):
 
 
 class Superseding(enum.Enum):
-    """How a visit counts of which an expert says what it has ended with."""
+    """The effect on the counts where an expert says what a visit has ended with."""
 
     TAKES_BACK = 'takes back'  # the failure that was counted
     COUNTS = 'counts'  # as a visit, which it was not before

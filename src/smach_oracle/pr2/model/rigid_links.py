@@ -35,7 +35,7 @@ def merge_rigid_links(robot: Element) -> None:
 
 
 def fixed_frames(robot: Element) -> Dict[str, Tuple[str, np.ndarray]]:
-    """For every link: the link that holds it (itself, if it moves), and 4x4, that link from it."""
+    """Return what holds each link (itself, if it moves), and 4x4, that link from it."""
     above = {_part(joint, 'child').get('link', ''): joint for joint in robot.findall('joint')}
     found: Dict[str, Tuple[str, np.ndarray]] = {}
     for link in robot.findall('link'):

@@ -62,7 +62,7 @@ class _AskingGoal:
         self._seen_s = time.monotonic()
 
     def missing_s(self, connections: List[Connection], now_s: float) -> float:
-        """For how long its own connection has been gone, in s.
+        """Return for how long its own connection has been gone, in s.
 
         Another one of the same name is another process.
         """

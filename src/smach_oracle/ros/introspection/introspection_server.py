@@ -130,7 +130,7 @@ class IntrospectionServer(object):
         self._status_pub = self._structure_pub = self._init_sub = None
 
     def leave_to_parent(self) -> None:
-        """In a forked child: show nothing on the topics of the parent."""
+        """Show nothing on the topics of the parent. A forked child calls it."""
         self._thread = self._status_pub = None
 
     def clear(self) -> None:
@@ -153,7 +153,7 @@ class IntrospectionServer(object):
     def _note_change(
         self, watch: ContainerWatch, info: str, active_states: List[str], userdata: Any
     ) -> None:
-        """In the executing thread: leave the status to the publishing one."""
+        """Leave the status to the publishing thread. The executing one calls it."""
         if len(self._changes) == LONGEST_BACKLOG:
             if not self._dropped:
                 smach.logwarn(

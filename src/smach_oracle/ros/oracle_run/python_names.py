@@ -66,7 +66,7 @@ def _find(module: str, path: Optional[Sequence[str]]) -> Optional[ModuleSpec]:
 
 
 def _found_otherwise(module: str) -> Optional[ModuleSpec]:
-    """By the finders of packages that are installed for development, among others."""
+    """Ask other finders, such as those of packages that are installed for development."""
     for finder in sys.meta_path:
         if finder is not PathFinder and hasattr(finder, 'find_spec'):
             found = finder.find_spec(module, None)

@@ -163,7 +163,7 @@ class _ScriptWatch:
         faulthandler.dump_traceback_later(LIMIT_S + 5.0, exit=True)
 
     def spin(self) -> None:
-        """In place of `rospy.spin`."""
+        """Stand in place of `rospy.spin`."""
         self._idle = True
         while not rospy.is_shutdown():
             time.sleep(0.05)

@@ -1,1 +1,1 @@
-"""Which node has sent a message, and whether that is the one whose message counts."""
+"""Finds the node that has sent a message, and whether it is the one whose message counts."""

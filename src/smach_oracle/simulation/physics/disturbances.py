@@ -253,7 +253,7 @@ def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
 
 
 def _joints(disturbance: Disturbance) -> List[str]:
-    """Those that an ``arm`` names."""
+    """Return the joints that an ``arm`` names."""
     return [
         name for name, _ in disturbance.values if name not in OPTIONS['arm'] and name != 'delay'
     ]

@@ -44,7 +44,7 @@ class Light(NamedTuple):
 
 
 class Lights:
-    """Those of one trial."""
+    """The lights of one trial."""
 
     def __init__(self) -> None:
         self._all: List[Light] = []

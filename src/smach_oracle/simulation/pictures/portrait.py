@@ -99,7 +99,7 @@ def _between(one: Viewpoint, other: Viewpoint, share: float) -> Viewpoint:
 
 
 def _light(eye: Sequence[float], target: Sequence[float]) -> List[float]:
-    """From where the light comes."""
+    """Return the place from which the light comes."""
     x, y, _ = np.subtract(eye, target)
     sine, cosine = np.sin(LIGHT_TURN), np.cos(LIGHT_TURN)
     return [x * cosine - y * sine, x * sine + y * cosine, LIGHT_HEIGHT]

@@ -18,7 +18,7 @@ from ..physics.world import World
 
 
 def no_report(status: str) -> None:
-    """For skills whose progress nobody follows."""
+    """Report to nobody: for skills whose progress nobody follows."""
 
 
 class DirectRobot:

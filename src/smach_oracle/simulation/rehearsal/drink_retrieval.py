@@ -71,15 +71,15 @@ class DrinkRetrievalRehearsal:
         self.missed = self.picks = 0  # looks that did not show the drink, and picks
 
     def looks_from(self) -> Tuple[float, float, float]:
-        """Where the state MOVE_IN drives."""
+        """Return the place to which the state MOVE_IN drives."""
         return LOOK_FROM[self.missed % len(LOOK_FROM)]
 
     def detect_goal(self) -> DetectDrinkGoal:
-        """As of the state DETECT_DRINK."""
+        """Return the goal of the state DETECT_DRINK."""
         return DetectDrinkGoal(MIN_HEIGHT, ORDERED, self.missed % 256)
 
     def pick_goal(self) -> PickGoal:
-        """As of the state PICK_DRINK."""
+        """Return the goal of the state PICK_DRINK."""
         self.picks += 1
         return PickGoal(
             'right', self.data['drink'], self.data['size'], FRIDGE, min(self.picks - 1, 255)

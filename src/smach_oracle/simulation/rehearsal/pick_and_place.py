@@ -96,14 +96,14 @@ class PickAndPlaceRehearsal:
         self.colour, self.size = ColorRGBA(), Vector3()  # of the object when it was first seen
 
     def head_goal(self) -> PointHeadGoal:
-        """As of the state POINT_HEAD."""
+        """Return the goal of the state POINT_HEAD."""
         view = VIEWS[self.missed % len(VIEWS)]
         return PointHeadGoal(
             self.look_at or PointStamped(Header(frame_id=ODOM_FRAME), Point(*view))
         )
 
     def detect_goal(self) -> DetectTabletopGoal:
-        """As of the state DETECT_TABLETOP."""
+        """Return the goal of the state DETECT_TABLETOP."""
         return DetectTabletopGoal(
             MIN_HEIGHT, self.colour, self.size, PointStamped(header=Header(frame_id=ODOM_FRAME))
         )
@@ -128,7 +128,7 @@ class PickAndPlaceRehearsal:
         self.data['map_id'] = self.skills.build_collision_map(goal, no_report).map_id
 
     def pick_goal(self) -> PickGoal:
-        """As of the state PICK."""
+        """Return the goal of the state PICK."""
         self.picks += 1
         return PickGoal(
             'right',

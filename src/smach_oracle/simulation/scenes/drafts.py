@@ -18,7 +18,7 @@ class SceneDraft(Protocol):
 
     @property
     def _replace(self) -> Callable[..., Any]:
-        """That of a NamedTuple."""
+        """Return the method of a NamedTuple."""
 
 
 Draft = TypeVar('Draft', bound=SceneDraft)

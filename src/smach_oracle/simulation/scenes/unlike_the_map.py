@@ -76,7 +76,7 @@ def true_table(seed: int, height: float, x: float, size: Vector) -> TrueTable:
 
 
 def localisation_error(seed: int) -> Vector:
-    """By how much the robot's localisation is wrong, m and rad."""
+    """Return the error of the robot's localisation, m and rad."""
     return _beside((0.0, 0.0, 0.0), LOCALISED, _drawn(seed, 'localisation_error', 3))
 
 

@@ -49,7 +49,7 @@ class InterfaceCommands:
     def __init__(
         self, known: Callable[[str], bool], call: Callable[..., Any] = call_service
     ) -> None:
-        """Without ROS calls until a command comes.
+        """Make no ROS calls until a command comes.
 
         :param known: whether there is a SharedAutonomy action of that name.
         :param call: calls a service, as call_service does.

@@ -135,7 +135,7 @@ class FollowedRobots:
         return copies(robot.source(self._nodes.get(robot.name, frozenset())) for robot in robots)
 
     def _begin(self, name: str) -> None:
-        """Without the lock: a master that hangs must not hold up the writing of sections."""
+        """Subscribe without the lock: a master that hangs must not hold the sections up."""
         robot = FollowedRobot(name)
         self._subscribers[name] = [
             subscribe_to_owner(

@@ -72,7 +72,7 @@ class RobotCameras:
         sections.put(SECTION, self._own)
 
     def _around(self, robot: str, cameras: Sequence[SensorView]) -> List[SensorView]:
-        """Those of its namespace that lie below no other robot's name."""
+        """Return the cameras of a robot's namespace that lie below no other robot's name."""
         space = robot[: robot.rfind('/')]
         others = [other for other in self._robots if other != robot]
         return [

@@ -19,7 +19,7 @@ def has_oracle(counter: TrialCounter) -> bool:
 
 
 def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
-    """In how many trials each thing happened at least once, and how often in all.
+    """Return how many trials had each thing at least once, and how often it happened in all.
 
     Counted by experiment and by with or without oracle, over the trials that have ended.
     """

@@ -87,7 +87,7 @@ class AccessControl:
     def _share_of(
         self, request: tornado.httputil.HTTPServerRequest, known: str
     ) -> Tuple[str, bool]:
-        """For whose limit a request counts, and whether that one has come with a token.
+        """Return who a request counts for in the limits, and whether it has come with a token.
 
         Strangers of the same address, or very many of them, take nothing from who has a token.
         """
