@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""The cost of a decision after a million visits, in units of its cost after ten.
+"""The cost of a decision in bare steps, and after a million visits in units of its cost after ten.
 
     python3 benchmarks/oracle_decision.py [--check] [--visits N]
 
-Both are measured in one run, best of many: a failure, from the end of the failed state to the entry
-into the next, for each policy that goes by rates, with the preconditions met. With --check the exit
-status is 1 where the ratio is above 1.5.
+All are measured in one run, best of many: a failure, from the end of the failed state to the entry
+into the next, for each policy that goes by rates, with the preconditions met. A bare step is that
+of oracle_overhead.py. With --check the exit status is 1 above a limit.
 """
 
 import argparse
@@ -14,14 +14,18 @@ import sys
 import time
 from typing import Any, List, Tuple
 
-from oracle_overhead import silence
+from oracle_overhead import bare_step_s, silence
 
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.baselines import BASELINES
 from smach_oracle.oracle.decision.policy import POLICIES
 
-LIMIT = 1.5
+GROWTH_LIMIT = 1.5
+# in bare steps. The aim is 1.2 times what the first release took, measured beside it in one run. It
+# is missed: the limit is what is reached and a fifth.
+AIM, LIMIT = 1200.0, 2750.0
+ROUNDS = 5
 FAILURES = 300
 
 
@@ -88,16 +92,29 @@ def main() -> int:
     args = parser.parse_args()
     silence()
     print('engine: {}'.format(smach.__file__))
-    worst = 0.0
+    is_missed = False
     for policy in sorted(set(POLICIES).difference(each.name for each in BASELINES)):
-        few, many = (min(machine_after(visits, policy)[1]) for visits in (10, args.visits))
-        few = min(few, min(machine_after(10, policy)[1]))
-        worst = max(worst, many / few)
+        rounds = [(bare_step_s(20000), min(machine_after(10, policy)[1])) for _ in range(ROUNDS)]
+        bare, few = (min(column) for column in zip(*rounds))
+        many = min(machine_after(args.visits, policy)[1])
+        steps, growth = few / bare, many / few
+        is_missed = is_missed or steps > LIMIT or growth > GROWTH_LIMIT
         print(
-            '{}: a decision takes {:.1f} us after ten visits, {:.1f} us after {}: {:.2f} times '
-            '(limit {:g})'.format(policy, few * 1e6, many * 1e6, args.visits, many / few, LIMIT)
+            '{}: a decision takes {:.1f} us or {:.0f} bare steps of {:.0f} ns after ten visits '
+            '(aim {:g}, limit {:g}), {:.1f} us after {}: {:.2f} times (limit {:g})'.format(
+                policy,
+                few * 1e6,
+                steps,
+                bare * 1e9,
+                AIM,
+                LIMIT,
+                many * 1e6,
+                args.visits,
+                growth,
+                GROWTH_LIMIT,
+            )
         )
-    return 1 if args.check and worst > LIMIT else 0
+    return 1 if args.check and is_missed else 0
 
 
 if __name__ == '__main__':

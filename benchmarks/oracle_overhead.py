@@ -6,22 +6,26 @@ Both are over the same two states.
     python3 benchmarks/oracle_overhead.py [--check] [--transitions N] [--rounds N]
 
 The bare loop is `label = transitions[label][states[label].execute(ud)]`. Loggers are silenced,
-nobody observes. The rounds alternate and the best of each counts, so that neighbours on the machine
-do not. Nested: the same two states three machines deep. The aim is 12 bare steps; with --check the
-exit status is 1 above 15, which leaves room for a busy machine.
+nobody observes, except where the last figure says so. Nested: the same two states three machines
+deep. Each figure is the fastest of many windows of 50 steps, and the windows of all machines
+alternate in rounds, so that neighbours on the machine do not count. With --check the exit status is
+1 above a limit.
 """
 
 import argparse
 import itertools
 import sys
 import time
-from typing import Dict
+from typing import Dict, Iterator, List
 
 import smach
 from smach_oracle.oracle import OracleContainer
 
-AIM, LIMIT = 12.0, 15.0
+# in bare steps; where the aim is missed, the limit is what is reached and a fifth
+AIM, LIMIT = 10.0, 14.4
+OBSERVED_AIM, OBSERVED_LIMIT = 40.0, 51.0
 DEPTH = 3
+WINDOW = 50  # steps
 
 
 class Fixed(smach.State):
@@ -61,25 +65,33 @@ def bare_step_s(count: int) -> float:
     transitions = {'A': {'x': 'B'}, 'B': {'y': 'A'}}
     ud: Dict[str, object] = {}
     label = 'A'
-    begin = time.perf_counter()
-    for _ in range(count):
-        label = transitions[label][states[label].execute(ud)]
-    return (time.perf_counter() - begin) / count
+    best = float('inf')
+    for _ in range(count // WINDOW):
+        begin = time.perf_counter()
+        for _ in range(WINDOW):
+            label = transitions[label][states[label].execute(ud)]
+        best = min(best, time.perf_counter() - begin)
+    return best / WINDOW
 
 
 def machine_step_s(machine: smach.StateMachine, count: int) -> float:
     """Seconds that one transition of `machine` takes, the loop in its `execute` included."""
-    smach.set_shutdown_check(
-        itertools.chain(itertools.repeat(False, count), itertools.repeat(True)).__next__
-    )
-    begin = time.perf_counter()
+    marks: List[float] = []
+
+    def windows() -> Iterator[Iterator[bool]]:
+        for _ in range(count // WINDOW):
+            marks.append(time.perf_counter())
+            yield itertools.repeat(False, WINDOW)
+        yield itertools.repeat(True)
+
+    smach.set_shutdown_check(itertools.chain.from_iterable(windows()).__next__)
     try:
         machine.execute()
     except (smach.InvalidTransitionError, smach.InvalidUserCodeError):
         pass  # SMACH says so of a nested machine that ends without outcome, as at a shutdown
-    elapsed_s = time.perf_counter() - begin
     smach.set_shutdown_check(lambda: False)
-    return elapsed_s / count
+    # the machine begins in the first window
+    return min(end - begin for begin, end in zip(marks[1:], marks[2:])) / WINDOW
 
 
 def silence() -> None:
@@ -114,12 +126,21 @@ def main() -> int:
     engine, wrapped, nested, watched = (cost / bare for cost in costs)
     print('engine: {}'.format(smach.__file__))
     print(
-        'bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f}, nested {:.1f}, '
-        'observed too {:.1f} (wrapped and nested: aim {:g}, limit {:g})'.format(
-            bare * 1e9, engine, wrapped, nested, watched, AIM, LIMIT
+        'bare step {:.0f} ns; in bare steps: engine {:.1f}, wrapped {:.1f}, nested {:.1f} '
+        '(aim {:g}, limit {:g}), observed too {:.1f} (aim {:g}, limit {:g})'.format(
+            bare * 1e9,
+            engine,
+            wrapped,
+            nested,
+            AIM,
+            LIMIT,
+            watched,
+            OBSERVED_AIM,
+            OBSERVED_LIMIT,
         )
     )
-    return 1 if args.check and max(wrapped, nested) > LIMIT else 0
+    is_missed = max(wrapped, nested) > LIMIT or watched > OBSERVED_LIMIT
+    return 1 if args.check and is_missed else 0
 
 
 if __name__ == '__main__':

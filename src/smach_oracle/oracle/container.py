@@ -10,7 +10,7 @@ import smach
 from .asking.question import Expert, names
 from .errors import SettingsError
 from .execution.oracle_state import OracleState
-from .execution.step import Step, before_step
+from .execution.step import Step, before_step, execute_observed
 from .execution.trial import run_container
 from .execution.unwrapping import execute_bare
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
@@ -29,6 +29,7 @@ from .settings.settings import PreconditionLists, SettingsLike, as_settings
 from .settings.unfit_names import Strictness
 
 EDGE_TO_ORACLE = 'failure'
+TRANSITION = EventKind.TRANSITION  # looked up once
 
 
 class _Shown:
@@ -418,8 +419,10 @@ class OracleContainer(smach.StateMachine):
                 try:
                     if constants:
                         write_constants(userdata, constants)
-                    if observed or record.special or node.abandoned:
+                    if record.special or node.abandoned:
                         outcome = Step(node, record).execute(state, view.remapper)
+                    elif observed:
+                        outcome = execute_observed(node, record, state, view.remapper)
                     else:
                         outcome = state.execute(view.remapper)
                 except Exception as err:
@@ -444,7 +447,7 @@ class OracleContainer(smach.StateMachine):
                     history.succeeded_other = history.succeeded
                     history.succeeded = label
                 if observed:
-                    node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=target)
+                    node.events.emit(TRANSITION, node.path, node.trial_id, label, outcome, target)
                 self._current_label = target
                 self._current_state = self._states[target]
                 self._current_transitions = self._transitions[target]

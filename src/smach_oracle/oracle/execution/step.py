@@ -1,6 +1,6 @@
 """The work around a state, off the short way of a plain success in container.py."""
 
-import time
+from time import monotonic
 from typing import Any, Mapping, Optional
 
 import smach
@@ -44,6 +44,7 @@ from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind
 from .unwell_failure import why_unwell_after
 
 NO_FACTS: Mapping[str, Any] = {}
+STATE_START = EventKind.STATE_START  # looked up once
 
 
 def before_step(node: TreeNode) -> Optional[Stop]:
@@ -98,6 +99,25 @@ def _pass_preempt_on(node: TreeNode) -> None:
         current.request_preempt()
 
 
+def execute_observed(
+    node: TreeNode, record: StateRecord, state: smach.State, userdata: smach.Remapper
+) -> object:
+    """Execute a state of which observers hear, and about which nothing else is special.
+
+    It returns what the state returns, and raises what it raises.
+    """
+    if node.tree.is_resumed:
+        return Step(node, record).execute(state, userdata)
+    node.events.emit(STATE_START, node.path, node.trial_id, record.label)
+    begun_s = monotonic()
+    try:
+        return state.execute(userdata)
+    finally:
+        took_s = monotonic() - begun_s
+        if took_s > (record.longest_s or 0.0) and not node.machine._preempt_requested:
+            record.longest_s = took_s
+
+
 class Step:
     """One visit of a state: its execution where more is to be done than that, and its end."""
 
@@ -131,11 +151,11 @@ class Step:
         if way_down:
             node.execution.start_below(way_down)  # before STATE_START, with which it is stored
         try:
-            node.emit(EventKind.STATE_START, state=record.label)
+            node.emit(STATE_START, record.label)
             blocked = node.tree.workers.blocked(state) if node.abandoned else ''
             if blocked:
                 return Overrun(blocked)
-            begun_s = time.monotonic()
+            begun_s = monotonic()
             outcome: object = None
             try:
                 if record.settings.time_limit_s is not None and node.tree.recover:
@@ -146,7 +166,7 @@ class Step:
                     outcome = state.execute(userdata)
                 return outcome
             finally:
-                took_s = time.monotonic() - begun_s
+                took_s = monotonic() - begun_s
                 if took_s > (record.longest_s or 0.0) and not (
                     isinstance(outcome, (Overrun, TakenOut)) or self._machine._preempt_requested
                 ):

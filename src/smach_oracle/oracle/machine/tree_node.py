@@ -284,10 +284,13 @@ class TreeNode:
                 each for each in self.as_preconditions if each is not state
             )
 
-    def emit(self, kind: EventKind, **fields: Any) -> None:
+    def emit(
+        self, kind: EventKind, state: str = '', outcome: str = '', target: str = '', **more: Any
+    ) -> None:
         """Tell the observers, unless this container still runs from a trial that is over."""
-        if self.events.observers:
-            self.events.emit(kind, self.path, self.trial_id, **fields)
+        events = self.events
+        if events.observers:
+            events.emit(kind, self.path, self.trial_id, state, outcome, target, **more)
 
     def emit_rated(self, kind: EventKind, record: StateRecord, **fields: Any) -> None:
         """Tell the observers of what happens to a state, with its failure rate and class."""
@@ -295,7 +298,7 @@ class TreeNode:
             standing = record.standing()
             self.emit(
                 kind,
-                state=record.label,
+                record.label,
                 failure_class=int(standing.failure_class),
                 rate=standing.rate,
                 **fields,

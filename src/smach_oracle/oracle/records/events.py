@@ -21,8 +21,8 @@ the machine. The log names it once. It gets the events that follow.
 """
 
 import threading
-import time
 from enum import IntEnum
+from time import time
 from types import MethodType
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
@@ -69,6 +69,9 @@ class EventKind(IntEnum):
     RESUMED = 31
 
 
+_LAST = EventKind.TRIAL_END
+
+
 class FailureKind(IntEnum):
     """The kinds of failure of a state. The numbers are those of OracleEvent.msg."""
 
@@ -104,6 +107,10 @@ class Event(NamedTuple):
     text: str = ''
     data: Optional[Mapping[str, Any]] = None  # plain data
 
+
+_new_tuple = tuple.__new__
+# what it holds behind `target` where nothing else is said
+_REST = tuple(Event._field_defaults.values())[3:]
 
 Observer = Callable[[Event], None]
 
@@ -150,19 +157,36 @@ class EventSource:
             self._seq = seq + 1
 
     def emit(
-        self, kind: EventKind, path: str, of_trial: Optional[str] = None, **fields: Any
+        self,
+        kind: EventKind,
+        path: str,
+        of_trial: Optional[str] = None,
+        state: str = '',
+        outcome: str = '',
+        target: str = '',
+        **more: Any,
     ) -> None:
         """Tell every observer. It costs nothing to speak of where there is none.
 
         What comes after the end of its trial (`of_trial`, None means the present one) is not told.
+        `more`: further fields of the event.
         """
         if not self.observers:
             return
         with self._lock:
-            if self._over or of_trial not in (None, self.trial_id):
+            if self._over or not (of_trial is None or of_trial == self.trial_id):
                 return
-            self._over = kind is EventKind.TRIAL_END
-            event = Event(kind, self.trial_id, self._seq, time.time(), path, **fields)
+            self._over = kind is _LAST
+            event: Event
+            if more:
+                event = Event(
+                    kind, self.trial_id, self._seq, time(), path, state, outcome, target, **more
+                )
+            else:  # twice at each step: in half the time
+                event = _new_tuple(
+                    Event,
+                    (kind, self.trial_id, self._seq, time(), path, state, outcome, target) + _REST,
+                )
             self._seq += 1
             for observer in tuple(self.observers):
                 try:
