@@ -112,15 +112,11 @@ class History:
         return FailureContext(
             state,
             initial,
-            self.failed_last(state),
+            self._streak.state == state,
             self.failing_since(state, successes),
             self.unconditioned,
             self.succeeded_before(state, successes),
         )
-
-    def failed_last(self, state: str) -> bool:
-        """Whether this container's most recent failure of the trial was of `state`."""
-        return self._streak.state == state
 
     def failing_since(self, state: str, successes: int) -> bool:
         """Whether, besides, `state` has not succeeded since.

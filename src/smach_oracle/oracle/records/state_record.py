@@ -15,6 +15,7 @@ class Standing(NamedTuple):
     rate: float  # 0 to 1, the learned failure rate
     recent: Tuple[int, int]  # failures among the latest results, and their number. 0, 0: not known
     failure_class: FailureClass
+    successes: int  # in all
     tried: str  # what the oracle did after its latest failure, '' where it has succeeded since
 
 
@@ -236,9 +237,10 @@ class StateRecord:
         with self._lock:
             estimator = self._up_to_date()
             rate, recent = estimator.rate, estimator.recent
-            what, successes = self._tried
-            tried = what if successes == estimator.successes else ''
-        return Standing(rate, recent, self._class_of(rate), tried)
+            successes = estimator.successes
+            what, then = self._tried
+        tried = what if then == successes else ''
+        return Standing(rate, recent, self._class_of(rate), successes, tried)
 
     @property
     def totals(self) -> Tuple[int, int]:
@@ -264,9 +266,9 @@ class StateRecord:
         """Return how often it is repeated in a trial without a counted failure, at least once."""
         return max(1, self.settings.max_recoveries)
 
-    def note_tried(self, what: str) -> None:
-        """Note what the oracle does after a failure."""
-        self._tried = what, self.totals[0]
+    def note_tried(self, what: str, successes: int) -> None:
+        """Note what the oracle does after a failure. `successes`: in all, before it."""
+        self._tried = what, successes
 
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""

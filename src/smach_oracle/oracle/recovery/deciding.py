@@ -2,6 +2,7 @@
 
 from typing import Any, Callable, List, Optional, Tuple
 
+from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, goes, going_would_repeat
 from ..machine.repeats import has_visited
@@ -12,7 +13,7 @@ from ..places.place import Place, place_named
 from ..places.way import Way, closed_in_words, repeated_on, way_to
 from ..records.events import EventKind
 from ..records.facts import Decider
-from ..records.state_record import StateRecord
+from ..records.state_record import Standing, StateRecord
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from .failure import Failure
@@ -56,6 +57,7 @@ class Deciding:
         self._preconditions = PreconditionRunner(node, record.settings, self.watch)
         self.tried: List[str] = []
         self.way: Optional[Way] = None  # that was decided on
+        self._standing: Optional[Standing] = None  # of the state as its policy was asked
 
     def cancel(self) -> None:
         """Preempt the precondition that runs."""
@@ -87,8 +89,9 @@ class Deciding:
 
     def _follow_policy(self, why_not_above: Callable[[], str]) -> Decided:
         record, policy = self._record, self._node.in_force.policy
-        preconditions = self._run_preconditions()
-        situation = Situation(record.failure_class, preconditions, self._continuous, self._past())
+        standing = self._standing = record.standing()
+        preconditions = self._run_preconditions(standing.failure_class)
+        situation = Situation(standing.failure_class, preconditions, self._continuous, self._past())
         action = policy.decide(situation)
         if action in (Action.ASK, Action.GIVE_UP):
             return Decider.POLICY, self.facts_of(action, blocked=policy.why(situation))
@@ -104,7 +107,7 @@ class Deciding:
             return decider, self.facts_of(Action.ASK, blocked=why_not)
         self.way = way
         facts = self.facts_of(action, target=self._named(way), wait_s=policy.wait_s(situation))
-        record.note_tried(goes(facts))
+        record.note_tried(goes(facts), standing.successes)
         return decider, facts
 
     def _past(self) -> Past:
@@ -170,9 +173,10 @@ class Deciding:
 
     def _function_that_runs(self) -> str:
         """Return which function among the preconditions was left behind and runs, '' for none."""
-        for spec in self._record.settings.preconditions:
+        workers = self._node.tree.workers
+        for spec in self._record.settings.preconditions if workers.abandoned else ():
             for name, function in spec.functions():
-                blocked = self._node.tree.workers.blocked(function)
+                blocked = workers.blocked(function)
                 if blocked:
                     return '{} {}'.format(name, blocked)
         return ''
@@ -180,7 +184,7 @@ class Deciding:
     def facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""
         record = self._record
-        standing = record.standing()
+        standing = self._standing or record.standing()
         return DecisionFacts(
             record.label,
             standing.recent,
@@ -196,12 +200,12 @@ class Deciding:
 
     # -- preconditions
 
-    def _run_preconditions(self) -> Preconditions:
+    def _run_preconditions(self, failure_class: FailureClass) -> Preconditions:
         record = self._record
         specs = record.settings.preconditions
         if not specs:
             return Preconditions.NONE
-        if not self._node.in_force.policy.runs_preconditions(record.failure_class):
+        if not self._node.in_force.policy.runs_preconditions(failure_class):
             return Preconditions.NOT_MET
         for spec in specs:
             if self._stop.stopped() or not self._run_precondition(spec):
@@ -211,7 +215,7 @@ class Deciding:
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
         self._emit(EventKind.PRECONDITION_START, target=spec.name)
         why_not = self._preconditions.run(spec)
-        for _ in range(self._record.most_repeats):
+        for _ in range(self._record.most_repeats if why_not else 0):
             if not why_not or not self._stop.has_waited_after(
                 'did not get its precondition ' + spec.name
             ):

@@ -1,10 +1,11 @@
 """Decides which outcomes sound like a failure. Pure, and without smach."""
 
 import re
-from typing import Iterable, Pattern
+from typing import Dict, Iterable, Pattern
 
 DEFAULT_FAILING_OUTCOMES = ('aborted', 'failed', 'failure', 'error')
 PREEMPTED = 'preempted'
+_MOST_KNOWN = 1000  # names. A state may make up outcomes without end
 
 
 def is_preempted(outcome: object) -> bool:
@@ -26,11 +27,19 @@ class FailingNames:
             word[:1].upper() + word[1:] for word in self.words if word[:1].isalpha()
         )
         self._camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
+        self._known: Dict[str, bool] = {}  # of names that were asked about
 
     def __contains__(self, outcome: object) -> bool:
-        if not isinstance(outcome, str) or is_preempted(outcome):
+        if not isinstance(outcome, str):
             return False
-        return bool(self._whole.match(outcome) or self._camel.match(outcome))
+        known = self._known.get(outcome)
+        if known is None:
+            known = not is_preempted(outcome) and bool(
+                self._whole.match(outcome) or self._camel.match(outcome)
+            )
+            if len(self._known) < _MOST_KNOWN:
+                self._known[outcome] = known
+        return known
 
 
 def _pattern(form: str, words: Iterable[str], flags: int) -> Pattern[str]:
