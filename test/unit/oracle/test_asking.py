@@ -180,6 +180,18 @@ def test_nonsense_without_end_ends_at_the_deadline_and_does_not_spin():
     assert len(machine.of(EventKind.QUERY_EXPIRED)) == 1
 
 
+def test_nonsense_does_not_spin_where_there_is_no_deadline():
+    times_s = []
+
+    def answer(question, cancelled, progress):
+        times_s.append(time.monotonic())
+        return goto('NOWHERE' if len(times_s) < 4 else 'B')
+
+    machine, _ = asking(*[answer] * 4, deadline_s=0)
+    assert machine.run() == 'done'
+    assert times_s[3] - times_s[1] > 0.5, 'it waits longer after each'
+
+
 def test_without_an_expert_the_machine_stops_at_once_with_the_original_outcome():
     machine = watched(Scripted('aborted'), settings={'max_recoveries': 0, 'deadline_s': 0})
     assert machine.run() == 'aborted'

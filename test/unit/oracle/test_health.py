@@ -223,6 +223,7 @@ def test_a_preempt_ends_the_wait(health, outcomes, ends):
     assert machine.machine.preempt_requested() is False
     assert machine.machine['A'].preempt_requested() is False
     assert notices(machine)[-1].outcome == 'stopped'
+    assert notices(machine)[-1].text.startswith('the wait for the robot to be well was ended after')
     assert not machine.of(EventKind.FAILURE)
     health.now = ''
     assert machine.run() == 'done'

@@ -1,5 +1,7 @@
 """Iterators on the way of a jump, and in the items of other Iterators."""
 
+import os
+
 import pytest
 from branch_machines import Item, inside, iterator_over
 from guarded_machines import chain
@@ -160,3 +162,24 @@ def test_what_was_given_up_in_one_trial_settles_no_failure_of_the_next():
     with pytest.raises(smach.InvalidUserCodeError):
         watched.run()
     assert [question.failed_state for question in expert.questions] == ['A', 'ALL']
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')),
+    reason="upstream's Iterator takes an error for the end of the items",
+)
+def test_items_that_can_be_had_once_and_raise_end_with_their_own_error():
+    def items():
+        yield 1
+        raise ValueError('dropped')
+
+    machine = chain(ALL=each_of(Scripted('done', outcomes=('done', 'aborted')), 'item', ()))
+    with machine['ALL']:
+        smach.Iterator.set_iteritems(items(), 'item')
+    watched = Watched(machine, name='TOP', settings={'memory': 1000})
+    with pytest.raises(smach.InvalidUserCodeError):
+        watched.run()
+    failures = watched.of(EventKind.FAILURE)
+    assert len(failures) > 1 and all('ValueError: dropped' in each.text for each in failures)
+    once = 'what it goes through can be iterated only once, and has raised an error'
+    assert once in [each.text for each in watched.of(EventKind.WARNING)]

@@ -190,6 +190,7 @@ def test_with_escalate_the_level_above_may_decide_before_a_person_is_asked():
         ('TOP/PICK', 'revisit', 'ARM'),
     ]
     assert machine.rate('ARM').failures == 1 and machine.rate('PICK').failures == 0
+    assert machine.rate('ARM').recoveries == 1
     visits_of_arm = machine.machine['PICK']._oracle.records.history.latest()
     assert [visit.result.name for visit in visits_of_arm] == ['FAILURE', 'SUCCESS']
     assert machine.visits() == [

@@ -286,6 +286,13 @@ def test_what_cannot_be_is_refused(state, name, why):
     assert 'is not allowed: {}; allowed: '.format(why) in str(raised.value)
 
 
+def test_a_state_of_the_same_name_in_another_container_can_be_one():
+    look = Scripted()
+    machine = chain(SEE=chain(LOOK=look), PICK=chain(LOOK=Scripted('aborted')))
+    watched = wrapped(machine, 'PICK/LOOK', '/SEE/LOOK')
+    assert watched.run() == 'done' and look.runs == 2
+
+
 def test_what_cannot_be_is_no_harm_where_settings_are_not_strict():
     watched = wrapped(chain(PICK=chain(GRASP=Scripted('aborted'))), 'GRASP', '/PICK', strict=False)
     assert watched.run() == 'done'

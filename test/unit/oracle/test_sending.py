@@ -4,7 +4,7 @@ import threading
 from typing import Any
 
 import pytest
-from guarded_machines import chain
+from guarded_machines import both, chain
 from held_machines import Gate, Held, eventually
 from machines import FakeExpert, Scripted, chain_of, contents, goto
 
@@ -211,6 +211,24 @@ def test_a_machine_that_does_not_run_begins_there() -> None:
     with held.begin():
         assert held.end() == 'done'
     assert [state.runs for state in states] == [0, 1]
+
+
+def test_what_waits_in_another_branch_does_not_wait_here() -> None:
+    gate, there = Gate(), Scripted()
+    machine = chain(
+        BOTH=both(HELD=chain(H=Scripted()), RUNS=chain(A=Scripted(gate), B=Scripted(), C=there))
+    )
+    held = Held(machine)
+    held.hand.set_breakpoint('H')
+    with held.begin():
+        assert gate.entered.wait(20)
+        held.waits_before('SM_ROOT/BOTH/HELD/H')
+        said = held.hand.go_to('SM_ROOT/BOTH/RUNS', 'C')
+        assert said == 'SM_ROOT/BOTH/RUNS goes to C once A has ended'
+        held.hand.remove_breakpoint('H')
+        gate.opened.set()
+        held.hand.resume()
+        assert (held.end(), there.runs) == ('done', 1)
 
 
 def test_a_machine_whose_expert_is_asked_goes_there_after_the_answer() -> None:

@@ -40,6 +40,7 @@ def test_the_defaults_are_those_of_the_design():
         'restore',
         ('stop', ''),
     )
+    assert settings.still_running_factor == 10
     assert settings.failing_outcomes == ('aborted', 'failed', 'failure', 'error')
     assert settings.deadline_s > 0, 'never an endless wait unless asked for'
     assert Settings.from_dict(None) == settings
@@ -317,3 +318,17 @@ def test_a_wrong_map_of_states_is_named(given, named):
     with pytest.raises(SettingsError) as caught:
         Settings.from_dict({'resume_map': given})
     assert named in str(caught.value) and 'KITCHEN/LOOK: SEARCH' in str(caught.value)
+
+
+def test_the_number_of_a_stored_moment_has_a_place_in_the_store():
+    most = 1 << 62
+    assert Settings.from_dict({'resume_from': most}).resume_from == most
+    with pytest.raises(SettingsError, match='resume_from'):
+        Settings.from_dict({'resume_from': most + 1})
+
+
+def test_an_error_says_what_is_wrong_also_with_its_file_and_with_more_that_is_allowed():
+    error = SettingsError('name', 'x' * 9, 'a word', problem='is too long')
+    at = str(error.set_at('oracle.yaml, line 3'))
+    assert at == "oracle.yaml, line 3: name: 'xxxxxxxxx' is too long; allowed: a word"
+    assert str(error.allowing(' or two')).endswith('is too long; allowed: a word or two')

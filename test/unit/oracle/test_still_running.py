@@ -248,6 +248,21 @@ def test_a_state_that_the_machine_came_to_by_itself_is_left_alone():
     assert machine.run() == 'done' and not expert.questions
 
 
+def test_a_state_that_has_never_ended_is_asked_about_after_the_seconds_alone():
+    gate = Gate()
+    expert = FakeExpert(goto('B'), letting_go(gate, None))
+    machine = asked(
+        Scripted('aborted'),
+        Scripted(gate),
+        expert=expert,
+        still_running_factor=1000,
+        states={'A': {'max_recoveries': 0}},
+    )
+    assert machine.run() == 'done'
+    assert [question.failed_state for question in expert.questions] == ['A', 'B']
+    assert expert.questions[1].text.count('how long it took before is not known') == 1
+
+
 def test_it_may_take_ten_times_its_longest_visit():
     expert = FakeExpert(goto('A'))
 
