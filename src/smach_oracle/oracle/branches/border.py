@@ -32,7 +32,7 @@ from .items import TrackedItems
 from .stand_in import StandIn, real
 
 
-class _Resumed(NamedTuple):
+class _ResumedItem(NamedTuple):
     """The values with which a container that was under way goes on. See `Border.resume`."""
 
     keys: Dict[str, Any]
@@ -56,7 +56,7 @@ class Border:
         self.below: Tuple[str, ...] = ()  # labels that lead to it from there
         self._lock = threading.Lock()
         self._is_in_use = False
-        self._resumed: Optional[_Resumed] = None
+        self._resumed: Optional[_ResumedItem] = None
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -102,7 +102,7 @@ class Border:
         `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1.
         0 means the first. `tell`: takes the userdata as they are then.
         """
-        self._resumed = _Resumed(dict(keys), tuple(gone), item, tell, self._trial_now())
+        self._resumed = _ResumedItem(dict(keys), tuple(gone), item, tell, self._trial_now())
 
     def forget_resumed(self) -> None:
         """Begin the next execution from the start, whatever was under way in the program before."""
@@ -113,7 +113,7 @@ class Border:
         """Whether its next execution goes on where the program was stopped."""
         return self._to_resume() is not None
 
-    def _to_resume(self) -> Optional[_Resumed]:
+    def _to_resume(self) -> Optional[_ResumedItem]:
         """Return how it goes on, unless that was of a trial before."""
         resumed = self._resumed
         return resumed if resumed is not None and resumed.trial_id == self._trial_now() else None

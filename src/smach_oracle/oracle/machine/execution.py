@@ -28,7 +28,7 @@ class Execution:
     executions inside which it takes place. `departure`: the verdict from below, or from here, that
     ends the present state. `unrecovered`: whether the oracle has given up, and so ended it.
 
-    The thread of the container calls its methods, but for `depart_by`, `start_of` and
+    The thread of the container calls its methods, except `depart_by`, `start_of` and
     `forget_unrecovered`, which belong to the threads of other containers.
     """
 

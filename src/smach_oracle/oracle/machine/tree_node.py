@@ -295,7 +295,7 @@ class TreeNode:
     def emit_rated(self, kind: EventKind, record: StateRecord, **fields: Any) -> None:
         """Tell the observers of what happens to a state, with its failure rate and class."""
         if self.events.observers:
-            standing = record.standing()
+            standing = record.read_rate()
             self.emit(
                 kind,
                 record.label,

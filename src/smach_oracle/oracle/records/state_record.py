@@ -9,7 +9,7 @@ from ..records.visits import Visit
 from ..settings.settings import StateSettings
 
 
-class Standing(NamedTuple):
+class RateReading(NamedTuple):
     """What the results of a state say of it, read at one moment."""
 
     rate: float  # 0 to 1, the learned failure rate
@@ -232,7 +232,7 @@ class StateRecord:
     def _class_of(self, rate: float) -> FailureClass:
         return classify(rate, self.settings.moderate_from, self.settings.high_from)
 
-    def standing(self) -> Standing:
+    def read_rate(self) -> RateReading:
         """Return what the results so far say."""
         with self._lock:
             estimator = self._up_to_date()
@@ -240,7 +240,7 @@ class StateRecord:
             successes = estimator.successes
             what, then = self._tried
         tried = what if then == successes else ''
-        return Standing(rate, recent, self._class_of(rate), successes, tried)
+        return RateReading(rate, recent, self._class_of(rate), successes, tried)
 
     @property
     def totals(self) -> Tuple[int, int]:

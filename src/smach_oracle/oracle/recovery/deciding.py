@@ -13,7 +13,7 @@ from ..places.place import Place, place_named
 from ..places.way import Way, closed_in_words, repeated_on, way_to
 from ..records.events import EventKind
 from ..records.facts import Decider
-from ..records.state_record import Standing, StateRecord
+from ..records.state_record import RateReading, StateRecord
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from .failure import Failure
@@ -57,7 +57,7 @@ class Deciding:
         self._preconditions = PreconditionRunner(node, record.settings, self.watch)
         self.tried: List[str] = []
         self.way: Optional[Way] = None  # that was decided on
-        self._standing: Optional[Standing] = None  # of the state as its policy was asked
+        self._standing: Optional[RateReading] = None  # of the state as its policy was asked
 
     def cancel(self) -> None:
         """Preempt the precondition that runs."""
@@ -89,7 +89,7 @@ class Deciding:
 
     def _follow_policy(self, why_not_above: Callable[[], str]) -> Decided:
         record, policy = self._record, self._node.in_force.policy
-        standing = self._standing = record.standing()
+        standing = self._standing = record.read_rate()
         preconditions = self._run_preconditions(standing.failure_class)
         situation = Situation(standing.failure_class, preconditions, self._continuous, self._past())
         action = policy.decide(situation)
@@ -184,7 +184,7 @@ class Deciding:
     def facts_of(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""
         record = self._record
-        standing = self._standing or record.standing()
+        standing = self._standing or record.read_rate()
         return DecisionFacts(
             record.label,
             standing.recent,

@@ -187,7 +187,7 @@ class OuterLevel:
         record = self._record
         if way_to(self._below, Place(self._node, record.label)) is None:
             return None
-        standing = record.standing()
+        standing = record.read_rate()
         record.learn(True)
         decider, facts = self._deciding.decide(self._foreseen)
         self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
