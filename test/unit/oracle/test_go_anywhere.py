@@ -75,6 +75,13 @@ def test_a_container_that_is_left_counts_with_the_outcome_that_it_had():
     assert sorted(counts) == [('done', 'C', 1), ('preempted', 'ORACLE', 1)]
 
 
+def test_a_state_that_one_container_has_needs_no_path():
+    machine = chain(A=Scripted(), PICK=chain(GRASP=Scripted('aborted')), C=Scripted())
+    watched, expert, outcome = run(machine, goto('C'))
+    assert outcome == 'done' and watched.visits() == ['A', 'PICK', 'GRASP', 'C']
+    assert len(expert.questions) == 1
+
+
 def test_down_into_the_middle_of_another_machine():
     machine = chain(
         PICK=chain(B=Scripted(), C=chain(D=Scripted(), E=Scripted())), PLACE=Scripted('aborted')

@@ -78,6 +78,12 @@ def test_functions_of_the_settings_and_the_given_one_must_all_be_well(health):
     assert machine.of(EventKind.HEALTH_WAIT_START)[0].text == 'battery; FakeHealth'
 
 
+def test_a_function_that_takes_too_long_counts_as_unwell_whatever_it_says(monkeypatch):
+    monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
+    port = health_ports.HealthFunctionPort('is_well', lambda: True)
+    assert port.why_unwell() == 'is_well took too long'
+
+
 def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
     machine = watched(Scripted('aborted'), settings={'healthy': {'topic': '/motors_on'}})
     assert machine.run() == 'done'

@@ -125,6 +125,19 @@ def test_the_second_half_of_a_pair_runs_only_where_the_first_does_not_hold(
     assert len(checks) == 1, 'the check is not run again'
 
 
+def test_a_state_that_is_not_repeated_by_itself_is_a_precondition_once():
+    once = Scripted()
+    machine = machine_with(
+        'X',
+        b=Scripted('aborted', 'aborted'),
+        extra=[('X', once)],
+        states={'X': {'on_retry': 'never'}},
+        memory=1000,
+    )
+    assert machine.run() == 'done'
+    assert once.runs == 1 and [met for _, met in ends(machine)] == ['met', 'not met']
+
+
 def test_preconditions_run_in_order_and_stop_at_the_first_that_is_not_met():
     ran = []
     machine = machine_with(

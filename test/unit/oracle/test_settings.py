@@ -8,6 +8,7 @@ from smach_oracle.oracle.errors import OracleError, SettingsError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 from smach_oracle.oracle.settings.preconditions import parse_preconditions
 from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.written import WrittenFloat, WrittenInt, plain
 
 
 def test_nobody_changes_settings_in_place():
@@ -332,3 +333,22 @@ def test_an_error_says_what_is_wrong_also_with_its_file_and_with_more_that_is_al
     at = str(error.set_at('oracle.yaml, line 3'))
     assert at == "oracle.yaml, line 3: name: 'xxxxxxxxx' is too long; allowed: a word"
     assert str(error.allowing(' or two')).endswith('is too long; allowed: a word or two')
+
+
+@pytest.mark.parametrize('word', ['later', 'state:', 'ask:A', 3, None])
+def test_how_a_trial_goes_on_is_one_of_four_words(word):
+    with pytest.raises(SettingsError, match='on_resume: .* is not allowed; allowed: '):
+        Settings.from_dict({'on_resume': word})
+
+
+def test_preconditions_belong_to_a_state():
+    with pytest.raises(SettingsError, match='it belongs to a state: below states: LABEL:'):
+        Settings.from_dict({'preconditions': ['LOOK']})
+
+
+def test_data_of_a_file_become_plain_numbers():
+    whole, part = WrittenInt(16), WrittenFloat(0.5)
+    whole.text, part.text = '0x10', '.5'
+    read = plain({'a': [whole], 'b': part})
+    assert read == {'a': [16], 'b': 0.5}
+    assert [type(read['a'][0]), type(read['b'])] == [int, float]
