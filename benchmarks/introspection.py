@@ -246,7 +246,7 @@ def make_server(kind: str, tree: Any) -> Any:
         import smach_ros
 
         return smach_ros.IntrospectionServer(SERVER, tree, '/TREE')
-    from smach_oracle.ros.introspection.introspection_server import IntrospectionServer
+    from smach_common.introspection.introspection_server import IntrospectionServer
 
     return IntrospectionServer(SERVER, tree, '/TREE')
 

@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ROOT / 'src' / 'smach_oracle'
 PICTURE = ROOT / 'doc' / 'images' / 'rooms'
 ENGINE = ('smach', 'smach_ros')  # upstream's, or our stand-ins
+COMMON = 'smach_common'  # what the rooms and the stand-ins share
 Graph = Dict[str, Set[str]]
 
 
@@ -40,14 +41,14 @@ def modules(path: Path) -> Iterator[str]:
 
 
 def imports(names: List[str]) -> Graph:
-    """Return which rooms each room imports, the engine among them."""
+    """Return which rooms each room imports, the engine and what is shared among them."""
     graph: Graph = {}
     for room in names:
         found = [
             name.split('.') for path in (SOURCES / room).rglob('*.py') for name in modules(path)
         ]
         inside = {parts[1] for parts in found if parts[0] == 'smach_oracle'} & set(names)
-        graph[room] = (inside | {parts[0] for parts in found} & set(ENGINE)) - {room}
+        graph[room] = (inside | {parts[0] for parts in found} & {*ENGINE, COMMON}) - {room}
     return graph
 
 
@@ -85,7 +86,7 @@ def dot() -> str:
             '\\n{}'.format(', '.join(packages[at : at + 3])) for at in range(0, len(packages), 3)
         )
         lines.append('  {} [label="{}{}"];'.format(room, room, below))
-    lines += ['  {} [style=dashed];'.format(name) for name in ENGINE]
+    lines += ['  {};'.format(COMMON), *('  {} [style=dashed];'.format(name) for name in ENGINE)]
     for room, targets in sorted(reduced(imports(names)).items()):
         lines += ['  {} -> {};'.format(room, target) for target in sorted(targets)]
     return '\n'.join(lines + ['}']) + '\n'

@@ -8,14 +8,15 @@ import _thread
 import threading
 import time
 import weakref
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Tuple
 
-import actionlib
 import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatusArray
 
 import smach
+from smach_common.action_topics import ActionTopics
+from smach_common.connections import Connection
 from smach_ros.server_watch import ServerWatch
 from smach_ros.waiting import shutting_down
 
@@ -63,17 +64,13 @@ class ActionLink(object):
     master answers.
     """
 
-    # actionlib counts its goals without one: two at once could get the same id
-    _sending = threading.Lock()
-
     def __init__(self, action_name: str, action_spec: Any) -> None:
         self.action_name = action_name
-        self.client: Optional[actionlib.ActionClient] = None
+        self.topics: Optional[ActionTopics] = None
         self.watch: Optional[ServerWatch] = None
         self.active_runs: 'weakref.WeakSet[Any]' = weakref.WeakSet()
         self._spec = action_spec
-        self._fast_ends: List[Any] = []
-        self._seen: Tuple[Any, ...] = ()
+        self._seen: List[Connection] = []
         self._seen_at = 0.0
         threading.Thread(target=self._connect, name='connect %s' % action_name, daemon=True).start()
 
@@ -95,97 +92,26 @@ class ActionLink(object):
             time.sleep(RETRY_CONNECT_S if complained else 0.05)
 
     def _open(self) -> None:
-        self._disable_nagle()
-        client = actionlib.ActionClient(self.action_name, self._spec)
-        watch = ServerWatch(client.status_sub)
-        self._fast_ends.append(
-            rospy.Subscriber(client.status_sub.name, GoalStatusArray, watch.note_status)
+        topics = ActionTopics(self.action_name, self._spec)
+        watch = ServerWatch(topics.client.status_sub)
+        self._status_sub = rospy.Subscriber(
+            topics.client.status_sub.name, GoalStatusArray, watch.note_status
         )
         self.watch = watch
-        self.client = client
-
-    def _disable_nagle(self) -> None:
-        # A goal a few milliseconds after the last one would otherwise wait for a delayed TCP
-        # acknowledgement (40 ms).
-        # Both directions are asked for by whoever opens the topic here first. These handles stay
-        # for that purpose.
-        if self._fast_ends:
-            return
-        base, spec = rospy.remap_name(self.action_name), self._spec()
-        for topic, message in (
-            ('goal', spec.action_goal),
-            ('result', spec.action_result),
-            ('feedback', spec.action_feedback),
-        ):
-            if topic == 'goal':
-                self._fast_ends.append(
-                    rospy.Publisher(
-                        base + '/' + topic, type(message), tcp_nodelay=True, queue_size=10
-                    )
-                )
-            else:
-                self._fast_ends.append(
-                    rospy.Subscriber(base + '/' + topic, type(message), tcp_nodelay=True)
-                )
-        self._fast_ends.append(
-            rospy.Subscriber(base + '/status', GoalStatusArray, tcp_nodelay=True)
-        )
+        self.topics = topics
 
     def ready(self) -> bool:
         """Whether a server is connected on all topics, so that neither a goal nor its result can
         get lost.
         """
-        connections = self._connections()
+        topics, watch = self.topics, self.watch
+        if topics is None or watch is None:
+            return False
+        connections = topics.connections_from(watch.server_id)
         if [id(each) for each in connections] != [id(each) for each in self._seen]:
             self._seen, self._seen_at = connections, time.monotonic()
         return bool(connections) and time.monotonic() - self._seen_at >= SETTLE_S
 
-    def _connections(self) -> Tuple[Any, ...]:
-        """The connections on which result and feedback come, or () while any topic is without the
-        server.
-        """
-        client, watch = self.client, self.watch
-        if client is None or watch is None or not watch.connections():
-            return ()
-        server_id = watch.server_id
-        heard = tuple(
-            _heard(topic, server_id) for topic in (client.result_sub, client.feedback_sub)
-        )
-        told = (client.pub_goal, client.pub_cancel)
-        return (
-            heard
-            if all(heard) and all(topic.impl.has_connection(server_id) for topic in told)
-            else ()
-        )
-
     def problem(self, frozen_after_s: float) -> Optional[str]:
         """Return why the server must be regarded as lost, or None. See ServerWatch."""
         return self.watch.problem(frozen_after_s) if self.watch is not None else None
-
-    def send_goal(
-        self,
-        goal: Any,
-        on_transition: Callable[[Any], None],
-        on_feedback: Callable[[Any, Any], None],
-    ) -> Any:
-        """Send ``goal`` (the action's Goal message), and return actionlib's goal handle, which
-        keeps the goal tracked.
-        """
-        if self.client is None:
-            raise smach.InvalidStateError(
-                "Action '%s' is not connected: send_goal() before ready()" % self.action_name
-            )
-        with self._sending:
-            return self.client.send_goal(goal, on_transition, on_feedback)
-
-
-def _heard(subscriber: Any, server_id: str) -> Any:
-    """The subscriber's connection to the server, or None."""
-    return next(
-        (
-            connection
-            for connection in subscriber.impl.connections or ()
-            if getattr(connection, 'callerid_pub', None) == server_id
-        ),
-        None,
-    )

@@ -8,6 +8,7 @@ from actionlib import CommState
 from actionlib_msgs.msg import GoalStatus
 
 import smach
+from smach_common.tracked_goal import TrackedGoal
 from smach_ros.action_link import ActionLink
 from smach_ros.waiting import Signal
 
@@ -19,7 +20,7 @@ received.
 RESULT_AFTER_S = 5.0
 
 
-class GoalRun(object):
+class GoalRun(TrackedGoal):
     """Tracks one goal. ``listener`` has SimpleActionState's three overridable callbacks.
 
     ``done`` turns True once, after ``status`` (a GoalStatus constant) and ``result`` (None if none
@@ -28,6 +29,7 @@ class GoalRun(object):
     """
 
     def __init__(self, link: ActionLink, listener: Any, signal: Signal) -> None:
+        super().__init__(UNSEEN_AFTER_S, RESULT_AFTER_S)
         self.done = False
         self.status = GoalStatus.PENDING
         self.result: Any = None
@@ -36,18 +38,18 @@ class GoalRun(object):
         self._listener: Optional[Any] = listener
         self._signal = signal
         self._was_active = False
-        self._acknowledged = False
         self._cancelled = False
-        self._ended_at: Optional[float] = None
-        self.handle: Any = None
-        self._sent_at = 0.0
         self._statuses_before = 0
 
     def send(self, goal: Any) -> None:
         """Send the goal and begin to track it."""
-        self._sent_at = time.monotonic()
-        self._statuses_before = self._link.watch.status_count if self._link.watch is not None else 0
-        self.handle = self._link.send_goal(goal, self._on_transition, self._on_feedback)
+        topics, watch = self._link.topics, self._link.watch
+        if topics is None:
+            raise smach.InvalidStateError(
+                "Action '%s' is not connected: send_goal() before ready()" % self._link.action_name
+            )
+        self._statuses_before = watch.status_count if watch is not None else 0
+        self.send_on(topics, goal)
         self._link.active_runs.add(self)
 
     def cancel(self) -> None:
@@ -82,7 +84,7 @@ class GoalRun(object):
 
     def _never_received(self) -> Optional[str]:
         watch = self._link.watch
-        if self._acknowledged or watch is None or time.monotonic() - self._sent_at < UNSEEN_AFTER_S:
+        if watch is None or not self.lacks_acknowledgement(time.monotonic()):
             return None
         if watch.status_count - self._statuses_before < UNSEEN_STATUSES:
             return None
@@ -92,22 +94,18 @@ class GoalRun(object):
         )
 
     def _result_lost(self) -> Optional[str]:
-        if self._ended_at is None or time.monotonic() - self._ended_at < RESULT_AFTER_S:
+        if not self.lacks_result(time.monotonic()):
             return None
         return (
             'its server reports the end of the goal, but no result came within %g s'
             % RESULT_AFTER_S
         )
 
-    def _on_transition(self, handle: Any) -> None:
-        state = handle.get_comm_state()
-        if state != CommState.WAITING_FOR_CANCEL_ACK:
-            self._acknowledged = True
+    def take_state(self, state: int, handle: Any) -> None:
+        """Tell the listener where the goal has got to."""
         if state in (CommState.ACTIVE, CommState.PREEMPTING) and not self._was_active:
             self._was_active = True
             self._tell('_goal_active_cb')
-        elif state == CommState.WAITING_FOR_RESULT:
-            self._ended_at = time.monotonic()
         elif state == CommState.DONE and not self.done and self._listener is not None:
             self.status, self.result = handle.get_goal_status(), handle.get_result()
             self.text = handle.get_goal_status_text()
@@ -115,7 +113,8 @@ class GoalRun(object):
             self.done = True
             self._signal.notify()
 
-    def _on_feedback(self, handle: Any, feedback: Any) -> None:
+    def on_feedback(self, handle: Any, feedback: Any) -> None:
+        """Tell the listener. This is actionlib's callback."""
         self._tell('_goal_feedback_cb', feedback)
 
     def _tell(self, callback: str, *values: Any) -> None:

@@ -3,7 +3,7 @@
 The server is the one that the oracle uses, whichever smach_ros is installed.
 """
 
-from smach_oracle.ros.introspection.introspection_server import (
+from smach_common.introspection.introspection_server import (
     INIT_TOPIC,
     STATUS_TOPIC,
     STRUCTURE_TOPIC,

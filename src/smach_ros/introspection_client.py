@@ -7,9 +7,9 @@ from typing import Any, List, Optional, Sequence
 import rospy
 
 import smach
+from smach_common.introspection.introspection_server import INIT_TOPIC, STATUS_TOPIC
+from smach_common.introspection.plain_pickle import encode_userdata
 from smach_msgs.msg import SmachContainerInitialStatusCmd, SmachContainerStatus
-from smach_oracle.ros.introspection.introspection_server import INIT_TOPIC, STATUS_TOPIC
-from smach_oracle.ros.introspection.plain_pickle import encode_userdata
 from smach_ros.waiting import deadline_after, seconds, shutting_down
 
 REPEAT_COMMAND_S = 2.0

@@ -12,7 +12,8 @@ from typing import Any, Callable, List, Optional
 import rospy
 
 import smach
-from smach_ros import node_probe
+from smach_common import node_probe
+from smach_common.connections import live_connections, sender_of
 
 SILENT_AFTER_S = 2.0
 """Status messages missing for this long make us ask the node."""
@@ -55,7 +56,7 @@ class ServerWatch(object):
 
     def note_status(self, message: Any) -> None:
         """Take note of a status message. Call it for every one."""
-        self.server_id = message._connection_header['callerid']
+        self.server_id = sender_of(message)
         self._last_status_at = self._clock()
         self.status_count += 1
         for connection in self.connections():
@@ -67,9 +68,8 @@ class ServerWatch(object):
         """Open connections to the server's status topic."""
         return [
             connection
-            for connection in self._subscriber.impl.connections or ()
-            if getattr(connection, 'callerid_pub', None) == self.server_id
-            and getattr(connection, 'socket', None) is not None
+            for connection in live_connections(self._subscriber)
+            if connection.callerid_pub == self.server_id
         ]
 
     def problem(self, frozen_after_s: float = FROZEN_AFTER_S) -> Optional[str]:

@@ -135,8 +135,8 @@ class SimpleActionState(smach.State):
         """A SimpleActionClient for the latest goal, for scripts, or None until the node is
         initialised.
         """
-        if self._client is None and self._link.client is not None:
-            self._client = StateClient(self._link.client)
+        if self._client is None and self._link.topics is not None:
+            self._client = StateClient(self._link.topics.client)
         return self._client
 
     def request_preempt(self) -> None:

@@ -6,7 +6,7 @@ from typing import Dict
 
 # on both engines: the executive, what SMACH does, what attaches a machine to its node, and the kit
 # with which users test theirs
-UNIT_TESTS = ['oracle', 'ros', 'smach', 'testing']
+UNIT_TESTS = ['oracle', 'ros', 'smach', 'smach_common', 'testing']
 # rostests of wrapped machines, and of what smach_ros does; not smach_ros_action_faults, which tests
 # what upstream has not: it looks into the links that states of ours share
 ROSTESTS = [

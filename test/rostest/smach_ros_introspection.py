@@ -14,14 +14,14 @@ from smach_ros_support import InBackground, LogWatch, userdata
 from waiting import stays, wait_for
 
 import smach
+from smach_common.introspection import introspection_server
+from smach_common.introspection.introspection_server import IntrospectionServer
+from smach_common.introspection.plain_pickle import decode_userdata
 from smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
     SmachContainerStructure,
 )
-from smach_oracle.ros.introspection import introspection_server
-from smach_oracle.ros.introspection.introspection_server import IntrospectionServer
-from smach_oracle.ros.introspection.plain_pickle import decode_userdata
 from smach_ros import IntrospectionClient
 
 MD5 = {

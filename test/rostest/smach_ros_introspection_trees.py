@@ -12,9 +12,9 @@ from smach_ros_support import LogWatch
 from waiting import stays, wait_for
 
 import smach
+from smach_common.introspection.plain_pickle import decode_userdata
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.ros.introspection import IntrospectionServer
-from smach_oracle.ros.introspection.plain_pickle import decode_userdata
 
 STATUS, STRUCTURE = '/smach/container_status', '/smach/container_structure'
 VIEWER_QUEUE = 50  # as smach_viewer has it

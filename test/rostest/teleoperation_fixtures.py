@@ -142,7 +142,6 @@ class Person:
                 outcomes=['succeeded', 'aborted'],
                 output_keys=['grasp', 'note'],
             ),
-            time.monotonic(),
         )
 
     def active(self, query_id='q1'):

@@ -7,8 +7,8 @@ from typing import Callable, FrozenSet, Iterable, List, NamedTuple, Optional
 import genpy
 import rospy
 
+from smach_common.connections import sender_of
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, OpenQueries, OpenQuery
-from smach_oracle.ros.introspection.viewer_jump import sender_of
 from smach_oracle.ros.senders.own_messages import is_named_after, publishers_of
 from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
 from smach_oracle.srv import (

@@ -261,7 +261,7 @@ class RosRobot:
         """
         with self._calls:
             link = self._ready(name, what)
-            sent = link.send(goal, time.monotonic())
+            sent = link.send(goal)
             cancelled_at: Optional[float] = None
             until = time.monotonic() + ends_within_s
             while True:

@@ -14,9 +14,10 @@ import rospy
 import tf2_ros
 from sensor_msgs.msg import CameraInfo, Image, JointState
 
+from smach_common.connections import live_connections
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import from_quaternion
-from smach_oracle.ros.connections import ConnectionGrace, live_connections
+from smach_oracle.ros.connections import ConnectionGrace
 from smach_oracle.ros.images import ImageError, colour_of, depth_of, intrinsics_of
 from smach_oracle.srv import Snapshot, SnapshotResponse
 

@@ -27,6 +27,8 @@ from typing import (
 import rospy
 
 import smach
+from smach_common.introspection.container_watch import CALLBACK_LISTS, is_watched
+from smach_common.introspection.introspection_server import IntrospectionServer
 from smach_oracle.forking import in_child
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -42,8 +44,6 @@ from .hand.hand_server import HandServer
 from .health.health_port import listen_to_health
 from .health.health_topics import HealthTopics
 from .interfaces.starting import OUTPUT_TOPIC
-from .introspection.container_watch import CALLBACK_LISTS, is_watched
-from .introspection.introspection_server import IntrospectionServer
 from .master_watch import start_master_watch
 from .parameters import private_flag, private_names, private_number, private_text
 from .publishers import EventPublisher, RatesPublisher, rates_of

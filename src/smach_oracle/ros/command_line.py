@@ -10,7 +10,7 @@ from typing import Any, Iterator
 import rosgraph
 import rospy
 
-from .master_watch import TimedTransport
+from smach_common.node_probe import TimedTransport
 
 ANSWER_S = 2.0  # that a node of the same name has to show that it runs
 OWN_NAME = '__name:='

@@ -1,16 +1,16 @@
-"""Connections that are there, of which the other side surely knows, or that rospy is closing."""
+"""Connections of which the other side surely knows, or that rospy is closing."""
 
 import http.client
 import socket
 import time
 import xmlrpc.client
 from contextlib import contextmanager
-from typing import Any, Dict, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Any, Dict, Iterator, Optional, Sequence, Set, Tuple
 
 import rospy
-from rospy.impl.tcpros_base import TCPROSTransport as Connection
 
-from .master_watch import TimedTransport
+from smach_common.connections import Connection
+from smach_common.node_probe import TimedTransport
 
 GRACE_S = 0.1
 """For a publisher that cannot be asked whether it knows of a new connection."""
@@ -22,18 +22,6 @@ ASK_AGAIN_S = 0.01
 
 TOPIC_ERRORS = (AttributeError, TypeError, rospy.ROSException)
 """What rospy raises where a topic is closed, or is being closed."""
-
-
-def live_connections(subscriber: rospy.Subscriber) -> List[Connection]:
-    """Return its connections, without those whose socket is gone.
-
-    The latter only wait to be made again.
-    """
-    if subscriber.impl is None:
-        return []
-    return [
-        each for each in subscriber.impl.connections if getattr(each, 'socket', None) is not None
-    ]
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import genpy
 import rospy
 from std_msgs.msg import Header
 
-from smach_oracle.foreign import ends_program, error_text, text_of
+from smach_common.foreign import ends_program, error_text, text_of
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow

@@ -8,8 +8,7 @@ everything again.
 import threading
 import time
 import xmlrpc.client
-from http.client import HTTPConnection
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 import rosgraph
 import rospy
@@ -21,10 +20,10 @@ from rospy.impl.registration import (
     get_topic_manager,
 )
 
+from smach_common.node_probe import CALL_LIMIT_S, TimedTransport
 from smach_oracle.forking import in_child
 
 POLL_S = 1.0
-CALL_LIMIT_S = 5.0  # a master that hangs must not hang the watch forever
 # rospy asks for it at each line of the log
 _ROSOUT_PARAM = '/rosout_disable_topics_generation'
 
@@ -39,19 +38,6 @@ class Registrations(NamedTuple):
     publications: Sequence[Sequence[str]]  # (topic, type)
     subscriptions: Sequence[Sequence[str]]  # (topic, type)
     services: Sequence[Tuple[str, str]]  # (service, uri)
-
-
-class TimedTransport(xmlrpc.client.Transport):
-    """XML-RPC over a connection with a time limit, in s."""
-
-    def __init__(self, limit_s: float = CALL_LIMIT_S) -> None:
-        super().__init__()
-        self._limit_s = limit_s
-
-    def make_connection(self, host: Union[str, Tuple[str, Dict[str, str]]]) -> HTTPConnection:
-        connection = super().make_connection(host)
-        connection.timeout = self._limit_s
-        return connection
 
 
 class MasterLink:

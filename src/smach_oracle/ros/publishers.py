@@ -12,7 +12,7 @@ from typing import Dict, Optional, Protocol, Sequence, Union
 
 import rospy
 
-from smach_oracle.foreign import error_text
+from smach_common.foreign import error_text
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Callable, Mapping, Optional, Sequence, Tuple, 
 import genpy
 import rospy
 
-from smach_oracle.foreign import error_text, repr_of
+from smach_common.foreign import error_text, repr_of
 from smach_oracle.forking import in_child
 from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver

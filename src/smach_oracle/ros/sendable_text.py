@@ -1,6 +1,6 @@
 """Texts that rospy can send. Pure."""
 
-from smach_oracle.foreign import text_of
+from smach_common.foreign import text_of
 
 
 def sendable_text(value: object) -> str:

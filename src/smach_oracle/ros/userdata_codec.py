@@ -21,7 +21,7 @@ from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Seque
 import genpy
 import roslib.message
 
-from smach_oracle.foreign import ends_program, repr_of, text_of, type_name
+from smach_common.foreign import ends_program, repr_of, text_of, type_name
 from smach_oracle.msg import UserdataItem
 from smach_oracle.oracle.errors import OracleError
 

@@ -256,7 +256,7 @@ def _moved(link: GoalLink, goal: genpy.Message) -> str:
     """Send a goal and wait for its end. Return why it was not reached, or ''."""
     if not _within(link.ready):
         return 'no controller at {}'.format(link.name)
-    sent = link.send(goal, time.monotonic())
+    sent = link.send(goal)
     until = time.monotonic() + _MOTION_S
     while time.monotonic() < until and not rospy.is_shutdown():
         event = sent.poll()

@@ -26,7 +26,7 @@ from typing import (
     Type,
 )
 
-from smach_oracle.foreign import ends_program, error_text
+from smach_common.foreign import ends_program, error_text
 
 from .object_parts import (
     attributes,

@@ -5,7 +5,7 @@ import sys
 from types import MemberDescriptorType
 from typing import Any, Iterator
 
-from smach_oracle.foreign import module_of, qualname_of
+from smach_common.foreign import module_of, qualname_of
 
 _IN_PYTHON = 1 << 9  # the flag of a class that no C code has laid out
 

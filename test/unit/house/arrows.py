@@ -1,19 +1,22 @@
 """Which room may import which in src/smach_oracle, and how an import is read against the tables.
 
-The layers within a room are contracts of import-linter, in pyproject.toml.
+The layers within a room are contracts of import-linter, in pyproject.toml. A name within
+smach_oracle stands without that word. One of smach_common has its own in front.
 """
 
 import re
+from pathlib import Path
 from typing import Dict, Iterable, Iterator, List, Set, Tuple
 
 from house import ROOT, imports, python_files, shown
 
 PACKAGE = ROOT / 'src/smach_oracle'
+COMMON = 'smach_common'  # what the rooms and the stand-ins share
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
     'oracle': {'foreign', 'forking', 'store'},
-    'store': {'foreign', 'forking'},  # no ROS, no SMACH
+    'store': {'smach_common.foreign', 'forking'},  # no ROS, no SMACH
     'ros': {
         'oracle.asking',
         'oracle.background',
@@ -29,9 +32,9 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.OracleContainer',
         'oracle.oracle_of',
         'oracle.waiting',
-        'foreign',
         'forking',
         'packages',
+        'smach_common',
         'store',
     },
     'geometry': set(),
@@ -42,7 +45,14 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.settings',
         'packages',
     },
-    'interfaces': {'oracle.asking', 'oracle.errors', 'oracle.settings', 'ros', 'geometry'},
+    'interfaces': {
+        'oracle.asking',
+        'oracle.errors',
+        'oracle.settings',
+        'ros',
+        'geometry',
+        'smach_common',
+    },
     'expert': {
         'oracle.asking',
         'oracle.errors',
@@ -54,9 +64,17 @@ ARROWS: Dict[str, Set[str]] = {
         'interfaces',
         'forking',
         'packages',
+        'smach_common',
         'store',
     },
-    'pr2': {'oracle.errors', 'oracle.number_checks', 'oracle.settings', 'ros', 'geometry'},
+    'pr2': {
+        'oracle.errors',
+        'oracle.number_checks',
+        'oracle.settings',
+        'ros',
+        'geometry',
+        'smach_common',
+    },
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {
         'oracle.errors',
@@ -94,7 +112,7 @@ ARROWS: Dict[str, Set[str]] = {
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'documentation': set(),
-    'foreign': set(),
+    'foreign': {'smach_common.foreign'},
     'forking': set(),
     'packages': set(),
 }
@@ -143,19 +161,27 @@ def below(place: str, names: Iterable[str]) -> bool:
     return (place + '.').startswith(tuple(name + '.' for name in names))
 
 
-def found(folder: str) -> Iterator[Tuple[str, str]]:
+def folder_of(place: str) -> Path:
+    """The folder of a place, such as a room; that of a module lacks its suffix."""
+    return (PACKAGE.parent if below(place.replace('/', '.'), [COMMON]) else PACKAGE) / place
+
+
+def found(place: str) -> Iterator[Tuple[str, str]]:
     """What a module or the files of a folder import, as (FILE:LINE, dotted name)."""
-    module = PACKAGE / (folder + '.py')
-    for each in [module] if module.is_file() else python_files('src/smach_oracle/' + folder):
+    module = folder_of(place).with_suffix('.py')
+    folder = str(folder_of(place).relative_to(ROOT))
+    for each in [module] if module.is_file() else python_files(folder):
         for line, name in imports(each):
             yield '{}:{}'.format(shown(each), line), name
 
 
-def ours(folder: str) -> Iterator[Tuple[str, str]]:
-    """What they import of smach_oracle, as (FILE:LINE, name within it); '' is the top itself."""
-    for where, name in found(folder):
+def ours(place: str) -> Iterator[Tuple[str, str]]:
+    """What they import of ours, as (FILE:LINE, name); '' is the top of smach_oracle itself."""
+    for where, name in found(place):
         if below(name, ['smach_oracle']):
             yield where, name[len('smach_oracle.') :]
+        elif below(name, [COMMON]):
+            yield where, name
 
 
 def told(wrong: Iterable[Tuple[str, str]]) -> List[str]:
@@ -165,11 +191,11 @@ def told(wrong: Iterable[Tuple[str, str]]) -> List[str]:
 
 def needs_ros(name: str) -> bool:
     """Whether a dotted name is a module of ROS, or a message of ours."""
-    return bool(OF_ROS.fullmatch(name.split('.')[0])) or below(
-        name, ['smach_oracle.' + each for each in MESSAGES]
-    )
+    of_common = below(name, [COMMON]) and not below(name, [COMMON + '.foreign'])
+    of_messages = below(name, ['smach_oracle.' + each for each in MESSAGES])
+    return of_common or of_messages or bool(OF_ROS.fullmatch(name.split('.')[0]))
 
 
 def needs_engine(name: str) -> bool:
     """Whether a dotted name is a module of SMACH."""
-    return bool(ENGINE.fullmatch(name.split('.')[0]))
+    return below(name, [COMMON + '.introspection']) or bool(ENGINE.fullmatch(name.split('.')[0]))

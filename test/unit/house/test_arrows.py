@@ -13,6 +13,7 @@ from typing import Dict, List, Set
 import pytest
 from arrows import (
     ARROWS,
+    COMMON,
     INSIDE,
     MESSAGES,
     OF_ROS,
@@ -22,6 +23,7 @@ from arrows import (
     TOP,
     WITH_SMACH,
     below,
+    folder_of,
     found,
     needs_engine,
     needs_ros,
@@ -31,7 +33,6 @@ from arrows import (
 from house import ROOT, imports, parse, python_files, shown
 from layers import LAYERS
 
-INTROSPECTION = 'smach_oracle.ros.introspection'
 MAX_MODULES = 20  # in a package, its __init__ not counted
 ROS = {
     'rospy',
@@ -139,7 +140,7 @@ def modules_of(room: str) -> Dict[str, Path]:
     """The modules of a room by dotted name; a package goes by its own."""
     named = {
         path.relative_to(ROOT / 'src').with_suffix('').parts: path
-        for path in python_files('src/smach_oracle/' + room)
+        for path in python_files(shown(folder_of(room)))
     }
     return {
         '.'.join(parts[:-1] if parts[-1] == '__init__' else parts): path
@@ -176,7 +177,7 @@ def circle_in(graph: Dict[str, Set[str]]) -> List[str]:
         left = {node: targets for node, targets in left.items() if node not in leaves}
 
 
-@pytest.mark.parametrize('room', ROOMS)
+@pytest.mark.parametrize('room', [COMMON, *ROOMS])
 def test_no_modules_of_a_room_import_each_other_in_a_circle(room):
     modules = modules_of(room)
     graph = {
@@ -213,25 +214,15 @@ def test_the_engine_needs_python_alone():
     } - STDLIB <= {'smach'}
 
 
-def test_the_engine_knows_of_the_oracle_only_its_introspection():
-    for package, allowed in (('smach', ()), ('smach_ros', (INTROSPECTION,))):
-        for path in python_files('src/' + package):
-            assert not [
-                name
-                for _, name in imports(path)
-                if name.startswith('smach_oracle')
-                and not (name + '.').startswith(tuple(each + '.' for each in allowed))
-            ], shown(path)
-
-
-def test_the_introspection_knows_nothing_of_the_oracle():
-    for path in python_files('src/smach_oracle/ros/introspection'):
-        assert not [
-            name
-            for _, name in imports(path)
-            if name.startswith('smach_oracle')
-            and not below(name, [INTROSPECTION, 'smach_oracle.foreign'])
-        ], shown(path)
+@pytest.mark.parametrize('package', ['smach', 'smach_ros', COMMON])
+def test_the_stand_ins_and_what_they_build_on_know_nothing_of_the_oracle(package):
+    allowed = {'smach': set(), 'smach_ros': {'smach', COMMON}, COMMON: {'smach'}}[package]
+    for path in python_files('src/' + package):
+        own = {name.split('.')[0] for _, name in imports(path)} & {*STAND_INS, COMMON}
+        assert own <= allowed | {package, 'smach_msgs'}, shown(path)
+        # nor by a name in a text, as import_module takes it
+        assert 'smach_oracle.' not in path.read_text(encoding='utf-8'), shown(path)
+        assert not [name for _, name in imports(path) if below(name, ['smach_oracle'])]
 
 
 def test_the_use_cases_are_scripts_as_any_smach_user_writes_them():
@@ -283,7 +274,7 @@ def test_everything_that_is_imported_is_set_up_on_debian():
     used = {name.split('.')[0] for path in python_files('src') for _, name in imports(path)}
     missing = {
         name
-        for name in used - STDLIB - STAND_INS - {'smach_oracle'}
+        for name in used - STDLIB - STAND_INS - {COMMON, 'smach_oracle'}
         if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there
     }
     assert not missing

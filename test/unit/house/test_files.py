@@ -46,7 +46,7 @@ def test_there_is_one_restricted_unpickler_and_it_decides_what_it_admits():
         and any('Unpickler' in ast.dump(base) for base in node.bases)
     ]
     assert [shown(path) for path, _ in classes] == [
-        'src/smach_oracle/ros/introspection/plain_pickle.py'
+        'src/smach_common/introspection/plain_pickle.py'
     ]
     assert 'find_class' in {
         node.name for node in classes[0][1].body if isinstance(node, ast.FunctionDef)

@@ -6,7 +6,7 @@ import re
 
 from house import ROOT, parse, python_files, shown
 
-PACKAGE = python_files('src/smach_oracle')
+PACKAGE = python_files('src/smach_oracle', 'src/smach_common')
 # the one in ros/ extends the bare one of the executive, and stands for it in ROS programs
 SHARED = {'OracleContainer'}
 (STATIC,) = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))

@@ -7,7 +7,7 @@ import re
 
 from house import parse, python_files, shown
 
-PACKAGE = python_files('src/smach_oracle')
+PACKAGE = python_files('src/smach_oracle', 'src/smach_common')
 MOST_ANY = 0.02  # share of annotations that are exactly Any
 MOST_IGNORES = 8
 

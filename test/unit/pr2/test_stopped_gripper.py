@@ -46,7 +46,7 @@ class FakeGripper:
 
     alive = ready
 
-    def send(self, goal, now_s):
+    def send(self, goal):
         return self.goal
 
 

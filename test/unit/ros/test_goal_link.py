@@ -8,9 +8,10 @@ import pytest
 import rospy
 from actionlib import CommState
 
+from smach_common.connections import reaches
 from smach_oracle.msg import SharedAutonomyAction
 from smach_oracle.ros import connections, goal_link
-from smach_oracle.ros.goal_link import GoalLink, SentGoal, ServedClient, _reaches
+from smach_oracle.ros.goal_link import GoalLink, SentGoal, ServedClient
 
 
 class FakeHandle:
@@ -31,7 +32,7 @@ class FakeHandle:
 
 
 def sent_and_seen(*states):
-    sent = SentGoal(time.monotonic())
+    sent = SentGoal()
     for state in states:
         sent.on_transition(FakeHandle(state))
     return sent
@@ -42,6 +43,7 @@ def sent_and_seen(*states):
     [
         ([], True),
         ([CommState.PENDING], False),
+        ([CommState.WAITING_FOR_CANCEL_ACK], True),
         ([CommState.PENDING, CommState.ACTIVE], False),
         ([CommState.ACTIVE, CommState.WAITING_FOR_RESULT], True),
     ],
@@ -73,9 +75,9 @@ class FakePublisher:
 
 
 def test_a_connection_to_a_node_that_has_died_reaches_nobody():
-    assert _reaches(FakePublisher('/by_hand'), '/by_hand')
-    assert not _reaches(FakePublisher('/by_hand', dead=['/by_hand']), '/by_hand')
-    assert not _reaches(FakePublisher('/other'), '/by_hand')
+    assert reaches(FakePublisher('/by_hand'), '/by_hand')
+    assert not reaches(FakePublisher('/by_hand', dead=['/by_hand']), '/by_hand')
+    assert not reaches(FakePublisher('/other'), '/by_hand')
 
 
 class FakeConnection:
@@ -104,7 +106,8 @@ class FakeClient:
 def client(monkeypatch):
     """What a link is made of, connected to a server."""
     monkeypatch.setattr(connections, 'GRACE_S', 0.2)
-    monkeypatch.setattr(rospy, 'Subscriber', lambda *_, **__: None)
+    for kind in ('Publisher', 'Subscriber'):
+        monkeypatch.setattr(rospy, kind, lambda *_, **__: None)
     client = FakeClient()
     monkeypatch.setattr(goal_link, 'ServedClient', lambda *_: client)
     return client

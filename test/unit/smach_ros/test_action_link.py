@@ -7,6 +7,9 @@ from waiting import stays, wait_for
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
+from actionlib.msg import TestAction
+
+from smach_common import action_topics
 from smach_ros import action_link
 from smach_ros.action_link import ActionLink
 
@@ -18,6 +21,9 @@ class FakeTopic:
         self.impl = self
         self.connections = [FakeConnection(server) for server in servers]
 
+    def check(self):
+        pass
+
     def has_connection(self, server):
         return any(connection.callerid_pub == server for connection in self.connections)
 
@@ -25,27 +31,29 @@ class FakeTopic:
 class FakeConnection:
     def __init__(self, server):
         self.callerid_pub = server
+        self.socket = object()
 
 
 class FakeClient:
     def __init__(self):
         self.pub_goal, self.pub_cancel = FakeTopic('/server'), FakeTopic('/server')
         self.result_sub, self.feedback_sub = FakeTopic('/server'), FakeTopic('/server')
+        self.status_sub = FakeTopic('/server')
 
 
 class FakeWatch:
     server_id = '/server'
-
-    def connections(self):
-        return [FakeConnection('/server')]
 
 
 @pytest.fixture
 def link(monkeypatch):
     monkeypatch.setattr(ActionLink, '_connect', lambda self: None)
     monkeypatch.setattr(action_link, 'SETTLE_S', 0.2)
-    link = ActionLink('work', None)
-    link.client, link.watch = FakeClient(), FakeWatch()
+    monkeypatch.setattr(action_topics, '_open_undelayed', lambda name, action: [])
+    link = ActionLink('work', TestAction)
+    client = FakeClient()
+    link.topics = action_topics.ActionTopics('work', TestAction, lambda name, spec: client)
+    link.watch = FakeWatch()
     return link
 
 
@@ -62,11 +70,14 @@ def test_a_new_connection_is_given_time_to_be_known_to_the_server(link):
 
 def test_a_connection_made_anew_is_given_that_time_again(link):
     becomes_ready_s(link)
-    link.client.result_sub = FakeTopic('/server')
+    link.topics.client.result_sub = FakeTopic('/server')
     assert 0.2 <= becomes_ready_s(link) < 5.0
 
 
-@pytest.mark.parametrize('topic', ['pub_goal', 'pub_cancel', 'result_sub', 'feedback_sub'])
+TOPICS = ['pub_goal', 'pub_cancel', 'status_sub', 'result_sub', 'feedback_sub']
+
+
+@pytest.mark.parametrize('topic', TOPICS)
 def test_a_topic_without_the_server_is_waited_for(link, topic):
-    setattr(link.client, topic, FakeTopic('/another'))
+    setattr(link.topics.client, topic, FakeTopic('/another'))
     assert stays(lambda: not link.ready(), 0.3), 'longer than a new connection is given'

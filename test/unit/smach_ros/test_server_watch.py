@@ -4,7 +4,8 @@ import pytest
 
 pytest.importorskip('rospy')
 pytest.importorskip('smach_ros')
-from smach_ros import node_probe, server_watch
+from smach_common import node_probe
+from smach_ros import server_watch
 
 
 class FakeClock(object):

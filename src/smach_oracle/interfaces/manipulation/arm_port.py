@@ -154,7 +154,7 @@ class GripperPort:
         self._wanted = position, effort
         goal = GripperCommandGoal()
         goal.command.position, goal.command.max_effort = position, effort
-        self._sent = self._link.send(goal, time.monotonic())
+        self._sent = self._link.send(goal)
 
     def stop(self) -> None:
         """Take back a motion that has not ended."""

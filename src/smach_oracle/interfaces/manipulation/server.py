@@ -13,10 +13,10 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Header
 
+from smach_common.connections import sender_of
 from smach_oracle.msg import CollisionBoxes, SharedAutonomyGoal, TeleopCommand, TeleopState
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.ros.command_line import parameters_only
-from smach_oracle.ros.introspection.viewer_jump import sender_of
 from smach_oracle.ros.master_watch import start_master_watch
 from smach_oracle.ros.senders.own_messages import listens
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode_all

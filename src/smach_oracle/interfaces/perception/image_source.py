@@ -13,10 +13,11 @@ import tf2_ros
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
+from smach_common.connections import live_connections
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.depth import points_of
 from smach_oracle.geometry.transforms import from_quaternion
-from smach_oracle.ros.connections import ConnectionGrace, live_connections
+from smach_oracle.ros.connections import ConnectionGrace
 from smach_oracle.ros.images import ImageError, cloud_message, colour_of, depth_of, intrinsics_of
 from smach_oracle.ros.service_calls import ServerGoneError, call_service
 from smach_oracle.srv import Snapshot, SnapshotRequest

@@ -128,7 +128,7 @@ class ExpertQueryClient(Expert):
         goal = to_goal(question, self.robot)
         goal.interface = offer.name
         goal.deadline = 0.0
-        return self._link.send(goal, time.monotonic())
+        return self._link.send(goal)
 
     def _run(
         self, offer: InterfaceOffer, question: Question, cancelled: threading.Event
@@ -185,7 +185,7 @@ class ExpertQueryClient(Expert):
     ) -> Optional[SharedAutonomyResult]:
         if not _wait_until_ready(link, self._server_wait_s, cancelled):
             return None
-        sent = link.send(to_interface_goal(offer, question), time.monotonic())
+        sent = link.send(to_interface_goal(offer, question))
         while not (cancelled.is_set() or rospy.is_shutdown()):
             event = sent.poll()
             if event is not None and event.status:
@@ -250,7 +250,7 @@ class _SentQuestion:
         """Send the question. The deadline does not begin again."""
         if self._deadline_s < math.inf:
             self._goal.deadline = max(self._deadline_s - now_s, 1e-3)
-        self._sent = self._link.send(self._goal, now_s)
+        self._sent = self._link.send(self._goal)
         self._times_sent += 1
         if self._times_sent > 1:
             rospy.loginfo('Question %s is asked again at %s', self._goal.query_id, self._link.name)

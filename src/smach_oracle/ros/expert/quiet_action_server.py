@@ -7,8 +7,9 @@ import actionlib
 import genpy
 import rospy
 
+from smach_common.connections import sender_of
+
 from ..connections import quiet_at_shutdown
-from ..introspection.viewer_jump import sender_of
 from ..log.said_once import warn_once
 from ..senders.own_messages import LISTENS_AFTER_S, listens
 

@@ -14,6 +14,7 @@ import actionlib
 import rosgraph.names
 import rospy
 
+from smach_common.connections import Connection
 from smach_oracle.msg import (
     ExpertQueryAction,
     ExpertQueryFeedback,
@@ -33,7 +34,7 @@ from smach_oracle.srv import (
 )
 
 from ..command_line import parameters_only
-from ..connections import Connection, quiet_at_shutdown
+from ..connections import quiet_at_shutdown
 from ..master_watch import start_master_watch
 from ..parameters import name_of, number_of
 from .open_questions import (

@@ -13,13 +13,13 @@ from typing import Any, Collection, Dict, Iterator, List, Optional, Tuple
 import rospy
 
 import smach
+from smach_common.connections import sender_of
+from smach_common.introspection.plain_pickle import RefusedDataError, decode_userdata
+from smach_common.introspection.viewer_jump import add_sender
 from smach_msgs.msg import SmachContainerInitialStatusCmd
 from smach_oracle.oracle.errors import TrialError
 from smach_oracle.oracle.identity import own_mark
 from smach_oracle.oracle.operator_hand import OperatorHand
-
-from ..introspection.plain_pickle import RefusedDataError, decode_userdata
-from ..introspection.viewer_jump import add_sender, sender_of
 
 _SAME_S = 1.0
 """Clients repeat a command several times a second until a status shows it; that is one wish."""

@@ -1,5 +1,5 @@
-"""A machine's structure and status, published for viewers, for our engine and for upstream's."""
+"""The introspection server of our stand-in, for scripts that run on upstream's `smach_ros`."""
 
-from .introspection_server import IntrospectionServer
+from smach_common.introspection import IntrospectionServer
 
 __all__ = ['IntrospectionServer']

@@ -22,12 +22,12 @@ from typing import (
 )
 
 import smach
-from smach_oracle.foreign import error_text
+from smach_common.foreign import error_text
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.unfit_names import did_you_mean
 
-_ENGINE = ('smach', 'smach_ros', 'smach_oracle')
+_ENGINE = ('smach', 'smach_ros', 'smach_common', 'smach_oracle')
 # functions of SMACH that build machines
 _BUILDING = (
     '__init__',

@@ -12,7 +12,8 @@ from typing import Iterator, List, Set, Tuple
 
 from smach_oracle.oracle.settings.patterns import matches
 
-_OTHERS = ('smach', 'smach_ros', 'smach_oracle', 'rospy')  # no program's own machines
+# no program's own machines
+_OTHERS = ('smach', 'smach_ros', 'smach_common', 'smach_oracle', 'rospy')
 # here a file that does not name SMACH has no labels
 _INSTALLED = (
     '/opt/ros/',

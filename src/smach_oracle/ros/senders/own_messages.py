@@ -9,7 +9,7 @@ import genpy
 import rospy
 from rospy.topics import get_topic_manager
 
-from ..introspection.viewer_jump import sender_of
+from smach_common.connections import sender_of
 
 Take = Callable[[Any], None]
 

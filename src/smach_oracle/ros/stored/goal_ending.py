@@ -7,7 +7,7 @@ from typing import Callable, Dict, List, Mapping
 import rospy
 from actionlib_msgs.msg import GoalID, GoalStatus, GoalStatusArray
 
-from ..connections import live_connections
+from smach_common.connections import live_connections
 
 POLL_S = 0.05
 CANCEL_EACH_S = 1.0

@@ -7,12 +7,12 @@ import rospy
 from waiting import wait_for
 
 import smach
+from smach_common.introspection import viewer_jump
+from smach_common.introspection.container_watch import ContainerWatch
+from smach_common.introspection.introspection_server import set_initial_states
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.ros.hand.viewer_commands import ViewerCommands
-from smach_oracle.ros.introspection import viewer_jump
-from smach_oracle.ros.introspection.container_watch import ContainerWatch
-from smach_oracle.ros.introspection.introspection_server import set_initial_states
 
 
 class Running:

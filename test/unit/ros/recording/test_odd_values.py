@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from recorded import events, finished
 
 import smach
+from smach_common.introspection.plain_pickle import decode_userdata, encode_userdata
 from smach_oracle.msg import UserdataItem
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 from smach_oracle.ros.event_messages import to_msg
-from smach_oracle.ros.introspection.plain_pickle import decode_userdata, encode_userdata
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording.event_packing import serialise
 from smach_oracle.ros.stored.ros_codecs import offer_ros_codecs

@@ -8,6 +8,7 @@ import genpy
 from expert_fixtures import make_question
 from hypothesis import strategies as st
 
+from smach_common.introspection.plain_pickle import RefusedDataError, decode_userdata
 from smach_msgs.msg import (
     SmachContainerInitialStatusCmd,
     SmachContainerStatus,
@@ -35,7 +36,6 @@ from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 from smach_oracle.ros.expert import client, server
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.hand import hand_server
-from smach_oracle.ros.introspection.plain_pickle import RefusedDataError, decode_userdata
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 from smach_oracle.srv import (
     AnswerQueryRequest,

@@ -128,7 +128,7 @@ class FakeGripperLink:
 
     alive = ready
 
-    def send(self, goal: Any, now_s: float) -> Any:
+    def send(self, goal: Any) -> Any:
         as_bytes(goal)
         return SimpleNamespace(
             cancel=lambda: None, poll=lambda timeout_s: None, unheard=lambda now_s: False

@@ -13,8 +13,8 @@ from typing import Any, Callable, Collection, Dict, Optional
 import rosgraph
 import rospy
 
+from smach_common.node_probe import TimedTransport
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.ros.master_watch import TimedTransport
 
 PERIOD_S = 1.5
 MOST_NODES = 200

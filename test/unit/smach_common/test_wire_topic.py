@@ -8,9 +8,9 @@ import pytest
 rospy = pytest.importorskip('rospy')
 from rospy.msg import deserialize_messages, serialize_message
 
+from smach_common.introspection import wire_topic
+from smach_common.introspection.wire_topic import LatestMessages, serialised
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.ros.introspection import wire_topic
-from smach_oracle.ros.introspection.wire_topic import LatestMessages, serialised
 
 STAMP = rospy.Time(12, 34)
 FIELDS = (['A'], ['B', 'Käse'], 'gAJ9cQAu', 'HEARTBEAT')

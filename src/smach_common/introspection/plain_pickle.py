@@ -11,7 +11,7 @@ import io
 import pickle
 from typing import Any, Callable, Dict, Mapping, Optional, Tuple
 
-from smach_oracle.foreign import ends_program
+from ..foreign import ends_program
 
 PROTOCOL = 2
 """What Python 2 viewers can read too."""

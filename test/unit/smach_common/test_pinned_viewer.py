@@ -10,8 +10,8 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import ContainerTree
-from smach_oracle.ros.introspection.introspection_server import structure_fields
+from smach_common.introspection.container_watch import ContainerTree
+from smach_common.introspection.introspection_server import structure_fields
 
 OUTCOMES = ['succeeded', 'aborted']
 

@@ -6,8 +6,8 @@ import smach
 from smach_oracle.oracle import OracleContainer
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import ContainerWatch
-from smach_oracle.ros.introspection.introspection_server import set_initial_states
+from smach_common.introspection.container_watch import ContainerWatch
+from smach_common.introspection.introspection_server import set_initial_states
 
 
 def wrapped_machine():

@@ -10,7 +10,7 @@ import pytest
 import smach
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.container_watch import (
+from smach_common.introspection.container_watch import (
     CALLBACK_LISTS,
     ContainerTree,
     is_watched,

@@ -30,12 +30,13 @@ from smach_msgs.msg import (
     SmachContainerStatus,
     SmachContainerStructure,
 )
-from smach_oracle.foreign import text_of, type_name
 
+from ..connections import sender_of
+from ..foreign import text_of, type_name
 from .container_watch import ContainerTree, ContainerWatch
 from .heartbeat_rounds import HeartbeatRounds
 from .plain_pickle import RefusedDataError, decode_userdata, encode_userdata
-from .viewer_jump import send_running, sender_of
+from .viewer_jump import send_running
 from .wire_topic import LatestMessages, WireMessage, WireTopic, waiting_bytes
 
 STATUS_TOPIC = '/smach/container_status'

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection import plain_pickle
+from smach_common.introspection import plain_pickle
 
 PLAIN = {
     'number': 1,

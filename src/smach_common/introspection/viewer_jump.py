@@ -32,8 +32,3 @@ def send_running(container: Any, label: str, written: Collection[str], by: str) 
         if is_sent is not None:
             return is_sent
     return None
-
-
-def sender_of(message: Any) -> str:
-    """Return the node that has sent a message, '' where that is not known."""
-    return str((getattr(message, '_connection_header', None) or {}).get('callerid', ''))

@@ -3,7 +3,7 @@
 import pytest
 
 pytest.importorskip('rospy')
-from smach_oracle.ros.introspection.heartbeat_rounds import (
+from smach_common.introspection.heartbeat_rounds import (
     GREETING_STEP_S,
     HEARTBEAT_S,
     LARGEST_PART,
