@@ -17,6 +17,8 @@ import time
 import traceback
 from pathlib import Path
 
+from quiet import silence
+
 HERE = Path(__file__).resolve().parent
 for folder in ('test/unit/support', 'test/rostest'):
     sys.path.insert(0, str(HERE.parent / folder))
@@ -28,6 +30,7 @@ def main() -> int:
     """Run and report."""
     arguments = parse_arguments()
     silence()
+    logging.disable(logging.CRITICAL)
     from borders.border import try_border
     from borders.table import BORDERS
 
@@ -69,17 +72,6 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--only', default='', metavar='WORDS', help='borders with these words')
     parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
     return parser.parse_args()
-
-
-def silence() -> None:
-    """Have neither SMACH nor ROS say anything."""
-    import smach
-
-    def silent(*said: object) -> None:
-        pass
-
-    smach.set_loggers(silent, silent, silent, silent)
-    logging.disable(logging.CRITICAL)
 
 
 if __name__ == '__main__':

@@ -25,7 +25,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Callable, Dict, List, Optional, Tuple
 
-from oracle_overhead import silence
+from quiet import silence
 
 import smach
 from smach_oracle.oracle import OracleContainer

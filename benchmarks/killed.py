@@ -58,7 +58,7 @@ def main() -> int:
 
 def kill_share(seed: str, kills: int) -> list:
     """Kill programs in a process of this pool."""
-    from oracle_overhead import silence
+    from quiet import silence
     from random_kills.killing import kill_many
 
     silence()

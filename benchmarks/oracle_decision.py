@@ -14,7 +14,8 @@ import sys
 import time
 from typing import Any, List, Tuple
 
-from oracle_overhead import bare_step_s, silence
+from oracle_overhead import bare_step_s
+from quiet import silence
 
 import smach
 from smach_oracle.oracle import OracleContainer

@@ -13,7 +13,7 @@ import itertools
 import sys
 import time
 
-from oracle_overhead import silence
+from quiet import silence
 
 import smach
 from smach_oracle.oracle import OracleContainer

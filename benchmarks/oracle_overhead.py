@@ -18,6 +18,8 @@ import sys
 import time
 from typing import Dict, Iterator, List
 
+from quiet import silence
+
 import smach
 from smach_oracle.oracle import OracleContainer
 
@@ -92,11 +94,6 @@ def machine_step_s(machine: smach.StateMachine, count: int) -> float:
     smach.set_shutdown_check(lambda: False)
     # the machine begins in the first window
     return min(end - begin for begin, end in zip(marks[1:], marks[2:])) / WINDOW
-
-
-def silence() -> None:
-    """Let nothing be logged."""
-    smach.set_loggers(*[lambda text: None] * 4)
 
 
 def main() -> int:

@@ -20,6 +20,8 @@ import threading
 from pathlib import Path
 from typing import Any, Counter, List
 
+from quiet import silence
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / 'test' / 'unit' / 'support'))
 
@@ -32,6 +34,7 @@ def main() -> int:
     if arguments.upstream:
         sys.path.insert(0, arguments.upstream)
     silence()
+    threading.excepthook = lambda said: None  # of the branches of Concurrences
     seeds: List[Any] = (
         [arguments.only]
         if arguments.only
@@ -69,17 +72,6 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument('--upstream', metavar='PATH', help='folder with an upstream smach')
     parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
     return parser.parse_args()
-
-
-def silence() -> None:
-    """Have neither SMACH nor the threads of its Concurrences say anything."""
-    import smach
-
-    def silent(*said: object) -> None:
-        pass
-
-    smach.set_loggers(silent, silent, silent, silent)
-    threading.excepthook = silent
 
 
 def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:

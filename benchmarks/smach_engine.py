@@ -25,6 +25,8 @@ import sys
 import time
 from typing import Callable, Dict, List, Optional
 
+from quiet import silence
+
 SRC = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, 'src')
 
 # Ratio to the bare loop that each row may reach.
@@ -92,20 +94,9 @@ def machine_loop(smach, with_userdata: bool) -> Callable[[int], float]:
     return run
 
 
-def import_silenced():
-    """The smach that comes first on the path, with loggers that do nothing."""
-    import smach
-
-    def silent(msg: str) -> None:
-        """A logger that nobody hears."""
-
-    smach.set_loggers(silent, silent, silent, silent)
-    return smach
-
-
 def measure(steps: int, rounds: int) -> Dict[str, float]:
     """Seconds a step, of the bare loop and of each row."""
-    smach = import_silenced()
+    smach = silence()
     loops = {
         'bare loop': bare_loop(smach),
         'outcome only': machine_loop(smach, False),
@@ -123,7 +114,7 @@ def measure(steps: int, rounds: int) -> Dict[str, float]:
 
 def memory_growth_kb(transitions: int) -> int:
     """Return the growth of the process (kB) while a machine made that many transitions."""
-    loop = machine_loop(import_silenced(), True)
+    loop = machine_loop(silence(), True)
     loop(10000)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     loop(transitions)

@@ -36,14 +36,25 @@ def classify(rate: float, moderate_from: float, high_from: float) -> FailureClas
     return FailureClass.LOW
 
 
-def _checked(memory: int, prior: float) -> None:
-    if not is_whole(memory, 1):
-        raise SettingsError('memory', memory, 'a whole number of results from 1')
-    if not is_number(prior, 0, 1):
-        raise SettingsError('prior', prior, 'a failure rate from 0 to 1')
+class _Totals:
+    """What both estimators keep: their memory and prior, and the counts of all results."""
+
+    def __init__(self, memory: int, prior: float) -> None:
+        """`memory`: results. `prior`: failure rate, 0 to 1.
+
+        :raises SettingsError: for a memory or prior that is not allowed.
+        """
+        if not is_whole(memory, 1):
+            raise SettingsError('memory', memory, 'a whole number of results from 1')
+        if not is_number(prior, 0, 1):
+            raise SettingsError('prior', prior, 'a failure rate from 0 to 1')
+        self.memory = memory
+        self.prior = float(prior)
+        self.successes = 0
+        self.failures = 0
 
 
-class FailureRate:
+class FailureRate(_Totals):
     """The failure rate of a state over its last results.
 
     The window holds the last `memory` results. It starts filled with `prior`.
@@ -62,15 +73,7 @@ class FailureRate:
     kind = 'window'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results. `prior`: failure rate, 0 to 1.
-
-        :raises SettingsError: for a memory or prior that is not allowed.
-        """
-        _checked(memory, prior)
-        self.memory = memory
-        self.prior = float(prior)
-        self.successes = 0
-        self.failures = 0
+        super().__init__(memory, prior)
         self._results = 0  # results seen, not the totals where these were taken over from elsewhere
         self._failed: Deque[int] = deque()  # which of them were failures, of the last memory + 1
 
@@ -152,7 +155,7 @@ class FailureRate:
         self._failed = deque(position for position, failed in enumerate(window) if failed)
 
 
-class ExponentialFailureRate:
+class ExponentialFailureRate(_Totals):
     """The exponentially weighted mean of a state's results, beginning with the prior.
 
     Each result replaces a share 1/memory of the estimate.
@@ -170,15 +173,7 @@ class ExponentialFailureRate:
     kind = 'exponential'
 
     def __init__(self, memory: int, prior: float) -> None:
-        """`memory`: results. `prior`: failure rate, 0 to 1.
-
-        :raises SettingsError: for a memory or prior that is not allowed.
-        """
-        _checked(memory, prior)
-        self.memory = memory
-        self.prior = float(prior)
-        self.successes = 0
-        self.failures = 0
+        super().__init__(memory, prior)
         self._rate = self._before = self.prior
 
     def add(self, failed: bool) -> None:
