@@ -3,7 +3,7 @@
 `OracleContainer` is the ROS-attached one where rospy is installed, else the bare one. It is looked
 up on first use, so that `smach_oracle.analysis` needs neither ROS nor SMACH.
 
-Errors that you may catch, in addition to those of the executive in `smach_oracle.oracle.errors`:
+Errors that you may catch, in addition to those of the executive in `smach_oracle.oracle.errors`::
 
     OracleError
     +-- AnswerError

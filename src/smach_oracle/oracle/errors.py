@@ -1,6 +1,6 @@
 """Errors of the executive. The docstring of the package draws those of the other rooms.
 
-Their tree:
+Their tree::
 
     OracleError
     +-- SettingsError (also a ValueError): a setting is wrong
