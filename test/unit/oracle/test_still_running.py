@@ -59,7 +59,7 @@ def failures(machine):
     return [event.state for event in machine.of(EventKind.FAILURE)]
 
 
-def test_a_person_is_asked_in_plain_words_and_the_state_runs_on():
+def test_a_person_is_asked_in_plain_words_and_the_state_runs_on(log):
     gate = Gate()
     expert = FakeExpert(letting_go(gate, None))
     machine = asked(Scripted('aborted', gate), expert=expert)
@@ -74,6 +74,8 @@ def test_a_person_is_asked_in_plain_words_and_the_state_runs_on():
     assert told(machine) == [('QUERY_OPENED', 'A'), ('QUERY_CANCELLED', 'A')]
     assert machine.of(EventKind.QUERY_CANCELLED)[0].text == 'A has ended'
     assert failures(machine) == ['A']
+    said = 'The expert is asked (question {})'.format(question.question_id)
+    assert any(level == 'warn' and said in text for level, text in log)
 
 
 def test_who_waits_on_is_asked_again_after_twice_the_time():
