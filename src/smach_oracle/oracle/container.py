@@ -89,7 +89,7 @@ class OracleContainer(smach.StateMachine):
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
         tree = Tree(OracleContainer, recover, expert, health)
         self._oracle = TreeNode(self, tree, checked, name)
-        self._oracle.strict = strict
+        self._oracle.in_force.wrap_with(strict)
 
     @classmethod
     def wrap(

@@ -96,3 +96,28 @@ def test_the_functions_of_the_page_are_there():
         if isinstance(function, ast.FunctionDef)
     }
     assert len(FUNCTIONS) > 5 and [name for name in FUNCTIONS if name not in functions] == []
+
+
+def test_no_module_but_its_own_writes_a_field_of_a_tree_node():
+    own = EXECUTIVE / 'machine/tree_node.py'
+    node = next(each for each in parse(own).body if getattr(each, 'name', '') == 'TreeNode')
+    fields = {
+        each.attr
+        for each in ast.walk(node)
+        if isinstance(each, ast.Attribute)
+        and isinstance(each.ctx, ast.Store)
+        and getattr(each.value, 'id', '') == 'self'
+    }
+    assert {'records', 'in_force', 'tree'} < fields and len(fields) <= 12
+    others = {'self', 'border', 'container', 'twin'}  # objects of other classes
+    found = [
+        (path.name, each.lineno, each.attr)
+        for path in sorted(EXECUTIVE.rglob('*.py'))
+        for each in ast.walk(parse(path))
+        if path != own
+        and isinstance(each, ast.Attribute)
+        and isinstance(each.ctx, (ast.Store, ast.Del))
+        and each.attr in fields
+        and getattr(each.value, 'id', '') not in others
+    ]
+    assert found == []

@@ -159,7 +159,7 @@ def test_an_execution_leaves_no_snapshot_and_no_entry_behind(row, options, tmp_p
                 ('start below', node.execution._starts_below),
                 ('resumed', node.tree.resumed.goes_on(node)),
                 ('questions', node.tree.resumed._questions),
-                ('precondition', node.as_preconditions),
+                ('precondition', node.tree._preconditions),
                 ('runs around', node.execution.runs_around),
             )
             if is_left

@@ -22,7 +22,7 @@ def adopt_branches(parent: TreeNode, put_under: PutUnder) -> None:
     """
     for below, container in list(borders_below(parent.machine)):
         border = border_of(container)
-        if border is None and parent.nested:
+        if border is None and parent.in_force.nested:
             border = _new_border(parent, below, container)
         if border is not None:
             _take_notice(border, parent, below, put_under)
@@ -87,6 +87,6 @@ def _new_machine(
     machine = put_under(bare, parent)
     node = machine._oracle
     node.branch = kind(container, label)
-    node.parent, node.below = parent, below
+    node.lie_below(parent, below)
     node.configure(parent.settings)
     return machine

@@ -82,10 +82,10 @@ def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
 
 def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
     """Yield the paths and patterns of `nested` that stand for nothing."""
-    if isinstance(top.nested, bool):
+    if isinstance(top.in_force.nested, bool):
         return
     known = sorted(set(paths_below(top.machine)))
-    for name in top.nested:
+    for name in top.in_force.nested:
         if not any(matches(name, path) for path in known):
             yield UnfitName(
                 SettingsError(
@@ -187,11 +187,11 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
 
 
 def _complain(node: TreeNode, unfit: UnfitName) -> None:
-    if callable(node.strict):
-        node.strict(unfit)
+    if callable(node.in_force.strict):
+        node.in_force.strict(unfit)
     elif unfit.kind in (UnfitKind.CHECKED, UnfitKind.GENERAL):
         return
-    elif node.strict:
+    elif node.in_force.strict:
         raise unfit.error
     else:
         smach.logwarn(str(unfit.error))

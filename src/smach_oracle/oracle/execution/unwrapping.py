@@ -41,7 +41,7 @@ def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
         raise TrialError('{!r} was not wrapped: there is nothing to undo'.format(machine))
     if machine.is_running():
         raise TrialError('{} runs; it can be unwrapped when it has ended'.format(node.path))
-    if node.inherits:
+    if node.in_force.inherits:
         raise TrialError('{} was wrapped with {}; unwrap that'.format(node.path, node.top().path))
     _strip(cast(WrappedMachine, machine))
     return machine
@@ -53,7 +53,7 @@ def _strip(machine: WrappedMachine) -> None:
         if not isinstance(child, container_class):
             continue
         wrapped = cast(WrappedMachine, child)
-        if wrapped._oracle.inherits:
+        if wrapped._oracle.in_force.inherits:
             _strip(wrapped)
         else:
             _stand_alone(wrapped)
@@ -77,7 +77,7 @@ def _stand_alone(machine: WrappedMachine) -> None:
     tree = Tree(node.tree.container_class, node.tree.recover, node.tree.expert)
     for each in nodes_of(machine):
         each.join(tree)
-    node.parent, node.below = None, ()
+    node.lie_below(None, ())
 
 
 def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -> Optional[str]:

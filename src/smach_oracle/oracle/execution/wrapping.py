@@ -62,12 +62,11 @@ def _put_in_order(
     machine: WrappedMachine, settings: Settings, nested: Nested, strict: Strictness
 ) -> None:
     top = machine._oracle
-    top.strict = strict
-    top.nested = nested
+    top.in_force.wrap_with(strict, nested)
     adopt(machine)
     _configure(machine, settings)
     for node in nodes_of(machine):
-        node.strict = strict
+        node.in_force.wrap_with(strict)
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -79,18 +78,19 @@ def bring_up_to_date(node: TreeNode) -> None:
     """
     node.machine._sync_oracle()
     place_gates(node)
-    if len(node.machine._states) != node.checked_states:
+    states = len(node.machine._states)
+    if node.in_force.is_unchecked(states):
         if node.parent is None:
             check_names(node)
         check_preconditions(node)
-        node.checked_states = len(node.machine._states)
+        node.in_force.note_checked(states)
     load_rates(node)
 
 
 def _configure(machine: WrappedMachine, settings: Settings) -> None:
     """Hand the settings to a machine and to those below it that have none of their own."""
     for node in nodes_of(machine):
-        if node.machine is machine or node.inherits:
+        if node.machine is machine or node.in_force.inherits:
             node.configure(settings)
 
 
@@ -127,7 +127,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
         return
     for container in containers_in(cast(WrappedMachine, machine)):
         made_of = two_classes(type(container))
-        if made_of is not None and (container is machine or container._oracle.inherits):
+        if made_of is not None and (container is machine or container._oracle.in_force.inherits):
             container._remove_oracle()
             remove_gates(cast(smach.StateMachine, container))
             release_branches(container)
@@ -152,14 +152,13 @@ def adopt(machine: WrappedMachine) -> None:
         node = container._oracle
         if container is not machine and (node.parent is None or node.tree is not parent.tree):
             _move_below(node, parent, below)
-        node.nested = parent.nested
+        node.in_force.wrap_with(nested=parent.in_force.nested)
         adopt(container)
 
 
 def _put_below(child: smach.StateMachine, parent: TreeNode) -> WrappedMachine:
     container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
-    container._oracle.inherits = True
-    container._oracle.strict = parent.strict
+    container._oracle.in_force.wrap_with(parent.in_force.strict, inherits=True)
     return container
 
 
@@ -169,8 +168,8 @@ def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
     It may have been on its own, or below another machine, before.
     """
     node.machine._remove_oracle()  # it may go by another name here, or not be wanted
-    node.parent, node.below = parent, below
+    node.lie_below(parent, below)
     node.join(parent.tree)
-    if node.inherits:
-        node.strict = parent.strict
-    node.configure(parent.settings if node.inherits else node.settings)
+    if node.in_force.inherits:
+        node.in_force.wrap_with(parent.in_force.strict)
+    node.configure(parent.settings if node.in_force.inherits else node.settings)

@@ -93,7 +93,7 @@ class Execution:
 
     def __enter__(self) -> 'Execution':
         node = self._node
-        node.execution = self
+        node.execute_as(self)
         if not self._is_whole:
             node.engine.begin_execution()
             return self

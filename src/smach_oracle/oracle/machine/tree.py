@@ -7,7 +7,7 @@ import itertools
 import os
 import threading
 import uuid
-from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
 
 import smach
 from smach_oracle.forking import is_child
@@ -83,6 +83,8 @@ class Tree:
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
         self._questions = 0
+        # states that are executed as preconditions now, each with its container
+        self._preconditions: List[Tuple[object, smach.State]] = []
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
         self._process = os.getpid()
         self._lock = threading.Lock()
@@ -136,6 +138,25 @@ class Tree:
             'paused': [self.control.paused, self.control.paused_by],
         }
 
+    def begin_precondition(self, node: object, state: smach.State) -> bool:
+        """Note that a state is executed as a precondition. Return False where it is so already."""
+        with self._lock:
+            is_free = not self.is_precondition(node, state)
+            if is_free:
+                self._preconditions.append((node, state))
+            return is_free
+
+    def end_precondition(self, node: object, state: smach.State) -> None:
+        """Note that it has ended."""
+        with self._lock:
+            self._preconditions = [
+                each for each in self._preconditions if each[0] is not node or each[1] is not state
+            ]
+
+    def is_precondition(self, node: object, state: object) -> bool:
+        """Whether a state of a container is executed as a precondition now."""
+        return any(each[0] is node and each[1] is state for each in self._preconditions)
+
     def next_visit(self) -> int:
         """Return the number of the next visit of a state, in whichever container."""
         return next(self._visits)
@@ -157,6 +178,7 @@ class Tree:
         state = dict(self.__dict__)
         del state['_lock'], state['rates_lock'], state['departures_lock'], state['early_end']
         state['expert'] = None
+        state['_preconditions'] = []
         state['waiting'] = MonotonicWaiting()
         state['keep_marks'] = no_store
         state['describe_failure'] = no_description

@@ -9,9 +9,8 @@ import smach
 from ..identity import own_mark
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
-from ..settings.patterns import Nested, is_nested_at
+from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
-from ..settings.unfit_names import Strictness
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .engine_probe import EngineProbe
@@ -97,24 +96,16 @@ class TreeNode:
         self.machine = machine
         self.parent: Optional['TreeNode'] = None
         self.below: Labels = ()
-        self.is_named = bool(name)
-        self.name = name or DEFAULT_NAME
-        self.strict: Strictness = True
-        self.nested: Nested = True
-        self.inherits = False  # wrapped for being nested: under the settings of the top machine
+        self._name = name
         self.in_force = ContainerSettings(settings)
         self.records = ContainerRecords(settings.history_length)
         self.engine = EngineProbe()
-        self.checked_states = -1  # number of states for which the settings were last checked
-        # the states that are executed as preconditions now
-        self.as_preconditions: Tuple[smach.State, ...] = ()
         self.join(tree)
         self.execution = Execution(self)
 
     def take_name(self, name: str) -> None:
         """Go by this name, unless it is empty."""
-        if name:
-            self.name, self.is_named = name, True
+        self._name = name or self._name
 
     def join(self, tree: Tree) -> None:
         """Become part of a tree."""
@@ -124,6 +115,20 @@ class TreeNode:
         self.trial_id = ''
 
     # -- its place
+
+    @property
+    def name(self) -> str:
+        """Return the name of the machine."""
+        return self._name or DEFAULT_NAME
+
+    @property
+    def is_named(self) -> bool:
+        """Whether it was given."""
+        return bool(self._name)
+
+    def lie_below(self, parent: Optional['TreeNode'], below: Labels) -> None:
+        """Have this place in a tree. None: on its own, or at the top."""
+        self.parent, self.below = parent, below
 
     @property
     def path(self) -> str:
@@ -205,7 +210,7 @@ class TreeNode:
     def wraps(self, below: Labels) -> bool:
         """Whether what these labels below this container lead to has an oracle of its own."""
         above = self.relative_path
-        return is_nested_at(self.nested, '/'.join(((above,) if above else ()) + below))
+        return is_nested_at(self.in_force.nested, '/'.join(((above,) if above else ()) + below))
 
     # -- settings and states
 
@@ -218,7 +223,6 @@ class TreeNode:
         """Go on under these settings with what was learned."""
         self.in_force.use(settings if self.branch is None else self.branch.settings_here(settings))
         self.records.history.resize(settings.history_length)
-        self.checked_states = -1
         for label, record in self.records.by_label.items():
             record.configure(self.settings_of(label), self.is_special())
 
@@ -269,21 +273,6 @@ class TreeNode:
 
     # -- what goes on
 
-    def begin_precondition(self, state: smach.State) -> bool:
-        """Note that a state is executed as a precondition. Return False where it is so already."""
-        with self.tree.departures_lock:
-            is_free = not any(each is state for each in self.as_preconditions)
-            if is_free:
-                self.as_preconditions += (state,)
-            return is_free
-
-    def end_precondition(self, state: smach.State) -> None:
-        """Note that it has ended."""
-        with self.tree.departures_lock:
-            self.as_preconditions = tuple(
-                each for each in self.as_preconditions if each is not state
-            )
-
     def emit(
         self, kind: EventKind, state: str = '', outcome: str = '', target: str = '', **more: Any
     ) -> None:
@@ -323,6 +312,10 @@ class TreeNode:
         self.trial_id = trial_id
         self.tree.resumed.forget(self)
         self.records.begin_trial()
+
+    def execute_as(self, execution: Execution) -> None:
+        """Have this as the present execution."""
+        self.execution = execution
 
     def begin_execution(self) -> None:
         """Forget what belongs to one execution of the container."""

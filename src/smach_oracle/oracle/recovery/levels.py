@@ -121,7 +121,7 @@ def runs_as_precondition(node: TreeNode) -> bool:
     while above is not None:
         state = above.machine._states.get(child.below[0])
         label = above.machine._current_label
-        if any(each is state for each in above.as_preconditions):
+        if above.tree.is_precondition(above, state):
             return True
         if above.machine._is_running and label is not None and above.is_oracle(label):
             return True

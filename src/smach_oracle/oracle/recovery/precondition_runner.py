@@ -191,7 +191,7 @@ class PreconditionRunner:
             if self._cancelled:
                 raise NotMet('preempted')
             self._running = state
-        if not site.node.begin_precondition(state):
+        if not site.node.tree.begin_precondition(site.node, state):
             self._running = None
             raise NotMet('is being run as a precondition already')
         try:
@@ -203,7 +203,7 @@ class PreconditionRunner:
         except Exception as err:
             raise NotMet('raised {}'.format(repr_of(err))) from err
         finally:
-            site.node.end_precondition(state)
+            site.node.tree.end_precondition(site.node, state)
             self._ended(state)
 
     def _with_limit(self, site: _Site, state: smach.State, label: str) -> object:
