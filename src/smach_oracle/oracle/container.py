@@ -9,10 +9,11 @@ import smach
 
 from .asking.question import Expert, names
 from .errors import SettingsError
-from .execution.oracle_state import OracleState
-from .execution.step import Step, before_step, execute_observed
-from .execution.trial import run_container
+from .execution.boundary import before_step
+from .execution.step import Step
+from .execution.trial import ContainerRun
 from .execution.unwrapping import execute_bare
+from .execution.visiting import execute_observed, execute_watched
 from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.learned_rates import read_by_hand, write_by_hand
@@ -23,6 +24,7 @@ from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
+from .recovery.phases import OracleState
 from .settings.health import HealthFunction
 from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
@@ -338,7 +340,10 @@ class OracleContainer(smach.StateMachine):
         """
         if self._oracle.tree.is_parents and not self.is_running():
             return execute_bare(self, *args, **kwargs)
-        return run_container(self, super().execute, args, kwargs)
+        with ContainerRun(self) as run:
+            if run.begins():
+                run.outcome = super().execute(*args, **kwargs)
+        return run.outcome
 
     def call_start_cbs(self) -> None:
         """Forget the execution before: the machine has its initial state now."""
@@ -420,7 +425,7 @@ class OracleContainer(smach.StateMachine):
                     if constants:
                         write_constants(userdata, constants)
                     if record.special or node.abandoned:
-                        outcome = Step(node, record).execute(state, view.remapper)
+                        outcome = execute_watched(node, record, state, view.remapper)
                     elif observed:
                         outcome = execute_observed(node, record, state, view.remapper)
                     else:

@@ -317,7 +317,7 @@ def test_a_record_counts_no_success_of_a_state_that_was_taken_out():
     assert left.outcome == 'ok' and not is_counted(left)
 
 
-@pytest.mark.xfail(strict=True, reason='passing_by.py tells it, and counts nothing')
+@pytest.mark.xfail(strict=True, reason='boundary.py tells it, and counts nothing')
 def test_each_transition_that_is_told_is_counted():
     machine = Held(
         chain(A=Scripted(outcomes=('ok', 'preempted'))), settings={'autonomy': 'confirm'}

@@ -6,7 +6,7 @@ import smach
 
 from ..machine.execution import Execution
 from ..machine.tree_node import WrappedMachine
-from ..recovery.failure import outcome_of_early_end
+from ..recovery.endings import outcome_of_early_end
 
 COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
 
@@ -59,11 +59,17 @@ def run_branch(machine: WrappedMachine, pending_preempt: bool) -> Optional[str]:
     outcome = node.tree.resumed.take_outcome(node)
     if outcome is not None:
         return outcome
+    error: Optional[BaseException] = None
+    run.begin()
     try:
-        with run:
-            return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
+        return outcome_of_early_end(node, _step_to_end(machine, pending_preempt))
     except smach.InvalidUserCodeError as err:
-        raised = err
+        error = raised = err
+    except BaseException as err:
+        error = err
+        raise
+    finally:
+        run.end(None, error)
     if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):
         raise raised.__cause__  # as bare: the container says what state it was
     raise raised

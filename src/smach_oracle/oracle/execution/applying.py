@@ -2,20 +2,19 @@
 
 from typing import Any, Mapping, Optional, Sequence
 
-from ..machine.repeats import leave_for, note_superseded
+from ..machine.repeats import note_superseded
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..places.way import Way
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
-from ..recovery.failure import Failure, leaving_outcome, natural_ending, route_of
+from ..recovery.endings import leaving_outcome
+from ..recovery.failure import route_of
 from ..recovery.occasions import FirstStep, Occasion, Superseding
+from ..recovery.phases import OracleState
 from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at
-from .entering import prepare_entry
-from .going_on import ask_to_go_on
-from .oracle_state import OracleState
-from .starting_over import restore_start
+from .entering import prepare_entry, start_over
 from .transitions import (
     be_back,
     go_to,
@@ -24,13 +23,6 @@ from .transitions import (
     stop_left_behind,
     terminate,
 )
-
-
-def leaving(node: TreeNode, failure: Failure) -> str:
-    """Return the outcome with which a container ends that is left: nobody goes by it."""
-    failing = node.in_force.failing
-    natural = natural_ending(failure, node.machine.get_registered_outcomes(), failing)
-    return leaving_outcome(node.machine, failing, natural.outcome)
 
 
 class Applying:
@@ -60,7 +52,8 @@ class Applying:
             stop_left_behind(self._node)
             return None
         if arrives_at(verdict) not in (None, self._node):
-            return self._depart()
+            self._service_preempt()  # the container is left for a level above
+            return self._terminate(leaving_outcome(self._node, self._occasion.failure))
         if isinstance(verdict, JumpTo):
             self._jump(verdict)
             return None
@@ -81,17 +74,10 @@ class Applying:
         else:
             node.records.history.count_superseded(record.label, outcome)
 
-    def _depart(self) -> str:
-        """End the container, which is left for a level above."""
-        self._service_preempt()
-        return self._terminate(leaving(self._node, self._occasion.failure))
-
     def _jump(self, jump: JumpTo) -> None:
         node, way = self._node, jump.way
         if jump.restarts:  # with the userdata of the start in all containers
-            restore_start(node)
-            leave_for(node, way.first)
-            ask_to_go_on(node, way.first)
+            start_over(node, way.first)
             userdata, missing = 'start', None
         else:
             entry = prepare_entry(way, jump.written, 'jumping')

@@ -1,32 +1,86 @@
-"""The state boundary as an operator uses it: holds, announcements, jumps that were asked for."""
+"""The state boundary: what comes before a state under a preempt, or while an operator has a say.
+
+That is holds, announcements and jumps that were asked for. Where a preempt comes before a state
+that is held, the machine takes the author's way after `preempted`. Without an oracle the state
+would be executed under the request. One that does not look at it would do its work, which an
+operator has held. So none is executed: the machine goes on as if the state had obeyed at once.
+"""
 
 import contextlib
-from typing import Iterator, Optional
+from typing import Iterator, Optional, Tuple, cast
 
 import smach
 
+from ..checkpoint.resuming import forget_resumed
 from ..control.hold import HeldPlace, Hold, LetGo
 from ..control.holding import Wait, wait_until_let_go
-from ..machine.tree_node import TreeNode
+from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
+from ..places.place import Place
 from ..records.events import EventKind
+from ..records.facts import PASSED_BY
+from ..recovery.endings import ending_at_once, route_at_preempt
+from ..recovery.failure import Route, route_of
 from ..recovery.operator_wait import clocks_stand_still
 from ..recovery.stop import is_asked_around
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
-from .passing_by import pass_by
+from .entering import keep_start
 from .sending import make_jump
-from .transitions import Stop, terminate
+from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
+
+Down = Tuple[Place, ...]
 
 
-def pass_boundary(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]:
-    """Do before a state what an operator has asked for. None: the state is executed now.
+def before_step(node: TreeNode) -> Optional[Stop]:
+    """Before the first state of an execution, and before any state under a preempt request.
 
-    :param was_preempted: whether there was a preempt request, which the last state may have obeyed.
-    :param is_drawn: whether its author drew the state after the last one's `preempted`.
+    Likewise before any state while an operator has a say. Under a request the state is preempted
+    too, unless the last one has serviced the request.
+
+    :returns: None where the state is executed now.
     """
+    if node.engine.stepped:
+        node.tree.control.calm(node.engine)
+    else:
+        node.begin_stepping()
+        if node.tree.restarts.is_due:
+            keep_start(node)
+    if node.execution.is_left_behind():
+        return stop_left_behind(node)
+    was_preempted = node.machine.preempt_requested()
+    if was_preempted:
+        _heed_preempt(node)
+    is_drawn = node.records.take_drawn()
+    if not node.engine.attentive:
+        return None
     with _locked(node):
         return _pass(node, was_preempted, is_drawn)
+
+
+def _heed_preempt(node: TreeNode) -> None:
+    with _locked(node):
+        _pass_preempt_on(node)
+
+
+def _pass_preempt_on(node: TreeNode) -> None:
+    machine = node.machine
+    node.execution.tell_preempt()
+    last = machine._preempted_state
+    if last is not None and not last.preempt_requested():
+        machine._preempt_requested = False
+        machine._preempted_state = machine._preempted_label = None
+        node.execution.note_no_preempt()
+        return
+    if last is not None:
+        last.recall_preempt()
+    current = machine._current_state
+    machine._preempted_state = current
+    machine._preempted_label = machine._current_label
+    # to our engine: who asked, and now waits for the lock, need not ask again
+    machine._is_preempt_passed_on = True
+    if current is not None:
+        current.request_preempt()
 
 
 @contextlib.contextmanager
@@ -43,6 +97,11 @@ def _locked(node: TreeNode) -> Iterator[None]:
 
 
 def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]:
+    """Do before a state what an operator has asked for. None: the state is executed now.
+
+    :param was_preempted: whether there was a preempt request, which the last state may have obeyed.
+    :param is_drawn: whether its author drew the state after the last one's `preempted`.
+    """
     machine, control = node.machine, node.tree.control
     stands = machine.preempt_requested()
     obeyed = was_preempted and (is_drawn or not stands)
@@ -94,7 +153,7 @@ def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
 
     :param asked: whether the container itself is to obey.
     """
-    stop = pass_by(node) if asked and not node.tree.control.holds_all else None
+    stop = _pass_by(node) if asked and not node.tree.control.holds_all else None
     return stop or _end_preempted(node)
 
 
@@ -122,12 +181,9 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
 
     Then its state is executed under the request, as without an oracle.
     """
-    machine = node.machine
-    registered = machine.get_registered_outcomes()
-    failing = sorted(each for each in registered if each in node.in_force.failing)
-    if PREEMPTED not in registered and not failing:
+    machine, outcome = node.machine, ending_at_once(node)
+    if outcome is None:
         return None
-    outcome = PREEMPTED if PREEMPTED in registered else failing[0]
     label = str(machine._current_label)
     if machine.preempt_requested():
         node.execution.tell_preempt()
@@ -136,3 +192,59 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
             recall_preempts(state)
     machine.service_preempt()
     return Stop(terminate(node, label, outcome, outcome))
+
+
+def _pass_by(node: TreeNode) -> Optional[Stop]:
+    """Go where the author sends a preempt of the current state, at a state boundary.
+
+    Return None where nothing is drawn for it. A machine in which the state would begin with a way
+    of its own is entered, and begins behind its first state.
+    """
+    machine = node.machine
+    label = str(machine._current_label)
+    route, down = _behind(node, label)
+    if not route.target:
+        return None
+    state = machine._states[label]
+    node.execution.tell_preempt()
+    forget_resumed(node)
+    record = node.record(label)
+    record.forget_entry()  # it may have been led to, and is not entered
+    obey_preempt(node, state, bool(down))
+    if not route.is_state:
+        machine.service_preempt()
+        return Stop(terminate(node, label, PREEMPTED, route.target))
+    if down:
+        record.go_down(down)
+        return Stop()  # to the next boundary, which is before the same state
+    node.emit(
+        EventKind.TRANSITION, state=label, outcome=PREEMPTED, target=route.target, **PASSED_BY
+    )
+    go_to(node, message_of(label, PREEMPTED, route.target), route.target)
+    return Stop()
+
+
+def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
+    """Return where a state leads at a preempt, with the way down where that is within it.
+
+    Within a machine that is the way behind the state in which it would begin.
+    """
+    inner = _machine_in(node, label)
+    if inner is not None:
+        led = [place.label for place in node.record(label).way_down if place.node is inner]
+        route, down = _behind(inner, led[0] if led else str(inner.machine._initial_state_label))
+        if route.is_state:
+            return Route(label, True), (Place(inner, route.target), *down)
+        if route.target:
+            return route_of(node.machine, label, route.target), ()
+    return route_at_preempt(node.machine, label), ()
+
+
+def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
+    """Return the node of a machine that is a state itself, and begins from its start."""
+    state = node.machine._states[label]
+    if not isinstance(state, node.tree.container_class):
+        return None
+    inner = cast(WrappedMachine, state)._oracle
+    goes_on = node.tree.resumed.entry_of(inner) is not None
+    return inner if inner.parent is node and not goes_on else None

@@ -182,10 +182,10 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
 
 def take_departure(node: TreeNode) -> Optional[Departure]:
     """Return the departure that the end of the present state is part of, once."""
-    departure = cast(Optional[Departure], node.execution.departure)
-    node.execution.depart_by(None)
-    if departure is None:
+    if node.execution.departure is None:
         return None
+    departure = cast(Departure, node.execution.departure)
+    node.execution.depart_by(None)
     stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
     return None if stopped or node.is_left_behind() else departure
 

@@ -1,12 +1,22 @@
-"""Prepares a place before a machine goes there, whoever sends it."""
+"""Prepares a place before a machine goes there, whoever sends it.
+
+An Iterator that has failed or was left goes on there with the item that was not finished. A script
+that is started over has its userdata as it was at first, in all containers of the tree.
+"""
 
 from typing import Collection, NamedTuple, Tuple
 
+import smach
+
+from ..branches.border import IteratorBorder, border_of
 from ..checkpoint.resuming import forget_resumed
+from ..machine.nesting import nodes_of
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
+from ..machine.tree_node import TreeNode
 from ..places.way import Way, missing_on
-from .going_on import ask_to_go_on
+from ..recovery.failure import Failure, judge
+from ..settings.failing_outcomes import is_preempted
 
 
 class Entry(NamedTuple):
@@ -32,7 +42,7 @@ def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
         restore(node.machine.userdata._data, snapshot, written, node.in_force.deep_copy_keys)
     leave_for(node, target, way.down[1:])
     for place in way.down:
-        ask_to_go_on(place.node, place.label)
+        _ask_to_go_on(place.node, place.label)
     if missing:
         place = way.down[-1]
         place.node.warn(
@@ -53,3 +63,60 @@ def missing_for(way: Way, written: Collection[str]) -> Tuple[str, ...]:
         return missing
     remapping = node.machine._remappings.get(label) or {}
     return tuple(key for key in missing if remapping.get(key, key) not in written)
+
+
+# -- an Iterator that goes on
+
+
+def _ask_to_go_on(node: TreeNode, target: str) -> None:
+    """Note that the oracle goes to a state: an Iterator that has failed or was left goes on there.
+
+    Any other Iterator of the container begins again when it is entered.
+    """
+    for label, state in list(node.machine._states.items()):
+        border = border_of(state) if isinstance(state, smach.Container) else None
+        if isinstance(border, IteratorBorder):
+            border.ask_to_go_on(label == target and _has_stopped_early(node, label, border))
+
+
+def _has_stopped_early(node: TreeNode, label: str, border: IteratorBorder) -> bool:
+    """Whether an Iterator has failed or was left, when it was executed last."""
+    outcome = border.outcome_before()
+    return (
+        outcome is None
+        or is_preempted(outcome)
+        or isinstance(judge(node, node.record(label), outcome, None), Failure)
+    )
+
+
+# -- a script that is started over
+
+
+def may_start_over(node: TreeNode) -> bool:
+    """Whether a policy of the tree may start its top machine over."""
+    return node.tree.recover and any(
+        each.in_force.policy.restarts for each in nodes_of(node.machine)
+    )
+
+
+def keep_start(node: TreeNode) -> None:
+    """Keep the userdata of a machine and of those in it, before its first state.
+
+    References are kept, and copies of `deep_copy_keys`, as in any snapshot. Branches of
+    Concurrences and Iterators have no userdata of their own.
+    """
+    node.tree.restarts.keep(
+        {id(each): each.snapshot() for each in nodes_of(node.machine) if each.branch is None}
+    )
+
+
+def start_over(node: TreeNode, target: str) -> None:
+    """Put the userdata of a machine, and of those in it, back to that of the start. Count it."""
+    restarts = node.tree.restarts
+    restarts.count += 1
+    for each in nodes_of(node.machine):
+        userdata = restarts.userdata_of(each)
+        if userdata is not None:
+            restore(each.machine.userdata._data, userdata, (), each.in_force.deep_copy_keys)
+    leave_for(node, target)
+    _ask_to_go_on(node, target)

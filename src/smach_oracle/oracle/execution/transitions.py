@@ -11,7 +11,7 @@ from ..settings.failing_outcomes import PREEMPTED
 
 
 class Stop(NamedTuple):
-    """The state is not executed now. `outcome`: of the container, None where it goes on."""
+    """The machine has gone on, or stops. `outcome`: of the container, None where it has none."""
 
     outcome: Optional[str] = None
 
@@ -49,11 +49,12 @@ def obey_preempt(node: TreeNode, state: smach.State, cleans_within: bool = False
     machine._preempted_state, machine._preempted_label = state, machine._current_label
 
 
-def stop_left_behind(node: TreeNode) -> None:
+def stop_left_behind(node: TreeNode) -> Stop:
     """End the execution without an outcome. Nobody waits for one."""
     log = smach.logwarn if node.tree.early_end.why is None else smach.loginfo
     log('{}: stops, as {}'.format(node.path, node.why_left_behind()))
     node.machine._is_running = False
+    return Stop()
 
 
 def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:

@@ -3,14 +3,14 @@
 Also what one execution of any container begins and ends.
 """
 
-import functools
 import time
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from types import TracebackType
+from typing import Any, Dict, List, Optional, Type
 
 import smach
 from smach_oracle.forking import in_child
 
-from ..checkpoint.resuming import Resumption, tell_resumed
+from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.execution import Execution, ends_program, why_no_outcome
 from ..machine.learned_rates import save_rates
@@ -22,102 +22,106 @@ from ..records.events import EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
-from ..recovery.failure import outcome_of_early_end
-from .starting_over import may_start_over
+from ..recovery.endings import outcome_of_early_end
+from .entering import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
 _running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
-def run_container(
-    machine: WrappedMachine,
-    execute: Callable[..., Optional[str]],
-    args: Tuple[Any, ...],
-    kwargs: Dict[str, Any],
-) -> Optional[str]:
-    """Execute a container. Where no container above it runs, this is a trial.
+class ContainerRun:
+    """One execution of a container by its engine, within this context.
 
-    Containers that lie in each other take the frames of this function many times on the stack.
+    Where no container above it runs, it is a trial. It is a context, and no function around the
+    engine's `execute`, for containers that lie in each other take its frames many times.
 
-    :param execute: the engine's own. It gets `args` and `kwargs`.
+    `outcome`: with which it ends.
     """
-    node = machine._oracle
-    is_top = not node.has_running_ancestor()
-    if is_top:
-        node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
-    run = Execution(node)
-    if not run.look_around():
-        smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
-        return outcome_of_early_end(node, None)
-    if is_top:
-        return _begin_trial(machine, run, functools.partial(execute, *args, **kwargs))
-    outcome = node.tree.resumed.take_outcome(node)
-    if outcome is None:
-        with run:
-            outcome = run.outcome = execute(*args, **kwargs)
-    return outcome_of_early_end(node, outcome)
 
+    def __init__(self, machine: WrappedMachine) -> None:
+        self._machine = machine
+        self._node = machine._oracle
+        self._execution = Execution(self._node)
+        self._is_executed = self._is_trial = False
+        self._store: Optional[TrialStore] = None
+        self.outcome: Optional[str] = None
 
-def _begin_trial(
-    machine: WrappedMachine, run: Execution, execute: Callable[[], Optional[str]]
-) -> Optional[str]:
-    node = machine._oracle
-    adopt(machine)
-    for each in nodes_of(machine):
-        bring_up_to_date(each)
-    if node.tree.recover:
-        node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
-    store = open_store(node)
-    resumed = None if store is None else store.to_resume()
-    node.tree.early_end.begin_trial(is_stored=store is not None)
-    node.tree.begin_trial(machine.new_trial_id() if resumed is None else resumed.trial.trial_id)
-    for each in nodes_of(machine):
-        # one that still runs was abandoned in an earlier trial, and is left there
-        if not each.machine.is_running():
-            each.begin_trial(node.tree.trial_id)
-    begin_watching(node)
-    node.tree.restarts.begin_trial(may_start_over(node))
-    node.tree.budget.begin(node.settings.budget)
-    if store is not None:
-        store.begin_trial(resumed)
-    return _run_trial(node, run, execute, store, resumed)
+    def __enter__(self) -> 'ContainerRun':
+        return self
 
+    def begins(self) -> bool:
+        """Begin. Return whether the engine is to execute the machine."""
+        node = self._node
+        is_top = not node.has_running_ancestor()
+        if is_top:
+            node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
+        if not self._execution.look_around():
+            smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
+            return False
+        if is_top:
+            self._begin_trial()
+        else:
+            self.outcome = node.tree.resumed.take_outcome(node)
+            if self.outcome is not None:
+                return False
+        self._is_executed = True
+        self._execution.begin()
+        return True
 
-def _run_trial(
-    node: TreeNode,
-    run: Execution,
-    execute: Callable[[], Optional[str]],
-    store: Optional[TrialStore],
-    resumed: Optional[Resumption],
-) -> Optional[str]:
-    if resumed is None:
-        node.emit(
-            EventKind.TRIAL_START,
-            data={
-                'initial': [node.machine._initial_state_label or ''],
-                'recovers': node.tree.recover,
-                'settings': _settings(node),
-            },
+    def _begin_trial(self) -> None:
+        node = self._node
+        adopt(self._machine)
+        for each in nodes_of(self._machine):
+            bring_up_to_date(each)
+        if node.tree.recover:
+            node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
+        store = self._store = open_store(node)
+        resumed = None if store is None else store.to_resume()
+        node.tree.early_end.begin_trial(is_stored=store is not None)
+        node.tree.begin_trial(
+            self._machine.new_trial_id() if resumed is None else resumed.trial.trial_id
         )
-    else:
-        tell_resumed(node, resumed)
-    node.tree.control.begin_trial()
-    outcome: Optional[str] = None
-    error: Optional[BaseException] = None
-    try:
+        for each in nodes_of(self._machine):
+            # one that still runs was abandoned in an earlier trial, and is left there
+            if not each.machine.is_running():
+                each.begin_trial(node.tree.trial_id)
+        begin_watching(node)
+        node.tree.restarts.begin_trial(may_start_over(node))
+        node.tree.budget.begin(node.settings.budget)
+        if store is not None:
+            store.begin_trial(resumed)
+        if resumed is None:
+            node.emit(
+                EventKind.TRIAL_START,
+                data={
+                    'initial': [node.machine._initial_state_label or ''],
+                    'recovers': node.tree.recover,
+                    'settings': _settings(node),
+                },
+            )
+        else:
+            tell_resumed(node, resumed)
+        node.tree.control.begin_trial()
+        self._is_trial = True
         _running.append(node)
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        node = self._node
         try:
-            with run:
-                outcome = run.outcome = execute()
+            if self._is_executed:
+                self._execution.end(self.outcome, error)
         finally:
-            _running.remove(node)
-        return outcome
-    except BaseException as err:
-        error = err
-        raise
-    finally:
-        if not node.tree.is_parents:
-            _end_trial(node, outcome, error, store)
+            if self._is_trial:
+                _running.remove(node)
+                if not node.tree.is_parents:
+                    _end_trial(node, self.outcome, error, self._store)
+            else:
+                self.outcome = outcome_of_early_end(node, self.outcome)
 
 
 def _end_trial(

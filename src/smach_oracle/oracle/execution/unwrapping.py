@@ -57,10 +57,10 @@ def _strip(machine: WrappedMachine) -> None:
             _strip(wrapped)
         else:
             _stand_alone(wrapped)
-    _strip_alone(machine)
+    strip_alone(machine)
 
 
-def _strip_alone(machine: WrappedMachine) -> None:
+def strip_alone(machine: WrappedMachine) -> None:
     """Give a machine back as it was before it was wrapped, but not those that are nested in it."""
     release_branches(machine)
     machine._remove_oracle()
@@ -105,7 +105,7 @@ def _make_bare(machine: WrappedMachine) -> None:
     for _, child in list(machines_below(machine)):
         if isinstance(child, tree.container_class):
             _make_bare(cast(WrappedMachine, child))
-    _strip_alone(machine)
+    strip_alone(machine)
     if isinstance(machine, tree.container_class):
         machine._oracle = TreeNode(
             machine, Tree(tree.container_class, recover=False), Settings(), name

@@ -4,9 +4,9 @@ from typing import cast
 
 import smach
 
-from ..branches.adopting import adopt_branches, release_branches
+from ..branches.adopting import adopt_branches
 from ..errors import SettingsError
-from ..identity import own_attributes, set_class
+from ..identity import own_attributes
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.protocols import Labels
@@ -15,8 +15,9 @@ from ..machine.tree_node import TreeNode, WrappedMachine
 from ..settings.patterns import Nested
 from ..settings.settings import Settings
 from ..settings.unfit_names import Strictness
-from .item_gates import place_gates, remove_gates
+from .item_gates import place_gates
 from .settings_check import check_names, check_preconditions
+from .unwrapping import strip_alone
 from .wrapped_classes import change_class, two_classes
 
 
@@ -128,11 +129,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
     for container in containers_in(cast(WrappedMachine, machine)):
         made_of = two_classes(type(container))
         if made_of is not None and (container is machine or container._oracle.in_force.inherits):
-            container._remove_oracle()
-            remove_gates(cast(smach.StateMachine, container))
-            release_branches(container)
-            set_class(container, made_of[1])
-            del own_attributes(container)['_oracle']
+            strip_alone(container)
 
 
 def adopt(machine: WrappedMachine) -> None:

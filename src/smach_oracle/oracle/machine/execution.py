@@ -1,7 +1,6 @@
 """One execution of a container: what is true from its begin to its end, and no longer."""
 
-from types import TracebackType
-from typing import TYPE_CHECKING, Any, Dict, Iterable, Optional, Protocol, Tuple, Type
+from typing import TYPE_CHECKING, Any, Dict, Iterable, Optional, Protocol, Tuple
 
 import smach
 from smach_oracle.foreign import error_text
@@ -24,9 +23,9 @@ class DeparturePort(Protocol):
 class Execution:
     """One execution of a container: the present one, or the latest.
 
-    It begins and ends as a context. `outcome`: with which it has ended. `runs_around`: the watched
-    executions inside which it takes place. `departure`: the verdict from below, or from here, that
-    ends the present state. `unrecovered`: whether the oracle has given up, and so ended it.
+    `runs_around`: the watched executions inside which it takes place. `departure`: the verdict from
+    below, or from here, that ends the present state. `unrecovered`: whether the oracle has given
+    up, and so ended it.
 
     The thread of the container calls its methods, except `depart_by`, `start_of` and
     `forget_unrecovered`, which belong to the threads of other containers.
@@ -35,7 +34,6 @@ class Execution:
     __slots__ = (
         '_node',
         '_is_whole',
-        'outcome',
         'runs_around',
         'departure',
         'unrecovered',
@@ -48,7 +46,6 @@ class Execution:
         """`is_whole`: it is told of, and begins a history. What holds a branch does so for it."""
         self._node = node
         self._is_whole = is_whole
-        self.outcome: Optional[str] = None
         self.runs_around: Tuple[LimitedRun, ...] = ()
         self.renew()
 
@@ -91,12 +88,13 @@ class Execution:
 
     # -- its begin and its end
 
-    def __enter__(self) -> 'Execution':
+    def begin(self) -> None:
+        """Be the present execution of the container from now on."""
         node = self._node
         node.execute_as(self)
         if not self._is_whole:
             node.engine.begin_execution()
-            return self
+            return
         node.begin_execution()
         self.starts_in = node.start_from_above(take=True)
         entry = node.tree.resumed.entry_of(node)
@@ -104,14 +102,9 @@ class Execution:
         node.emit(
             EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
         )
-        return self
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
+    def end(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
+        """Be over, with an outcome or an error, or with neither."""
         node = self._node
         if error is not None:
             # also after what no engine cleans up after, such as Ctrl-C
@@ -124,8 +117,8 @@ class Execution:
         if self._is_whole:
             node.emit(
                 EventKind.CONTAINER_END,
-                outcome=self.outcome or '',
-                text=why_no_outcome(self.outcome, error),
+                outcome=outcome or '',
+                text=why_no_outcome(outcome, error),
             )
         self.runs_around = ()
         node.records.drop_snapshots()

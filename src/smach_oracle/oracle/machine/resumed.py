@@ -58,7 +58,7 @@ class _AskedOnce:
         self.passes: List[StateRecord] = list(passes)
 
 
-class Resumed:
+class ResumedTrial:
     """What waits for the next execution of a container, or for the coming visit of a state.
 
     `checkpoint.resuming` writes it as a stored trial goes on. Each of it is taken once. A container
@@ -170,4 +170,4 @@ class Resumed:
 
     def __reduce__(self) -> Tuple[Any, ...]:
         """A copied or pickled machine goes on with no trial."""
-        return Resumed, ()
+        return ResumedTrial, ()

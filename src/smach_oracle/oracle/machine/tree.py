@@ -21,7 +21,7 @@ from ..settings.health import HealthFunction
 from ..waiting import MonotonicWaiting, Waiting
 from .alarm_clock import AlarmClock
 from .health_watch import HealthWatch
-from .resumed import Resumed
+from .resumed import ResumedTrial
 from .trial_budget import TrialBudget
 from .workers import Workers
 
@@ -75,7 +75,7 @@ class Tree:
         self.clock = AlarmClock()
         self.control = Control()
         self.trial_id = ''
-        self.resumed = Resumed()
+        self.resumed = ResumedTrial()
         self.is_resumed = False  # whether the trial goes on after its program was stopped
         self.rates_lock = threading.Lock()
         self.departures_lock = threading.Lock()
@@ -105,7 +105,7 @@ class Tree:
         self.trial_id = trial_id
         self.trials += 1
         self.is_resumed = False
-        self.resumed = Resumed()
+        self.resumed = ResumedTrial()
         self._questions = 0
         self._said.clear()
         self.events.begin_trial(trial_id)

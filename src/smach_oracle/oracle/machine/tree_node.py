@@ -8,7 +8,7 @@ import smach
 
 from ..identity import own_mark
 from ..records.events import EventKind
-from ..records.state_record import StateRecord
+from ..records.state_record import RateReading, StateRecord
 from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
@@ -281,15 +281,24 @@ class TreeNode:
         if events.observers:
             events.emit(kind, self.path, self.trial_id, state, outcome, target, **more)
 
-    def emit_rated(self, kind: EventKind, record: StateRecord, **fields: Any) -> None:
-        """Tell the observers of what happens to a state, with its failure rate and class."""
+    def emit_rated(
+        self,
+        kind: EventKind,
+        record: StateRecord,
+        reading: Optional[RateReading] = None,
+        **fields: Any,
+    ) -> None:
+        """Tell the observers of what happens to a state, with its failure rate and class.
+
+        `reading`: of the rate before. None means that of now.
+        """
         if self.events.observers:
-            standing = record.read_rate()
+            reading = reading or record.read_rate()
             self.emit(
                 kind,
                 record.label,
-                failure_class=int(standing.failure_class),
-                rate=standing.rate,
+                failure_class=int(reading.failure_class),
+                rate=reading.rate,
                 **fields,
             )
 

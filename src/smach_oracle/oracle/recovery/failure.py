@@ -1,21 +1,25 @@
-"""The end of a state: where it leads, whether it is a failure, how the container would end.
+"""The end of a state: where its outcome leads, or what kind of failure it is.
 
 Without an oracle an unsuccessful outcome leads to a state of the author's or ends the machine
 (paper, section VI-A).
 """
 
 import traceback
-from typing import Any, Callable, NamedTuple, Optional, Tuple
+from functools import lru_cache, partial
+from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_oracle.foreign import error_text, repr_of
 
 from ..asking.question import names
+from ..machine.nesting import items_under_way
 from ..machine.protocols import Machine
+from ..machine.resumed import Unfinished
 from ..machine.tree_node import TreeNode
-from ..records.events import FailureKind
+from ..records.events import EventKind, FailureKind
+from ..records.state_record import RateReading, StateRecord
 from ..records.visits import VisitResult
-from ..settings.failing_outcomes import PREEMPTED, FailingNames, is_preempted
+from ..settings.failing_outcomes import FailingNames, is_preempted
 
 
 class Route(NamedTuple):
@@ -53,15 +57,6 @@ class Failure(NamedTuple):
         if self.kind is FailureKind.INTERRUPTED:
             return 'has no result, since ' + self.text.partition(':')[0]
         return self.text if self.is_held_back else ''
-
-
-class ContainerEnding(NamedTuple):
-    """The way a container would end, or go on, without an oracle: exactly one is set."""
-
-    state: Optional[str] = None
-    outcome: Optional[str] = None
-    error: Optional[Exception] = None
-    obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
 
 
 def is_registered(state: smach.State, outcome: object) -> bool:
@@ -128,96 +123,6 @@ def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult
     return VisitResult.SUCCESS if kind is FailureKind.NOT_A_FAILURE else VisitResult.FAILURE
 
 
-def natural_ending(
-    failure: Failure, container_outcomes: Tuple[str, ...], failing: FailingNames
-) -> ContainerEnding:
-    """Return how the failure would have ended the container without an oracle.
-
-    An overrun has no such ending, since the state would still run: the container's own failing
-    outcome, else an error.
-    """
-    if failure.route is not None and failure.route.target:
-        route = failure.route
-        return (
-            ContainerEnding(state=route.target)
-            if route.is_state
-            else ContainerEnding(outcome=route.target)
-        )
-    if failure.error is not None:
-        return ContainerEnding(error=failure.error())
-    for word in failing.words:
-        if word in container_outcomes:
-            return ContainerEnding(outcome=word)
-    for outcome in sorted(container_outcomes, key=str):
-        if outcome in failing:
-            return ContainerEnding(outcome=outcome)
-    return ContainerEnding(
-        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text))
-    )
-
-
-def route_at_preempt(machine: Machine, label: str) -> Route:
-    """Follow the outcome `preempted` of a state that a preempt ends before it has done anything.
-
-    It leads nowhere where the state has no such outcome, or where it leads to the state itself.
-    """
-    registered = machine._states[label].get_registered_outcomes()
-    outcome = next((each for each in registered if is_preempted(each)), None)
-    route = Route('', False) if outcome is None else route_of(machine, label, outcome)
-    return Route('', False) if route.is_state and route.target == label else route
-
-
-def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
-    """Return how a container ends, or goes on, where a preempt or a shutdown ends a recovery.
-
-    At a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
-    unless the state still runs. Else, and once a preempt was obeyed, its own outcome `preempted`
-    ends it.
-    """
-    machine = node.machine
-    registered = machine.get_registered_outcomes()
-    state = machine._states[failure.state]
-    if machine.preempt_requested() and not (
-        smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)
-    ):
-        route = route_at_preempt(machine, failure.state)
-        if route.target:
-            return (
-                ContainerEnding(state=route.target, obeys=True)
-                if route.is_state
-                else (ContainerEnding(outcome=route.target))
-            )
-    if PREEMPTED in registered:
-        return ContainerEnding(outcome=PREEMPTED)
-    return natural_ending(failure, registered, node.in_force.failing)
-
-
-def leaving_outcome(machine: Machine, failing: FailingNames, wanted: Optional[str]) -> str:
-    """Return an outcome with which a container ends that is left: nobody goes by it.
-
-    :param wanted: how its failure would have ended it.
-    """
-    outcomes = sorted(machine.get_registered_outcomes(), key=str)
-    for outcome in (PREEMPTED, wanted):
-        if outcome in outcomes:
-            return str(outcome)
-    return next((outcome for outcome in outcomes if outcome in failing), outcomes[0])
-
-
-def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str]:
-    """Return an outcome for a Concurrence or an Iterator where its trial has ended early.
-
-    It wants one, and nobody goes by it.
-    """
-    if (
-        outcome is not None
-        or node.tree.early_end.why is None
-        or not (node.branch is not None or len(node.below) > 1)
-    ):
-        return outcome
-    return leaving_outcome(node.machine, node.in_force.failing, None)
-
-
 def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
     """Return the error with which a machine passes on what a state raised.
 
@@ -251,4 +156,134 @@ def unbound_text(label: str, outcome: str, container_outcomes: Tuple[str, ...]) 
     return (
         'Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
         'the container has {}'.format(outcome, label, names(container_outcomes))
+    )
+
+
+# -- judging
+
+
+class Overrun(NamedTuple):
+    """Stands in place of the outcome of a state that overran its time limit, or still runs."""
+
+    text: str
+
+
+class HeldBack(NamedTuple):
+    """Stands in place of the outcome of a state that was not executed, to not repeat it."""
+
+    text: str
+
+
+def judge(
+    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+) -> Union[Route, Failure]:
+    """Return where the outcome leads, or what kind of failure it is."""
+    judged = _judge(node, record, outcome, error)
+    if isinstance(judged, Route):
+        return judged
+    items = items_under_way(node)
+    return judged._replace(text='; '.join(filter(None, (judged.text, items)))) if items else judged
+
+
+def _judge(
+    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+) -> Union[Route, Failure]:
+    machine = node.machine
+    label, state = record.label, machine._states[record.label]
+    if error is not None:
+        return Failure(
+            label,
+            FailureKind.EXCEPTION,
+            '',
+            error_text(error),
+            None,
+            _once(partial(raised_error, label, state, error)),
+            traceback_of(error),
+        )
+    if isinstance(outcome, Overrun):
+        return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
+    if isinstance(outcome, Unfinished):
+        return _failure_before(node, label, outcome)
+    if isinstance(outcome, HeldBack):
+        return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
+    if not is_registered(state, outcome):
+        text = unregistered_text(label, state, outcome)
+        if node.branch is not None and isinstance(outcome, str):
+            # Concurrences and Iterators go on with such an outcome
+            return Failure(
+                label, FailureKind.UNREGISTERED_OUTCOME, outcome, text, Route(outcome, False)
+            )
+        return Failure(
+            label,
+            FailureKind.UNREGISTERED_OUTCOME,
+            outcome if isinstance(outcome, str) else '',
+            text,
+            None,
+            _once(partial(smach.InvalidTransitionError, text)),
+        )
+    route = route_of(machine, label, outcome)
+    kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
+    if kind is FailureKind.NOT_A_FAILURE:
+        return route
+    if route.target:
+        return Failure(label, kind, outcome, _description(node, label, state), route)
+    text = unbound_text(label, outcome, machine.get_registered_outcomes())
+    return Failure(
+        label, kind, outcome, text, route, _once(partial(smach.InvalidTransitionError, text))
+    )
+
+
+def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
+    """Have an error made once: SMACH logs each that is made."""
+    return lru_cache(maxsize=1)(make)
+
+
+def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
+    """Return the failure of a visit that was begun before the program was stopped."""
+    route = route_of(node.machine, label, before.outcome) if before.outcome else None
+    error = None
+    if route is None or not route.target:
+        route = None
+        if before.kind not in (
+            FailureKind.INTERRUPTED,
+            FailureKind.TIME_LIMIT,
+            FailureKind.HELD_BACK,
+        ):
+            error = partial(smach.InvalidUserCodeError, '{}: {}'.format(label, before.text))
+    return Failure(label, before.kind, before.outcome, before.text, route, error)
+
+
+def _description(node: TreeNode, label: str, state: smach.State) -> str:
+    try:
+        return node.tree.describe_failure(state)
+    except Exception as err:  # it looks into states of any make
+        smach.logwarn(
+            '{}/{}: cannot say more of its failure: {}'.format(node.path, label, repr_of(err))
+        )
+        return ''
+
+
+def in_words(failure: Failure) -> str:
+    """Say in one line what went wrong."""
+    if failure.outcome and failure.text and failure.route is not None:
+        return '{} ({})'.format(failure.outcome, failure.text)
+    return failure.text or failure.outcome
+
+
+def tell_failure(
+    node: TreeNode,
+    record: StateRecord,
+    failure: Failure,
+    continuous: bool = False,
+    reading: Optional[RateReading] = None,
+) -> None:
+    """Tell the observers. `reading`: of the rate, without this failure. None: that of now."""
+    node.emit_rated(
+        EventKind.FAILURE,
+        record,
+        reading,
+        outcome=failure.outcome,
+        failure_kind=int(failure.kind),
+        continuous=continuous,
+        text=failure.text,
     )

@@ -1,6 +1,6 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
 
-from typing import Any, FrozenSet, List, NamedTuple, Optional, Tuple
+from typing import TYPE_CHECKING, Any, List, NamedTuple, Optional, Tuple
 
 import smach
 
@@ -8,24 +8,26 @@ from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
-from ..places.levels import is_direct, levels_above
+from ..places.levels import failure_context, is_direct, levels_above
 from ..places.place import Place
-from ..places.stepping_back import failure_context
-from ..places.way import Way, way_to
+from ..places.way import way_to
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
-from .deciding import Deciding
+from .deciding import Decided, Deciding
+from .endings import ContainerEnding, natural_ending
 from .failure import (
-    ContainerEnding,
     Failure,
     Route,
     author_recovers,
     failure_kind,
-    natural_ending,
     route_of,
+    tell_failure,
 )
-from .stop import RecoveryStop
+from .verdict import JumpTo
+
+if TYPE_CHECKING:
+    from .recovering import Recovering
 
 
 def _is_overridden(above: TreeNode, below: Labels) -> bool:
@@ -143,98 +145,62 @@ def levels_that_may_decide(node: TreeNode) -> List[TreeNode]:
     return found
 
 
-class OuterDecision(NamedTuple):
-    """A recovery that a level above has decided on.
-
-    `written`: userdata keys that survive a restore, where the way ends at that level.
-    """
-
-    decided_by: TreeNode
-    way: Way
-    text: str
-    written: FrozenSet[str]
-    wait_s: float = 0.0  # waited before
-    restarts: bool = False
-
-
-class OuterLevel:
-    """The oracle of a level above, which decides about its own state as if that had failed.
+def decide_above(
+    recovering: 'Recovering', level: TreeNode, failure: Failure
+) -> Optional[Tuple[JumpTo, float]]:
+    """Have a level above decide about its own state, as if that had failed.
 
     That is a failure of the state only where the oracle does not ask.
+
+    :param failure: the end of the level below, as it would be judged here.
+    :returns: the jump, and for how long it waits before, s. None where this level asks too, or has
+        been left meanwhile.
     """
+    record = level.record(failure.state)
+    below = recovering.node
+    if way_to(below, Place(level, record.label)) is None:
+        return None
+    context = failure_context(level, record)
+    continuous = level.in_force.policy.is_continuous(context)
+    deciding = Deciding(level, record, failure, context, continuous, recovering.stop)
+    reading = record.read_rate()
+    record.learn(True)
+    with recovering.deciding_above(deciding):
+        decider, facts = deciding.decide(lambda: _foreseen_behind(level, failure))
+    recovering.tried += ['{}: {}'.format(level.path, each) for each in deciding.tried]
+    way = way_to(below, deciding.way.down[-1]) if deciding.way is not None else None
+    if deciding.way is None or way is None:
+        record.take_back_failure()
+        recovering.tried.append('{}: {}: asks too'.format(level.path, cause_of(facts)))
+        return None
+    level.records.note_failure(record)
+    sentence = decision_sentence(facts, cause_of(facts))
+    smach.loginfo('{}/{}'.format(level.path, sentence))
+    tell_failure(level, record, failure, continuous, reading)
+    tell_decision(level, record, (decider, facts), continuous, sentence)
+    record.recoveries += 1
+    kept = deciding.way.kept(deciding.watch)
+    restarts = facts.action is Action.RESTART
+    jump = JumpTo(way, text=sentence, written=kept, decided_by=level, restarts=restarts)
+    return jump, facts.wait_s
 
-    def __init__(
-        self, node: TreeNode, below: TreeNode, failure: Failure, stop: RecoveryStop
-    ) -> None:
-        """`below`: the level below, which asks. `failure`: as its end would be judged here."""
-        self._node = node
-        self._record: StateRecord = node.record(failure.state)
-        self._failure = failure
-        self._below = below
-        self._context = failure_context(node, self._record)
-        self._continuous = node.in_force.policy.is_continuous(self._context)
-        self._deciding = Deciding(
-            node, self._record, failure, self._context, self._continuous, stop
-        )
-        self.tried: List[str] = []
 
-    def cancel(self) -> None:
-        """Preempt the precondition that runs."""
-        self._deciding.cancel()
+def _foreseen_behind(level: TreeNode, failure: Failure) -> str:
+    foreseen = foreseen_above(level, natural_ending(level, failure))
+    return foreseen.text if foreseen is not None else ''
 
-    def decide(self) -> Optional[OuterDecision]:
-        """Return the recovery, or None where this level asks too, or has been left meanwhile."""
-        record = self._record
-        if way_to(self._below, Place(self._node, record.label)) is None:
-            return None
-        standing = record.read_rate()
-        record.learn(True)
-        decider, facts = self._deciding.decide(self._foreseen)
-        self.tried = ['{}: {}'.format(self._node.path, each) for each in self._deciding.tried]
-        decided = self._deciding.way
-        way = way_to(self._below, decided.down[-1]) if decided is not None else None
-        if decided is None or way is None:
-            record.take_back_failure()
-            self.tried.append('{}: {}: asks too'.format(self._node.path, cause_of(facts)))
-            return None
-        self._node.records.note_failure(record)
-        sentence = decision_sentence(facts, cause_of(facts))
-        smach.loginfo('{}/{}'.format(self._node.path, sentence))
-        self._node.emit(
-            EventKind.FAILURE,
-            state=record.label,
-            outcome=self._failure.outcome,
-            failure_kind=int(self._failure.kind),
-            failure_class=int(standing.failure_class),
-            rate=standing.rate,
-            continuous=self._continuous,
-            text=self._failure.text,
-        )
-        self._node.emit_rated(
-            EventKind.DECISION,
-            record,
-            outcome=facts.action.value,
-            target=facts.target,
-            continuous=self._continuous,
-            text=sentence,
-            data={DECIDED_BY: decider.value},
-        )
-        record.recoveries += 1
-        return OuterDecision(
-            self._node,
-            way,
-            sentence,
-            decided.kept(self._deciding.watch),
-            facts.wait_s,
-            facts.action is Action.RESTART,
-        )
 
-    def _foreseen(self) -> str:
-        node = self._node
-        foreseen = foreseen_above(
-            node,
-            natural_ending(
-                self._failure, node.machine.get_registered_outcomes(), node.in_force.failing
-            ),
-        )
-        return foreseen.text if foreseen is not None else ''
+def tell_decision(
+    node: TreeNode, record: StateRecord, decided: Decided, continuous: bool, sentence: str
+) -> None:
+    """Tell the observers what the oracle of a level has decided."""
+    decider, facts = decided
+    node.emit_rated(
+        EventKind.DECISION,
+        record,
+        outcome=facts.action.value,
+        target=facts.target,
+        continuous=continuous,
+        text=sentence,
+        data={DECIDED_BY: decider.value},
+    )

@@ -6,10 +6,13 @@ Which phases of a recovery do anything, what is counted and what is told follows
 import enum
 from typing import Callable, NamedTuple, Optional
 
+import smach
+
 from ..asking.question import Answer
 from ..decision.policy import FailureContext
 from ..machine.resumed import Unfinished
-from .failure import Failure
+from ..records.events import FailureKind
+from .failure import Failure, in_words
 from .verdict import Verdict
 
 
@@ -129,3 +132,20 @@ def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
 def often_unwell(failure: Failure, context: FailureContext, continuous: bool, why: str) -> Occasion:
     """A state has failed while the robot was not well, too often not to be counted."""
     return failed(failure, context, continuous)._replace(first=FirstStep.WAIT_AND_DECIDE, why=why)
+
+
+def log_occasion(occasion: Occasion, place: str) -> None:
+    """Log why the oracle is entered. `place`: path of the state."""
+    if not occasion.is_logged:
+        return
+    failure = occasion.failure
+    words = failure.details or in_words(failure)
+    if occasion.first is FirstStep.ENTER_AGAIN:
+        # what the wait says in the log is one sentence for all who wait
+        smach.loginfo('{} failed, which is not counted: {}'.format(place, words))
+    elif failure.is_held_back:  # what was in doubt, or had not begun, has not failed
+        smach.logwarn('{} {}'.format(place, failure.text))
+    elif failure.kind is FailureKind.INTERRUPTED:
+        smach.logwarn('{}: {}'.format(place, failure.text))
+    else:
+        smach.logwarn('{} failed: {}'.format(place, words))

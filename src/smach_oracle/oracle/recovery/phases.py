@@ -1,11 +1,12 @@
 """A recovery, phase by phase: the first that comes to a verdict ends it (paper, Algorithm 1).
 
 Each phase is a function of the recovery. It returns a verdict, or None to leave it to the next. A
-new way to recover is one more function, and its place in `recover`. Which phases do anything on
-which occasion is in a table of doc/executive_inside.md.
+new way to recover is one more function here, and its place in `OracleState.execute`. Which phases
+do anything on which occasion is in a table of doc/executive_inside.md.
 """
 
-from typing import FrozenSet, List, Optional
+import threading
+from typing import Any, Dict, FrozenSet, List, Optional, Tuple
 
 import smach
 
@@ -14,6 +15,7 @@ from ..asking.question import Answer, AnswerKind, Expert
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
+from ..errors import TrialError
 from ..machine.health_watch import FAILED
 from ..machine.limited_run import standing_still
 from ..machine.repeats import repeated_by_going_to
@@ -21,38 +23,23 @@ from ..machine.tree_node import TreeNode
 from ..places.place import Place
 from ..places.way import Way, why_closed_on
 from ..records.events import EventKind, FailureKind
-from ..records.facts import DECIDED_BY, Decider
+from ..records.facts import Decider
 from .deciding import Decided
-from .failure import natural_ending
+from .endings import natural_ending
 from .falling_back import fall_back, fallback_in_words
 from .levels import (
     Foreseen,
-    OuterDecision,
-    OuterLevel,
+    decide_above,
     failure_above,
     foreseen_above,
     levels_that_may_decide,
     runs_as_precondition,
+    tell_decision,
 )
-from .obeying import verdict_of
 from .occasions import FirstStep, FromBelow
 from .recovering import Recovering
 from .stop import preempt_beside
-from .verdict import JumpTo, Verdict
-
-
-def recover(recovering: Recovering) -> Verdict:
-    """Go through the phases, and return the verdict of the first that comes to one."""
-    return (
-        obey_given(recovering)
-        or wait_until_well(recovering)
-        or ask_first(recovering)
-        or decide(recovering)
-        or escalate(recovering)
-        or ask_expert(recovering)
-        or fall_back(recovering)
-    )  # every verdict counts as true, and the last phase has one
-
+from .verdict import JumpTo, Verdict, leads_to, verdict_of
 
 # -- what comes before a decision
 
@@ -176,18 +163,9 @@ def _wait_and_jump(recovering: Recovering, wait_s: float, jump: JumpTo) -> Verdi
 
 
 def _tell_decision(recovering: Recovering, decided: Decided) -> None:
-    decider, facts = decided
-    node, sentence = recovering.node, decision_sentence(facts, recovering.cause)
+    node, sentence = recovering.node, decision_sentence(decided[1], recovering.cause)
     smach.loginfo('{}/{}'.format(node.path, sentence))
-    node.emit_rated(
-        EventKind.DECISION,
-        recovering.record,
-        outcome=facts.action.value,
-        target=facts.target,
-        continuous=recovering.occasion.continuous,
-        text=sentence,
-        data={DECIDED_BY: decider.value},
-    )
+    tell_decision(node, recovering.record, decided, recovering.occasion.continuous, sentence)
 
 
 # -- the levels above
@@ -213,17 +191,8 @@ def escalate(recovering: Recovering) -> Optional[Verdict]:
         return recovering.end_early()
     if outer is not None:
         recovering.record.recoveries += 1
-        return _wait_and_jump(
-            recovering,
-            outer.wait_s,
-            JumpTo(
-                outer.way,
-                text=outer.text,
-                written=outer.written,
-                decided_by=outer.decided_by,
-                restarts=outer.restarts,
-            ),
-        )
+        jump, wait_s = outer
+        return _wait_and_jump(recovering, wait_s, jump)
     return _give_way(recovering, nobody) if nobody else None
 
 
@@ -259,7 +228,9 @@ def _levels_that_may_decide(recovering: Recovering, decider: Decider) -> List[Tr
     return levels_that_may_decide(recovering.node)
 
 
-def _decided_above(recovering: Recovering, levels: List[TreeNode]) -> Optional[OuterDecision]:
+def _decided_above(
+    recovering: Recovering, levels: List[TreeNode]
+) -> Optional[Tuple[JumpTo, float]]:
     """Return what the innermost level decides that does not ask, or None where all ask."""
     below, ending = recovering.node, recovering.natural_ending()
     for level in levels:
@@ -268,16 +239,11 @@ def _decided_above(recovering: Recovering, levels: List[TreeNode]) -> Optional[O
         )
         if failure is None or recovering.stop.is_over():
             return None
-        recovering.outer = OuterLevel(level, recovering.node, failure, recovering.stop)
-        decision = recovering.outer.decide()
-        recovering.tried += recovering.outer.tried
-        recovering.outer = None
+        decision = decide_above(recovering, level, failure)
         if decision is not None:
             return decision
         below = level
-        ending = natural_ending(
-            failure, level.machine.get_registered_outcomes(), level.in_force.failing
-        )
+        ending = natural_ending(level, failure)
     return None
 
 
@@ -346,3 +312,83 @@ def _obey(recovering: Recovering, answer: Answer) -> Verdict:
             recovering.natural_ending,
         )
     )
+
+
+class OracleState(smach.State):
+    """The ORACLE state of one container.
+
+    Its outcomes are the labels of all states and all container outcomes.
+    """
+
+    def __init__(self) -> None:
+        smach.State.__init__(self, outcomes=[])
+        self._lock = threading.Lock()
+        self._recovering: Optional[Recovering] = None
+        self._verdict: Optional[Verdict] = None
+
+    def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
+        """Have these outcomes and no others, and return the transitions, each to its own name."""
+        self._outcomes = set(labels)
+        return {label: label for label in labels}
+
+    def begin(self, recovering: Recovering) -> None:
+        """Be ready to recover from a failure.
+
+        From now on a preempt request reaches the recovery.
+        """
+        with self._lock:
+            self._preempt_requested = False
+            self._recovering = recovering
+            self._verdict = None
+
+    def execute(self, ud: smach.UserData) -> str:
+        """Recover from the failure handed to `begin`.
+
+        :returns: where the machine goes, '' where it raises. It follows the verdict itself.
+        :raises TrialError: where no failure was handed over.
+        """
+        recovering = self._recovering
+        if recovering is None:
+            raise TrialError('the meta state is entered by failures alone')
+        try:
+            self._verdict = (
+                obey_given(recovering)
+                or wait_until_well(recovering)
+                or ask_first(recovering)
+                or decide(recovering)
+                or escalate(recovering)
+                or ask_expert(recovering)
+                or fall_back(recovering)
+            )  # every verdict counts as true, and the last phase has one
+            return leads_to(self._verdict)
+        finally:
+            with self._lock:
+                self._recovering = None
+
+    def take_verdict(self) -> Verdict:
+        """Return what the recovery that `execute` ran has come to, once.
+
+        :raises TrialError: where `execute` has run none.
+        """
+        verdict, self._verdict = self._verdict, None
+        if verdict is None:
+            raise TrialError('the meta state has executed without a recovery')
+        return verdict
+
+    def request_preempt(self) -> None:
+        """End the recovery: a precondition that runs is preempted, an open question taken back."""
+        smach.State.request_preempt(self)
+        with self._lock:
+            recovering = self._recovering
+        if recovering is not None:
+            recovering.cancel()
+
+    def __getstate__(self) -> Dict[str, Any]:
+        """Leave out what belongs to a recovery: neither that nor a lock travels with a machine."""
+        state = dict(self.__dict__)
+        state.update(_lock=None, _recovering=None, _verdict=None)
+        return state
+
+    def __setstate__(self, state: Dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._lock = threading.Lock()

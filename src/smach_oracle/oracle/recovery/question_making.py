@@ -12,7 +12,6 @@ from ..places.levels import levels_above
 from ..places.place import places_of
 from ..places.way import Way, missing_on, repeated_on, way_to, why_closed_on
 from ..records.state_record import StateRecord
-from .branch_choices import outcomes_of_branch, running_again
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
 
@@ -50,7 +49,7 @@ def make_question(
         history=node.records.history.latest(),
         choices=tuple(_state_choices(node, account.written)),
         supersede_outcomes=(
-            outcomes_of_branch(node, state)
+            _outcomes_of_branch(node, state)
             or tuple(_supersede_outcomes(machine, record.label, state))
         ),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
@@ -97,7 +96,7 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             why_closed_on(way),
             repeated_on(way),
             container,
-            running_again(way),
+            _running_again(way),
         )
 
 
@@ -124,3 +123,47 @@ def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, Any]:
         for key in state.get_registered_input_keys()
         if remapping.get(key, key) in data
     }
+
+
+# -- Concurrences and Iterators
+
+
+def _outcomes_of_branch(node: TreeNode, state: smach.State) -> Tuple[OutcomeChoice, ...]:
+    """Return the outcomes of a branch, and in words where they lead. None where it is no branch.
+
+    Those that go on with the next item come first.
+    """
+    branch = node.branch
+    if branch is None:
+        return ()
+    last = [
+        (not branch.goes_on_after(outcome), str(outcome), outcome)
+        for outcome in state.get_registered_outcomes()
+    ]
+    return tuple(OutcomeChoice(outcome, branch.leads_to(outcome)) for _, _, outcome in sorted(last))
+
+
+def _running_again(way: Way) -> Tuple[str, ...]:
+    """Return the branches that would all run again if the machine went a way.
+
+    They are those of the outermost Concurrence that is entered, be it the place or on the way down.
+    """
+    for entered in _entered_on(way):
+        if isinstance(entered, smach.Concurrence):
+            return tuple(map(str, entered.get_children()))
+    return ()
+
+
+def _entered_on(way: Way) -> Iterator[smach.State]:
+    """Yield the states that are entered, outermost first.
+
+    Containers between two places, such as a Concurrence in an Iterator, are among them.
+    """
+    for place, below in zip(way.down, way.down[1:]):
+        around: Any = place.node.machine._states[place.label]
+        yield around
+        for label in below.node.below[1:]:
+            around = around.get_children()[label]
+            yield around
+    last = way.down[-1]
+    yield last.node.machine._states[last.label]

@@ -1,7 +1,8 @@
 """One recovery under way: what its phases share, and how it ends early."""
 
+import contextlib
 import threading
-from typing import Any, List, Mapping, Optional
+from typing import Any, Iterator, List, Mapping, Optional
 
 import smach
 
@@ -14,9 +15,9 @@ from ..places.way import Way
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from .deciding import Decided, Deciding
-from .failure import ContainerEnding, Failure, natural_ending, preempted_ending
+from .endings import ContainerEnding, natural_ending, preempted_ending
+from .failure import Failure
 from .falling_back import fallback_in_short, fallback_in_words
-from .levels import OuterLevel
 from .occasions import Occasion
 from .question_making import Account, make_question, targets_of
 from .stop import RecoveryStop, preempt_beside
@@ -51,7 +52,7 @@ class Recovering:
         self.cause = ''  # of the decision
         self.asks_at_once = False  # no policy has a say
         self.decided: Optional[Decided] = None  # to ask
-        self.outer: Optional[OuterLevel] = None  # that decides now
+        self._above: Optional[Deciding] = None  # of a level above, which decides now
         self.why_no_answer = ''
         self.tried: List[str] = self.deciding.tried
         self.question_cancelled = threading.Event()  # also at a shutdown, and long after a deadline
@@ -61,9 +62,18 @@ class Recovering:
         self.stop.cancelled.set()
         self.question_cancelled.set()
         self.deciding.cancel()
-        outer = self.outer
-        if outer is not None:
-            outer.cancel()
+        above = self._above
+        if above is not None:
+            above.cancel()
+
+    @contextlib.contextmanager
+    def deciding_above(self, deciding: Deciding) -> Iterator[None]:
+        """Have a preempt end the decision of a level above, within it."""
+        self._above = deciding
+        try:
+            yield
+        finally:
+            self._above = None
 
     def stopped(self) -> bool:
         """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
@@ -133,9 +143,7 @@ class Recovering:
 
     def natural_ending(self) -> ContainerEnding:
         """Return how the failure would have ended the container."""
-        return natural_ending(
-            self.failure, self.node.machine.get_registered_outcomes(), self.node.in_force.failing
-        )
+        return natural_ending(self.node, self.failure)
 
     def give_up(self, text: str, outcome: str = '') -> Verdict:
         """End the container with an outcome, or ('') as the failure would have ended it."""

@@ -7,9 +7,9 @@ from typing import Any, Dict, List, Optional, Tuple
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
-from smach_oracle.oracle.execution.oracle_state import OracleState
 from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.recovery.phases import OracleState
 
 from .answers import Options, draw_reply
 from .building import LIMIT_S, World, build, owed_branches

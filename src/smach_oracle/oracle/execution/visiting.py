@@ -1,0 +1,111 @@
+"""Executes a state where more is to be done than that."""
+
+from time import monotonic
+
+import smach
+
+from ..machine.repeats import note_visit
+from ..machine.snapshots import UserdataGate
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_view import view_behind
+from ..records.events import EventKind
+from ..records.state_record import StateRecord
+from ..recovery.failure import HeldBack, Overrun
+from ..recovery.still_running import TakenOut, WatchedVisit
+
+STATE_START = EventKind.STATE_START  # looked up once
+
+
+def execute_observed(
+    node: TreeNode, record: StateRecord, state: smach.State, userdata: smach.Remapper
+) -> object:
+    """Execute a state of which observers hear, and about which nothing else is special.
+
+    It returns what the state returns, and raises what it raises.
+    """
+    if node.tree.is_resumed:
+        return execute_watched(node, record, state, userdata)
+    node.events.emit(STATE_START, node.path, node.trial_id, record.label)
+    begun_s = monotonic()
+    try:
+        return state.execute(userdata)
+    finally:
+        took_s = monotonic() - begun_s
+        if took_s > (record.longest_s or 0.0) and not node.machine._preempt_requested:
+            record.longest_s = took_s
+
+
+def execute_watched(
+    node: TreeNode, record: StateRecord, state: smach.State, userdata: smach.Remapper
+) -> object:
+    """Execute the state, watched, and return its outcome, an Overrun, or that it is held back.
+
+    It raises what the state raises. With a time limit it gets a view of its own, which is shut
+    when the state overruns, in place of `userdata`.
+    """
+    if node.tree.is_resumed:
+        unfinished = node.tree.resumed.take_unfinished(node, record)
+        if unfinished is not None:
+            return unfinished
+    entered_by_oracle, way_down = record.entered_by_oracle, record.way_down
+    if entered_by_oracle or way_down:
+        record.forget_entry()
+    if node.in_force.deep_copy_keys:
+        record.snapshot = node.snapshot()
+    if node.tree.numbers_visits:
+        why_not = note_visit(node, record)
+        if why_not:
+            return HeldBack(why_not)
+    if way_down:
+        node.execution.start_below(way_down)  # before STATE_START, with which it is stored
+    try:
+        node.emit(STATE_START, record.label)
+        blocked = node.tree.workers.blocked(state) if node.abandoned else ''
+        if blocked:
+            return Overrun(blocked)
+        begun_s = monotonic()
+        outcome: object = None
+        try:
+            if record.settings.time_limit_s is not None and node.tree.recover:
+                outcome = _execute_limited(node, record, state, record.settings.time_limit_s)
+            elif entered_by_oracle:
+                outcome = WatchedVisit(node, record).execute(userdata)
+            else:
+                outcome = state.execute(userdata)
+            return outcome
+        finally:
+            took_s = monotonic() - begun_s
+            if took_s > (record.longest_s or 0.0) and not (
+                isinstance(outcome, (Overrun, TakenOut)) or node.machine._preempt_requested
+            ):
+                record.longest_s = took_s
+    finally:
+        if way_down:
+            node.execution.start_below(())
+
+
+def _execute_limited(
+    node: TreeNode, record: StateRecord, state: smach.State, limit_s: float
+) -> object:
+    """Execute a state in a worker, as `execute_watched` does."""
+    machine, label = node.machine, record.label
+
+    def on_late_write(key: str) -> None:
+        if node.tree.is_new(node.path, label, 'late write', key):
+            smach.logwarn(
+                '{}/{}: a write to userdata key {!r} came after the time limit and '
+                'is dropped'.format(node.path, label, key)
+            )
+
+    gate = UserdataGate(machine, on_late_write)
+    result = node.tree.workers.run(
+        state,
+        view_behind(gate, machine, label, state),
+        gate,
+        label,
+        limit_s,
+        record.settings.grace_period_s,
+    )
+    if result.error is not None:
+        raise result.error
+    return Overrun(result.overrun) if result.overrun else result.outcome

@@ -1,0 +1,125 @@
+"""How a container ends, or goes on, where no oracle leads it elsewhere."""
+
+import itertools
+from typing import NamedTuple, Optional, Sequence
+
+import smach
+
+from ..machine.protocols import Machine
+from ..machine.tree_node import TreeNode
+from ..settings.failing_outcomes import PREEMPTED, is_preempted
+from .failure import Failure, Route, route_of
+
+
+class ContainerEnding(NamedTuple):
+    """The way a container would end, or go on, without an oracle: exactly one is set."""
+
+    state: Optional[str] = None
+    outcome: Optional[str] = None
+    error: Optional[Exception] = None
+    obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
+
+
+def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
+    """Return how the failure would have ended the container without an oracle.
+
+    An overrun has no such ending, since the state would still run: the container's own failing
+    outcome, else an error.
+    """
+    if failure.route is not None and failure.route.target:
+        route = failure.route
+        return (
+            ContainerEnding(state=route.target)
+            if route.is_state
+            else ContainerEnding(outcome=route.target)
+        )
+    if failure.error is not None:
+        return ContainerEnding(error=failure.error())
+    outcome = failing_outcome(node, node.in_force.failing.words)
+    if outcome is not None:
+        return ContainerEnding(outcome=outcome)
+    return ContainerEnding(
+        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text))
+    )
+
+
+def route_at_preempt(machine: Machine, label: str) -> Route:
+    """Follow the outcome `preempted` of a state that a preempt ends before it has done anything.
+
+    It leads nowhere where the state has no such outcome, or where it leads to the state itself.
+    """
+    registered = machine._states[label].get_registered_outcomes()
+    outcome = next((each for each in registered if is_preempted(each)), None)
+    route = Route('', False) if outcome is None else route_of(machine, label, outcome)
+    return Route('', False) if route.is_state and route.target == label else route
+
+
+def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
+    """Return how a container ends, or goes on, where a preempt or a shutdown ends a recovery.
+
+    At a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
+    unless the state still runs. Else, and once a preempt was obeyed, its own outcome `preempted`
+    ends it.
+    """
+    machine = node.machine
+    registered = machine.get_registered_outcomes()
+    state = machine._states[failure.state]
+    if machine.preempt_requested() and not (
+        smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)
+    ):
+        route = route_at_preempt(machine, failure.state)
+        if route.target:
+            return (
+                ContainerEnding(state=route.target, obeys=True)
+                if route.is_state
+                else (ContainerEnding(outcome=route.target))
+            )
+    if PREEMPTED in registered:
+        return ContainerEnding(outcome=PREEMPTED)
+    return natural_ending(node, failure)
+
+
+def failing_outcome(node: TreeNode, first: Sequence[str] = ()) -> Optional[str]:
+    """Return the failing outcome with which a container ends that nobody leads elsewhere.
+
+    None means it has none. `first`: names that come before the order of the alphabet.
+    """
+    outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
+    named = (outcome for outcome in first if outcome in outcomes)
+    return next(
+        itertools.chain(named, (each for each in outcomes if each in node.in_force.failing)), None
+    )
+
+
+def ending_at_once(node: TreeNode) -> Optional[str]:
+    """Return the outcome with which a container ends by a preempt before a state, None for none."""
+    if PREEMPTED in node.machine.get_registered_outcomes():
+        return PREEMPTED
+    return failing_outcome(node)
+
+
+def leaving_outcome(node: TreeNode, failure: Optional[Failure] = None) -> str:
+    """Return an outcome with which a container ends that is left: nobody goes by it.
+
+    :param failure: what would have ended it.
+    """
+    outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
+    wanted = natural_ending(node, failure).outcome if failure is not None else None
+    for outcome in (PREEMPTED, wanted):
+        if outcome in outcomes:
+            return str(outcome)
+    return failing_outcome(node) or outcomes[0]
+
+
+def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str]:
+    """Return an outcome for a Concurrence or an Iterator where its trial has ended early.
+
+    It wants one, and nobody goes by it.
+    """
+    if (
+        outcome is not None
+        or node.tree.early_end.why is None
+        or not (node.branch is not None or len(node.below) > 1)
+    ):
+        return outcome
+    return leaving_outcome(node)
