@@ -1,4 +1,4 @@
-"""How a container ends, or goes on, where no oracle leads it elsewhere."""
+"""Endings: the ways a container ends, or goes on, where no oracle leads it elsewhere."""
 
 import itertools
 from typing import NamedTuple, Optional, Sequence
