@@ -57,7 +57,9 @@ def main() -> int:
     except ImportError:
         sys.exit('python3-coverage is not installed: run scripts/setup --dev')
     print('coverage {}'.format(coverage.__version__))
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # SIGINT too: a shell that starts this in the background has it ignored
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     mutants, is_whole = choose(arguments), False
     trials: List[Trial] = []
     try:
