@@ -13,11 +13,11 @@ from .control.control import Jump
 from .control.hold import HeldPlace, Hold
 from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
-from .execution.sending import Prospect, prospect_of, way_for
+from .execution.sending import Prospect, jump_path_for, prospect_of
 from .machine.nesting import nodes_of
 from .machine.repeats import note_initial
 from .machine.tree_node import TreeNode, node_of
-from .places.place import Place
+from .places.place import TreePlace
 from .records.events import EventKind
 from .settings.settings import AUTONOMY_LEVELS
 
@@ -171,7 +171,7 @@ class OperatorHand:
             entered now, and where an unconfirmed state may be repeated.
         """
         node = self._node_at(path, state)
-        place = Place(node, state)
+        place = TreePlace(node, state)
         prospect = prospect_of(place, tuple(written))
         if prospect.why_not:
             raise OperatorError(prospect.why_not)
@@ -181,7 +181,7 @@ class OperatorHand:
                     state, ', '.join(prospect.repeats)
                 )
             )
-        sent = way_for(place).meets
+        sent = jump_path_for(place).meets
         if sent.machine.is_running():
             text = self._ask_jump(
                 sent,

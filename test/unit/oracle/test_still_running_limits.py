@@ -10,7 +10,7 @@ from waiting import wait_for
 
 from smach_oracle.oracle.machine import trial_budget
 from smach_oracle.oracle.machine.alarm_clock import AlarmClock
-from smach_oracle.oracle.places import way
+from smach_oracle.oracle.places import jump_path
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 
@@ -162,7 +162,7 @@ def test_the_answer_waits_until_the_robot_is_well():
 def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
     closed = []
     monkeypatch.setattr(
-        way, 'why_closed', lambda node, label: 'still runs' if closed and label == 'B' else ''
+        jump_path, 'why_closed', lambda node, label: 'still runs' if closed and label == 'B' else ''
     )
 
     class ClosesB(Gate):

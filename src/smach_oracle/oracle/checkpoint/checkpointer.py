@@ -13,7 +13,7 @@ from ..branches.around import borders_around, borders_in
 from ..branches.border import Border, IteratorBorder
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
-from ..places.place import Place
+from ..places.place import TreePlace
 from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
@@ -231,7 +231,7 @@ class Checkpointer:
             is_container = isinstance(node.machine._states.get(label), smach.Container)
             below = self._below(path) if is_container else []
             sent_to = [
-                Place(each, start).path
+                TreePlace(each, start).path
                 for each, start in ((each, each.start_from_above()) for each in below)
                 if start
             ]

@@ -15,8 +15,8 @@ from ..machine.nesting import borders_below, nodes_of
 from ..machine.repeats import leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
 from ..machine.tree_node import TreeNode, node_of
-from ..places.place import Place, place_named, places_of
-from ..places.way import Way, way_to
+from ..places.jump_path import JumpPath, jump_path_to
+from ..places.place import TreePlace, place_named, places_of
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
@@ -99,7 +99,7 @@ def _end_goals(top: TreeNode, resumption: Resumption) -> None:
 class EntryPoint:
     """The place where one container goes on. It is used up when that begins to execute."""
 
-    def __init__(self, stored: StoredContainer, down: Sequence[Place] = ()) -> None:
+    def __init__(self, stored: StoredContainer, down: Sequence[TreePlace] = ()) -> None:
         """`down`: the states in which the containers below begin, where it is sent to one."""
         self._stored, self._down = stored, tuple(down)
 
@@ -153,10 +153,10 @@ def _of_states(node: TreeNode, told: List[Any]) -> List[Any]:
     ]
 
 
-def _down_to(node: TreeNode, path: str) -> Sequence[Place]:
+def _down_to(node: TreeNode, path: str) -> Sequence[TreePlace]:
     """Return the way down from a container to a place to which a jump was under way."""
     place = next((each for each in places_of(node) if each.path == path), None)
-    way = None if place is None else way_to(node, place)
+    way = None if place is None else jump_path_to(node, place)
     return way.down[1:] if way is not None and way.meets is node else ()
 
 
@@ -202,11 +202,11 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
     stood = resumption.tree.container(top.key)
-    way = _way_named(top, resumption.begins_at) if resumption.begins_at else None
+    way = _jump_path_named(top, resumption.begins_at) if resumption.begins_at else None
     if way is not None:
         stood.at = [way.first, BEFORE]
     elif stood.label in top.machine._states and stood.sent is not None:
-        way = _way_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
+        way = _jump_path_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
     if way is not None:
         leave_unconfirmed(top, way.first)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
@@ -217,13 +217,13 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         _Setting(resumption, nodes).set_container(top)
 
 
-def _way_named(top: TreeNode, path: str) -> Way:
+def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
     """Return the way to a state that the settings, or oracle_state, name.
 
     :raises SettingsError: where there is no such state.
     """
     place = place_named(top, path)
-    way = None if place is None else way_to(top, place)
+    way = None if place is None else jump_path_to(top, place)
     if way is None:
         raise SettingsError(
             'on_resume',
@@ -264,7 +264,7 @@ class _Setting:
         elif stored.phase == IN:
             self._go_on_in(node, stored, record)
         else:
-            self.ask_at([Place(node, stored.label)])
+            self.ask_at([TreePlace(node, stored.label)])
         return True
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
@@ -294,7 +294,7 @@ class _Setting:
             + [each.parent.record(each.below[0]) for each in around if each.parent is not None],
         )
 
-    def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[Place]:
+    def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[TreePlace]:
         """Return the rest of a jump: below, nothing has begun yet. Empty for no jump."""
         tree, state = self._resumption.tree, '{}/{}/'.format(node.key, stored.label)
         down = _down_to(node, stored.jumped_to)
@@ -336,7 +336,7 @@ class _Setting:
         """Send the machine to where the state stands now that was under way in a container."""
         top = node.top()
         place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
-        way = None if place is None else way_to(top, place)
+        way = None if place is None else jump_path_to(top, place)
         # others may run next to it, which would be left
         if (
             place is None
@@ -370,7 +370,7 @@ class _Setting:
             self._resumed.enter_at(node, EntryPoint(stored))
         self._interrupt(node, label, GONE.format(gone))
 
-    def ask_at(self, down: Sequence[Place]) -> None:
+    def ask_at(self, down: Sequence[TreePlace]) -> None:
         """Have a person asked at states that are not to come again, or where nothing is to move."""
         for node, label in down:
             why = why_held_back(node, node.record(label))

@@ -11,7 +11,7 @@ import smach
 from ..errors import SettingsError
 from ..machine.repeats import begin_once_more
 from ..machine.tree_node import TreeNode
-from ..places.place import Place, place_named
+from ..places.place import TreePlace, place_named
 from ..records.visit_marks import VisitMark
 from ..settings.settings import ALLOW
 from .stored_container import StoredContainer
@@ -85,7 +85,7 @@ def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> 
         if node is not None and (mark.done or mark.reached) and label in node.labels():
             node.record(label)  # of a state that only a precondition has run, too
             node.records.marks.take_over(label, mark)
-    for place in (Place(node, label) for node in nodes if in_doubt for label in node.labels()):
+    for place in (TreePlace(node, label) for node in nodes if in_doubt for label in node.labels()):
         if place.node.settings_of(place.label).on_retry != ALLOW:
             place.node.record(place.label)
             unknown = place.node.records.marks.of(place.label)

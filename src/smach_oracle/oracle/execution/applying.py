@@ -5,7 +5,7 @@ from typing import Any, Mapping, Optional, Sequence
 from ..machine.repeats import note_superseded
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
-from ..places.way import Way
+from ..places.jump_path import JumpPath
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
@@ -14,7 +14,7 @@ from ..recovery.failure import route_of
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at
-from .entering import prepare_entry, start_over
+from .jump_entry import prepare_entry, start_over
 from .transitions import (
     be_back,
     go_to,
@@ -85,7 +85,7 @@ class Applying:
         self._note_entry(way.first)
         self._go_on(way.first, jump.by, jump.text, userdata, missing, self._across(way))
 
-    def _across(self, way: Way) -> Mapping[str, str]:
+    def _across(self, way: JumpPath) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""
         below = self._occasion.below
         return {

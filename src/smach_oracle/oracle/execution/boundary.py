@@ -16,7 +16,7 @@ from ..control.hold import HeldPlace, Hold, LetGo
 from ..control.holding import Wait, wait_until_let_go
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
-from ..places.place import Place
+from ..places.place import TreePlace
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
 from ..recovery.endings import ending_at_once, route_at_preempt
@@ -25,11 +25,11 @@ from ..recovery.operator_wait import clocks_stand_still
 from ..recovery.stop import is_asked_around
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
-from .entering import keep_start
+from .jump_entry import keep_start
 from .sending import make_jump
 from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
 
-Down = Tuple[Place, ...]
+Down = Tuple[TreePlace, ...]
 
 
 def before_step(node: TreeNode) -> Optional[Stop]:
@@ -234,7 +234,7 @@ def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
         led = [place.label for place in node.record(label).way_down if place.node is inner]
         route, down = _behind(inner, led[0] if led else str(inner.machine._initial_state_label))
         if route.is_state:
-            return Route(label, True), (Place(inner, route.target), *down)
+            return Route(label, True), (TreePlace(inner, route.target), *down)
         if route.target:
             return route_of(node.machine, label, route.target), ()
     return route_at_preempt(node.machine, label), ()

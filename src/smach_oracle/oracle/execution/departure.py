@@ -14,8 +14,8 @@ from ..branches.border import IteratorBorder, border_of
 from ..machine.nesting import machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..places.handing_over import links_to
+from ..places.jump_path import repeated_on, why_closed_on
 from ..places.levels import levels_above
-from ..places.way import repeated_on, why_closed_on
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure

@@ -6,10 +6,10 @@ from ..asking.question import names
 from ..control.control import Jump
 from ..machine.repeats import why_closed
 from ..machine.tree_node import TreeNode
-from ..places.place import Place, place_at
-from ..places.way import Way, repeated_on, way_to, why_closed_on
+from ..places.jump_path import JumpPath, jump_path_to, repeated_on, why_closed_on
+from ..places.place import TreePlace, place_at
 from ..records.events import EventKind
-from .entering import missing_for, prepare_entry
+from .jump_entry import missing_for, prepare_entry
 from .transitions import go_to
 
 
@@ -21,7 +21,7 @@ class Prospect(NamedTuple):
     repeats: Tuple[str, ...] = ()  # guarded states (`on_retry`) that may be repeated
 
 
-def way_for(place: Place) -> Way:
+def jump_path_for(place: TreePlace) -> JumpPath:
     """Return the way to a place from the innermost container around it that runs.
 
     It is that from its own container where none runs.
@@ -29,11 +29,11 @@ def way_for(place: Place) -> Way:
     sent: Optional[TreeNode] = place.node
     while sent is not None and not sent.machine._is_running:
         sent = sent.parent
-    way = way_to(sent, place) if sent is not None else None
-    return way or Way((), place.node, (place,))
+    way = jump_path_to(sent, place) if sent is not None else None
+    return way or JumpPath((), place.node, (place,))
 
 
-def prospect_of(place: Place, written: Tuple[str, ...] = ()) -> Prospect:
+def prospect_of(place: TreePlace, written: Tuple[str, ...] = ()) -> Prospect:
     """Return what comes of sending the machine to a place.
 
     :param written: userdata keys that are written for it.
@@ -47,10 +47,10 @@ def prospect_of(place: Place, written: Tuple[str, ...] = ()) -> Prospect:
                 node.path, label, names(each for each in labels if not closed[each])
             )
         )
-    return _prospect_on(way_for(place), written)
+    return _prospect_on(jump_path_for(place), written)
 
 
-def _prospect_on(way: Way, written: Tuple[str, ...]) -> Prospect:
+def _prospect_on(way: JumpPath, written: Tuple[str, ...]) -> Prospect:
     closed_now = why_closed_on(way)
     if closed_now:
         return Prospect('{} cannot be entered now: {}'.format(way.down[-1].label, closed_now))
@@ -65,7 +65,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     """
     label = str(node.machine._current_label)
     place = place_at(node, jump.container, jump.state)
-    way = way_to(node, place) if place is not None else None
+    way = jump_path_to(node, place) if place is not None else None
     why_not = _why_not(way, jump)
     if way is None or why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
@@ -86,7 +86,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     return True
 
 
-def _why_not(way: Optional[Way], jump: Jump) -> str:
+def _why_not(way: Optional[JumpPath], jump: Jump) -> str:
     if way is None or way.left:
         return 'there is no such state'
     prospect = _prospect_on(way, jump.written)

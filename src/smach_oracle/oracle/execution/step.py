@@ -42,7 +42,7 @@ from ..recovery.occasions import Occasion
 from ..recovery.phases import OracleState
 from ..recovery.recovering import Recovering
 from ..recovery.stack_room import too_deep_below, too_deep_here
-from ..recovery.still_running import TakenOut
+from ..recovery.still_running import EndedByAnswer
 from ..recovery.stop import note_end_under_preempt, winds_down
 from ..recovery.verdict import Preempted, Verdict, arrives_at
 from .applying import Applying
@@ -96,9 +96,9 @@ class Step:
         departure = take_departure(node)
         if departure is not None:
             return self._left(departure, outcome, error)
-        if isinstance(outcome, TakenOut):
+        if isinstance(outcome, EndedByAnswer):
             if not (machine.preempt_requested() or smach.is_shutdown()):
-                return self._taken_out(outcome)
+                return self._ended_by_answer(outcome)
             outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
@@ -163,7 +163,7 @@ class Step:
             )
         )
 
-    def _taken_out(self, taken: TakenOut) -> Occasion:
+    def _ended_by_answer(self, taken: EndedByAnswer) -> Occasion:
         """Go as an expert has answered while the state still ran. What it ended with is nothing."""
         record, answer = self._record, taken.answer
         recall_preempts(self._machine._states[record.label])
@@ -177,7 +177,7 @@ class Step:
             if answer.kind is AnswerKind.SUPERSEDE
             else VisitResult.PREEMPTED,
         )
-        return occasions.taken_out(taken.failure, self._context(), answer, outcome)
+        return occasions.ended_by_answer(taken.failure, self._context(), answer, outcome)
 
     def _held_back(self, failure: Failure, stopping: bool) -> Union[Occasion, Stop]:
         """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""

@@ -23,7 +23,7 @@ from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.endings import outcome_of_early_end
-from .entering import may_start_over
+from .jump_entry import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
 _running: List[TreeNode] = []  # top nodes of the trials of this process

@@ -11,7 +11,7 @@ from ..machine.userdata_view import view_behind
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..recovery.failure import HeldBack, Overrun
-from ..recovery.still_running import TakenOut, WatchedVisit
+from ..recovery.still_running import EndedByAnswer, WatchedVisit
 
 STATE_START = EventKind.STATE_START  # looked up once
 
@@ -76,7 +76,7 @@ def execute_watched(
         finally:
             took_s = monotonic() - begun_s
             if took_s > (record.longest_s or 0.0) and not (
-                isinstance(outcome, (Overrun, TakenOut)) or node.machine._preempt_requested
+                isinstance(outcome, (Overrun, EndedByAnswer)) or node.machine._preempt_requested
             ):
                 record.longest_s = took_s
     finally:

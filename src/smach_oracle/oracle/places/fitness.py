@@ -8,7 +8,7 @@ from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..settings.unfit_names import did_you_mean
 from .handing_over import links_to
-from .place import Place, place_named
+from .place import TreePlace, place_named
 
 
 def why_unfit(node: TreeNode, label: str, name: str) -> str:
@@ -71,11 +71,11 @@ def _around(node: TreeNode) -> List[TreeNode]:
     return found
 
 
-def _is_around(place: Place, node: TreeNode) -> bool:
+def _is_around(place: TreePlace, node: TreeNode) -> bool:
     return any(each.parent is place.node and each.below[0] == place.label for each in _around(node))
 
 
-def _is_in_iterator(place: Place, node: TreeNode) -> bool:
+def _is_in_iterator(place: TreePlace, node: TreeNode) -> bool:
     """Whether an Iterator lies between a place and what is around both."""
     common, inner = _around(node), place.node
     while inner.parent is not None and not any(inner is each for each in common):

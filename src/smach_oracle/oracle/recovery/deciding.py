@@ -8,9 +8,9 @@ from ..decision.sentence import DecisionFacts, goes, going_would_repeat
 from ..machine.repeats import has_visited
 from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
+from ..places.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
 from ..places.levels import levels_above
-from ..places.place import Place, place_named
-from ..places.way import Way, closed_in_words, repeated_on, way_to
+from ..places.place import TreePlace, place_named
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.state_record import RateReading, StateRecord
@@ -56,7 +56,7 @@ class Deciding:
         self.watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
         self._preconditions = PreconditionRunner(node, record.settings, self.watch)
         self.tried: List[str] = []
-        self.way: Optional[Way] = None  # that was decided on
+        self.way: Optional[JumpPath] = None  # that was decided on
         self._standing: Optional[RateReading] = None  # of the state as its policy was asked
 
     def cancel(self) -> None:
@@ -96,7 +96,7 @@ class Deciding:
         if action in (Action.ASK, Action.GIVE_UP):
             return Decider.POLICY, self.facts_of(action, blocked=policy.why(situation))
         name, place = self._place_of(action)
-        way = way_to(self._node, place) if place is not None else None
+        way = jump_path_to(self._node, place) if place is not None else None
         if way is None:
             return Decider.POLICY, self.facts_of(
                 Action.ASK, blocked='there is no state {!r} to go back to'.format(name)
@@ -117,7 +117,7 @@ class Deciding:
             place = '{}/{} {}'.format(node.path, record.label, record.visits)
         return Past(record.recoveries, node.tree.restarts.count, place, node.tree.trials - 1)
 
-    def _place_of(self, action: Action) -> Tuple[str, Optional[Place]]:
+    def _place_of(self, action: Action) -> Tuple[str, Optional[TreePlace]]:
         """Return where a decision leads, by name and as a place.
 
         None means there is no such state.
@@ -126,7 +126,7 @@ class Deciding:
         if action is Action.RESTART:
             top = [node, *levels_above(node)][-1]
             label = top.machine._initial_state_label or ''
-            return label, Place(top, label)
+            return label, TreePlace(top, label)
         name = (
             self._record.label
             if action is Action.REVISIT
@@ -134,12 +134,12 @@ class Deciding:
         )
         return name, place_named(node, name)
 
-    def _named(self, way: Way) -> str:
+    def _named(self, way: JumpPath) -> str:
         """Return the label of a place, or its path where it is in another container."""
         place = way.down[-1]
         return place.label if place.node is self._node else place.path
 
-    def _what_prevents(self, way: Way) -> Tuple[Decider, str]:
+    def _what_prevents(self, way: JumpPath) -> Tuple[Decider, str]:
         """Spend a recovery on going to a place, or return what prevents it, and why."""
         for decider, why_not in (
             (Decider.ON_RETRY, self.why_repeats_on),
@@ -153,9 +153,9 @@ class Deciding:
 
     def _why_repeats(self, label: str) -> str:
         """Say what would be repeated if the machine went to a state by itself, or '' if nothing."""
-        return self.why_repeats_on(Way((), self._node, (Place(self._node, label),)))
+        return self.why_repeats_on(JumpPath((), self._node, (TreePlace(self._node, label),)))
 
-    def why_repeats_on(self, way: Way) -> str:
+    def why_repeats_on(self, way: JumpPath) -> str:
         """Say what would be repeated if the machine went to a place by itself, or '' if nothing."""
         repeated, place = repeated_on(way), way.down[-1]
         if not repeated:
@@ -167,7 +167,7 @@ class Deciding:
             )
         return going_would_repeat(self._record.label, target, repeated)
 
-    def _why_not(self, way: Way) -> str:
+    def _why_not(self, way: JumpPath) -> str:
         """Return why the machine cannot go on to a place by itself now, '' where it can."""
         return closed_in_words(way, self._named(way)) or self._function_that_runs()
 

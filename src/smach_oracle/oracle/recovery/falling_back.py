@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Optional
 
 from ..asking.question import names
+from ..places.jump_path import JumpPath, jump_path_to, why_closed_on
 from ..places.place import place_named
-from ..places.way import Way, way_to, why_closed_on
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ def fall_back(recovering: 'Recovering') -> Verdict:
         return recovering.keep(why)
     verb, target = node.settings.on_no_answer
     if verb == 'goto':
-        way = _way_back(recovering)
+        way = _jump_path_back(recovering)
         problem = _why_not(recovering, way) or recovering.budget.take_recovery()
         if way is not None and not problem:
             recovering.record.fallbacks += 1
@@ -39,7 +39,7 @@ def fallback_in_words(recovering: 'Recovering') -> str:
         return 'stop, and keep the trial for the next start'
     node = recovering.node
     verb, target = node.settings.on_no_answer
-    if verb == 'goto' and not _why_not(recovering, _way_back(recovering)):
+    if verb == 'goto' and not _why_not(recovering, _jump_path_back(recovering)):
         return 'go to {}'.format(target)
     if verb == 'give_up' and target in node.machine.get_registered_outcomes():
         return 'end with {}'.format(target)
@@ -60,14 +60,14 @@ def fallback_in_short(recovering: 'Recovering') -> str:
     return ' '.join(recovering.node.settings.on_no_answer).strip()
 
 
-def _way_back(recovering: 'Recovering') -> Optional[Way]:
+def _jump_path_back(recovering: 'Recovering') -> Optional[JumpPath]:
     """Return the way to the place that `on_no_answer` names, None where there is none."""
     node = recovering.node
     place = place_named(node, node.settings.on_no_answer[1])
-    return way_to(node, place) if place is not None else None
+    return jump_path_to(node, place) if place is not None else None
 
 
-def _why_not(recovering: 'Recovering', way: Optional[Way]) -> str:
+def _why_not(recovering: 'Recovering', way: Optional[JumpPath]) -> str:
     """Return why `on_no_answer` cannot lead to a place, '' where it can.
 
     It has a cap, or a trial without experts might not end.

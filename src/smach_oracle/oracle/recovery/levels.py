@@ -8,9 +8,9 @@ from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
+from ..places.jump_path import jump_path_to
 from ..places.levels import failure_context, is_direct, levels_above
-from ..places.place import Place
-from ..places.way import way_to
+from ..places.place import TreePlace
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
@@ -158,7 +158,7 @@ def decide_above(
     """
     record = level.record(failure.state)
     below = recovering.node
-    if way_to(below, Place(level, record.label)) is None:
+    if jump_path_to(below, TreePlace(level, record.label)) is None:
         return None
     context = failure_context(level, record)
     continuous = level.in_force.policy.is_continuous(context)
@@ -168,7 +168,7 @@ def decide_above(
     with recovering.deciding_above(deciding):
         decider, facts = deciding.decide(lambda: _foreseen_behind(level, failure))
     recovering.tried += ['{}: {}'.format(level.path, each) for each in deciding.tried]
-    way = way_to(below, deciding.way.down[-1]) if deciding.way is not None else None
+    way = jump_path_to(below, deciding.way.down[-1]) if deciding.way is not None else None
     if deciding.way is None or way is None:
         record.take_back_failure()
         recovering.tried.append('{}: {}: asks too'.format(level.path, cause_of(facts)))

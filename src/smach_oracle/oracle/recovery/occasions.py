@@ -86,7 +86,9 @@ def interrupted(
     )
 
 
-def taken_out(failure: Failure, context: FailureContext, answer: Answer, outcome: str) -> Occasion:
+def ended_by_answer(
+    failure: Failure, context: FailureContext, answer: Answer, outcome: str
+) -> Occasion:
     """A state was ended by an answer while it still ran. `failure`: as if it had failed."""
     return Occasion(
         failure,

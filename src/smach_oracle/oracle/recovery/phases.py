@@ -20,8 +20,8 @@ from ..machine.health_watch import FAILED
 from ..machine.limited_run import standing_still
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
-from ..places.place import Place
-from ..places.way import Way, why_closed_on
+from ..places.jump_path import JumpPath, why_closed_on
+from ..places.place import TreePlace
 from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from .deciding import Decided
@@ -106,7 +106,7 @@ def _enter_again(recovering: Recovering) -> Optional[Verdict]:
     node, label = recovering.node, recovering.record.label
     if not repeated_by_going_to(node, label):
         recovering.record.unwell_repeats += 1
-        return recovering.jump(Way((), node, (Place(node, label),)))
+        return recovering.jump(JumpPath((), node, (TreePlace(node, label),)))
     recovering.judge_anew(
         recovering.failure._replace(
             kind=FailureKind.HELD_BACK,

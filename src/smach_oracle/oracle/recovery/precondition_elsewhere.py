@@ -10,8 +10,8 @@ from typing import Any, Dict, List, Tuple
 from ..machine.snapshots import UserdataGate, WriteWatch
 from ..machine.tree_node import TreeNode
 from ..places.handing_over import hand_down, hand_on, hand_up, links_to
-from ..places.place import Place
-from ..places.way import Way, way_to
+from ..places.jump_path import JumpPath, jump_path_to
+from ..places.place import TreePlace
 from ..settings.settings import ALLOW
 
 
@@ -22,12 +22,12 @@ class NotMet(Exception):
 class RunElsewhere:
     """One run of a state of another container than that of the failed state."""
 
-    def __init__(self, node: TreeNode, place: Place, own: UserdataGate) -> None:
+    def __init__(self, node: TreeNode, place: TreePlace, own: UserdataGate) -> None:
         """`node`: the failed state's container. `own`: what its userdata is written through.
 
         :raises NotMet: where the state cannot be run now.
         """
-        way = way_to(node, place)
+        way = jump_path_to(node, place)
         if way is None:
             raise NotMet('{} is in no container that is being executed'.format(place.path))
         _check(way)
@@ -67,7 +67,7 @@ class RunElsewhere:
         return self._own if container.userdata is self._userdata else container.userdata
 
 
-def _check(way: Way) -> None:
+def _check(way: JumpPath) -> None:
     for place in way.down[1:]:
         if place.node.machine._is_running:
             raise NotMet('{} runs at this time'.format(place.node.path))

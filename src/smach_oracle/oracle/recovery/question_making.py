@@ -8,9 +8,9 @@ from ..asking.answer_rules import Target
 from ..asking.question import LevelOutcome, OutcomeChoice, Question, StateChoice
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
+from ..places.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..places.levels import levels_above
 from ..places.place import places_of
-from ..places.way import Way, missing_on, repeated_on, way_to, why_closed_on
 from ..records.state_record import StateRecord
 from .failure import Failure, route_of
 from .precondition_probe import LivePreconditionProbe
@@ -66,24 +66,24 @@ def make_question(
 
 def targets_of(node: TreeNode) -> Mapping[Target, str]:
     """Return where a machine could go, and why it cannot go there now, '' where it can."""
-    return {_target(node, way): why_closed_on(way) for way in _ways(node)}
+    return {_target(node, way): why_closed_on(way) for way in _jump_paths(node)}
 
 
-def _ways(node: TreeNode) -> Iterator[Way]:
+def _jump_paths(node: TreeNode) -> Iterator[JumpPath]:
     """Yield the ways to all places of the tree, its own first, in the order of the states."""
     for place in places_of(node):
-        way = way_to(node, place)
+        way = jump_path_to(node, place)
         if way is not None:
             yield way
 
 
-def _target(node: TreeNode, way: Way) -> Target:
+def _target(node: TreeNode, way: JumpPath) -> Target:
     place = way.down[-1]
     return '' if place.node is node else place.node.path, place.label
 
 
 def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateChoice]:
-    for way in _ways(node):
+    for way in _jump_paths(node):
         container, label = _target(node, way)
         record = way.down[-1].node.record(label)
         yield StateChoice(
@@ -143,7 +143,7 @@ def _outcomes_of_branch(node: TreeNode, state: smach.State) -> Tuple[OutcomeChoi
     return tuple(OutcomeChoice(outcome, branch.leads_to(outcome)) for _, _, outcome in sorted(last))
 
 
-def _running_again(way: Way) -> Tuple[str, ...]:
+def _running_again(way: JumpPath) -> Tuple[str, ...]:
     """Return the branches that would all run again if the machine went a way.
 
     They are those of the outermost Concurrence that is entered, be it the place or on the way down.
@@ -154,7 +154,7 @@ def _running_again(way: Way) -> Tuple[str, ...]:
     return ()
 
 
-def _entered_on(way: Way) -> Iterator[smach.State]:
+def _entered_on(way: JumpPath) -> Iterator[smach.State]:
     """Yield the states that are entered, outermost first.
 
     Containers between two places, such as a Concurrence in an Iterator, are among them.

@@ -11,7 +11,7 @@ from ..asking.question import Question
 from ..decision.policy import Action
 from ..decision.sentence import cause_of
 from ..machine.tree_node import TreeNode
-from ..places.way import Way
+from ..places.jump_path import JumpPath
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from .deciding import Decided, Deciding
@@ -127,7 +127,7 @@ class Recovering:
 
     # -- verdicts
 
-    def jump(self, way: Way, text: str = '') -> Verdict:
+    def jump(self, way: JumpPath, text: str = '') -> Verdict:
         """Go to a place, once the robot is well."""
         return self.when_well(JumpTo(way, text=text, written=way.kept(self.deciding.watch)))
 

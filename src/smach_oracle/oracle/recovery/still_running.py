@@ -24,7 +24,7 @@ from .question_making import Account, make_question, targets_of
 from .stop import why_stopped
 
 
-class TakenOut(NamedTuple):
+class EndedByAnswer(NamedTuple):
     """Stands in place of the outcome of a state that an answer ended while it still ran."""
 
     answer: Answer
@@ -77,7 +77,7 @@ class WatchedVisit:
             under_way.pop(id(self._state), None)
             answer = self._end()
         if answer is not None:
-            return TakenOut(answer, self._failure(), outcome, error)
+            return EndedByAnswer(answer, self._failure(), outcome, error)
         if error is not None:
             raise error
         return outcome

@@ -10,16 +10,16 @@ import smach
 from ..asking.question import Answer, AnswerKind
 from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
+from ..places.jump_path import JumpPath, jump_path_to
 from ..places.levels import levels_above
 from ..places.place import place_at
-from ..places.way import Way, way_to
 from .endings import ContainerEnding
 
 
 class JumpTo(NamedTuple):
     """Go to a state, its userdata as the settings say."""
 
-    way: Way
+    way: JumpPath
     by: str = ''  # the expert's name
     text: str = ''
     # userdata keys of the container where the ways meet that survive a restore
@@ -99,7 +99,7 @@ def verdict_of(
     for key, value in (answer.outputs or {}).items():
         watch.gate[remapping.get(key, key)] = value
     if answer.kind is AnswerKind.GOTO:
-        way = way_of(answer, node)
+        way = jump_path_of(answer, node)
         return JumpTo(way, answer.by, answer.why, way.kept(watch))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Supersede(answer.outcome, answer.by, answer.why)
@@ -107,13 +107,13 @@ def verdict_of(
     return GiveUp(ending, answer.by, answer.why, _level_of(answer, node))
 
 
-def way_of(answer: Answer, node: TreeNode) -> Way:
+def jump_path_of(answer: Answer, node: TreeNode) -> JumpPath:
     """Return the way that an answer sends the machine.
 
     :raises InvalidStateError: where there is none. An answer that was checked has one.
     """
     place = place_at(node, answer.container, answer.state)
-    way = way_to(node, place) if place is not None else None
+    way = jump_path_to(node, place) if place is not None else None
     if way is None:
         raise smach.InvalidStateError(
             'there is no way to {}/{}'.format(answer.container or node.path, answer.state)

@@ -9,10 +9,10 @@ from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
 from .handing_over import links_to
 from .levels import levels_above
-from .place import Place
+from .place import TreePlace
 
 
-class Way(NamedTuple):
+class JumpPath(NamedTuple):
     """The way from a container to a place: out to where they meet, and down again.
 
     `left`: the containers that are left, innermost first. `meets`: the innermost container that
@@ -22,7 +22,7 @@ class Way(NamedTuple):
 
     left: Tuple[TreeNode, ...]
     meets: TreeNode
-    down: Tuple[Place, ...]
+    down: Tuple[TreePlace, ...]
 
     @property
     def first(self) -> str:
@@ -37,28 +37,28 @@ class Way(NamedTuple):
         return frozenset(watch.written_in(self.meets.machine))
 
 
-def way_to(node: TreeNode, place: Place) -> Optional[Way]:
+def jump_path_to(node: TreeNode, place: TreePlace) -> Optional[JumpPath]:
     """Return the way from a container that is being executed to a place.
 
     None means there is none.
     """
     if place.node is node:
-        return Way((), node, (place,))
+        return JumpPath((), node, (place,))
     levels = [node, *levels_above(node)]
-    down: List[Place] = [place]
+    down: List[TreePlace] = [place]
     while not any(down[0].node is level for level in levels):
         below = down[0].node
         if below.parent is None:
             return None
-        down.insert(0, Place(below.parent, below.below[0]))
+        down.insert(0, TreePlace(below.parent, below.below[0]))
     index = next(i for i, level in enumerate(levels) if level is down[0].node)
-    return Way(tuple(levels[:index]), levels[index], tuple(down))
+    return JumpPath(tuple(levels[:index]), levels[index], tuple(down))
 
 
 # -- what is told of a place before the machine goes there
 
 
-def why_closed_on(way: Way) -> str:
+def why_closed_on(way: JumpPath) -> str:
     """Return why a place, or one on the way down, cannot be entered now, '' where it can."""
     for place in way.down:
         why = why_closed(place.node, place.label)
@@ -67,7 +67,7 @@ def why_closed_on(way: Way) -> str:
     return ''
 
 
-def closed_in_words(way: Way, name: str) -> str:
+def closed_in_words(way: JumpPath, name: str) -> str:
     """Say that a place of this name, or one on the way down, is closed, or ''.
 
     It is a clause.
@@ -77,12 +77,12 @@ def closed_in_words(way: Way, name: str) -> str:
     return '{} {}'.format(name, why) if why and not why.startswith(way.meets.path) else why
 
 
-def repeated_on(way: Way) -> Tuple[str, ...]:
+def repeated_on(way: JumpPath) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a place."""
     return repeated_by_going_to(way.meets, way.first)
 
 
-def missing_on(way: Way, written: Iterable[str]) -> Tuple[str, ...]:
+def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
     """Return the input keys of a place's state that would be missing after the jump.
 
     :param written: keys of the container `meets` that survive a restore.

@@ -14,19 +14,19 @@ from ..machine.nesting import nodes_of
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
-from ..places.way import Way, missing_on
+from ..places.jump_path import JumpPath, missing_on
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
 
 
-class Entry(NamedTuple):
+class JumpEntry(NamedTuple):
     """The way in which a place is entered."""
 
     missing: Tuple[str, ...]  # input keys that it does not find
     userdata: str  # 'restore' or 'keep'
 
 
-def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
+def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEntry:
     """Put the userdata back where the settings say so, and note in which states containers begin.
 
     To be called in the thread of the container that holds the whole way, its lock held.
@@ -49,10 +49,10 @@ def prepare_entry(way: Way, written: Collection[str], sent: str) -> Entry:
             '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
         )
     node.record(target).go_down(way.down[1:])
-    return Entry(missing, 'keep' if snapshot is None else 'restore')
+    return JumpEntry(missing, 'keep' if snapshot is None else 'restore')
 
 
-def missing_for(way: Way, written: Collection[str]) -> Tuple[str, ...]:
+def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     """Return the input keys that a place would not find.
 
     :param written: keys of the container that holds the whole way, written for it.
