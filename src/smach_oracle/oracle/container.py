@@ -414,10 +414,7 @@ class OracleContainer(smach.StateMachine):
             transitions: Transitions = self._current_transitions  # type: ignore[assignment]
             outcome: Any  # a user's state may return anything
             error = None
-            try:
-                constants = self._constants[label]
-            except KeyError:
-                constants = None
+            constants = self._constants.get(label)
             if engine.lock_is_held:
                 lock.release()
             try:

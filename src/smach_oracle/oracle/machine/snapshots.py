@@ -181,9 +181,11 @@ class WriteWatch:
     def begin(self) -> UserdataMark:
         """Begin with what may be taken back."""
         data = dict(self._machine.userdata._data)
-        copies = {key: copied(data[key]) for key in self._deep if key in data}
         self._kept.update(self.gate.written)
         self.gate.written.clear()  # the set itself: branches of the gate have it, too
+        if not self._deep:
+            return UserdataMark(data, {}, {})
+        copies = {key: copied(data[key]) for key in self._deep if key in data}
         return UserdataMark(data, copies, {key: fingerprint(data[key]) for key in copies})
 
     def take_back(self, begun: UserdataMark) -> None:

@@ -161,7 +161,10 @@ class TreeNode:
 
     def top(self) -> 'TreeNode':
         """Return the node of the top machine."""
-        return self._labels_from_top()[1]
+        node = self
+        while node.parent is not None:
+            node = node.parent
+        return node
 
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""

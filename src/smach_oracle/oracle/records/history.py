@@ -109,11 +109,13 @@ class History:
         :param initial: the container's initial state.
         :param successes: number of successes of `state` in all.
         """
+        streak = self._streak
+        fails_last = streak.state == state
         return FailureContext(
             state,
             initial,
-            self._streak.state == state,
-            self.failing_since(state, successes),
+            fails_last,
+            fails_last and streak.successes == successes,
             self.unconditioned,
             self.succeeded_before(state, successes),
         )
@@ -133,8 +135,9 @@ class History:
 
         :param successes: number of successes of `state` in all.
         """
-        if self.failing_since(state, successes) and self._streak.anchored:
-            return self._streak.anchor
+        streak = self._streak
+        if streak.state == state and streak.successes == successes and streak.anchored:
+            return streak.anchor
         return self._latest_other(state)
 
     def failed(self, state: str, successes: int) -> None:

@@ -294,8 +294,10 @@ class StateRecord:
             self._up_to_date().restore(learned)
 
     def _by_edges(self) -> int:
-        edges = self.fast
-        return self._retired + sum([edge.count for edge in list(edges.values())] if edges else ())
+        count = self._retired
+        for edge in list(self.fast.values()):
+            count += edge.count
+        return count
 
     def __getstate__(self) -> Dict[str, Any]:
         """Leave out what belongs to an execution under way."""

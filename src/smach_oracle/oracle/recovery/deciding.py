@@ -141,13 +141,12 @@ class Deciding:
 
     def _what_prevents(self, way: JumpPath) -> Tuple[Decider, str]:
         """Spend a recovery on going to a place, or return what prevents it, and why."""
-        for decider, why_not in (
-            (Decider.ON_RETRY, self.why_repeats_on),
-            (Decider.POLICY, self._why_not),
-        ):
-            reason = why_not(way)
-            if reason:
-                return decider, reason
+        reason = self.why_repeats_on(way)
+        if reason:
+            return Decider.ON_RETRY, reason
+        reason = self._why_not(way)
+        if reason:
+            return Decider.POLICY, reason
         spent = self._budget.take_recovery()
         return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
 
@@ -213,7 +212,8 @@ class Deciding:
         return Preconditions.MET
 
     def _run_precondition(self, spec: PreconditionSpec) -> bool:
-        self._emit(EventKind.PRECONDITION_START, target=spec.name)
+        emit, label = self._node.emit, self._record.label
+        emit(EventKind.PRECONDITION_START, label, target=spec.name)
         why_not = self._preconditions.run(spec)
         for _ in range(self._record.most_repeats if why_not else 0):
             if not why_not or not self._stop.has_waited_after(
@@ -222,7 +222,7 @@ class Deciding:
                 break
             why_not = self._preconditions.run(spec)
         outcome = 'not met' if why_not else 'met'
-        self._emit(EventKind.PRECONDITION_END, target=spec.name, outcome=outcome, text=why_not)
+        emit(EventKind.PRECONDITION_END, label, outcome, spec.name, text=why_not)
         if why_not:
             self._not_met = spec.name
         else:
@@ -233,6 +233,3 @@ class Deciding:
             )
         )
         return not why_not
-
-    def _emit(self, kind: EventKind, **fields: Any) -> None:
-        self._node.emit(kind, state=self._record.label, **fields)
