@@ -23,9 +23,9 @@ from smach_oracle.oracle.decision.baselines import BASELINES
 from smach_oracle.oracle.decision.policy import POLICIES
 
 GROWTH_LIMIT = 1.5
-# in bare steps. The aim is 1.2 times what the first release took, measured beside it in one run. It
-# is missed: the limit is what is reached and a fifth.
-AIM, LIMIT = 1200.0, 2750.0
+# in bare steps. Wanted are 75 us where the first executive took 62 us: 1.2 times its 1000 bare
+# steps. That is missed. The limit is what is reached, 1900, and a fifth.
+AIM, LIMIT = 1200.0, 2300.0
 ROUNDS = 5
 FAILURES = 300
 

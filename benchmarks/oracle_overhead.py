@@ -23,7 +23,7 @@ from quiet import silence
 import smach
 from smach_oracle.oracle import OracleContainer
 
-# in bare steps; where the aim is missed, the limit is what is reached and a fifth
+# in bare steps. The aims are missed, by 2 and by 3. The limits are what is reached and a fifth.
 AIM, LIMIT = 10.0, 14.4
 OBSERVED_AIM, OBSERVED_LIMIT = 40.0, 51.0
 DEPTH = 3

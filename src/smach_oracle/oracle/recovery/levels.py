@@ -194,6 +194,8 @@ def tell_decision(
     node: TreeNode, record: StateRecord, decided: Decided, continuous: bool, sentence: str
 ) -> None:
     """Tell the observers what the oracle of a level has decided."""
+    if not node.events.observers:
+        return
     decider, facts = decided
     node.emit_rated(
         EventKind.DECISION,

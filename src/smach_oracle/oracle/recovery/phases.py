@@ -165,10 +165,7 @@ def _wait_and_jump(recovering: Recovering, wait_s: float, jump: JumpTo) -> Verdi
 def _tell_decision(recovering: Recovering, decided: Decided) -> None:
     node, sentence = recovering.node, decision_sentence(decided[1], recovering.cause)
     smach.loginfo('{}/{}'.format(node.path, sentence))
-    if node.events.observers:
-        tell_decision(
-            node, recovering.record, decided, recovering.occasion.continuous, sentence
-        )
+    tell_decision(node, recovering.record, decided, recovering.occasion.continuous, sentence)
 
 
 # -- the levels above
