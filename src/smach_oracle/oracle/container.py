@@ -345,6 +345,11 @@ class OracleContainer(smach.StateMachine):
                 run.outcome = super().execute(*args, **kwargs)
         return run.outcome
 
+    def request_preempt(self) -> None:
+        """Ask it to stop, and wake what waits in its tree, such as an operator's hold."""
+        super().request_preempt()
+        self._oracle.tree.scope.wake()
+
     def call_start_cbs(self) -> None:
         """Forget the execution before: the machine has its initial state now."""
         node = self._oracle

@@ -10,7 +10,7 @@ from typing import Callable, List, TypeVar
 
 import rospy
 
-from smach_oracle.oracle.background import BackgroundCall
+from smach_oracle.oracle.scope.background_call import BackgroundCall
 
 _LOOK_S = 0.1
 SHUTDOWN_WAIT_S = 2.0  # for a call that had begun before the shutdown was requested

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Iterable, Iterator, List, Mapping, Option
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of, unwrap
 from smach_oracle.oracle.asking.question import Answer, Expert, Progress, Question
-from smach_oracle.oracle.background import BackgroundCall
 from smach_oracle.oracle.errors import TrialError
 from smach_oracle.oracle.identity import remove_identical
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.scope.background_call import BackgroundCall
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 from smach_oracle.oracle.settings.settings import (

@@ -19,7 +19,6 @@ ARROWS: Dict[str, Set[str]] = {
     'store': {'smach_common.foreign', 'forking'},  # no ROS, no SMACH
     'ros': {
         'oracle.asking',
-        'oracle.background',
         'oracle.container',
         'oracle.decision',
         'oracle.errors',
@@ -27,11 +26,11 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.number_checks',
         'oracle.prospects',
         'oracle.records',
+        'oracle.scope',
         'oracle.settings',
         'oracle.operator_hand',
         'oracle.OracleContainer',
         'oracle.oracle_of',
-        'oracle.waiting',
         'forking',
         'packages',
         'smach_common',
@@ -99,11 +98,11 @@ ARROWS: Dict[str, Set[str]] = {
     'testing': {
         'oracle.OracleContainer',
         'oracle.asking',
-        'oracle.background',
         'oracle.errors',
         'oracle.identity',
         'oracle.oracle_of',
         'oracle.records',
+        'oracle.scope',
         'oracle.settings',
         'oracle.unwrap',
         'ros',

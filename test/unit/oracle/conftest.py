@@ -10,6 +10,8 @@ import pytest
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import smach
+from smach_oracle.oracle.machine import tree
+from smach_oracle.oracle.scope.clock import FakeClock
 
 
 @pytest.fixture(autouse=True)
@@ -24,6 +26,14 @@ def log(monkeypatch):
         monkeypatch.setattr(smach, 'log' + level, logger)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     return lines
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """The clock of every machine that the test wraps: only the test has its time pass."""
+    clock = FakeClock()
+    monkeypatch.setattr(tree, 'MonotonicClock', lambda: clock)
+    return clock
 
 
 @pytest.fixture

@@ -4,11 +4,10 @@ import threading
 
 import pytest
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, in_thread, supersede
-from test_time_limits import Clock
+from test_time_limits import LimitClock
 from waiting import wait_for
 
 import smach
-import smach_oracle.oracle.machine.workers as workers
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind, EventSource
 
@@ -73,9 +72,7 @@ def threads_of_x():
 
 def abandoned(monkeypatch, deaf, child, *others, observed=True, **settings):
     """A machine whose X was abandoned while `deaf` was stuck."""
-    clock = Clock()
-    clock.end(2, deaf.stuck)
-    monkeypatch.setattr(workers, 'wait', clock.wait)
+    LimitClock(monkeypatch).end(2, deaf.stuck)
     machine = Watched(
         drawn('X', child, *others),
         expert=FakeExpert(goto('OTHER')),

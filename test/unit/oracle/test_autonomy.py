@@ -12,6 +12,8 @@ from smach_oracle.oracle.control.path_pattern import PathPattern
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.scope.clock import FakeClock
+from smach_oracle.oracle.scope.scope import Scope
 
 
 def test_a_state_that_is_to_be_confirmed_waits_for_that_alone() -> None:
@@ -172,14 +174,14 @@ def test_wrong_levels_and_patterns_are_refused() -> None:
 
 
 def test_a_level_that_is_set_just_before_a_wait_begins_counts() -> None:
-    control, place = Control(), HeldPlace('TOP', 'A')
+    control, place = Control(FakeClock()), HeldPlace('TOP', 'A')
     control.set_level(PathPattern('A'), 'confirm')
     hold = control.hold_before(place, control.level_of(place, 'run') == 'confirm')
     assert hold is not None
     control.set_level(PathPattern('A'), 'run')
     control.begin(hold)
     assert not hold.waits_for_confirmation
-    assert control.wait(hold, lambda: None) is LetGo.RESUMED
+    assert control.wait(hold, Scope()) is LetGo.RESUMED
 
 
 def test_after_an_operators_preempt_what_comes_behind_the_clean_up_is_confirmed() -> None:

@@ -64,7 +64,7 @@ class FakeWaiting:
         self.waited = []
         self._then = then
 
-    def wait(self, seconds, what, stopped, pause):
+    def wait(self, seconds, what, scope):
         self.waited.append((seconds, what))
         self._then()
 

@@ -2,15 +2,18 @@
 
 from smach_oracle.oracle.records.early_end import EarlyEnd
 from smach_oracle.oracle.records.facts import TrialEnd
+from smach_oracle.oracle.scope.reason import Reason
+from smach_oracle.oracle.scope.scope import Scope
 
 
 def test_a_trial_that_is_kept_says_so_unless_it_has_ended_before():
-    early = EarlyEnd()
+    scope = Scope()
+    early = EarlyEnd(scope)
     early.begin_trial(is_stored=True)
     early.keep()
-    assert early.why is TrialEnd.KEPT
+    assert early.why is TrialEnd.KEPT and scope.reason is Reason.EARLY_END
     early.begin_trial(is_stored=True)
-    assert early.why is None
+    assert early.why is None and scope.reason is None
     with early.asking():
         early.note_shutdown()
     early.keep()

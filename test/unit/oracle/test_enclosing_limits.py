@@ -14,13 +14,11 @@ from machines import (
     interface,
     supersede,
 )
-from test_time_limits import Clock
+from test_time_limits import LimitClock
 from waiting import wait_for
 
 import smach
-import smach_oracle.oracle.machine.workers as workers
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.machine import limited_run
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 SETTINGS = {'max_recoveries': 0, 'deadline_s': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}}
@@ -29,10 +27,9 @@ SETTINGS = {'max_recoveries': 0, 'deadline_s': 0, 'interfaces': {'hand': {'actio
 @pytest.fixture
 def clock(monkeypatch):
     """The limit of X is over as soon as somebody is asked."""
-    clock = Clock()
+    clock = LimitClock(monkeypatch)
     clock.asked = threading.Event()
     clock.end(1, clock.asked)
-    monkeypatch.setattr(workers, 'wait', clock.wait)
     return clock
 
 
@@ -150,22 +147,3 @@ def test_a_preempt_ends_the_question_and_all_around_it(clock):
     assert asked.wait(10)
     machine.machine.request_preempt()
     assert run.result() == 'preempted'
-
-
-@pytest.mark.parametrize('questions', [1, 2])
-def test_time_that_stood_still_is_given_back_once(questions, monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(limited_run, 'monotonic', lambda: now[0])
-    run = limited_run.LimitedRun()
-    assert run.take_stood_s() == 0.0
-    with run.stands_still():
-        now[0] = 3.0
-        if questions == 2:
-            with run.stands_still():
-                now[0] = 5.0
-        assert run.take_stood_s() == now[0]
-        assert run.take_stood_s() > 0.0, 'it still stands'
-        before = now[0]
-        now[0] = 10.0
-    assert run.take_stood_s() == 10.0 - before
-    assert run.take_stood_s() == 0.0

@@ -13,6 +13,8 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.machine import health_ports
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.scope.reason import Reason
+from smach_oracle.oracle.scope.scope import Scope
 
 SETTINGS = {'health_settle_s': 0.05}
 
@@ -81,7 +83,7 @@ def test_functions_of_the_settings_and_the_given_one_must_all_be_well(health):
 def test_a_function_that_takes_too_long_counts_as_unwell_whatever_it_says(monkeypatch):
     monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
     port = health_ports.HealthFunctionPort('is_well', lambda: True)
-    assert port.why_unwell() == 'is_well took too long'
+    assert port.why_unwell(Scope()) == 'is_well took too long'
 
 
 def test_a_topic_that_nobody_listens_to_counts_as_well_and_is_warned_of(log):
@@ -171,11 +173,12 @@ def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
         return True  # as it was when it began
 
     port = health_ports.HealthFunctionPort('is_well', is_well)
-    assert port.why_unwell(begun.is_set) == ''  # a preempt: nobody waits for it
+    preempted = Scope(look=lambda: Reason.PREEMPTED if begun.is_set() else None)
+    assert port.why_unwell(preempted) == ''  # nobody waits for it
     if is_asked_meanwhile:
         monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
-        assert port.why_unwell() == 'is_well does not return'
+        assert port.why_unwell(Scope()) == 'is_well does not return'
         monkeypatch.undo()
     go.set()
     assert ended.wait(10) and wait_for(port._call.done.is_set)
-    assert port.why_unwell() == 'is_well: motors: off'
+    assert port.why_unwell(Scope()) == 'is_well: motors: off'

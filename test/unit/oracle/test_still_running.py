@@ -17,11 +17,10 @@ from machines import (
     supersede,
     watched,
 )
-from test_time_limits import Clock
+from test_time_limits import LimitClock
 from waiting import wait_for
 
 import smach
-import smach_oracle.oracle.machine.workers as workers
 from smach_oracle.oracle.asking.question import AnswerKind, Expert
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
@@ -302,7 +301,8 @@ def test_a_preempt_or_a_shutdown_takes_the_question_back(stop, monkeypatch):
         else:
             monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
         cancelled_in_time.append(cancelled.wait(10))
-        gate.go.set()
+        if stop == 'shutdown':  # a preempt ends the state itself
+            gate.go.set()
 
     machine = asked(Scripted('aborted', gate), Scripted(), expert=FakeExpert(ask))
     machine.run()
@@ -394,10 +394,9 @@ def around(label, child):
 
 
 def test_limits_around_run_on_and_take_the_question_back(monkeypatch):
-    clock = Clock()
+    clock = LimitClock(monkeypatch)
     clock.asked = threading.Event()
     clock.end(1, clock.asked)  # the limit of X is over as soon as somebody is asked
-    monkeypatch.setattr(workers, 'wait', clock.wait)
 
     def ask(question, cancelled, progress):
         clock.asked.set()
@@ -448,8 +447,10 @@ def test_the_clocks_thread_lives_only_while_a_state_runs():
         )
         return 'ok'
 
-    machine = asked(Scripted('aborted', looks))
+    before = set(threading.enumerate())  # some of tests before may still end
+    machine = asked(Scripted('aborted', looks), still_running_s=60.0)
     assert machine.run() == 'done'
+    clocks = [clock for clock in clocks if clock not in before]
     assert [clock.daemon for clock in clocks] == [True], 'it keeps no program from its end'
     assert wait_for(
         lambda: (

@@ -8,24 +8,19 @@ from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, su
 from test_still_running import asked, told
 from waiting import wait_for
 
-from smach_oracle.oracle.machine import trial_budget
-from smach_oracle.oracle.machine.alarm_clock import AlarmClock
 from smach_oracle.oracle.places import jump_path
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
+from smach_oracle.oracle.scope.alarm_clock import AlarmClock
+from smach_oracle.oracle.scope.clock import MonotonicClock
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """The budget's monotonic time, in s: a list of one number."""
-    now = [1000.0]
-    monkeypatch.setattr(trial_budget, 'monotonic', lambda: now[0])
-    return now
-
-
-def warned_once(machine, gate):
+def warned_once(machine, gate, clock=None):
     """Run until it warns, and a little longer; return what it warned of."""
     run = in_thread(machine.run)
+    if clock is not None:
+        assert gate.entered.wait(10)
+        clock.advance(1.0)  # now it has run too long
     assert wait_for(lambda: machine.of(EventKind.WARNING))
     assert not gate.go.wait(0.3)  # six times as long as it takes to ask
     gate.go.set()
@@ -47,9 +42,9 @@ def test_where_the_minutes_are_over_the_log_warns_once(clock):
     gate, expert = Gate(), FakeExpert()
     machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
     machine.machine.events.observers.append(
-        lambda event: event.kind is EventKind.JUMP and clock.__setitem__(0, 1061.0)
+        lambda event: event.kind is EventKind.JUMP and clock.advance(61.0)
     )
-    assert warned_once(machine, gate).endswith("the trial's 1 minute is over")
+    assert warned_once(machine, gate, clock).endswith("the trial's 1 minute is over")
     assert not expert.questions
 
 
@@ -57,11 +52,13 @@ def test_the_question_is_open_no_longer_than_the_minutes(clock):
     gate = Gate()
 
     def ask(question, cancelled, progress):
-        clock[0] += 61.0
+        clock.advance(61.0)
 
     expert = FakeExpert(ask)
     machine = asked(Scripted('aborted', gate), expert=expert, budget={'minutes': 1})
     run = in_thread(machine.run)
+    assert gate.entered.wait(10)
+    clock.advance(1.0)  # now it has run too long
     assert wait_for(lambda: machine.of(EventKind.QUERY_EXPIRED))
     assert not gate.go.wait(0.3)  # nobody is asked again
     gate.go.set()
@@ -127,7 +124,7 @@ def test_a_state_that_is_held_back_is_no_longer_one_that_the_oracle_has_entered(
 
 
 def test_the_clock_lives_on_after_an_alarm_that_fails(log):
-    clock, rung = AlarmClock(), threading.Event()
+    clock, rung = AlarmClock(MonotonicClock()), threading.Event()
 
     def fails():
         raise RuntimeError('no more threads')

@@ -21,21 +21,25 @@ from waiting import wait_for
 
 import smach
 import smach_oracle.oracle.machine.workers as worker
+from smach_oracle.oracle.machine.limited_run import LimitedRun
 from smach_oracle.oracle.records.events import EventKind, FailureKind
+from smach_oracle.oracle.scope.clock import FakeClock
 
 LIMITED = {'time_limit_s': 30.0, 'grace_period_s': 5.0}
 ABANDONING = {'time_limit_s': 30.0, 'grace_period_s': 0.1}
 BRIEF_S = 0.1  # a limit that is waited for in full, by a state which never ends before
 
 
-class Clock:
+class LimitClock(FakeClock):
     """The time that the executive gives to states: what it waits for is over once a test allows it.
 
     Nothing depends on how busy the machine is, and no second is waited for in full.
     """
 
-    def __init__(self):
+    def __init__(self, monkeypatch):
+        FakeClock.__init__(self)
         self._over: List[threading.Event] = []
+        monkeypatch.setattr(worker, 'LimitedRun', lambda clock: LimitedRun(self))
 
     def end(self, waits, once):
         """Let the next so many waits (a limit, then a grace period) be over once `once` is set."""
@@ -45,20 +49,18 @@ class Clock:
         """Whether every wait that was to end has ended."""
         return not self._over
 
-    def wait(self, event, seconds):
-        """In place of `worker.wait`."""
-        ended = wait_for(lambda: event.is_set() or self._over and self._over[0].is_set())
-        assert ended, 'nothing ends this wait'
-        if not event.is_set():
+    def wait(self, bell, left_s, longest_s, is_pause):
+        """Have the time that is left pass, once a test allows it."""
+        if self._over and self._over[0].is_set():
             self._over.pop(0)
-        return event.is_set()
+            self.advance(left_s)
+        else:
+            bell.wait(0.005)  # who waits looks again
 
 
 @pytest.fixture
 def clock(monkeypatch):
-    clock = Clock()
-    monkeypatch.setattr(worker, 'wait', clock.wait)
-    return clock
+    return LimitClock(monkeypatch)
 
 
 class Stubborn(Scripted):
@@ -263,16 +265,13 @@ def test_ctrl_c_in_the_worker_reaches_the_machine(stop):
 def test_ctrl_c_while_the_machine_waits_leaves_the_state_behind(monkeypatch):
     state = Stubborn()
     machine = limited(state, time_limit_s=10.0)
-    real = worker.wait
 
-    def interrupted(event, seconds):
-        if seconds == 10.0:
-            monkeypatch.setattr(worker, 'wait', real)
+    class Interrupted(LimitClock):
+        def wait(self, bell, left_s, longest_s, is_pause):
             assert state.stuck.wait(20)
             raise KeyboardInterrupt
-        return real(event, seconds)
 
-    monkeypatch.setattr(worker, 'wait', interrupted)
+    Interrupted(monkeypatch)
     with pytest.raises(KeyboardInterrupt):
         machine.run()
     assert machine.machine.is_running() is False
@@ -318,15 +317,6 @@ def test_an_overrun_in_a_machine_without_a_failing_outcome_raises():
     )
     with pytest.raises(smach.InvalidUserCodeError, match='overran its time limit of 0.1 s'):
         machine.run()
-
-
-def test_what_is_waited_for_ends_a_wait_and_so_do_its_seconds():
-    event = threading.Event()
-    begin = time.monotonic()
-    assert worker.wait(event, BRIEF_S) is False
-    assert time.monotonic() - begin >= BRIEF_S
-    event.set()
-    assert worker.wait(event, 10.0 * threading.TIMEOUT_MAX) is True
 
 
 def test_without_recovery_there_are_no_limits():

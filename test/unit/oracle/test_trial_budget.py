@@ -10,19 +10,11 @@ from machines import FakeExpert, Scripted, Watched, give_up, goto, waits
 import smach
 from smach_oracle.oracle.asking import inquiry
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.machine import trial_budget
+from smach_oracle.oracle.machine.trial_budget import TrialBudget
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import Decider
 from smach_oracle.oracle.settings.budget import Budget
 from smach_oracle.oracle.settings.settings import Settings
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """The budget's monotonic time, in s: a list of one number."""
-    now = [1000.0]
-    monkeypatch.setattr(trial_budget, 'monotonic', lambda: now[0])
-    return now
 
 
 def failing(*answers, budget, times=100, **settings):
@@ -221,7 +213,7 @@ def passing(clock, minutes, outcome='aborted'):
     """A step of a state that takes so long and ends so."""
 
     def step(state, ud):
-        clock[0] += 60.0 * minutes
+        clock.advance(60.0 * minutes)
         return outcome
 
     return step
@@ -252,7 +244,7 @@ def test_when_the_minutes_are_over_it_ends_as_without_an_oracle(clock):
 
 def test_an_exception_is_raised_then(clock):
     def late(state, ud):
-        clock[0] += 61
+        clock.advance(61)
         raise ValueError('no grasp')
 
     machine = Watched(chain(PICK=Scripted(late)), settings={'budget': {'minutes': 1}})
@@ -269,9 +261,9 @@ def test_preconditions_that_outlast_the_minutes_are_followed_by_no_recovery(cloc
 
 
 def test_a_deadline_at_the_very_end_is_not_without_end(clock):
-    budget = trial_budget.TrialBudget()
+    budget = TrialBudget(clock)
     budget.begin(Budget(minutes=1))
-    clock[0] += 60
+    clock.advance(60)
     deadline_s, is_cut = budget.within(0)
     assert 0 < deadline_s < 0.1 and is_cut
 
@@ -279,7 +271,7 @@ def test_a_deadline_at_the_very_end_is_not_without_end(clock):
 @pytest.mark.parametrize('deadline_s', [300.0, 0])
 def test_a_question_is_open_no_longer_than_the_trial(clock, deadline_s):
     def too_late(question, cancelled, progress):
-        clock[0] += 90
+        clock.advance(90)
         return None
 
     machine, expert = failing(

@@ -4,21 +4,12 @@ import pytest
 from machines import FakeExpert, FakeHealth, Scripted, goto, supersede, watched
 from test_health import SETTINGS, fails_unwell, heals_at_once, notices
 
-from smach_oracle.oracle.machine import trial_budget
 from smach_oracle.oracle.records.events import EventKind
 
 
 @pytest.fixture
 def health():
     return FakeHealth()
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """The budget's monotonic time, in s: a list of one number."""
-    now = [1000.0]
-    monkeypatch.setattr(trial_budget, 'monotonic', lambda: now[0])
-    return now
 
 
 def flapping(health, times=100, expert=None, **settings):
@@ -81,7 +72,7 @@ def test_the_minutes_end_the_wait(health, clock):
 
     def pass_time(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
-            clock[0] += 61.0
+            clock.advance(61.0)
 
     machine.machine.events.observers.append(pass_time)
     assert machine.run() == 'aborted'
@@ -91,7 +82,7 @@ def test_the_minutes_end_the_wait(health, clock):
 
 def test_after_the_minutes_nobody_waits(health, clock):
     def late(state, ud):
-        clock[0] += 61.0
+        clock.advance(61.0)
         return fails_unwell(health)(state, ud)
 
     machine = watched(Scripted(late), health=health, settings=dict(SETTINGS, budget={'minutes': 1}))
@@ -114,7 +105,7 @@ def test_the_minutes_end_the_wait_before_a_jump(health, clock):
 
     def pass_time(event):
         if event.kind is EventKind.HEALTH_WAIT_START:
-            clock[0] += 61.0
+            clock.advance(61.0)
 
     machine.machine.events.observers.append(pass_time)
     assert machine.run() == 'aborted' and machine.visits() == ['A']

@@ -1,11 +1,12 @@
 """Waits that are passed through a service: what it lets pass, and what is waited for."""
 
-import threading
 import types
 
 import pytest
 import rospy
 
+from smach_oracle.oracle.scope.reason import Reason
+from smach_oracle.oracle.scope.scope import Scope
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.ros.waiting import service_waiting
 from smach_oracle.ros.waiting.service_waiting import ServiceWaiting
@@ -41,18 +42,14 @@ class World:
             raise self._error
         return types.SimpleNamespace(stamp=rospy.Time(self.now_s))
 
-    def wait(self, seconds, what, stopped, pause):
+    def wait(self, seconds, what, scope):
         """What the oracle waits for by itself."""
         self.waited.append(pytest.approx(seconds))
 
 
-def never():
-    return False
-
-
 def test_time_passes_by_the_service_in_pieces(monkeypatch):
     world = World(monkeypatch)
-    world.waiting.wait(2.5, 'to try PICK again', never, lambda s: None)
+    world.waiting.wait(2.5, 'to try PICK again', Scope())
     assert world.asked == [
         ('/world/pass_time', seconds, 'to try PICK again') for seconds in (1.0, 1.0, 0.5)
     ]
@@ -61,13 +58,13 @@ def test_time_passes_by_the_service_in_pieces(monkeypatch):
 
 def test_what_a_world_with_a_pace_does_not_let_pass_is_waited_for(monkeypatch):
     world = World(monkeypatch, passes=0.0)
-    world.waiting.wait(1.5, '', never, lambda s: None)
+    world.waiting.wait(1.5, '', Scope())
     assert world.waited == [1.0, 0.5]
 
 
 def test_without_the_service_all_of_it_is_waited_for(monkeypatch):
     world = World(monkeypatch, error=ServerGoneError('gone'))
-    world.waiting.wait(5.0, '', never, lambda s: None)
+    world.waiting.wait(5.0, '', Scope())
     assert (len(world.asked), world.waited) == (1, [5.0])
 
 
@@ -76,12 +73,12 @@ def test_a_service_that_is_not_there_is_named_once(monkeypatch):
     world = World(monkeypatch, error=ServerGoneError('/world/pass_time: gone for good'))
     monkeypatch.setattr(rospy, 'logwarn', lambda *args: warnings.append(args[0] % args[1:]))
     for _ in range(3):
-        world.waiting.wait(5.0, '', never, lambda s: None)
+        world.waiting.wait(5.0, '', Scope())
     assert len(warnings) == 1 and 'gone for good; the oracle waits without it' in warnings[0]
 
 
 def test_a_preempt_between_two_pieces_ends_the_wait(monkeypatch):
-    stop = threading.Event()
-    world = World(monkeypatch, then=stop.set)
-    world.waiting.wait(5.0, '', stop.is_set, lambda s: None)
+    scope = Scope()
+    world = World(monkeypatch, then=lambda: scope.cancel(Reason.PREEMPTED))
+    world.waiting.wait(5.0, '', scope)
     assert len(world.asked) == 1

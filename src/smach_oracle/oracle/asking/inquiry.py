@@ -1,18 +1,17 @@
 """Asking the expert until an answer fits or the deadline is over (paper, section V)."""
 
 import threading
-import time
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
 from smach_oracle.foreign import repr_of
 
-from ..background import BackgroundCall
 from ..errors import AnswerError
 from ..records.events import EventKind
+from ..scope.background_call import BackgroundCall
+from ..scope.scope import Scope
 from .answer_rules import Target, addressed, check_answer, checked_type, choices_of
 from .question import Answer, AnswerKind, Expert, Progress, Question
 
-_WATCH_PERIOD_S = 0.05  # how soon a shutdown is noticed while a question is open
 # how long past the deadline an expert is waited for before its question is taken back
 _OVERTIME_S = 2.0
 # how long an expert's port is waited for once its question has been taken back
@@ -25,9 +24,7 @@ class Asker(Protocol):
 
     tried: List[str]  # what was tried already, in words. Runs of interfaces are added
     question_cancelled: threading.Event  # the question is to be taken back
-
-    def stopped(self) -> bool:
-        """Whether something ends the recovery, such as a preempt or a shutdown."""
+    scope: Scope  # ends the recovery, as a preempt or a shutdown does
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the failure. `deadline_s`: seconds left, 0 without end."""
@@ -53,33 +50,6 @@ class Reply(NamedTuple):
     why_none: str = ''
 
 
-class _StopWatch:
-    """Sets `cancelled` when the asker stops, and when an expert is long overdue."""
-
-    def __init__(self, asker: Asker, cancelled: threading.Event, end: Optional[float]) -> None:
-        self._asker = asker
-        self._cancelled = cancelled
-        self._latest = None if end is None else end + _OVERTIME_S
-        self._over = threading.Event()
-        self._thread = threading.Thread(
-            target=self._watch, name='smach_oracle shutdown watch', daemon=True
-        )
-
-    def __enter__(self) -> '_StopWatch':
-        self._thread.start()
-        return self
-
-    def __exit__(self, *exc_info: object) -> None:
-        self._over.set()
-
-    def _watch(self) -> None:
-        while not self._over.wait(_WATCH_PERIOD_S):
-            late = self._latest is not None and time.monotonic() > self._latest
-            if self._asker.stopped() or late:
-                self._cancelled.set()
-                return
-
-
 class _NoAnswer(Exception):
     """Nobody answers this question any more. It never leaves this module."""
 
@@ -91,7 +61,9 @@ class Inquiry:
         """`deadline_s`: 0 waits without end."""
         self._asker = asker
         self._expert = expert
-        self._end = time.monotonic() + deadline_s if deadline_s else None
+        self._scope = asker.scope
+        self._now = asker.scope.clock.now
+        self._end = self._now() + deadline_s if deadline_s else None
         self._cancelled = asker.question_cancelled
         self._unfit = 0
         self._question_id = ''
@@ -99,8 +71,7 @@ class Inquiry:
     def run(self) -> Reply:
         """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
-            with _StopWatch(self._asker, self._cancelled, self._end):
-                return Reply(self._ask_until_it_fits(), self._question_id)
+            return Reply(self._ask_until_it_fits(), self._question_id)
         except _NoAnswer as why:
             return Reply(None, self._question_id, str(why))
 
@@ -116,11 +87,11 @@ class Inquiry:
             self._pause()
 
     def _remaining_s(self) -> float:
-        if self._asker.stopped():
+        if self._scope.reason is not None:
             raise _NoAnswer('taken back')
         if self._end is None:
             return 0.0
-        remaining_s = self._end - time.monotonic()
+        remaining_s = self._end - self._now()
         if remaining_s <= 0:
             raise _NoAnswer('no answer by the deadline')
         return remaining_s
@@ -131,7 +102,7 @@ class Inquiry:
         pause_s = 0.0
         if self._unfit > 1:
             pause_s = min(_MAX_PAUSE_S, 0.05 * 2.0 ** min(self._unfit, 10))
-        self._cancelled.wait(pause_s if self._end is None else min(pause_s, self._remaining_s()))
+        self._scope.wait(pause_s if self._end is None else min(pause_s, self._remaining_s()))
 
     def _answer_to(self, question: Question) -> Optional[Answer]:
         """Return the answer to one question, None where it did not fit."""
@@ -188,13 +159,16 @@ class Inquiry:
 
     def _wait_for(self, port: BackgroundCall) -> None:
         """Wait for the expert's port, and not long once its question has been taken back."""
-        while not port.done.wait(_WATCH_PERIOD_S):
-            if self._cancelled.is_set() and not port.done.wait(_PATIENCE_S) and port.leave():
-                self._asker.warn(
-                    "the expert's port goes on although its question was taken back; "
-                    'it is left behind'
-                )
-                raise _NoAnswer('no answer by the deadline')
+        latest_s = None if self._end is None else self._end + _OVERTIME_S - self._now()
+        if self._scope.wait(latest_s, port.done):
+            return
+        self._cancelled.set()
+        patience = Scope(clock=self._scope.clock)  # in which nothing ends it
+        if not patience.wait(_PATIENCE_S, port.done) and port.leave():
+            self._asker.warn(
+                "the expert's port goes on although its question was taken back; it is left behind"
+            )
+            raise _NoAnswer('no answer by the deadline')
 
     def _try_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         try:

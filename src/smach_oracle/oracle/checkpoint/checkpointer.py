@@ -17,6 +17,7 @@ from ..places.place import TreePlace
 from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
+from ..scope.reason import Reason
 from .container_facts import ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, WeakIds, keys_of
@@ -415,4 +416,4 @@ def _enters(event: Event, node: TreeNode) -> bool:
 
 def must_stop(node: TreeNode) -> bool:
     """Whether nobody may wait any longer."""
-    return node.machine.preempt_requested() or bool(smach.is_shutdown())
+    return not node.execution.scope.reasons.isdisjoint((Reason.PREEMPTED, Reason.SHUTDOWN))

@@ -7,18 +7,15 @@ engines, `attentive`, which they look at in any case. Without a request a step c
 import contextlib
 import math
 import threading
-import time
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
+from typing import Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
 
+from ..scope.clock import Clock
+from ..scope.scope import Scope
 from ..settings.settings import CONFIRM_FIRST
 from .hold import HeldBy, HeldPlace, Hold, LetGo
 from .path_pattern import PathPattern
 
-_LOOK_PERIOD_S = 0.05  # how soon a wait sees a preempt or a shutdown, of which nobody tells it
-
 _SETTLE_S = 1.0  # how long a command waits at most for a container that is being sent
-
-EndedBy = Callable[[], Optional[LetGo]]
 
 
 class Engine(Protocol):
@@ -59,7 +56,8 @@ class Control:
     `is_set`: whether an operator has asked for any of them, so that a machine looks before a state.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._changed = threading.Condition()
         self._engines: Dict[int, Engine] = {}
         self._holds: List[Hold] = []
@@ -162,25 +160,25 @@ class Control:
         with self._changed:
             self._holds.remove(hold)
 
-    def wait(self, hold: Hold, ended_by: EndedBy) -> LetGo:
+    def wait(self, hold: Hold, scope: Scope) -> LetGo:
         """Wait until a hold that has begun is let go, and return by what.
 
-        :param ended_by: what else ends the wait, such as a preempt. It is asked 20 times a second.
+        :param scope: ends the wait, as a preempt does.
         """
         while True:
-            let_go = ended_by()  # a user's machine has a say in it: not under the lock
+            hold.changed.clear()
+            with self._changed:
+                let_go, stop = self._let_go(hold), self._stop
+            reason = scope.reason  # a user's machine has a say in it: not under the lock
+            if reason is not None:
+                return LetGo.by(reason)  # it goes before what an operator has asked for since
             if let_go is not None:
                 return let_go
-            with self._changed:
-                let_go = self._let_go(hold)
-                if let_go is None:
-                    self._changed.wait(_LOOK_PERIOD_S)
-            if let_go is not None:
-                return ended_by() or let_go  # a preempt that came before it goes before it
+            scope.wait(None if stop is None else stop.ends_s - self._clock.now(), hold.changed)
 
     def _let_go(self, hold: Hold) -> Optional[LetGo]:
         if self._stop is not None:  # the preempt is on its way, and lets go what it comes to
-            return LetGo.PREEMPTED if time.monotonic() > self._stop.ends_s else None
+            return LetGo.PREEMPTED if self._clock.now() >= self._stop.ends_s else None
         if hold.may_be_sent and hold.key in self._jumps:
             return LetGo.SENT
         if hold.stepped:
@@ -243,7 +241,7 @@ class Control:
         finally:
             with self._changed:
                 lifts_pause, self.paused, self.paused_by = self.paused, False, ''
-                self._stop = _OperatorStop(time.monotonic() + _SETTLE_S, lifts_pause)
+                self._stop = _OperatorStop(self._clock.now() + _SETTLE_S, lifts_pause)
                 self._note_change()
 
     def stop_is_over(self) -> None:
@@ -290,7 +288,7 @@ class Control:
             held = self._held(path)
             for hold in held:
                 hold.stepped = True
-            self._changed.notify_all()
+            self._wake()
             return held
 
     def confirm(self, path: str = '') -> Tuple[Hold, ...]:
@@ -303,7 +301,7 @@ class Control:
             held = tuple(each for each in self._held(path) if each.waits_for_confirmation)
             for hold in held:
                 hold.confirmed = True
-            self._changed.notify_all()
+            self._wake()
             return held
 
     def _settle(self) -> None:
@@ -393,8 +391,10 @@ class Control:
         if self.is_set:
             for engine in list(self._engines.values()):
                 engine.attentive = True
-        self._changed.notify_all()
+        self._wake()
 
-    def __reduce__(self) -> Tuple[type, Tuple[()]]:
-        """Nothing that an operator has asked travels with a copied or pickled machine."""
-        return Control, ()
+    def _wake(self) -> None:
+        """Have all that wait look again."""
+        for hold in self._holds:
+            hold.changed.set()
+        self._changed.notify_all()

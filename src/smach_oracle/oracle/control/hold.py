@@ -3,6 +3,9 @@
 from enum import Enum
 from typing import NamedTuple
 
+from ..scope.bell import Flag
+from ..scope.reason import Reason
+
 
 class HeldBy(str, Enum):
     """The reason why a container waits."""
@@ -21,7 +24,12 @@ class LetGo(str, Enum):
     SENT = 'sent'  # to another state
     PREEMPTED = 'preempted'
     SHUTDOWN = 'shutdown'
-    LEFT_BEHIND = 'left behind'  # the state around it was abandoned
+    LEFT_BEHIND = 'left behind'  # the state around it was abandoned, or its trial ends early
+
+    @classmethod
+    def by(cls, reason: Reason) -> 'LetGo':
+        """Return what the end of the work around a wait is for the wait."""
+        return cls.LEFT_BEHIND if reason is Reason.EARLY_END else cls(reason.text)
 
 
 class HeldPlace(NamedTuple):
@@ -48,6 +56,7 @@ class Hold:
         'asks',
         'autonomy',
         'key',
+        'changed',
     )
 
     def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
@@ -60,6 +69,7 @@ class Hold:
         self.asks = True  # whether the autonomy of its state counts
         self.autonomy = ''  # that by its settings
         self.key = place.path  # by which jumps of the container are asked for
+        self.changed = Flag()  # an operator has asked for something since it was looked at
 
     @property
     def waits_for_confirmation(self) -> bool:

@@ -6,7 +6,8 @@ from typing import Any, ContextManager, NamedTuple, Protocol
 import smach
 
 from ..records.events import EventKind
-from .control import Control, EndedBy
+from ..scope.scope import Scope
+from .control import Control
 from .hold import HeldBy, Hold, LetGo
 
 _WHY = {
@@ -28,7 +29,7 @@ class Wait(NamedTuple):
 
     teller: HoldTeller
     clocks: ContextManager[None]  # time limits around it stand still within
-    ended_by: EndedBy  # what ends it beside the operator
+    scope: Scope  # ends it
 
 
 def wait_until_let_go(control: Control, hold: Hold, wait: Wait) -> LetGo:
@@ -39,7 +40,7 @@ def wait_until_let_go(control: Control, hold: Hold, wait: Wait) -> LetGo:
     try:
         _tell_begin(hold, control.paused_by, wait.teller)
         with wait.clocks:
-            let_go = control.wait(hold, wait.ended_by)
+            let_go = control.wait(hold, wait.scope)
             return let_go
     finally:
         control.end(hold)

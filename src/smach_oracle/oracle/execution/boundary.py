@@ -162,18 +162,10 @@ def _wait(node: TreeNode, hold: Hold) -> LetGo:
     lock.release()  # who asks for a preempt takes it
     try:
         return wait_until_let_go(
-            node.tree.control, hold, Wait(node, clocks_stand_still(node), lambda: _ended_by(node))
+            node.tree.control, hold, Wait(node, clocks_stand_still(node), node.execution.scope)
         )
     finally:
         lock.acquire()
-
-
-def _ended_by(node: TreeNode) -> Optional[LetGo]:
-    if node.is_left_behind():
-        return LetGo.LEFT_BEHIND
-    if node.machine.preempt_requested():
-        return LetGo.PREEMPTED
-    return LetGo.SHUTDOWN if smach.is_shutdown() else None
 
 
 def _end_preempted(node: TreeNode) -> Optional[Stop]:

@@ -186,8 +186,8 @@ def take_departure(node: TreeNode) -> Optional[Departure]:
         return None
     departure = cast(Departure, node.execution.departure)
     node.execution.depart_by(None)
-    stopped = departure.arrives_at.machine.preempt_requested() or smach.is_shutdown()
-    return None if stopped or node.is_left_behind() else departure
+    stops = departure.arrives_at.execution.scope.reason is not None
+    return None if stops or node.is_left_behind() else departure
 
 
 def is_settled(node: TreeNode, failure: Failure) -> bool:

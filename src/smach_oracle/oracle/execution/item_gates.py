@@ -4,7 +4,7 @@ An Iterator is under no oracle. It calls its transition callbacks between items,
 machine that it contains is held at its own boundaries.
 """
 
-from typing import Any, Iterator, Tuple
+from typing import Any, Iterator, Optional, Tuple
 
 import smach
 
@@ -12,6 +12,8 @@ from ..branches.border import border_of
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
+from ..scope.reason import Reason
+from ..scope.scope import Scope
 
 
 class ItemGate:
@@ -31,7 +33,11 @@ class ItemGate:
         label = next(iter(self._container.get_children()), '')
         relative = '/'.join(filter(None, (node.relative_path,) + self._below))
         autonomy = node.in_force.of_state(relative, label).autonomy
-        wait_for_operator(node, self._below, label, autonomy, self._container.preempt_requested)
+        scope = Scope(node.execution.scope_around, look=self._look_for_preempt)
+        wait_for_operator(node, self._below, label, autonomy, scope)
+
+    def _look_for_preempt(self) -> Optional[Reason]:
+        return Reason.PREEMPTED if self._container.preempt_requested() else None
 
 
 def place_gates(node: TreeNode) -> None:

@@ -4,7 +4,6 @@ A state has ended. `Step.ended` judges how, makes an occasion of a failure, and 
 with it (paper, section IV-A).
 """
 
-import time
 from typing import Any, Mapping, Optional, Union, cast
 
 import smach
@@ -90,20 +89,20 @@ class Step:
             if too_deep is not None:
                 node.execution.give_up()  # upstream's Concurrence drops what its states raise
                 raise too_deep.with_traceback(None) from None
-        node.tree.early_end.note_end_of_state(smach.is_shutdown)
+        node.tree.early_end.note_end_of_state()
         if node.execution.is_left_behind():
             return stop_left_behind(node)
         departure = take_departure(node)
         if departure is not None:
             return self._left(departure, outcome, error)
         if isinstance(outcome, EndedByAnswer):
-            if not (machine.preempt_requested() or smach.is_shutdown()):
+            if node.execution.scope.reason is None:
                 return self._ended_by_answer(outcome)
             outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
             return self._unfinished(judged, outcome)
-        stopping = machine.preempt_requested() or smach.is_shutdown() or ends_program(error)
+        stopping = node.execution.scope.reason is not None or ends_program(error)
         if machine.preempt_requested():
             node.execution.tell_preempt()
             note_end_under_preempt(
@@ -196,9 +195,9 @@ class Step:
         It teaches nothing. A failure from before is counted and told already.
         """
         node, record = self._node, self._record
-        if node.tree.early_end.end_at_shutdown(bool(smach.is_shutdown())):
+        if node.tree.early_end.end_at_shutdown():
             return stop_left_behind(node)
-        if self._machine.preempt_requested() or smach.is_shutdown():
+        if node.execution.scope.reason is not None:
             return self._end_preempted(failure)
         if failure.kind is FailureKind.INTERRUPTED:
             tell_failure(node, record, failure)
@@ -210,18 +209,14 @@ class Step:
         It looks for the settle time. Where a preempt or a shutdown comes meanwhile, it returns '':
         nothing is a failure then.
         """
-        node, machine = self._node, self._machine
-
-        def stopped() -> bool:
-            return machine.preempt_requested() or smach.is_shutdown() or node.is_left_behind()
-
-        lock = machine._state_transitioning_lock
+        scope = self._node.execution.scope
+        lock = self._machine._state_transitioning_lock
         lock.release()
         try:
-            why = node.tree.health.unwell_after(stopped, time.sleep)
+            why = self._node.tree.health.unwell_after(scope)
         finally:
             lock.acquire()
-        return '' if stopped() else why or None
+        return '' if scope.reason is not None else why or None
 
     def _failed_unwell(self, failure: Failure, why: str) -> Union[Occasion, Stop]:
         """Go on after a failure while the robot was not well: it is not counted.

@@ -6,6 +6,8 @@ import smach
 from smach_oracle.foreign import error_text
 
 from ..records.events import NO_OUTCOME, EventKind
+from ..scope.reason import Reason
+from ..scope.scope import Scope
 from .limited_run import LimitedRun, runs_of_thread
 
 if TYPE_CHECKING:
@@ -81,10 +83,23 @@ class Execution:
 
         It executes inside a state that was abandoned, or its trial has ended early.
         """
-        if self._node.tree.early_end.why is not None:
+        if self._node.tree.scope.told is not None:
             return True
         around = self.runs_around
-        return bool(around) and any(run.abandoned for run in around)
+        return bool(around) and any(run.told is not None for run in around)
+
+    @property
+    def scope_around(self) -> Scope:
+        """Return the scope of what goes on around it: its trial, and states with a time limit."""
+        return Scope(self._node.tree.scope, *self.runs_around)
+
+    @property
+    def scope(self) -> Scope:
+        """Return the scope of what goes on in it, which a preempt of the container ends."""
+        return Scope(self._node.tree.scope, *self.runs_around, look=self._look_for_preempt)
+
+    def _look_for_preempt(self) -> Optional[Reason]:
+        return Reason.PREEMPTED if self._node.machine.preempt_requested() else None
 
     # -- its begin and its end
 

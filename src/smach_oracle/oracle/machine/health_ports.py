@@ -1,14 +1,13 @@
 """Sources of the robot's health: ports, and functions of the user's own."""
 
-import time
-from typing import Callable, Optional, Protocol
+from typing import Optional, Protocol
 
 from smach_oracle.foreign import error_text, repr_of
 
-from ..background import BackgroundCall
+from ..scope.background_call import BackgroundCall
+from ..scope.scope import Scope
 from ..settings.health import HealthFunction
 
-_LOOK_S = 0.05  # how soon a preempt or a shutdown is noticed while a function runs
 # a function that takes longer counts as one that says no
 FUNCTION_LIMIT_S = 2.0
 
@@ -33,20 +32,19 @@ class HealthFunctionPort:
         self._call: Optional[BackgroundCall] = None
         self._since_s = 0.0
 
-    def why_unwell(self, stopped: Callable[[], bool] = lambda: False) -> str:
-        """Return what is wrong, '' where all is well, also where `stopped()` ends the asking."""
+    def why_unwell(self, scope: Scope) -> str:
+        """Return what is wrong, '' where all is well, also where `scope` ends the asking."""
+        now = scope.clock.now
         call = self._call
         if call is None or call.done.is_set():
-            self._since_s = time.monotonic()
+            self._since_s = now()
             call = self._call = BackgroundCall(self._function, 'smach_oracle health')
             call.start()
-        while not call.done.wait(_LOOK_S):
-            if time.monotonic() > self._since_s + FUNCTION_LIMIT_S:
-                return '{} does not return'.format(self._name)
-            if stopped():
-                return ''
+        if not scope.wait(self._since_s + FUNCTION_LIMIT_S - now(), call.done):
+            is_late = now() >= self._since_s + FUNCTION_LIMIT_S
+            return '{} does not return'.format(self._name) if is_late else ''
         self._call = None
-        if time.monotonic() > self._since_s + FUNCTION_LIMIT_S:
+        if now() > self._since_s + FUNCTION_LIMIT_S:
             return '{} took too long'.format(self._name)
         return self._in_words(call)
 

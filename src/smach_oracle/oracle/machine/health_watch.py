@@ -2,13 +2,15 @@
 
 import random
 import threading
-import time
 from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
 
 import smach
 
 from ..identity import is_same, name_of
 from ..records.events import EventKind
+from ..scope.bell import Flag
+from ..scope.clock import Clock
+from ..scope.scope import Scope
 from ..settings.health import (
     HealthCondition,
     HealthFunction,
@@ -26,8 +28,6 @@ FAILED = 'failed'  # what has happened to a state that waits
 
 # makes a port for topics and diagnostics
 ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
-Pause = Callable[[float], object]
-Stopped = Callable[[], bool]
 
 
 class Teller(Protocol):
@@ -44,11 +44,12 @@ class Teller(Protocol):
 class _UnwellPhase:
     """The time from the first container that waits to the last. `teller` is the first's."""
 
-    def __init__(self, teller: Teller, state: str, why: str) -> None:
+    def __init__(self, teller: Teller, state: str, why: str, clock: Clock) -> None:
         self.teller = teller
         self.state = state
         self.why = why
-        self.since_s = time.monotonic()
+        self.clock = clock
+        self.since_s = clock.now()
         self.waiting = 0
         self.states: Set[str] = set()  # paths of the states that wait, or have waited
         self.well_since_s: Optional[float] = None
@@ -67,6 +68,7 @@ class HealthWatch:
         self.listen: Optional[ListenToHealth] = None
         self._lock = threading.RLock()
         self._asking = threading.Lock()
+        self._asked = Flag()  # by the thread that has asked last
         self._conditions: Tuple[HealthCondition, ...] = ()
         self._settle_s = 0.0
         self._functions: List[HealthFunctionPort] = []
@@ -108,40 +110,43 @@ class HealthWatch:
             )
         return self.listen(heard) if heard and self.listen is not None else None
 
-    def why_unwell(self, stopped: Stopped, since_s: Optional[float] = None) -> str:
-        """Ask once, and return all that is wrong, '' where all is well or `stopped()`.
+    def why_unwell(self, scope: Scope, since_s: Optional[float] = None) -> str:
+        """Ask once, and return all that is wrong, '' where all is well or `scope` is cancelled.
 
         :param since_s: from this monotonic time on all must have held, as far as it was heard.
         """
         # one thread asks at a time, and the others have their look a little later
-        while not self._asking.acquire(timeout=0.05):
-            if stopped():
+        while not self._asking.acquire(blocking=False):
+            self._asked.clear()
+            if self._asking.locked() and not scope.wait(until=self._asked):
                 return ''
         try:
             wrong = [self._listening.why_unwell(since_s)] if self._listening is not None else []
-            wrong += [port.why_unwell(stopped) for port in self._functions]
+            wrong += [port.why_unwell(scope) for port in self._functions]
         finally:
             self._asking.release()
+            self._asked.set()
         return '; '.join(why for why in wrong if why)
 
-    def unwell_after(self, stopped: Stopped, pause: Pause) -> str:
+    def unwell_after(self, scope: Scope) -> str:
         """Return why the robot was not well at what has just happened, '' where it was.
 
         What stops a robot may be heard of after what it has stopped: it is looked again until the
-        settle time is over, and once after that. `stopped()` ends that.
+        settle time is over, and once after that. The end of `scope` ends that.
         """
-        looked_s = time.monotonic()
+        now = scope.clock.now
+        looked_s = now()
         until_s = looked_s + self._settle_s
         while True:
-            since_s, looked_s = looked_s, time.monotonic()
+            since_s, looked_s = looked_s, now()
             phase = self._phase
-            why = phase.why if phase is not None else self.why_unwell(stopped, since_s)
-            if why or looked_s >= until_s or stopped():
+            why = phase.why if phase is not None else self.why_unwell(scope, since_s)
+            if why or looked_s >= until_s or scope.reason is not None:
                 return why
-            pause(max(0.0, min(self._until_next_look_s(), until_s - time.monotonic())))
+            scope.wait(max(0.0, min(self._until_next_look_s(), until_s - now())))
 
     def wait_until_well(
-        self, teller: Teller, state: str, what: str, why: str, stopped: Stopped, pause: Pause
+        self, teller: Teller, state: str, what: str, why: str, scope: Scope
     ) -> bool:
         """Wait until the robot has been well for the settle time.
 
@@ -149,16 +154,16 @@ class HealthWatch:
 
         :param what: happened to `state`, or is about to. The log says it.
         :param why: the robot is not well.
-        :returns: False where `stopped()` has ended the wait.
+        :returns: False where `scope` has ended the wait.
         """
-        phase = self._join(teller, state, what, why)
-        looked_s = time.monotonic()
+        phase = self._join(teller, state, what, why, scope.clock)
+        looked_s = scope.clock.now()
         try:
-            while not stopped():
-                since_s, looked_s = looked_s, time.monotonic()
-                if self._has_settled(phase, stopped, since_s):
+            while scope.reason is None:
+                since_s, looked_s = looked_s, scope.clock.now()
+                if self._has_settled(phase, scope, since_s):
                     return True
-                pause(
+                scope.wait(
                     self._until_next_look_s() if phase.well_since_s is not None else LOOK_PERIOD_S
                 )
             return False
@@ -172,13 +177,13 @@ class HealthWatch:
         mean_s = max(SHORTEST_LOOK_S, self._settle_s / LOOKS_IN_SETTLE_TIME)
         return min(LOOK_PERIOD_S, mean_s) * random.uniform(0.2, 1.8)
 
-    def _join(self, teller: Teller, state: str, what: str, why: str) -> _UnwellPhase:
+    def _join(self, teller: Teller, state: str, what: str, why: str, clock: Clock) -> _UnwellPhase:
         place = '{}/{}'.format(teller.path, state)
         with self._lock:
             phase = self._phase
             is_first = phase is None
             if phase is None:
-                phase = self._phase = _UnwellPhase(teller, state, why)
+                phase = self._phase = _UnwellPhase(teller, state, why, clock)
             phase.waiting += 1
             phase.states.add(place)
             if is_first:
@@ -192,13 +197,13 @@ class HealthWatch:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))
         return phase
 
-    def _has_settled(self, phase: _UnwellPhase, stopped: Stopped, since_s: float) -> bool:
+    def _has_settled(self, phase: _UnwellPhase, scope: Scope, since_s: float) -> bool:
         """Look once. Return whether the phase is over, by this look or another's."""
-        why = '' if phase.over else self.why_unwell(stopped, since_s)
+        why = '' if phase.over else self.why_unwell(scope, since_s)
         with self._lock:
-            if phase.over or (not why and stopped()):
+            if phase.over or (not why and scope.reason is not None):
                 return phase.over
-            now_s = time.monotonic()
+            now_s = phase.clock.now()
             if why:
                 phase.well_since_s = None
                 return False
@@ -218,7 +223,7 @@ class HealthWatch:
     def _end(self, phase: _UnwellPhase, outcome: str) -> None:
         phase.over = True
         self._phase = None
-        waited_s = time.monotonic() - phase.since_s
+        waited_s = phase.clock.now() - phase.since_s
         text = (
             'the robot is well again after {:.1f} s'
             if outcome == 'well'
@@ -232,7 +237,3 @@ class HealthWatch:
             text=text,
             data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)},
         )
-
-    def __reduce__(self) -> Tuple[Any, ...]:
-        """Neither who is asked nor a wait travels with a copied or pickled machine."""
-        return HealthWatch, ()

@@ -8,9 +8,9 @@ from ..asking.question import Expert
 from ..errors import TrialError
 from ..records.events import EventSource
 from ..records.rate_rows import StateRateRow, TransitionRow
+from ..scope.waiting import Waiting
 from ..settings.health import HealthFunction
 from ..settings.settings import Settings
-from ..waiting import Waiting
 from .health_watch import ListenToHealth
 from .nesting import nodes_of
 from .tree_node import TreeNode, WrappedMachine, node_of

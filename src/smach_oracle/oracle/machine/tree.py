@@ -17,9 +17,12 @@ from ..control.control import Control
 from ..records.early_end import EarlyEnd
 from ..records.events import EventSource
 from ..records.restarts import Restarts
+from ..scope.alarm_clock import AlarmClock
+from ..scope.clock import MonotonicClock
+from ..scope.reason import Reason
+from ..scope.scope import Scope
+from ..scope.waiting import MonotonicWaiting, Waiting
 from ..settings.health import HealthFunction
-from ..waiting import MonotonicWaiting, Waiting
-from .alarm_clock import AlarmClock
 from .health_watch import HealthWatch
 from .resumed import ResumedTrial
 from .trial_budget import TrialBudget
@@ -36,6 +39,11 @@ def no_description(state: smach.State) -> str:
     return ''
 
 
+def look_for_shutdown() -> Optional[Reason]:
+    """Return whether the process goes down, of which SMACH tells nobody who does not ask."""
+    return Reason.SHUTDOWN if smach.is_shutdown() else None
+
+
 def no_store() -> None:
     """Nothing is kept."""
 
@@ -43,6 +51,22 @@ def no_store() -> None:
 def new_id() -> str:
     """Return an id that nobody else uses."""
     return uuid.uuid4().hex[:12]
+
+
+# what each tree has of its own (`Tree._be_at_rest`)
+_AT_REST = {
+    'scope',
+    'workers',
+    'budget',
+    'early_end',
+    'waiting',
+    'health',
+    'alarms',
+    'control',
+    'rates_lock',
+    'departures_lock',
+    '_lock',
+}
 
 
 class Tree:
@@ -60,25 +84,16 @@ class Tree:
         self.recover = recover
         self.expert = expert
         self.events = EventSource(log_error)
-        self.workers = Workers()
-        self.budget = TrialBudget()
         self.restarts = Restarts()
-        self.early_end = EarlyEnd()
-        self.waiting: Waiting = MonotonicWaiting()
         self.trials = 0  # begun
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
         self._visits = itertools.count(1)
         # has a store keep which states have begun, at once, where there is no event of it
         self.keep_marks: Callable[[], None] = no_store
-        self.health = HealthWatch(health)
-        self.clock = AlarmClock()
-        self.control = Control()
         self.trial_id = ''
         self.resumed = ResumedTrial()
         self.is_resumed = False  # whether the trial goes on after its program was stopped
-        self.rates_lock = threading.Lock()
-        self.departures_lock = threading.Lock()
         self.rates_loaded = ''  # the rates file read last
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
@@ -87,6 +102,21 @@ class Tree:
         self._preconditions: List[Tuple[object, smach.State]] = []
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
         self._process = os.getpid()
+        self._be_at_rest(health)
+
+    def _be_at_rest(self, health: Optional[HealthFunction] = None) -> None:
+        """Have nothing under way, nothing asked by an operator, and locks that nobody holds."""
+        clock = MonotonicClock()
+        self.scope = Scope(look=look_for_shutdown, clock=clock)
+        self.workers = Workers(clock)
+        self.budget = TrialBudget(clock)
+        self.early_end = EarlyEnd(self.scope)
+        self.waiting: Waiting = MonotonicWaiting()
+        self.health = HealthWatch(health)
+        self.alarms = AlarmClock(clock)
+        self.control = Control(clock)
+        self.rates_lock = threading.Lock()
+        self.departures_lock = threading.Lock()
         self._lock = threading.Lock()
 
     @property
@@ -173,20 +203,16 @@ class Tree:
     def __getstate__(self) -> Dict[str, Any]:
         """Leave out what cannot travel with a pickled or copied machine.
 
-        That is the expert, its connection, a clock that was handed in, and locks.
+        That is the expert, its connection, a clock that was handed in, locks, all that is under
+        way and all that an operator has asked.
         """
-        state = dict(self.__dict__)
-        del state['_lock'], state['rates_lock'], state['departures_lock'], state['early_end']
+        state = {key: value for key, value in self.__dict__.items() if key not in _AT_REST}
         state['expert'] = None
         state['_preconditions'] = []
-        state['waiting'] = MonotonicWaiting()
         state['keep_marks'] = no_store
         state['describe_failure'] = no_description
         return state
 
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__dict__.update(state)
-        self.early_end = EarlyEnd()
-        self._lock = threading.Lock()
-        self.rates_lock = threading.Lock()
-        self.departures_lock = threading.Lock()
+        self._be_at_rest()

@@ -1,10 +1,9 @@
 """Counts what is left of a trial's budget, for all containers of a tree."""
 
-import contextlib
 import threading
-from time import monotonic
-from typing import Any, Iterator, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
+from ..scope.clock import Clock, PausableClock
 from ..settings.budget import Budget
 
 _LEAST_S = 0.001  # 0 s would be without end
@@ -13,12 +12,13 @@ _LEAST_S = 0.001  # 0 s would be without end
 class TrialBudget:
     """Counts what a trial has spent. Safe to use from several threads.
 
-    Each answer is '' where there is something left, else a clause that says what is spent.
+    Each answer is '' where there is something left, else a clause that says what is spent. `time`
+    is what has passed of the minutes.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
         self._lock = threading.Lock()
-        self._standing = 0  # how many let the minutes stand still now
+        self.time = PausableClock(clock)
         self.begin(Budget())
 
     def begin(self, limits: Budget) -> None:
@@ -26,40 +26,19 @@ class TrialBudget:
         with self._lock:
             self._limits = limits
             self._recoveries = self._questions = 0
-            self._begun_s = self._stands_since_s = monotonic()
-            self._stood_s = 0.0
+            self.time.begin()
 
     def spent(self) -> List[float]:
         """Return the recoveries, the questions and the seconds spent."""
         with self._lock:
-            self._note()
-            return [self._recoveries, self._questions, monotonic() - self._begun_s - self._stood_s]
+            return [self._recoveries, self._questions, self.time.now()]
 
     def go_on(self, spent: Optional[Sequence[float]]) -> None:
         """Go on after `begin` with what was spent before. None means nothing."""
         if spent:
             with self._lock:
                 self._recoveries, self._questions = int(spent[0]), int(spent[1])
-                self._begun_s -= spent[2]
-
-    @contextlib.contextmanager
-    def stands_still(self) -> Iterator[None]:
-        """Let the minutes stand still. Several may do so at once."""
-        with self._lock:
-            self._note()
-            self._standing += 1
-        try:
-            yield
-        finally:
-            with self._lock:
-                self._note()
-                self._standing -= 1
-
-    def _note(self) -> None:
-        now_s = monotonic()
-        if self._standing:
-            self._stood_s += now_s - self._stands_since_s
-        self._stands_since_s = now_s
+                self.time.begin(self.time.now() + spent[2])
 
     def why_over(self) -> str:
         """Say that the minutes are over."""
@@ -76,9 +55,7 @@ class TrialBudget:
         minutes = self._limits.minutes
         if minutes is None:
             return None
-        with self._lock:
-            self._note()
-            return max(0.0, self._begun_s + self._stood_s + 60.0 * minutes - monotonic())
+        return max(0.0, 60.0 * minutes - self.time.now())
 
     def within(self, deadline_s: float) -> Tuple[float, bool]:
         """Return a deadline that is not beyond the minutes, and whether they cut it.
@@ -111,10 +88,6 @@ class TrialBudget:
             why_not = self.why_no_question()
             self._questions += not why_not
             return why_not
-
-    def __reduce__(self) -> Tuple[Any, ...]:
-        """Leave what a trial has spent out of a copied or pickled machine."""
-        return TrialBudget, ()
 
 
 def _spent(limit: Optional[int], used: int, one: str, many: str) -> str:

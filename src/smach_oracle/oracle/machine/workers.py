@@ -6,20 +6,18 @@ While an abandoned thread lives, what it runs is blocked: nobody enters it again
 """
 
 import functools
-import math
 import threading
-import time
-from typing import Any, Callable, Dict, List, NamedTuple, Optional
+from typing import Callable, Dict, List, NamedTuple, Optional
 
 import smach
 from smach_oracle.foreign import repr_of
 
-from ..background import BackgroundCall, KeptThread
 from ..identity import attribute_of, own_mark
-from .limited_run import LimitedRun, enter
+from ..scope.background_call import BackgroundCall, KeptThread
+from ..scope.clock import Clock
+from ..scope.scope import CallEnd, Scope
+from .limited_run import LimitedRun, inside
 from .snapshots import UserdataGate
-
-_STOP_PERIOD_S = 0.05  # how soon a function that runs is left behind at a preempt or a shutdown
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
 _LATE = 'still runs since it overran its time limit'
@@ -45,7 +43,8 @@ class _Left(NamedTuple):
 class Workers:
     """Threads of one tree of containers, by the id of the state or function that they run."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
         self._lock = threading.Lock()
         self.abandoned: Dict[int, _Left] = {}
         # states with a time limit whose thread lives, and those that are asked about if they take
@@ -81,45 +80,39 @@ class Workers:
         `gate` is what `userdata` writes through. What the state raises is told in the result, not
         raised.
         """
-        run = LimitedRun()
+        run = LimitedRun(self._clock)
         call = BackgroundCall(
             functools.partial(_execute_inside, run, state, userdata),
             'smach_oracle worker of {}'.format(label),
             functools.partial(self._ended_late, state),
         )
-        self.under_way[id(state)] = run
-        try:
-            call.start()
-            return self._run_within(run, state, call, gate, limit_s, grace_s)
-        finally:
-            if not call.left:
-                self.under_way.pop(id(state), None)
 
-    def _run_within(
-        self,
-        run: LimitedRun,
-        state: smach.State,
-        call: BackgroundCall,
-        gate: UserdataGate,
-        limit_s: float,
-        grace_s: float,
-    ) -> LimitedResult:
+        def stop() -> None:
+            gate.shut()
+            request_preempt(state)
+
+        self.under_way[id(state)] = run
+        end = None
         try:
-            left_s = limit_s
-            while left_s:
-                if wait(call.done, left_s):
-                    return LimitedResult(call.result, call.error)
-                left_s = run.take_stood_s()
-        except BaseException:
-            # Ctrl-C in the machine's thread: nothing the state does from now on counts
-            self._leave_state(run, state, call, gate, 0.0)
-            raise
-        ended = self._leave_state(run, state, call, gate, grace_s)
-        what = 'overran its time limit of {:g} s and '.format(limit_s)
-        if ended:
-            return LimitedResult(overrun=what + 'ended when it was preempted')
+            end = run.run(call, limit_s, grace_s, stop, run.time)
+        finally:
+            if call.left:
+                self._block(state, call, _LATE)
+                run.abandon()
+                _stop_bare_machines(state)
+            else:
+                self.under_way.pop(id(state), None)
+                if end is not CallEnd.BY_ITSELF:
+                    recall_preempts(state)
+        if end is CallEnd.BY_ITSELF:
+            return LimitedResult(call.result, call.error)
         return LimitedResult(
-            overrun=what + 'was abandoned {:g} s after it was preempted'.format(grace_s)
+            overrun='overran its time limit of {:g} s and '.format(limit_s)
+            + (
+                'was abandoned {:g} s after it was preempted'.format(grace_s)
+                if call.left
+                else 'ended when it was preempted'
+            )
         )
 
     def _ended_late(self, state: smach.State) -> None:
@@ -133,9 +126,9 @@ class Workers:
         gate: UserdataGate,
         limit_s: Optional[float],
         grace_s: float,
-        stopped: Callable[[], bool],
+        scope: Scope,
     ) -> LimitedResult:
-        """Call `function` until its time limit (s, monotonic, None: no limit) or until `stopped()`.
+        """Call `function` until its time limit (s, None: no limit), or until `scope` is cancelled.
 
         It has `grace_s` more to end by itself, in which it writes nothing any more, and is left
         behind then. `gate` is what `userdata` writes through. What the function raises is told in
@@ -143,33 +136,25 @@ class Workers:
         """
         thread = self._take_thread()
         call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
-        call.start()
-        is_free = False
-        end = time.monotonic() + (math.inf if limit_s is None else limit_s)
-        why = ''
+        end = None
         try:
-            while not why and not call.done.wait(
-                min(_STOP_PERIOD_S, max(0.0, end - time.monotonic()))
-            ):
-                if time.monotonic() >= end:
-                    why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
-                elif stopped():
-                    why = 'was stopped by a preempt or a shutdown'
-            if not why:
-                is_free = True
-                return LimitedResult(call.result, call.error)
-            gate.shut()
-            wait(call.done, grace_s)
-        except BaseException:
-            self._abandon(function, call, gate, _STOPPED)
-            raise
+            end = scope.run(call, limit_s, grace_s, gate.shut)
         finally:
-            if is_free and not self.abandoned:
+            if call.left:
+                is_late = end is CallEnd.OVERRUN and scope.reason is None
+                self._block(function, call, _LATE if is_late else _STOPPED)
+            if end is CallEnd.BY_ITSELF and not self.abandoned:
                 self._idle.append(thread)
             else:
                 thread.end()
-        late = self._abandon(function, call, gate, _STOPPED if stopped() else _LATE)
-        return LimitedResult(overrun=why + (' and was left behind' if late else ''))
+        if end is CallEnd.BY_ITSELF:
+            return LimitedResult(call.result, call.error)
+        why = (
+            'overran its time limit of {:g} s'.format(limit_s or 0.0)
+            if end is CallEnd.OVERRUN
+            else 'was stopped by a preempt or a shutdown'
+        )
+        return LimitedResult(overrun=why + (' and was left behind' if call.left else ''))
 
     def _take_thread(self) -> KeptThread:
         """Return a thread for a function: an idle one, or a new one."""
@@ -186,63 +171,22 @@ class Workers:
             while self._idle:
                 self._idle.pop().end()
 
-    def _leave_state(
-        self,
-        run: LimitedRun,
-        state: smach.State,
-        call: BackgroundCall,
-        gate: UserdataGate,
-        grace_s: float,
-    ) -> bool:
-        """Preempt a state and abandon it after its grace period.
-
-        Return False where that was needed.
-        """
-        gate.shut()
-        try:
-            state.request_preempt()
-        except Exception as err:  # a user's request_preempt must not keep the machine from going on
-            smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
-        try:
-            wait(call.done, grace_s)
-        finally:
-            abandoned = self._abandon(state, call, gate, _LATE)
-            if abandoned:
-                run.abandon()
-                _stop_bare_machines(state)
-            else:
-                recall_preempts(state)
-        return not abandoned
-
-    def _abandon(self, target: object, call: BackgroundCall, gate: UserdataGate, why: str) -> bool:
-        """Leave a thread to itself. Return False where it has ended after all."""
-        if not call.leave():
-            return False
-        gate.shut()
+    def _block(self, target: object, call: BackgroundCall, why: str) -> None:
         with self._lock:
             self.abandoned[id(target)] = _Left(target, call, why)
-        return True
-
-    def __getstate__(self) -> Dict[str, Any]:
-        """Threads do not travel with a pickled machine."""
-        return {}
-
-    def __setstate__(self, state: Dict[str, Any]) -> None:
-        self.__init__()  # type: ignore[misc]
 
 
 def _execute_inside(run: LimitedRun, state: smach.State, userdata: smach.Remapper) -> object:
-    enter(run)
-    return state.execute(userdata)
+    with inside(run):
+        return state.execute(userdata)
 
 
-def wait(event: threading.Event, seconds: float) -> bool:
-    """Wait for `event`, however long, monotonic time."""
-    end = time.monotonic() + seconds
-    while not event.wait(min(max(0.0, end - time.monotonic()), threading.TIMEOUT_MAX)):
-        if time.monotonic() >= end:
-            return event.is_set()
-    return True
+def request_preempt(state: smach.State) -> None:
+    """Preempt a state. A user's own `request_preempt` must not keep the machine from going on."""
+    try:
+        state.request_preempt()
+    except Exception as err:
+        smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 
 
 def _stop_bare_machines(state: smach.State) -> None:

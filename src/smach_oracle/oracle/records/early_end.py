@@ -5,18 +5,21 @@ Pure, and without smach.
 
 import contextlib
 import threading
-from typing import Callable, Iterator, Optional
+from typing import Iterator, Optional
 
+from ..scope.reason import Reason
+from ..scope.scope import Scope
 from .facts import TrialEnd
 
 
 class EarlyEnd:
     """The early end of one trial. Every container then stops where it stands, without an outcome.
 
-    Any thread may call it.
+    It cancels the scope of the trial. Any thread may call it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, scope: Scope) -> None:
+        self._scope = scope
         self.why: Optional[TrialEnd] = None  # None: it has not come
         # sys.exit or Ctrl-C in a thread: the error of a Concurrence need not have it as its cause
         self.of_program: Optional[BaseException] = None
@@ -28,6 +31,7 @@ class EarlyEnd:
     def begin_trial(self, is_stored: bool) -> None:
         """Begin a trial. `is_stored`: it has a store from which it can go on."""
         with self._lock:
+            self._scope.renew()
             self.why, self.of_program, self._is_stored = None, None, is_stored
 
     @contextlib.contextmanager
@@ -41,15 +45,15 @@ class EarlyEnd:
             with self._lock:
                 self._asking -= 1
 
-    def note_end_of_state(self, is_shutdown: Callable[[], bool]) -> None:
+    def note_end_of_state(self) -> None:
         """Note that a state has ended: next to an open question a shutdown may have ended it."""
         if self._asking:
-            self.end_at_shutdown(is_shutdown())
+            self.end_at_shutdown()
 
     def keep(self) -> None:
         """End the trial early, as nobody has answered whether it may go on."""
         with self._lock:
-            self.why = self.why or TrialEnd.KEPT
+            self._end(TrialEnd.KEPT)
 
     def note_shutdown(self) -> None:
         """Note that the process goes down, before its machines are preempted for that."""
@@ -58,16 +62,18 @@ class EarlyEnd:
             if self._asking:
                 self._end_at_shutdown()
 
-    def end_at_shutdown(self, is_shutdown: bool) -> bool:
-        """End a stored trial early where the process goes down, and return whether it has so ended.
-
-        `is_shutdown`: what SMACH says of it.
-        """
+    def end_at_shutdown(self) -> bool:
+        """End a stored trial early where the process goes down, and return whether it has ended."""
+        is_shutdown = self._is_going_down or self._scope.reason is Reason.SHUTDOWN
         with self._lock:
-            if is_shutdown or self._is_going_down:
+            if is_shutdown:
                 self._end_at_shutdown()
             return self.why is not None
 
     def _end_at_shutdown(self) -> None:
-        if self._is_stored and self.why is None:
-            self.why = TrialEnd.SHUTDOWN
+        if self._is_stored:
+            self._end(TrialEnd.SHUTDOWN)
+
+    def _end(self, why: TrialEnd) -> None:
+        self.why = self.why or why
+        self._scope.cancel(Reason.EARLY_END)

@@ -54,7 +54,7 @@ class Deciding:
         self._met: List[str] = []  # names of preconditions
         self._not_met = ''
         self.watch = WriteWatch(node.machine, node.in_force.deep_copy_keys)
-        self._preconditions = PreconditionRunner(node, record.settings, self.watch)
+        self._preconditions = PreconditionRunner(node, record.settings, self.watch, stop.scope)
         self.tried: List[str] = []
         self.way: Optional[JumpPath] = None  # that was decided on
         self._standing: Optional[RateReading] = None  # of the state as its policy was asked
@@ -207,7 +207,7 @@ class Deciding:
         if not self._node.in_force.policy.runs_preconditions(failure_class):
             return Preconditions.NOT_MET
         for spec in specs:
-            if self._stop.stopped() or not self._run_precondition(spec):
+            if self._stop.scope.reason is not None or not self._run_precondition(spec):
                 return Preconditions.NOT_MET
         return Preconditions.MET
 

@@ -7,6 +7,7 @@ import smach
 
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
+from ..scope.reason import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
 from .failure import Failure, Route, route_of
 
@@ -64,9 +65,8 @@ def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     machine = node.machine
     registered = machine.get_registered_outcomes()
     state = machine._states[failure.state]
-    if machine.preempt_requested() and not (
-        smach.is_shutdown() or node.is_left_behind() or node.tree.workers.blocked(state)
-    ):
+    is_preempt_alone = node.execution.scope.reasons == {Reason.PREEMPTED}
+    if is_preempt_alone and not node.tree.workers.blocked(state):
         route = route_at_preempt(machine, failure.state)
         if route.target:
             return (

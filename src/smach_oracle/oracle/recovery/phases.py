@@ -38,7 +38,7 @@ from .levels import (
 )
 from .occasions import FirstStep, FromBelow
 from .recovering import Recovering
-from .stop import preempt_beside
+from .stop import in_words, preempt_beside
 from .verdict import JumpTo, Verdict, leads_to, verdict_of
 
 # -- what comes before a decision
@@ -270,11 +270,13 @@ def _ask(recovering: Recovering, expert: Expert) -> Optional[Verdict]:
     with standing_still(node.execution.runs_around), early_end.asking():
         reply = Inquiry(recovering, expert, deadline_s).run()
     if recovering.stopped():
-        if early_end.end_at_shutdown(bool(smach.is_shutdown())):
+        if early_end.end_at_shutdown():
             preempt_beside(node)
         if reply.question_id:
             recovering.emit(
-                EventKind.QUERY_CANCELLED, query_id=reply.question_id, text=recovering.stop.why()
+                EventKind.QUERY_CANCELLED,
+                query_id=reply.question_id,
+                text=in_words(recovering.scope.reason, node),
             )
         return recovering.preempted()
     if reply.answer is not None:

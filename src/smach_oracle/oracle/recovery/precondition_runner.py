@@ -18,6 +18,7 @@ from ..machine.userdata_view import constants_of, view_behind, write_constants
 from ..places.fitness import why_unfit
 from ..places.place import place_named
 from ..records.events import FailureKind
+from ..scope.scope import Scope
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import RUN, StateSettings
@@ -43,8 +44,10 @@ class PreconditionRunner:
     function that runs is left behind, nothing more begins.
     """
 
-    def __init__(self, node: TreeNode, settings: StateSettings, watch: WriteWatch) -> None:
-        """`settings`: of the state whose preconditions are to be run."""
+    def __init__(
+        self, node: TreeNode, settings: StateSettings, watch: WriteWatch, scope: Scope
+    ) -> None:
+        """`settings`: of the state whose preconditions are to be run. `scope`: of the recovery."""
         self._settings = settings
         self._node = node
         self._watch = watch
@@ -53,12 +56,11 @@ class PreconditionRunner:
         self._elsewhere: List[RunElsewhere] = []
         self._lock = threading.Lock()
         self._running: Optional[Any] = None
-        self._cancelled = False
+        self._scope = scope
 
     def cancel(self) -> None:
-        """Preempt what runs, and let nothing more begin."""
+        """Preempt what runs, once the scope is cancelled, which lets nothing more begin."""
         with self._lock:
-            self._cancelled = True
             running = self._running
         if running is not None:
             running.request_preempt()
@@ -97,7 +99,7 @@ class PreconditionRunner:
     def _wait_for_operator(self, node: TreeNode, name: str, label: str = '') -> None:
         """Wait where an operator holds the tree. `label`: of a state of the container."""
         autonomy = node.settings_of(label).autonomy if label else RUN
-        wait_for_operator(node, (), name, autonomy, self._stopped)
+        wait_for_operator(node, (), name, autonomy, self._scope)
 
     def _call(self, spec: PreconditionSpec) -> None:
         self._wait_for_operator(self._node, spec.name)
@@ -109,7 +111,7 @@ class PreconditionRunner:
             gate,
             self._settings.time_limit_s,
             self._settings.grace_period_s,
-            self._stopped,
+            self._scope,
         )
         if isinstance(ended.error, Exception):
             raise NotMet('{} raised {}'.format(spec.name, repr_of(ended.error))) from ended.error
@@ -123,15 +125,12 @@ class PreconditionRunner:
         if not truth_of(result):
             raise NotMet('{} returned {}'.format(spec.name, repr_of(result)))
 
-    def _stopped(self) -> bool:
-        return self._cancelled or smach.is_shutdown() or self._node.is_left_behind()
-
     def _check_free(self, target: object) -> None:
         """Check that a state or a function may be entered now.
 
         :raises NotMet: where it may not.
         """
-        if self._cancelled:
+        if self._scope.told is not None:
             raise NotMet('preempted')
         blocked = self._node.tree.workers.blocked(target)
         if blocked:
@@ -188,7 +187,7 @@ class PreconditionRunner:
         self._wait_for_operator(site.node, label or type(state).__name__, label)
         self._check_free(state)
         with self._lock:
-            if self._cancelled:
+            if self._scope.told is not None:
                 raise NotMet('preempted')
             self._running = state
         if not site.node.tree.begin_precondition(site.node, state):
@@ -230,12 +229,12 @@ class PreconditionRunner:
     def _ended(self, state: smach.State) -> None:
         with self._lock:
             self._running = None
-            cancelled = self._cancelled
+            cancelled = self._scope.told is not None
         if cancelled and not self._node.tree.workers.blocked(state):
             state.recall_preempt()  # the meta state services the request in its place
 
     def _judge(self, site: _Site, state: smach.State, label: str, outcome: Any) -> None:
-        if self._cancelled:
+        if self._scope.told is not None:
             raise NotMet('preempted')
         if not is_registered(state, outcome):
             raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))

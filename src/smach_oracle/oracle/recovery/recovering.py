@@ -14,6 +14,7 @@ from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
+from ..scope.reason import Reason
 from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending, preempted_ending
 from .failure import Failure
@@ -44,6 +45,7 @@ class Recovering:
         self.occasion = occasion
         self.failure = occasion.failure
         self.stop = RecoveryStop(node, record)
+        self.scope = self.stop.scope
         self.deciding = Deciding(
             node, record, occasion.failure, occasion.context, occasion.continuous, self.stop
         )
@@ -59,7 +61,7 @@ class Recovering:
 
     def cancel(self) -> None:
         """End the recovery soon: preempt what runs, take the question back."""
-        self.stop.cancelled.set()
+        self.scope.cancel(Reason.PREEMPTED)
         self.question_cancelled.set()
         self.deciding.cancel()
         above = self._above
@@ -77,7 +79,7 @@ class Recovering:
 
     def stopped(self) -> bool:
         """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
-        return self.stop.stopped()
+        return self.scope.reason is not None
 
     def ask_at_once(self, why: str) -> None:
         """Have a person asked, whatever a policy says. `why`: a clause."""
@@ -136,7 +138,7 @@ class Recovering:
         health = self.node.tree.health
         if not (isinstance(verdict, JumpTo) and health.is_set):
             return verdict
-        why = health.why_unwell(self.stopped)
+        why = health.why_unwell(self.scope)
         if why and not self.stop.wait_until_well('is left for ' + verdict.way.down[-1].label, why):
             return self.end_early()
         return verdict

@@ -5,11 +5,9 @@ limit is never abandoned, so a person is asked, while it runs, whether to wait o
 """
 
 import threading
-import time
 from typing import Any, List, Mapping, NamedTuple, Optional
 
 import smach
-from smach_oracle.foreign import repr_of
 
 from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry, Reply
@@ -17,11 +15,15 @@ from ..asking.question import Answer, AnswerKind, Expert, Question
 from ..decision.sentence import ran_in_words, still_running_sentence
 from ..machine.limited_run import WatchedRun, inside, standing_still
 from ..machine.tree_node import TreeNode
+from ..machine.workers import request_preempt
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
+from ..scope.bell import Flag
+from ..scope.reason import Reason
+from ..scope.scope import Scope
 from .failure import Failure
 from .question_making import Account, make_question, targets_of
-from .stop import why_stopped
+from .stop import in_words
 
 
 class EndedByAnswer(NamedTuple):
@@ -41,14 +43,18 @@ class WatchedVisit:
     """
 
     def __init__(self, node: TreeNode, record: StateRecord) -> None:
+        clock = node.tree.scope.clock
         self._node = node
         self._machine = node.machine
         self._record = record
         self._state: smach.State = node.machine._states[record.label]
-        self._run = WatchedRun()  # its time stands still while a person is asked inside the state
-        self._begun_s = time.monotonic()
+        self._run = WatchedRun(clock)  # its time stands still while a person is asked inside
+        self._now = clock.now
+        self._begun_s = clock.now()
         self._lock = threading.Lock()
-        self._ended = threading.Event()
+        self._ended = Flag()
+        self._due_s = 0.0  # of the run's own time: it is asked about then
+        self.scope: Scope = node.tree.scope  # while it asks, one that ends with the visit
         self._answer: Optional[Answer] = None
         self._open_id = ''  # of the question that is open
         self._answered = False  # by who wants the state to end. It has no effect before `_answer`
@@ -57,16 +63,17 @@ class WatchedVisit:
         self.question_cancelled = threading.Event()
 
     def execute(self, userdata: smach.Remapper) -> object:
-        """Execute the state, and return its outcome, or a TakenOut.
+        """Execute the state, and return its outcome, or an EndedByAnswer.
 
         It raises what the state raises.
         """
-        node, settings = self._node, self._node.settings
-        longest_s = self._record.longest_s or 0.0
-        limit_s = max(settings.still_running_s, settings.still_running_factor * longest_s)
+        node = self._node
         under_way = node.tree.workers.under_way
         under_way[id(self._state)] = self._run
-        node.tree.clock.ring_in(limit_s, self._ring)
+        settings = node.settings
+        longest_s = self._record.longest_s or 0.0
+        due_s = max(settings.still_running_s, settings.still_running_factor * longest_s)
+        self._ask_at(due_s)
         outcome, error = None, None
         try:
             with inside(self._run):
@@ -86,7 +93,8 @@ class WatchedVisit:
         """The state has ended: close the question. Return the answer that has ended it, if any."""
         with self._lock:
             self._ended.set()
-        self._node.tree.clock.forget(self._ring)
+        self.scope.wake()
+        self._node.tree.alarms.forget(self._ring)
         self.question_cancelled.set()
         self._close('{} has ended'.format(self._record.label))
         if self._answered and self._answer is None and not self._machine.preempt_requested():
@@ -94,52 +102,59 @@ class WatchedVisit:
         return self._answer
 
     def _ran_s(self) -> float:
-        return time.monotonic() - self._begun_s
+        return self._now() - self._begun_s
 
     # -- asking, in threads of its own
 
+    def _ask_at(self, due_s: float) -> None:
+        """Ask once the state has run so long. Its time may stand still meanwhile."""
+        with self._lock:
+            self._due_s = due_s
+            if not self._ended.is_set():
+                left_s = self._run.time.left_s(due_s)
+                self._node.tree.alarms.ring_in(left_s, self._ring)
+
     def _ring(self) -> None:
-        left_s = self._run.take_stood_s()
-        if left_s:
-            self._node.tree.clock.ring_in(left_s, self._ring)
+        if self._run.time.left_s(self._due_s):
+            self._ask_at(self._due_s)
         else:
             threading.Thread(
                 target=self._ask, name='smach_oracle still running', daemon=True
             ).start()
 
     def _ask(self) -> None:
+        if self._asks_again():
+            self._ask_at(self._run.time.now() + self._ran_s())  # once it has run twice as long
+
+    def _look_for_end(self) -> Optional[Reason]:
+        return Reason.ENDED if self._ended.is_set() else None
+
+    def _asks_again(self) -> bool:
+        """Ask. Return whether to do so again, if it runs on."""
         expert = self._node.tree.expert if self._node.in_force.policy.asks else None
-        if self.stopped():
-            return
-        spent = self._why_nobody_is_asked()
+        self.scope = Scope(self._node.execution.scope, look=self._look_for_end)
+        if self.scope.reason is not None:
+            return False
+        spent = '' if expert is None else self._budget.why_over() or self._budget.take_question()
         if expert is None or spent:
-            self.warn(
-                '{} Nobody is asked: {}'.format(self._sentence(), spent)
-                if spent
-                else self._sentence()
-            )
-            return
+            self.warn(self._sentence() + (' Nobody is asked: ' + spent if spent else ''))
+            return False
         reply = self._inquire(expert)
-        if self.stopped():
+        reason = self.scope.reason
+        if reason is not None:
             if not self._ended.is_set():
-                self._node.tree.early_end.end_at_shutdown(bool(smach.is_shutdown()))
-            self._close(why_stopped(self._node, self._machine.preempt_requested()))
-        elif reply.answer is None:
+                self._node.tree.early_end.end_at_shutdown()
+                self._close(in_words(reason, self._node))
+            return False
+        if reply.answer is None:
             why_over = self._budget.why_over()
             self._expire('; '.join(filter(None, (reply.why_none, why_over))))
-            if not why_over:
-                self._ask_later()
-        elif self._is_wait_on(reply.answer):
+            return not why_over
+        if self._is_wait_on(reply.answer):
             smach.loginfo('{}: {} waits on'.format(self._place(), reply.answer.by or 'the expert'))
-            self._ask_later()
-        else:
-            self._take_out(reply.answer)
-
-    def _why_nobody_is_asked(self) -> str:
-        """Spend a question of the trial's, or say that time or questions are spent."""
-        if self._node.tree.expert is None or not self._node.in_force.policy.asks:
-            return ''
-        return self._budget.why_over() or self._budget.take_question()
+            return True
+        self._take_out(reply.answer)
+        return False
 
     def _inquire(self, expert: Expert) -> Reply:
         # the state runs on, and so do the time limits around it. Whoever looks whether a state
@@ -147,12 +162,6 @@ class WatchedVisit:
         watched = [run for run in self._node.execution.runs_around if isinstance(run, WatchedRun)]
         with standing_still(watched), self._node.tree.early_end.asking():
             return Inquiry(self, expert, self._budget.within(0.0)[0]).run()
-
-    def _ask_later(self) -> None:
-        """Ask again once it has run twice as long."""
-        with self._lock:
-            if not self._ended.is_set():
-                self._node.tree.clock.ring_in(self._ran_s(), self._ring)
 
     def _is_wait_on(self, answer: Answer) -> bool:
         return (
@@ -175,28 +184,14 @@ class WatchedVisit:
                     answer.named(),
                 ).rstrip()
             )
-            try:
-                self._state.request_preempt()
-            except Exception as err:  # it is the user's
-                smach.logerr(
-                    'request_preempt of {} failed: {}'.format(repr_of(self._state), repr_of(err))
-                )
-        if not self._ended.wait(self._record.settings.grace_period_s):
+            request_preempt(self._state)
+        if not Scope(clock=self._run.clock).wait(self._record.settings.grace_period_s, self._ended):
             self.warn(
                 'does not heed its preempt and still runs; the machine waits for its end, '
                 'and then goes as answered'
             )
 
     # -- its question
-
-    def stopped(self) -> bool:
-        """Whether the state has ended, or a preempt or a shutdown ends the visit."""
-        return (
-            self._ended.is_set()
-            or self._machine.preempt_requested()
-            or smach.is_shutdown()
-            or self._node.is_left_behind()
-        )
 
     def make_question(self, deadline_s: float) -> Question:
         """Return a new question about the state. `deadline_s`: seconds left, 0 without end."""

@@ -1,24 +1,21 @@
 """Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
 
-import threading
 from typing import Optional, Sequence
-
-import smach
 
 from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
+from ..scope.reason import Reason
+from ..scope.scope import Scope
 from ..settings.failing_outcomes import is_preempted
 
 
-def why_stopped(node: TreeNode, preempted: bool) -> str:
-    """Return why what goes on in a container is stopped, where that is so."""
+def in_words(reason: Optional[Reason], node: TreeNode) -> str:
+    """Return why a question is taken back, as the events say it."""
     early = node.tree.early_end.why
     if early is not None:
         return early.value
-    if preempted:
-        return 'preempted'
-    return 'left behind' if node.is_left_behind() else 'shutdown'
+    return (reason or Reason.SHUTDOWN).text
 
 
 def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None:
@@ -91,29 +88,29 @@ def preempt_beside(node: TreeNode) -> None:
 
 
 class RecoveryStop:
-    """Whether one recovery is over. `cancelled` is set by a preempt, from any thread."""
+    """Whether one recovery is over.
+
+    A preempt or a shutdown cancels its `scope`, and so does the end of what goes on around it. The
+    end of the trial's time cancels `timed` as well.
+    """
 
     def __init__(self, node: TreeNode, record: StateRecord) -> None:
         self._node = node
         self._record = record
-        self.cancelled = threading.Event()
+        self.scope = Scope(node.execution.scope_around)
+        self.timed = Scope(self.scope, look=self._look_at_budget)
 
-    def stopped(self) -> bool:
-        """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
-        return self.cancelled.is_set() or smach.is_shutdown() or self._node.is_left_behind()
-
-    def why(self) -> str:
-        """Return why it is stopped."""
-        return why_stopped(self._node, self.cancelled.is_set())
+    def _look_at_budget(self) -> Optional[Reason]:
+        return Reason.TIME_OVER if self._node.tree.budget.why_over() else None
 
     def is_over(self) -> bool:
         """Whether it is stopped, or the trial's time is over."""
-        return self.stopped() or bool(self._node.tree.budget.why_over())
+        return self.timed.reason is not None
 
     def has_waited(self, seconds: float) -> bool:
         """Let time pass. Return False where something has ended the recovery meanwhile."""
         with standing_still(self._node.execution.runs_around):
-            self._node.tree.waiting.wait(seconds, 'waiting', self.is_over, self.cancelled.wait)
+            self._node.tree.waiting.wait(seconds, 'waiting', self.timed)
         return not self.is_over()
 
     # -- health
@@ -126,13 +123,13 @@ class RecoveryStop:
         health = self._node.tree.health
         if not health.is_set:
             return False
-        why = health.unwell_after(self.stopped, self.cancelled.wait)
+        why = health.unwell_after(self.scope)
         return bool(why) and self.wait_until_well(what, why)
 
     def wait_until_well(self, what: str, why: str) -> bool:
         """Wait until the robot is well. Return False where something has ended the recovery."""
         with standing_still(self._node.execution.runs_around):
             is_well = self._node.tree.health.wait_until_well(
-                self._node, self._record.label, what, why, self.is_over, self.cancelled.wait
+                self._node, self._record.label, what, why, self.timed
             )
         return is_well and not self.is_over()

@@ -9,7 +9,8 @@ from typing import Optional
 
 import rospy
 
-from smach_oracle.oracle.waiting import MonotonicWaiting, Pause, Stopped
+from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.scope.waiting import MonotonicWaiting
 from smach_oracle.srv import PassTime, PassTimeRequest
 
 from ..log.said_once import warn_once
@@ -29,25 +30,25 @@ class ServiceWaiting:
         self._service = service
         self._by_itself = MonotonicWaiting()
 
-    def wait(self, seconds: float, what: str, stopped: Stopped, pause: Pause) -> None:
-        """Wait so many seconds, or until soon after `stopped()` is true."""
+    def wait(self, seconds: float, what: str, scope: Scope) -> None:
+        """Wait so many seconds, or until `scope` is cancelled."""
         left_s = seconds
-        while left_s > 0 and not stopped():
+        while left_s > 0 and scope.reason is None:
             piece_s = min(left_s, _PIECE_S)
-            passed_s = self._pass(piece_s, what, stopped)
+            passed_s = self._pass(piece_s, what, scope)
             if passed_s is None:
-                self._by_itself.wait(left_s, what, stopped, pause)
+                self._by_itself.wait(left_s, what, scope)
                 return
             if passed_s < _ENOUGH * piece_s:  # a world with a pace of its own
-                self._by_itself.wait(piece_s - passed_s, what, stopped, pause)
+                self._by_itself.wait(piece_s - passed_s, what, scope)
             left_s -= piece_s
 
-    def _pass(self, seconds: float, what: str, stopped: Stopped) -> Optional[float]:
+    def _pass(self, seconds: float, what: str, scope: Scope) -> Optional[float]:
         """Let time pass, and return how many s it was, None where the service does not do so."""
         begun_s, until_s = rospy.get_time(), time.monotonic() + _LIMIT_S
         call = ServiceCall(self._service, PassTime, PassTimeRequest(seconds, what))
         while call.is_alive() and time.monotonic() < until_s:
-            if stopped():
+            if scope.reason is not None:
                 return seconds
             call.join(_LOOK_S)
         try:

@@ -6,6 +6,8 @@ import queue
 import threading
 from typing import Callable, Optional
 
+from .bell import Flag
+
 
 class KeptThread:
     """A thread that makes one call after another, since to start one costs more than most calls.
@@ -48,7 +50,7 @@ class BackgroundCall:
         """`kept`: the thread that makes the call. None means a new one of that name."""
         self.result: object = None
         self.error: Optional[BaseException] = None
-        self.done = threading.Event()
+        self.done = Flag()
         self.left = False
         self._function = function
         self._on_late_end = on_late_end
