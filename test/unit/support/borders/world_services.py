@@ -1,5 +1,6 @@
 """Borders of the simulated world: its services, on one world that stays as it is."""
 
+import dataclasses
 import functools
 from types import SimpleNamespace
 from typing import Any, Callable
@@ -75,7 +76,7 @@ def _service(name: str, task: str = TASKS[0], with_lab: bool = False) -> Callabl
     def take(request: Any) -> str:
         made = _world()
         node = made.node
-        node._settings = SETTINGS._replace(task=task)
+        node._settings = dataclasses.replace(SETTINGS, task=task)
         node._lab = Lab(LabRun(3, 0.5), None, node._settings) if with_lab else None
         kept = node._recognition._views.copy()
         with fake_ros(), mock.patch.object(reveal, 'RenderedView', made.view):
