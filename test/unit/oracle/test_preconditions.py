@@ -12,6 +12,8 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 
+BRIEF = {'grace_period_s': 0.05}  # waited for in full by a function that hangs
+
 
 def machine_with(*preconditions, b=None, extra=(), **settings):
     """A, B, C, where B fails once (unless given) and has the preconditions; `extra`: (label, state)
@@ -272,7 +274,7 @@ def test_a_function_that_still_runs_is_not_called_again():
     hanging.leave()
 
 
-@pytest.mark.parametrize('settings', [{}, {'time_limit_s': 1000.0}])
+@pytest.mark.parametrize('settings', [BRIEF, dict(BRIEF, time_limit_s=1000.0)])
 def test_a_function_that_does_not_come_back_does_not_outlast_a_preempt(settings):
     hanging = Hanging()
     machine = machine_with(hanging, **settings)
@@ -287,7 +289,7 @@ def test_a_function_that_does_not_come_back_does_not_outlast_a_preempt(settings)
 
 def test_a_function_that_does_not_come_back_does_not_outlast_a_shutdown(monkeypatch):
     hanging = Hanging()
-    machine = machine_with(hanging)
+    machine = machine_with(hanging, **BRIEF)
     run = in_thread(machine.run)
     assert hanging.entered.wait(10)
     monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
