@@ -1,7 +1,7 @@
 """The memory of one container: its states' records, its history, the ways out of its oracle."""
 
 import copy
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Dict, Mapping, Optional, Tuple
 
 from ..decision.merged_rates import base_of
 from ..decision.policy import FailureContext
@@ -23,11 +23,11 @@ class ContainerRecords:
         self.history = History(history_length)
         self.marks = VisitMarks()
         # before a stop that was obeyed, each with the snapshot of its latest entry
-        self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, Any]]], ...]] = None
+        self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, object]]], ...]] = None
         self._is_drawn = False  # the next state is what the author drew after `preempted`
         self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
-        self.to_come: Dict[str, Dict[str, Any]] = {}
+        self.to_come: Dict[str, Dict[str, object]] = {}
 
     def make(self, label: str, settings: StateSettings, special: bool) -> StateRecord:
         """Make the record of a state, with what a rates file says of it."""
@@ -38,12 +38,12 @@ class ContainerRecords:
             record.shared = base_of(learned)
         return record
 
-    def learned(self) -> Dict[str, Any]:
+    def learned(self) -> Dict[str, object]:
         """Return what was learned of each state that is there, as plain data."""
         return {label: record.learned() for label, record in list(self.by_label.items())}
 
     def take_over(
-        self, label: str, settings: StateSettings, learned: Mapping[str, Any], is_shared: bool
+        self, label: str, settings: StateSettings, learned: Mapping[str, object], is_shared: bool
     ) -> None:
         """Take over what was learned of a state, which may not be there yet.
 

@@ -21,8 +21,8 @@ NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
 
 def take_snapshot(
-    data: Mapping[str, Any], deep_copy_keys: Iterable[str], warn: Callable[[str, str], None]
-) -> Dict[str, Any]:
+    data: Mapping[str, object], deep_copy_keys: Iterable[str], warn: Callable[[str, str], None]
+) -> Dict[str, object]:
     """Return the userdata as it is now.
 
     It holds references. `deep_copy_keys` are copied through and through. `warn` takes each key that
@@ -42,8 +42,8 @@ def take_snapshot(
 
 
 def restore(
-    data: Dict[str, Any],
-    snapshot: Mapping[str, Any],
+    data: Dict[str, object],
+    snapshot: Mapping[str, object],
     keep: Iterable[str],
     deep_copy_keys: Iterable[str],
 ) -> None:
@@ -153,8 +153,8 @@ class UserdataMark(NamedTuple):
     `copies` and `prints` (fingerprints) are those of the deep-copied keys.
     """
 
-    data: Dict[str, Any]
-    copies: Dict[str, Any]
+    data: Dict[str, object]
+    copies: Dict[str, object]
     prints: Dict[str, Optional[bytes]]
 
 

@@ -348,7 +348,7 @@ class TreeNode:
         self.tree.control.attend(self.engine)
         self.abandoned = self.tree.workers.abandoned
 
-    def snapshot(self) -> Dict[str, Any]:
+    def snapshot(self) -> Dict[str, object]:
         """Return the userdata as it is now."""
         return take_snapshot(
             self.machine.userdata._data, self.in_force.deep_copy_keys, self.warn_not_copied
@@ -356,7 +356,7 @@ class TreeNode:
 
     # -- learned rates, for a rates file (rates_file.Learner)
 
-    def learn(self, label: str, learned: Mapping[str, Any], is_shared: bool) -> None:
+    def learn(self, label: str, learned: Mapping[str, object], is_shared: bool) -> None:
         """Take over what was learned of a state. `is_shared`: whether the rates file has it.
 
         :raises ValueError: where it cannot be read.

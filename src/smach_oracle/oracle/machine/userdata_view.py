@@ -1,6 +1,6 @@
 """The userdata of a state: the container's userdata by the state's own key names."""
 
-from typing import Any, Collection, Iterable, Mapping, Tuple, cast
+from typing import Collection, Iterable, Mapping, Tuple, cast
 
 import smach
 
@@ -10,7 +10,7 @@ from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 
 
-def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
+def constants_of(machine: Machine, label: str) -> Mapping[str, object]:
     """Return the constants given with a state, by keys of the container.
 
     Engines without constants have none.
@@ -18,7 +18,7 @@ def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
     return machine._constants.get(label) or {}
 
 
-def write_constants(userdata: smach.UserData, constants: Mapping[str, Any]) -> None:
+def write_constants(userdata: smach.UserData, constants: Mapping[str, object]) -> None:
     """Write a state's constants before it runs, as the engine does. They stay."""
     for key, value in constants.items():
         userdata[key] = value

@@ -18,19 +18,19 @@ LAST_SEQ = 'last_seq'  # key in the data of RESUMED: number of the last event th
 # key in the data of TRANSITION: true where it says nothing of how good the state is
 NOT_COUNTED = 'not_counted'
 # fields of such a TRANSITION: the author's own, from a failure while the robot was not well
-UNCOUNTED: Mapping[str, Any] = {
+UNCOUNTED: Mapping[str, object] = {
     'text': 'not counted, as the robot is not well',
     'data': {NOT_COUNTED: True},
 }
 
 # fields of the TRANSITION of a state that was left for a state of another container
-LEFT: Mapping[str, Any] = {
+LEFT: Mapping[str, object] = {
     'text': 'left for a state of another container',
     'data': {NOT_COUNTED: True},
 }
 
 # fields of the TRANSITION from a state that was held, and that a preempt has ended before it began
-PASSED_BY: Mapping[str, Any] = {'text': 'preempted before it began', 'data': {NOT_COUNTED: True}}
+PASSED_BY: Mapping[str, object] = {'text': 'preempted before it began', 'data': {NOT_COUNTED: True}}
 
 _OLD_SPENT = ' spent on it'
 _OLD_STOPPED = ('KeyboardInterrupt:', 'SystemExit:')

@@ -1,6 +1,6 @@
 """Counts how often a trial was started over, and keeps the userdata of its start."""
 
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Dict, Mapping, Optional, Tuple
 
 
 class Restarts:
@@ -17,17 +17,17 @@ class Restarts:
         """Forget the trial before. `is_wanted`: whether a policy may start this one over."""
         self.count = 0
         self.is_due = is_wanted
-        self._userdata: Mapping[int, Dict[str, Any]] = {}
+        self._userdata: Mapping[int, Dict[str, object]] = {}
 
-    def keep(self, userdata: Mapping[int, Dict[str, Any]]) -> None:
+    def keep(self, userdata: Mapping[int, Dict[str, object]]) -> None:
         """Keep snapshots of the userdata of the start, by the id of the node."""
         self.is_due = False
         self._userdata = userdata
 
-    def userdata_of(self, node: object) -> Optional[Dict[str, Any]]:
+    def userdata_of(self, node: object) -> Optional[Dict[str, object]]:
         """Return the userdata with which a container has begun, None where it is not known."""
         return self._userdata.get(id(node))
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> Tuple[object, ...]:
         """A copied or pickled machine has begun no trial."""
         return Restarts, ()

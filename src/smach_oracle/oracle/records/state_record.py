@@ -106,7 +106,7 @@ class StateRecord:
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
         self.fast: Dict[Any, FastEdge] = {}
-        self.snapshot: Optional[Dict[str, Any]] = None
+        self.snapshot: Optional[Dict[str, object]] = None
         self.view: KeptView = _NO_VIEW  # from its last visit
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
@@ -122,7 +122,7 @@ class StateRecord:
         self.way_down: Tuple[Any, ...] = ()
         self._learned = 0  # successes by way of edges that the estimator knows
         # what of it the rates file has, as `base_of` tells it
-        self.shared: Dict[str, Any] = {}
+        self.shared: Dict[str, object] = {}
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
         self._visits = 0  # not counted by an FastEdge
@@ -195,12 +195,12 @@ class StateRecord:
         with self._lock:
             self._up_to_date().take_back_failure()
 
-    def learned(self) -> Dict[str, Any]:
+    def learned(self) -> Dict[str, object]:
         """Return what was learned as plain data."""
         with self._lock:
             return self._up_to_date().snapshot()
 
-    def merged_with(self, theirs: Mapping[str, Any]) -> Dict[str, Any]:
+    def merged_with(self, theirs: Mapping[str, object]) -> Dict[str, object]:
         """Return what others have learned, with what was learned here since it was last shared.
 
         :raises ValueError: where theirs cannot be read.
@@ -208,7 +208,7 @@ class StateRecord:
         with self._lock:
             return merged(self._up_to_date().snapshot(), self.shared, theirs, self.settings.memory)
 
-    def share(self, before: Mapping[str, Any], written: Mapping[str, Any]) -> None:
+    def share(self, before: Mapping[str, object], written: Mapping[str, object]) -> None:
         """Have what is shared now. `before`: what was learned here when it was merged."""
         with self._lock:
             estimator = self._up_to_date()
@@ -285,7 +285,7 @@ class StateRecord:
             counts[outcome, edge.target] = counts.get((outcome, edge.target), 0) + edge.count
         return counts
 
-    def restore(self, learned: Mapping[str, Any]) -> None:
+    def restore(self, learned: Mapping[str, object]) -> None:
         """Take over a snapshot of an estimator.
 
         :raises ValueError: where it cannot be read.
@@ -299,14 +299,14 @@ class StateRecord:
             count += edge.count
         return count
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
         state.update(snapshot=None, view=_NO_VIEW, way_down=())
         del state['_lock']
         return state
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         for name, value in state.items():
             setattr(self, name, value)
         self._lock = threading.RLock()
