@@ -3,7 +3,7 @@
 import threading
 import warnings
 from enum import IntEnum
-from typing import Any, Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
+from typing import Callable, Iterable, Mapping, NamedTuple, Optional, Tuple
 
 from ..records.events import FailureKind
 from ..records.visits import Visit
@@ -97,9 +97,9 @@ class Question(NamedTuple):
     output_keys: Tuple[str, ...]  # of the failed state, its own names
     give_up_outcomes: Tuple[str, ...]
     interfaces: Tuple[InterfaceOffer, ...]
-    userdata: Mapping[str, Any]  # the container's, values as they are
+    userdata: Mapping[str, object]  # the container's, values as they are
     # the failed state's inputs, by its own key names, where present
-    input_userdata: Mapping[str, Any]
+    input_userdata: Mapping[str, object]
     deadline_s: float  # 0: waits without end
     fallback: str  # what happens at the deadline, in words
     # how those of the choices stand, as long as it is open. None means nobody can tell
@@ -121,7 +121,7 @@ class Answer(NamedTuple):
     # SUPERSEDE, GIVE_UP ('' there: as the failure would have ended the container)
     outcome: str = ''
     interface: str = ''  # INTERFACE
-    outputs: Optional[Mapping[str, Any]] = None  # by the failed state's own key names
+    outputs: Optional[Mapping[str, object]] = None  # by the failed state's own key names
     by: str = ''
     why: str = ''
     # GOTO, GIVE_UP: path of the container of `state`, or of the one that ends with `outcome`; '':

@@ -1,6 +1,6 @@
 """Carries out a verdict: the one place that moves a machine from the meta state."""
 
-from typing import Any, Mapping, Optional, Sequence
+from typing import Mapping, Optional, Sequence
 
 from ..machine.repeats import note_superseded
 from ..machine.tree_node import TreeNode
@@ -175,7 +175,7 @@ class Applying:
         again = self._occasion.first is FirstStep.ENTER_AGAIN and target == self._record.label
         return bool(by) or not again
 
-    def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, Any]) -> None:
+    def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, object]) -> None:
         self._node.emit(
             EventKind.JUMP, state=self._record.label, target=target, by=by, text=text, data=data
         )

@@ -5,7 +5,7 @@ Also what one execution of any container begins and ends.
 
 import time
 from types import TracebackType
-from typing import Any, Dict, List, Optional, Type
+from typing import Dict, List, Optional, Type
 
 import smach
 from smach_oracle.forking import in_child
@@ -148,7 +148,7 @@ def _end_trial(
         store.end(why, outcome or '', time.time())
 
 
-def _settings(node: TreeNode) -> Dict[str, Any]:
+def _settings(node: TreeNode) -> Dict[str, object]:
     """Return the settings by which the top oracle decides, without those of single states."""
     settings, defaults = node.settings, node.settings.defaults
     parameters = sorted(settings.policy_parameters.items())
@@ -164,7 +164,7 @@ def _settings(node: TreeNode) -> Dict[str, Any]:
     }
 
 
-def _learned(node: TreeNode) -> Dict[str, Any]:
+def _learned(node: TreeNode) -> Dict[str, object]:
     """Return what was learned so far, where it is kept in a file.
 
     A record of the trial then has all that is needed to go on after it.

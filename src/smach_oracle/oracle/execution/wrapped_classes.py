@@ -17,7 +17,7 @@ def wrapped_class(oracle_class: type, base: type) -> type:
     key = id(oracle_class), id(base)
     made = _MADE.get(key)
     if made is None:
-        namespace: Dict[str, Any] = {
+        namespace: Dict[str, object] = {
             '__module__': base.__module__,
             '__qualname__': base.__qualname__,
             '__doc__': base.__doc__,

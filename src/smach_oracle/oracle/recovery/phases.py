@@ -6,7 +6,7 @@ do anything on which occasion is in a table of doc/executive_inside.md.
 """
 
 import threading
-from typing import Any, Dict, FrozenSet, List, Optional, Tuple
+from typing import Dict, FrozenSet, List, Optional, Tuple
 
 import smach
 
@@ -385,12 +385,12 @@ class OracleState(smach.State):
         if recovering is not None:
             recovering.cancel()
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
         state.update(_lock=None, _recovering=None, _verdict=None)
         return state
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
         self._lock = threading.Lock()

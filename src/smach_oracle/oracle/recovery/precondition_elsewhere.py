@@ -38,7 +38,7 @@ class RunElsewhere:
         self._runs = not way.down[1:]  # whether its container is one around the failed state
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
-        self._before: List[Tuple[Dict[str, Any], Dict[str, Any]]] = [
+        self._before: List[Tuple[Dict[str, object], Dict[str, object]]] = [
             (link.below.userdata._data, dict(link.below.userdata._data)) for link in self._down[:-1]
         ]
         self.gate = self._watch.gate

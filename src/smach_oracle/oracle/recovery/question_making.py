@@ -115,7 +115,7 @@ def _supersede_outcomes(
             yield OutcomeChoice(outcome, route.target)
 
 
-def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, Any]:
+def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, object]:
     data = dict(machine.userdata._data)
     remapping = machine._remappings.get(label) or {}
     return {

@@ -256,7 +256,7 @@ class WatchedVisit:
             return
         self._node.emit(kind, state=self._record.label, **fields)
 
-    def _note_answer(self, fields: Mapping[str, Any]) -> bool:
+    def _note_answer(self, fields: Mapping[str, object]) -> bool:
         """Close the question, as it is answered. Return False where it was taken back before."""
         waits_on = (fields.get('outcome'), fields.get('target')) == (
             AnswerKind.GOTO.name.lower(),
