@@ -5,10 +5,10 @@ import subprocess
 import pytest
 from house import ROOT
 
-PRODUCT = ('src/smach_oracle/oracle/new.py', 'benchmarks/new.py', 'scripts/new')
-LIBRARY = ('src/smach_oracle/ros/new.py', 'src/smach/new.py')
-EXECUTIVE = ('src/smach_oracle/oracle/recovery/new.py',)
-TEST = ('test/unit/house/test_new.py',)
+PRODUCT = ('src/smach_oracle/oracle/container.py', 'benchmarks/killed.py', 'scripts/what_if')
+LIBRARY = ('src/smach_oracle/ros/images.py', 'src/smach/state.py')
+EXECUTIVE = ('src/smach_oracle/oracle/recovery/phases.py',)
+TEST = ('test/unit/house/test_files.py',)
 
 
 def rules_broken(source, place):

@@ -22,7 +22,7 @@ Look = Callable[[], Optional[Reason]]
 
 
 class CallEnd(Enum):
-    """How a call ended for who ran it (`Scope.run`)."""
+    """The end of a call, as who ran it sees it (`Scope.run`)."""
 
     BY_ITSELF = 'by itself'
     OVERRUN = 'overrun'
