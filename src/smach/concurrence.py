@@ -118,21 +118,25 @@ class Concurrence(Container):
             raise smach.InvalidStateError(
                 'This concurrence has no states; they are added inside `with concurrence:`.'
             )
-        self._copy_input_keys(parent_ud, self.userdata)
-        smach.loginfo('Concurrence starting with userdata: \n\t%s' % list(self.userdata.keys()))
-        self.call_start_cbs()
-        self._wait_while_paused()
-        run = self._run_children()
-        serviced = self._settle_preempt(run)
-        self._raise_error_of(run)
-        smach.loginfo('Concurrent Outcomes: %s' % run.outcomes)
-        outcome = self._determine_outcome(run.outcomes, serviced)
-        self.call_termination_cbs(list(self._states), outcome)
-        self._copy_output_keys(self.userdata, parent_ud)
+        with self._execution() as execution:
+            self._take_inputs(parent_ud)
+            smach.loginfo('Concurrence starting with userdata: \n\t%s' % list(self.userdata.keys()))
+            self.call_start_cbs()
+            self._wait_while_paused()
+            run = self._run_children()
+            serviced = self._settle_preempt(run)
+            self._raise_error_of(run)
+            smach.loginfo('Concurrent Outcomes: %s' % run.outcomes)
+            outcome = self._determine_outcome(run.outcomes, serviced)
+            self.call_termination_cbs(list(self._states), outcome)
+            self._copy_output_keys(self.userdata, parent_ud)
+            execution.outcome = outcome
         return outcome
 
     def _run_children(self) -> ParallelRun:
-        run = ParallelRun(self._states, self._execute_child, self._child_began, self._child_ended)
+        run = ParallelRun(
+            self._states, self._runner, self._execute_child, self._child_began, self._child_ended
+        )
         self._run = run
         if self._preempt_is_over:
             self._preempt_is_over = False
@@ -148,7 +152,7 @@ class Concurrence(Container):
 
     def _execute_child(self, label: str) -> Any:
         state = self._states[label]
-        return state.execute(
+        return self._runner(label, state).execute(
             smach.Remapper(
                 self.userdata,
                 state.get_registered_input_keys(),
@@ -183,9 +187,10 @@ class Concurrence(Container):
         A preempt that came when no child was running any more reached nobody. It stays with the
         container, so that its parent sees that it was not serviced.
         """
-        deaf = [label for label in self._states if self._states[label].preempt_requested()]
+        runners = {label: self._runner(label, state) for label, state in self._states.items()}
+        deaf = [label for label, runner in runners.items() if runner.preempt_requested()]
         for label in deaf:
-            self._states[label].recall_preempt()
+            runners[label].recall_preempt()
         if not self.preempt_requested():
             return False
         for label in deaf:

@@ -32,6 +32,9 @@ class Container(State):
     _construction_stack: List['Container'] = []
     _construction_lock = threading.RLock()
 
+    # an ``ExecutionHook`` (``smach.hooks``) of a Concurrence or an Iterator, or one that is like it
+    execution_hook: Any = None
+
     _context_kwargs: Sequence[Any] = ()
     _pause_requested = False  # of containers that do not call __init__
 
@@ -221,6 +224,25 @@ class Container(State):
         if parent_ud is not None:
             _copy_keys(self.get_registered_input_keys(), parent_ud, ud, 'input')
 
+    def _execution(self) -> Any:
+        """The context of one execution, which the hook may give."""
+        hook = self.execution_hook
+        return _NO_HOOK if hook is None else hook.execution(self)
+
+    def _take_inputs(self, parent_ud: Any) -> None:
+        hook = self.execution_hook
+        if hook is None:
+            self._copy_input_keys(parent_ud, self.userdata)
+        else:
+            hook.take_inputs(
+                self, lambda: self._copy_input_keys(parent_ud, self.userdata), parent_ud
+            )
+
+    def _runner(self, label: str, state: Any) -> Any:
+        """Return what executes a state: the state itself, or whatever the hook names."""
+        hook = self.execution_hook
+        return state if hook is None else hook.runners.get(label, state)
+
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
         """Copy this container's output keys to the parent's userdata. A missing one is a
         warning.
@@ -266,6 +288,21 @@ class Container(State):
             time.sleep(_PAUSE_POLL_S)
         self._pause_requested = False
         smach.loginfo('%s resumed.' % type(self).__name__)
+
+
+class _NoHook(object):
+    """The context of an execution without a hook."""
+
+    __slots__ = ('outcome',)
+
+    def __enter__(self) -> '_NoHook':
+        return self
+
+    def __exit__(self, *raised: Any) -> None:
+        pass
+
+
+_NO_HOOK = _NoHook()
 
 
 def _copy_keys(keys: Sequence[str], source: Any, target: Any, kind: str) -> None:

@@ -1,8 +1,6 @@
-"""The public methods that a machine calls at every step only if somebody put others in their
-place.
-"""
+"""What somebody may put in the way of a container's execution: a hook, or methods of their own."""
 
-from typing import Any
+from typing import Any, Callable, Dict, Iterable, Optional, Union
 
 from smach.container import Container
 from smach.state import State
@@ -19,3 +17,49 @@ def is_hooked(machine: Any) -> bool:
         getattr(getattr(machine, name), '__func__', None) is not method
         for name, method in _HOOKS.items()
     )
+
+
+class HookedExecution(object):
+    """The context of one execution. ``outcome``: with which that ends, None where it raises.
+
+    It keeps no frame on the stack, on which containers may lie in each other many times.
+    """
+
+    outcome: Optional[str] = None
+
+    def __enter__(self) -> 'HookedExecution':
+        return self
+
+    def __exit__(self, kind: Any, error: Optional[BaseException], trace: Any) -> None:
+        pass
+
+
+class ExecutionHook(object):
+    """Has a say in the execution of a Concurrence or an Iterator whose ``execution_hook`` it is.
+
+    This one changes nothing. A container may have one hook, which is set while it is at rest.
+
+    ``runners``: by label, what executes a state in its place. It needs the methods ``execute(ud)``,
+    ``request_preempt()``, ``preempt_requested()`` and ``recall_preempt()`` of a state. Whoever asks
+    the container for its children gets the states.
+    """
+
+    def __init__(self) -> None:
+        self.runners: Dict[str, Any] = {}
+
+    def execution(self, container: Any) -> 'HookedExecution':
+        """Return the context in which the container executes once.
+
+        A shallow copy of a container has its hook too, hence ``container``.
+        """
+        return HookedExecution()
+
+    def take_inputs(self, container: Any, copy: Callable[[], None], parent_ud: Any) -> None:
+        """Let the container take its input keys, by ``copy()``."""
+        copy()
+
+    def items(
+        self, container: Any, items: Union[Iterable[Any], Callable[[], Iterable[Any]]]
+    ) -> Union[Iterable[Any], Callable[[], Iterable[Any]]]:
+        """Return what an Iterator goes through in place of its items."""
+        return items

@@ -98,24 +98,28 @@ class Iterator(Container):
         """Go through the items and return the outcome. It raises InvalidUserCodeError if the state
         or the iterable raised.
         """
-        self._is_running = True
-        try:
-            self._copy_input_keys(parent_ud, self.userdata)
-            self.call_start_cbs()
-            last_outcome = self._iterate(self._fresh_items())
-            if self._preempt_requested:
-                self._end_preempt()
-        finally:
-            self._is_running = False
-        outcome = self._final_outcome_map.get(last_outcome, last_outcome)
-        # The label itself, not a list of one: it is what callbacks of an iterator have always been
-        # given.
-        self.call_termination_cbs(self._state_label, outcome)
-        self._copy_output_keys(self.userdata, parent_ud)
+        with self._execution() as execution:
+            self._is_running = True
+            try:
+                self._take_inputs(parent_ud)
+                self.call_start_cbs()
+                last_outcome = self._iterate(self._fresh_items())
+                if self._preempt_requested:
+                    self._end_preempt()
+            finally:
+                self._is_running = False
+            outcome = self._final_outcome_map.get(last_outcome, last_outcome)
+            # The label itself, not a list of one: it is what callbacks of an iterator have always
+            # been given.
+            self.call_termination_cbs(self._state_label, outcome)
+            self._copy_output_keys(self.userdata, parent_ud)
+            execution.outcome = outcome
         return outcome
 
     def _fresh_items(self) -> Iterator_[Any]:
-        return iter(self._items() if callable(self._items) else self._items)
+        hook = self.execution_hook
+        items = self._items if hook is None else hook.items(self, self._items)
+        return iter(items() if callable(items) else items)
 
     def _iterate(self, items: Iterator_[Any]) -> str:
         """Execute the state until something stops it, and return its last outcome, or that of
@@ -163,11 +167,13 @@ class Iterator(Container):
                 'This iterator has no state to repeat; give it one with '
                 'Iterator.set_contained_state().'
             )
+        hook = self.execution_hook
+        runner = state if hook is None else hook.runners.get(self._state_label, state)
         # before the first item: later ones are not reached with a preempt pending
         if self.preempt_requested():
-            state.request_preempt()
+            runner.request_preempt()
         try:
-            outcome: str = state.execute(self.userdata)
+            outcome: str = runner.execute(self.userdata)
         except smach.InvalidUserCodeError:
             smach.logerr("Could not execute iterator state '%s'" % self._state_label)
             raise
@@ -184,15 +190,17 @@ class Iterator(Container):
         """Stop after the current item, and ask the contained state to stop within it."""
         self._preempt_requested = True
         if self._is_running and self._state is not None:
-            self._state.request_preempt()
+            self._runner(self._state_label, self._state).request_preempt()
 
     def _end_preempt(self) -> None:
         """Stopping is servicing. A state that did not notice must not find the old request in its
         next run.
         """
         self._preempt_requested = False
-        if self._state is not None and self._state.preempt_requested():
-            self._state.recall_preempt()
+        if self._state is not None:
+            runner = self._runner(self._state_label, self._state)
+            if runner.preempt_requested():
+                runner.recall_preempt()
 
     # -- what outsiders may ask
 

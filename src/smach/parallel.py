@@ -22,6 +22,7 @@ _GRACE_S = 1.0
 class ParallelRun(object):
     """Executes each state in a thread of its own, once.
 
+    ``runner(label, state)`` returns what takes the preempt requests of a state.
     ``execute(label)`` runs the state and returns its outcome. ``began(label)`` and ``ended(label)``
     are called in the state's thread, never for two states at once. The first error of any of them
     preempts the other states.
@@ -30,6 +31,7 @@ class ParallelRun(object):
     def __init__(
         self,
         states: Mapping[str, State],
+        runner: Callable[[str, State], State],
         execute: Callable[[str], str],
         began: Callable[[str], object],
         ended: Callable[[str], object],
@@ -38,6 +40,7 @@ class ParallelRun(object):
         self.error: Optional[smach.SmachError] = None
         self.preempted: Set[str] = set()
         self._states = states
+        self._runner = runner
         self._execute = execute
         self._began = began
         self._ended = ended
@@ -82,7 +85,7 @@ class ParallelRun(object):
             self._preempt_state(label)
 
     def _preempt_state(self, label: str) -> None:
-        state = self._states[label]
+        state = self._runner(label, self._states[label])
         try:
             state.request_preempt()
         except Exception:

@@ -1,7 +1,4 @@
-"""OracleContainer: a StateMachine that recovers from failures (paper, section IV).
-
-It asks an expert only when it must.
-"""
+"""OracleContainer: a StateMachine that recovers from failures (paper, section IV)."""
 
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, cast
 
@@ -11,6 +8,7 @@ from .asking.question import Expert, names
 from .errors import SettingsError
 from .execution.boundary import before_step
 from .execution.step import Step
+from .execution.transitions import terminate
 from .execution.trial import ContainerRun
 from .execution.unwrapping import execute_bare
 from .execution.visiting import execute_observed, execute_watched
@@ -304,6 +302,8 @@ class OracleContainer(smach.StateMachine):
         label = node.settings.oracle_label
         meta = states.get(label)
         outcomes = self.get_registered_outcomes()
+        if isinstance(meta, OracleState) and meta.leads_on(self, label, outcomes):
+            return
         if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
             raise SettingsError(
                 'oracle_label',
@@ -323,6 +323,7 @@ class OracleContainer(smach.StateMachine):
                 + tuple(name for name in sorted(outcomes, key=str) if name not in states)
             )
         states[label] = meta
+        meta.note_led(self, label, outcomes)
 
     def _remove_oracle(self) -> None:
         label = self._oracle.settings.oracle_label
@@ -382,11 +383,9 @@ class OracleContainer(smach.StateMachine):
         """Execute the current state and make the transition, and go on with the next state.
 
         It goes on while each is a plain success, the engine's own loop has called it, and nothing
-        makes that stop or pause. It returns None to let the loop go on, else the container's
-        outcome.
+        makes that stop or pause. It returns None, or the container's outcome at the end.
 
-        Every transition takes this way, so it is kept flat: a plain success costs what is on this
-        page.
+        Every transition takes this way: a plain success costs what is on this page.
         """
         node = self._oracle
         lock = self._state_transitioning_lock
@@ -439,7 +438,8 @@ class OracleContainer(smach.StateMachine):
                 try:
                     edge = record.fast[outcome]
                     target = edge.target
-                    plain = transitions[outcome] is target and not self._preempt_requested
+                    plain = transitions[outcome] is edge.drawn and not self._preempt_requested
+                    plain = plain and not (edge.is_end and node.ends_specially())
                 except Exception:
                     # seen for the first time, no plain success, or no outcome at all
                     plain = False
@@ -455,6 +455,8 @@ class OracleContainer(smach.StateMachine):
                     history.succeeded = label
                 if observed:
                     node.events.emit(TRANSITION, node.path, node.trial_id, label, outcome, target)
+                if edge.is_end:
+                    return terminate(node, label, outcome, target)
                 self._current_label = target
                 self._current_state = self._states[target]
                 self._current_transitions = self._transitions[target]
@@ -471,6 +473,12 @@ class OracleContainer(smach.StateMachine):
             finally:
                 if not engine.lock_is_held:
                     lock.release()
+
+    def _state_ended(self, outcome: Any, error: Optional[Exception]) -> Optional[str]:
+        """Go on behind the current state, which was executed elsewhere, with the lock held."""
+        return Step(self._oracle, self._oracle.record(str(self._current_label))).ended(
+            outcome, error
+        )
 
     # -- pickling and copying
 

@@ -7,9 +7,9 @@ import smach
 from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .machine.nesting import nodes_of
+from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode, WrappedMachine
 from .records.events import FailureKind
-from .recovery.failure import Route, author_recovers, failure_kind, route_of
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
@@ -95,19 +95,18 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
 def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     machine: Any = node.machine
     initial = machine._initial_state_label or next(iter(node.labels()), '')
-    if node.branch is not None:
-        machine = node.branch.container
+    shown = node.site.shown(node)
     return ContainerProspect(
         node.path,
-        machine,
+        shown,
         initial,
-        tuple(sorted(machine.get_registered_outcomes(), key=str)),
+        tuple(sorted(shown.get_registered_outcomes(), key=str)),
         node.settings,
         node.parent is None,
         node.tree.recover,
         tuple(_state(node, label, decides) for label in node.labels()),
         tuple(_guarded(node)),
-        node.branch is not None,
+        not node.site.is_container,
     )
 
 
@@ -137,23 +136,12 @@ def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
     route = route_of(node.machine, label, outcome)
     kind = failure_kind(outcome, route, settings.failure_outcomes, node.in_force.failing)
-    branch = node.branch
-    if branch is not None:
-        return OutcomeProspect(
-            outcome,
-            Route(branch.leads_to(outcome), True),
-            kind is not FailureKind.NOT_A_FAILURE,
-            kind is not FailureKind.NOT_A_FAILURE
-            and settings.author_recoveries != 'override'
-            and branch.foresees(node, outcome),
-        )
     return OutcomeProspect(
         outcome,
-        route,
+        node.site.in_words(route, outcome),
         kind is not FailureKind.NOT_A_FAILURE,
-        author_recovers(
-            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
-        ),
+        kind is not FailureKind.NOT_A_FAILURE
+        and node.site.foresees(node, outcome, route, kind, settings),
     )
 
 

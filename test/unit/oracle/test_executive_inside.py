@@ -63,7 +63,7 @@ class Noted:
 
     def _move(self, machine, label):
         node = node_of(machine)
-        if node is not None and node.branch is None:
+        if node is not None and node.site.is_container:
             self.moves += 1
             lock = machine._state_transitioning_lock
             if not self._is_own(node.path):

@@ -170,7 +170,7 @@ def test_a_state_whose_class_uses_the_names_of_our_marks_runs():
     class Marked(smach.State):
         """Its author has used our name for something else."""
 
-        _oracle = _oracle_border = 'mine'
+        _oracle = _oracle_wrapper = 'mine'
 
         def __init__(self):
             smach.State.__init__(self, ['ok', 'aborted'])

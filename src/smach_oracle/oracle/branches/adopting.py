@@ -4,13 +4,14 @@ from typing import Callable, Dict, Iterator, Optional, Tuple, cast
 
 import smach
 
-from ..machine.nesting import borders_below
+from ..identity import own_attributes
+from ..machine.nesting import WRAPPER, branching_below
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode, WrappedMachine
-from .border import Border, border_of
-from .border_classes import put_border, take_border_away
-from .branch import Branch, ConcurrenceBranch, IteratorBranch
+from .branch import BranchSite, ConcurrenceSite, IteratorSite
 from .branch_machine import BranchMachine
+from .upstream import HOOK, ask_no_more, asks_hook, have_asked
+from .wrapper import ConcurrenceWrapper, ContainerWrapper, IteratorWrapper, wrapper_of
 
 PutUnder = Callable[[smach.StateMachine, TreeNode], WrappedMachine]
 
@@ -20,73 +21,87 @@ def adopt_branches(parent: TreeNode, put_under: PutUnder) -> None:
 
     `put_under` wraps a machine as one nested in `parent`.
     """
-    for below, container in list(borders_below(parent.machine)):
-        border = border_of(container)
-        if border is None and parent.in_force.nested:
-            border = _new_border(parent, below, container)
-        if border is not None:
-            _take_notice(border, parent, below, put_under)
+    for below, container in list(branching_below(parent.machine)):
+        wrapper = wrapper_of(container)
+        if wrapper is None and parent.in_force.nested:
+            wrapper = _new_wrapper(parent, below, container)
+        if wrapper is not None:
+            _take_notice(wrapper, parent, below, put_under)
 
 
 def release_branches(machine: object) -> None:
     """Give the Concurrences and Iterators below a machine back as they were before."""
-    for _, container in list(borders_below(machine)):
-        take_border_away(container)
+    for _, container in list(branching_below(machine)):
+        if wrapper_of(container) is not None:
+            ask_no_more(container)
+            for mark in (WRAPPER, HOOK):
+                own_attributes(container).pop(mark, None)
 
 
-def _new_border(parent: TreeNode, below: Labels, container: smach.Container) -> Optional[Border]:
+def _new_wrapper(
+    parent: TreeNode, below: Labels, container: smach.Container
+) -> Optional[ContainerWrapper]:
+    asks = asks_hook(type(container))
     try:
-        put_border(container)
+        if not asks:
+            have_asked(container)
     except TypeError as err:
         smach.logwarn(
             '{}/{}: its states get no oracle, since its class cannot be extended ({})'.format(
                 parent.path, '/'.join(below), err
             )
         )
-    return border_of(container)
+        return None
+    is_iterator = isinstance(container, smach.Iterator)
+    kind = IteratorWrapper if is_iterator else ConcurrenceWrapper
+    wrapper: ContainerWrapper = kind(container)
+    own_attributes(container).update({WRAPPER: wrapper, **({HOOK: wrapper} if asks else {})})
+    return wrapper
 
 
-def _take_notice(border: Border, parent: TreeNode, below: Labels, put_under: PutUnder) -> None:
+def _take_notice(
+    wrapper: ContainerWrapper, parent: TreeNode, below: Labels, put_under: PutUnder
+) -> None:
     """Have a machine for each branch that there is now."""
-    if border.top is None or border.top.tree is not parent.tree:
-        border.top, border.below = parent, below
-    if border.top is not parent:
+    if wrapper.top is None or wrapper.top.tree is not parent.tree:
+        wrapper.top, wrapper.below = parent, below
+    if wrapper.top is not parent:
         return  # it is in two places: the first one is used
     found: Dict[str, WrappedMachine] = {}
-    for label, state in _plain_states(border):
-        machine = border.machines.get(label)
+    for label, state in _plain_states(wrapper):
+        machine = wrapper.machines.get(label)
         if machine is None and parent.wraps(below + (label,)):
-            machine = _new_machine(border, label, state, parent, below, put_under)
+            machine = _new_machine(wrapper, label, state, parent, below, put_under)
         if machine is not None:
             found[label] = machine
-            cast(BranchMachine, machine).take(state, border.container.userdata, {})
-    border.machines = found
+            cast(BranchMachine, machine).take(state, wrapper.container.userdata, {})
+    wrapper.machines = found
 
 
-def _plain_states(border: Border) -> Iterator[Tuple[str, smach.State]]:
-    for label, state in border.states():
+def _plain_states(wrapper: ContainerWrapper) -> Iterator[Tuple[str, smach.State]]:
+    for label, state in wrapper.states():
         if label and not isinstance(state, smach.Container):
             yield label, state
 
 
 def _new_machine(
-    border: Border,
+    wrapper: ContainerWrapper,
     label: str,
     state: smach.State,
     parent: TreeNode,
     below: Labels,
     put_under: PutUnder,
 ) -> WrappedMachine:
-    container = border.container
+    container = wrapper.container
     is_iterator = isinstance(container, smach.Iterator)
     bare = BranchMachine(label, is_alone=is_iterator)
     bare.take(state, container.userdata, {})
-    kind: Callable[[smach.Container, str], Branch] = (
-        IteratorBranch if is_iterator else ConcurrenceBranch
+    kind: Callable[[smach.Container, str], BranchSite] = (
+        IteratorSite if is_iterator else ConcurrenceSite
     )
     machine = put_under(bare, parent)
     node = machine._oracle
-    node.branch = kind(container, label)
+    node.site = kind(container, label)
     node.lie_below(parent, below)
     node.configure(parent.settings)
     return machine

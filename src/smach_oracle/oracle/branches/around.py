@@ -1,31 +1,42 @@
-"""Finds the Concurrences and Iterators between a container and the machine above it."""
+"""The wrappers of the Concurrences and Iterators around a container, and in its states."""
 
 from typing import List, Tuple
 
-from ..machine.nesting import borders_below
+from ..machine.nesting import branching_below
 from ..machine.tree_node import TreeNode
-from .border import Border, border_of
+from .wrapper import ContainerWrapper, wrapper_of
 
 
-def borders_around(node: TreeNode) -> List[Tuple[str, Border]]:
+def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
     """Return them, each with its path, the outermost first."""
     parent = node.parent
-    if parent is None or (len(node.below) < 2 and node.branch is None):
+    if parent is None or not node.runs_in_branch:
         return []
     found = []
-    for below, container in borders_below(parent.machine):
-        border = border_of(container)
-        if border is not None and node.below[: len(below)] == below:
-            found.append(('/'.join((parent.key,) + below), border))
+    for below, container in branching_below(parent.machine):
+        wrapper = wrapper_of(container)
+        if wrapper is not None and node.below[: len(below)] == below:
+            found.append(('/'.join((parent.key,) + below), wrapper))
     return found
 
 
-def borders_in(node: TreeNode, label: str) -> List[Tuple[str, Border]]:
+def wrappers_in(node: TreeNode, label: str) -> List[Tuple[str, ContainerWrapper]]:
     """Return those in a state of a machine, down to the next machines, each with its path."""
     return [
-        ('/'.join((node.key,) + below), border)
-        for below, border in (
-            (below, border_of(container)) for below, container in borders_below(node.machine)
+        ('/'.join((node.key,) + below), wrapper)
+        for below, wrapper in (
+            (below, wrapper_of(container)) for below, container in branching_below(node.machine)
         )
-        if border is not None and below[0] == label
+        if wrapper is not None and below[0] == label
     ]
+
+
+def ask_to_go_on(node: TreeNode, target: str) -> None:
+    """Note that the oracle goes to a state: an Iterator that has failed or was left goes on there.
+
+    Any other Iterator of the container begins again when it is entered.
+    """
+    for label, state in list(node.machine._states.items()):
+        wrapper = wrapper_of(state)
+        if wrapper is not None:
+            wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

@@ -1,54 +1,110 @@
-"""One branch: where its outcomes lead, by its author's word."""
+"""The sites of branches: plain states of a Concurrence or an Iterator."""
 
 from dataclasses import replace
-from typing import Any, Tuple
+from typing import Any, Optional, Tuple
 
 import smach
 
+from ..asking.question import OutcomeChoice
 from ..identity import attribute_of
+from ..machine.nesting import wrapper_of
+from ..machine.site import Route, Site, failure_kind, route_of
 from ..machine.tree_node import TreeNode
-from ..records.events import FailureKind
-from ..recovery.failure import failure_kind, route_of
-from ..settings.settings import Settings
-from .items import TrackedItems
+from ..records.events import Event, EventKind, FailureKind
+from ..settings.settings import Settings, StateSettings
+
+_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
 
-class Branch:
+class BranchSite(Site):
     """The Concurrence or Iterator that holds a plain state, as the oracle of the state knows it."""
+
+    is_container = False
+    goes_on_with_any = True
+    begins_by = EventKind.STATE_START
 
     def __init__(self, container: smach.Container, label: str) -> None:
         self.container: Any = container
         self.label = label
 
-    def settings_here(self, settings: Settings) -> Settings:
-        """Return the settings of the whole machine as they are in force for the branch."""
-        return settings
+    def shown(self, node: TreeNode) -> smach.Container:
+        """Return the container that people see."""
+        container: smach.Container = self.container
+        return container
 
-    def foresees(self, node: TreeNode, outcome: str) -> bool:
+    def settings_of_state(self, settings: StateSettings) -> StateSettings:
+        """Leave out preconditions by label: beside a branch is no state that could be run for it.
+
+        A path names one elsewhere.
+        """
+        if not any(spec.labels() for spec in settings.preconditions):
+            return settings
+        return replace(
+            settings,
+            preconditions=tuple(
+                spec
+                for spec in settings.preconditions
+                if all('/' in label for label in spec.labels())
+            ),
+        )
+
+    def foresees(
+        self,
+        node: TreeNode,
+        outcome: str,
+        route: Route,
+        kind: FailureKind,
+        settings: StateSettings,
+    ) -> bool:
         """Whether the author has said what is to happen at this failing outcome."""
+        return settings.author_recoveries != 'override' and self._is_drawn(node, outcome)
+
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
         raise NotImplementedError
 
-    def leads_to(self, outcome: str) -> str:
+    def in_words(self, route: Route, outcome: str) -> Route:
         """Say where an outcome leads, for people."""
+        return Route(self._leads_to(outcome), True)
+
+    def _leads_to(self, outcome: str) -> str:
         raise NotImplementedError
 
-    def goes_on_after(self, outcome: str) -> bool:
+    def choices(self, node: TreeNode, label: str) -> Tuple[OutcomeChoice, ...]:
+        """Return the outcomes, and where they lead. Those that lead to the next item come first."""
+        last = [
+            (not self._goes_on_after(outcome), str(outcome), outcome)
+            for outcome in node.machine._states[label].get_registered_outcomes()
+        ]
+        return tuple(
+            OutcomeChoice(outcome, self._leads_to(outcome)) for _, _, outcome in sorted(last)
+        )
+
+    def _goes_on_after(self, outcome: str) -> bool:
         """Whether an outcome leads to the next item."""
         return False
 
-    def passes_over(self, outcome: str) -> str:
-        """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
-        return ''
+    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
+        """Say nothing: the Concurrence or Iterator tells."""
+
+    def ended_by(self, node: TreeNode, event: Event) -> Optional[str]:
+        """Return the outcome with which the branch ends at an event, None for other events."""
+        outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
+        is_end = event.kind in _LEAVES and outcome and not node.is_oracle(outcome)
+        return outcome if is_end and outcome not in node.machine._states else None
+
+    def is_line_over(self, node: TreeNode, event: Event) -> bool:
+        """Whether the branch is over by an event."""
+        return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
 
 
-class ConcurrenceBranch(Branch):
-    """One state of a Concurrence."""
+class ConcurrenceSite(BranchSite):
+    """The site of one state of a Concurrence."""
 
     def settings_here(self, settings: Settings) -> Settings:
         """Keep the userdata at jumps: others write it at the same time."""
         return replace(settings, userdata='keep', deep_copy_keys=())
 
-    def foresees(self, node: TreeNode, outcome: str) -> bool:
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
         """Whether the outcome map names it for the branch, and leads to what is no failure."""
         return any(
             not is_failure_above(node, name)
@@ -56,39 +112,37 @@ class ConcurrenceBranch(Branch):
             if dict(_entries(conditions)).get(self.label) == outcome
         )
 
-    def leads_to(self, outcome: str) -> str:
-        """Say where an outcome leads, for people."""
+    def _leads_to(self, outcome: str) -> str:
         return 'the end of this branch'
 
 
-class IteratorBranch(Branch):
-    """The state of an Iterator."""
+class IteratorSite(BranchSite):
+    """The site of the state of an Iterator."""
 
-    def foresees(self, node: TreeNode, outcome: str) -> bool:
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""
         if loops(self.container, outcome):
             return True
         mapped = self.container._final_outcome_map
         return outcome in mapped and not is_failure_above(node, mapped[outcome])
 
-    def leads_to(self, outcome: str) -> str:
-        """Say where an outcome leads, for people."""
+    def _leads_to(self, outcome: str) -> str:
         if loops(self.container, outcome):
             return 'the next item'
         return 'the end of the iteration, with {}'.format(
             self.container._final_outcome_map.get(outcome, outcome)
         )
 
-    def goes_on_after(self, outcome: str) -> bool:
-        """Whether an outcome leads to the next item."""
+    def _goes_on_after(self, outcome: str) -> bool:
         return loops(self.container, outcome)
 
-    def passes_over(self, outcome: str) -> str:
+    def tell_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
         """Say which item is passed over where this failing outcome leads to the next one."""
-        items = self.container._items
-        if isinstance(items, TrackedItems) and loops(self.container, outcome):
-            return items.in_words()
-        return ''
+        wrapper = wrapper_of(self.container)
+        item = wrapper.in_words() if wrapper is not None else ''
+        if item and loops(self.container, outcome):
+            text = '{} is passed over with {}, as its author has drawn it'
+            node.warn(text.format(item, outcome), label)
 
 
 def loops(iterator: smach.Iterator, outcome: str) -> bool:

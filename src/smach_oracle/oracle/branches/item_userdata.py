@@ -18,7 +18,8 @@ class ItemUserdata:
     def __init__(self, iterator: Any) -> None:
         self._iterator = iterator
         self._given: Dict[str, Any] = {}  # its io keys when it began
-        self._at_item: Optional[Dict[str, Any]] = None
+        # its userdata as the item under way began
+        self.at_item: Optional[Dict[str, Any]] = None
 
     def begin_item(
         self, begun: Optional[Mapping[str, Any]], deep_copy_keys: Sequence[str], warn: Warn
@@ -29,7 +30,7 @@ class ItemUserdata:
         visit has written already.
         """
         data = self._iterator.userdata._data if begun is None else begun
-        self._at_item = take_snapshot(data, deep_copy_keys, warn)
+        self.at_item = take_snapshot(data, deep_copy_keys, warn)
 
     def begin(
         self, userdata: Optional[smach.UserData], deep_copy_keys: Sequence[str], warn: Warn
@@ -39,8 +40,8 @@ class ItemUserdata:
 
     def take_back(self, deep_copy_keys: Sequence[str]) -> None:
         """Take back what the unfinished item wrote."""
-        if self._at_item is not None:
-            restore(self._iterator.userdata._data, self._at_item, (), deep_copy_keys)
+        if self.at_item is not None:
+            restore(self._iterator.userdata._data, self.at_item, (), deep_copy_keys)
 
     def to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
         """Return what finished items have left under keys that are inputs and outputs.
@@ -63,7 +64,7 @@ class ItemUserdata:
         return {} if userdata is None else {key: userdata[key] for key in both if key in userdata}
 
     def __getstate__(self) -> Dict[str, Any]:
-        return dict(self.__dict__, _given={}, _at_item=None)
+        return dict(self.__dict__, _given={}, at_item=None)
 
 
 def _same(one: object, other: object) -> bool:

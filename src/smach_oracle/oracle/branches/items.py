@@ -56,13 +56,13 @@ class TrackedItems:
                 )
             )
 
-    def __iter__(self) -> 'TrackedItems':
+    def __iter__(self) -> Iterator[object]:
         if self.goes_on and self.has_rest():
             self._go_on()
         else:
             self._begin()
         self.goes_on = False
-        return self
+        return self._hand_out()
 
     def _begin(self) -> None:
         source = self._source()
@@ -128,16 +128,16 @@ class TrackedItems:
         for _ in range(self.number):
             next(self._items, None)
 
-    def __next__(self) -> object:
+    def _hand_out(self) -> Iterator[object]:
         if self._is_pending:
             self._is_pending = False
-            return self._item
+            yield self._item
         try:
-            item = next(cast(Iterator[object], self._items))
-        except StopIteration:
-            self.is_exhausted = True
-            raise
-        except Exception as err:
+            for item in cast(Iterator[object], self._items):
+                self._item, self.is_finished = item, False
+                self.number += 1
+                yield item
+        except Exception as err:  # of whoever makes the items
             self._error = err
             self.is_finished = True  # the one before
             self._tell(
@@ -146,9 +146,7 @@ class TrackedItems:
                 )
             )
             raise
-        self._item, self.is_finished = item, False
-        self.number += 1
-        return item
+        self.is_exhausted = True
 
     # -- to others it is what was given
 

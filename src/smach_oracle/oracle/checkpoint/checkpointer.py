@@ -9,8 +9,8 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, GOAL, IN,
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..branches.around import borders_around, borders_in
-from ..branches.border import Border, IteratorBorder
+from ..branches.around import wrappers_around, wrappers_in
+from ..branches.wrapper import ContainerWrapper
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..places.place import TreePlace
@@ -45,7 +45,6 @@ _COMMITTED = frozenset(
 )
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
-_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
 
 class Checkpointer:
@@ -84,7 +83,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
-        self._borders: Dict[str, Tuple[TreeNode, List[Tuple[str, Border]]]] = {}
+        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, ContainerWrapper]]]] = {}
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, Any] = {}
         self._seq_stored = -1
@@ -121,10 +120,10 @@ class Checkpointer:
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
             if event.kind in _HAS_RUN:
-                self._wrote[_userdata_path(node)] = '{}/{}'.format(node.path, event.state)
+                self._wrote[node.path] = '{}/{}'.format(node.path, event.state)
         if event.kind is EventKind.CONTAINER_START and not self._enters_again(node):
             pending += self._facts_of(node).begin_execution()
-        if _enters(event, node):
+        if event.kind is node.site.begins_by:
             self._entered.setdefault(_begins_line(node), []).append(node)
         if event.kind is EventKind.CONTAINER_END:
             pending += self._collected(node, all_keys=True)
@@ -139,7 +138,7 @@ class Checkpointer:
         """
         return (
             event.kind in _COMMITTED
-            or self._ends_branch(event, node)
+            or node.site.is_line_over(node, event)
             or event.seq >= self._seq_stored + SEQ_RESERVE - 1
             or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
         )
@@ -239,7 +238,7 @@ class Checkpointer:
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
             if is_container and not (
                 any(self._top.tree.resumed.goes_on(each) for each in below)
-                or any(border.is_resumed for _, border in borders_in(node, label))
+                or any(wrapper.is_resumed for _, wrapper in wrappers_in(node, label))
             ):
                 yield from self._not_begun_below(path)
         elif (
@@ -258,11 +257,9 @@ class Checkpointer:
             yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind in _CLOSES and self._top.tree.early_end.why is None:
             yield Fact(node.key, ASKED, None)
-        elif kind is EventKind.CONTAINER_END and node.branch is None and event.outcome:
-            yield fact_of(node.key, AT, [event.outcome, ENDED])
-        elif node.branch is not None and kind in _LEAVES:
-            outcome = event.outcome if kind is EventKind.GIVE_UP else event.target
-            if outcome and not node.is_oracle(outcome) and outcome not in node.machine._states:
+        else:
+            outcome = node.site.ended_by(node, event)
+            if outcome is not None:
                 yield fact_of(node.key, AT, [outcome, ENDED])
 
     def _not_begun_below(self, path: str) -> Iterator[Fact]:
@@ -275,17 +272,11 @@ class Checkpointer:
     def _below(self, path: str) -> List[TreeNode]:
         return [node for key, node in self._nodes.items() if (key + '/').startswith(path + '/')]
 
-    def _ends_branch(self, event: Event, node: TreeNode) -> bool:
-        """Whether a branch has ended, or a machine in a Concurrence: no state follows it."""
-        if node.branch is not None:
-            return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
-        return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
-
-    def _borders_around(self, node: TreeNode) -> List[Tuple[str, Border]]:
-        """Return what `borders_around` does, looked for once for each container."""
-        kept = self._borders.get(node.key)
+    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
+        """Return what `wrappers_around` does, looked for once for each container."""
+        kept = self._wrappers.get(node.key)
         if kept is None or kept[0] is not node:
-            kept = self._borders[node.key] = node, borders_around(node)
+            kept = self._wrappers[node.key] = node, wrappers_around(node)
         return kept[1]
 
     def _items_around(self, event: Event, node: TreeNode) -> Iterator[Fact]:
@@ -293,16 +284,16 @@ class Checkpointer:
 
         One moment has both: what is inside goes on with the userdata of this item.
         """
-        for path, border in self._borders_around(node):
+        for path, wrapper in self._wrappers_around(node):
             if event.kind is EventKind.CONTAINER_START and event.path == path:
                 continue  # it has not begun with any
-            number = border.item_number if isinstance(border, IteratorBorder) else 0
+            number = wrapper.item_number
             if number and self._items.get(path) != number:
                 self._items[path] = number
                 yield fact_of(path, ITEMS, number)
                 yield from self._not_begun_below(path)
-                if not _enters(event, node):  # else the commit has them
-                    yield from self._keys(path, border.container.userdata._data, None)
+                if event.kind is not node.site.begins_by:  # else the commit has them
+                    yield from self._keys(path, wrapper.container.userdata._data, None)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
@@ -349,7 +340,7 @@ class Checkpointer:
             if labels
             else frozenset()
         )
-        yield from self._keys(_userdata_path(node), node.machine.userdata._data, reached)
+        yield from self._keys(node.path, node.machine.userdata._data, reached)
 
     def _keys(
         self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
@@ -363,7 +354,7 @@ class Checkpointer:
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata into which the outputs of a container have gone."""
-        for path, _ in self._borders_around(node):
+        for path, _ in self._wrappers_around(node):
             self._wrote[path] = node.key
         yield from self._keys_around(node)
         if node.parent is not None and len(node.below) == 1:
@@ -372,8 +363,8 @@ class Checkpointer:
 
     def _keys_around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata of the Concurrences and Iterators around a node."""
-        for path, border in self._borders_around(node):
-            yield from self._keys(path, border.container.userdata._data, None)
+        for path, wrapper in self._wrappers_around(node):
+            yield from self._keys(path, wrapper.container.userdata._data, None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         told = (
@@ -395,23 +386,11 @@ class Checkpointer:
         )
 
 
-def _userdata_path(node: TreeNode) -> str:
-    """Return the path of the container whose userdata a node's states work on."""
-    return node.path if node.branch is not None else node.key
-
-
 def _begins_line(node: TreeNode) -> str:
     """Return the key of the outermost container around one that surely runs in its thread."""
-    while node.parent is not None and node.branch is None and len(node.below) == 1:
+    while node.parent is not None and not node.runs_in_branch:
         node = node.parent
     return node.key
-
-
-def _enters(event: Event, node: TreeNode) -> bool:
-    """Whether a container, or the state of a branch, begins at an event."""
-    return event.kind is (
-        EventKind.CONTAINER_START if node.branch is None else EventKind.STATE_START
-    )
 
 
 def must_stop(node: TreeNode) -> bool:

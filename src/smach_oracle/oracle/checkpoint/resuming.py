@@ -7,11 +7,11 @@ import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
 from smach_oracle.store.rows import StoredTrial
 
-from ..branches.around import borders_in
-from ..branches.border import border_of
+from ..branches.around import wrappers_in
 from ..branches.items import can_be_indexed
+from ..branches.wrapper import wrapper_of
 from ..errors import SettingsError
-from ..machine.nesting import borders_below, nodes_of
+from ..machine.nesting import branching_below, nodes_of
 from ..machine.repeats import leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
 from ..machine.tree_node import TreeNode, node_of
@@ -175,10 +175,10 @@ def _forget(node: TreeNode) -> None:
         if each is not node:
             resumed.forget(each)
         resumed.forget_states(each)
-        for _, container in borders_below(each.machine):
-            border = border_of(container)
-            if border is not None:
-                border.forget_resumed()
+        for _, container in branching_below(each.machine):
+            wrapper = wrapper_of(container)
+            if wrapper is not None:
+                wrapper.forget_resumed()
 
 
 def go_on(top: TreeNode, resumption: Resumption) -> None:
@@ -253,7 +253,7 @@ class _Setting:
         if stored.label not in node.machine._states:
             self._ask_at_beginning(node, stored, stored.label)
             return True
-        if node.branch is None:
+        if node.site.is_container:
             self._resumed.enter_at(node, EntryPoint(stored, self._way_down(node, stored)))
         record = node.record(stored.label)
         # a question of an earlier moment may have been answered since: it is asked again
@@ -273,10 +273,10 @@ class _Setting:
         if inside is None:
             self._resumed.go_on_with(record, self._unfinished(node, stored))
             return
-        for path, border in borders_in(node, stored.label):
+        for path, wrapper in wrappers_in(node, stored.label):
             if self._has_begun(path):
                 told = self._resumption.tree.container(path)
-                border.resume(told.keys, told.gone, told.item, told.complete_snapshots)
+                wrapper.resume(told.keys, told.gone, told.item, told.complete_snapshots)
         asked = [self.set_container(each) for each in inside]
         if self._resumption.asks and not any(asked):
             self._ask_behind(node, label=stored.label, inside=inside)
@@ -338,11 +338,7 @@ class _Setting:
         place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
         way = None if place is None else jump_path_to(top, place)
         # others may run next to it, which would be left
-        if (
-            place is None
-            or way is None
-            or any(len(each.below) > 1 or each.branch is not None for each in _up_from(node))
-        ):
+        if place is None or way is None or node.runs_beside_others():
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
@@ -366,7 +362,7 @@ class _Setting:
         if not label:
             return
         stored.at, stored.asked = [label, BEFORE], []
-        if node.branch is None:
+        if node.site.is_container:
             self._resumed.enter_at(node, EntryPoint(stored))
         self._interrupt(node, label, GONE.format(gone))
 
@@ -438,12 +434,12 @@ def _is_wrapped_through(state: object) -> bool:
     """Whether each plain state in it has an oracle of its own, so that each is told of."""
     if isinstance(state, smach.StateMachine):
         return node_of(state) is not None
-    border = border_of(state)
+    wrapper = wrapper_of(state)
     return (
-        border is not None
+        wrapper is not None
         and all(
-            label in border.machines or _is_wrapped_through(inner)
-            for label, inner in border.states()
+            label in wrapper.machines or _is_wrapped_through(inner)
+            for label, inner in wrapper.states()
         )
         and (not isinstance(state, smach.Iterator) or can_be_indexed(state))
     )

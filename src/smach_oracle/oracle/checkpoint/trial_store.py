@@ -17,7 +17,7 @@ from smach_oracle.store.store_writer import Ending, StoreWriter
 from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, SettingsError
 from ..identity import remove_identical
-from ..machine.nesting import borders_below, nodes_of
+from ..machine.nesting import branching_below, nodes_of
 from ..machine.tree import new_id, no_store
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
@@ -268,7 +268,7 @@ class TrialStore:
 def _tell_what_begins_anew(top: TreeNode) -> None:
     """Name the Iterators that would begin with their first item after a crash."""
     for node in nodes_of(top.machine):
-        for below, container in borders_below(node.machine):
+        for below, container in branching_below(node.machine):
             if isinstance(container, smach.Iterator) and not can_be_indexed(container):
                 smach.logwarn(
                     '{}/{}: begins again with its first item where the machine is '

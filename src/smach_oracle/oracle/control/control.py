@@ -7,7 +7,7 @@ engines, `attentive`, which they look at in any case. Without a request a step c
 import contextlib
 import math
 import threading
-from typing import Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
 
 from ..scope.clock import Clock
 from ..scope.scope import Scope
@@ -58,7 +58,8 @@ class Control:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._changed = threading.Condition()
+        self._lock = threading.RLock()  # quicker to take than the condition
+        self._changed = threading.Condition(self._lock)
         self._engines: Dict[int, Engine] = {}
         self._holds: List[Hold] = []
         self._jumps: Dict[str, Jump] = {}
@@ -92,20 +93,26 @@ class Control:
 
     def attend(self, engine: Engine) -> None:
         """Wake this machine from now on, and at once where something is set."""
-        with self._changed:
+        with self._lock:
             self._engines[id(engine)] = engine
             engine.attentive = self.is_set or engine.stays_attentive
 
-    def leave(self, engine: Engine, path: str) -> Optional[Jump]:
-        """Forget a machine whose execution is over, and return the jump that it has not made."""
-        with self._changed:
+    def leave(self, engine: Engine, key: Callable[[], str]) -> Optional[Jump]:
+        """Forget a machine whose execution is over, and return the jump that it has not made.
+
+        `key`: tells that of its container.
+        """
+        with self._lock:
             self._engines.pop(id(engine), None)
+            if not (self._moving or self._jumps):
+                return None
+            path = key()
             self._note_arrived(path)
             return self._pop_jump(path)
 
     def calm(self, engine: Engine) -> None:
         """Let a machine take the short way again, where nothing is set."""
-        with self._changed:
+        with self._lock:
             engine.attentive = self.is_set or engine.stays_attentive
 
     def hold_before(
@@ -123,7 +130,7 @@ class Control:
         :param asked: whether a preempt of its container stands. Then a breakpoint pauses nothing.
         :param obeyed: whether the state before has serviced one.
         """
-        with self._changed:
+        with self._lock:
             if self._pauses(asked, obeyed):
                 return Hold(place, HeldBy.PAUSE, confirms)
             if breaks and self._breaks_before(place, not asked):
@@ -209,7 +216,7 @@ class Control:
 
     def take_jump(self, path: str) -> Optional[Jump]:
         """Return where the container at `path` is to go, once."""
-        with self._changed:
+        with self._lock:
             return self._pop_jump(path)
 
     def _pop_jump(self, path: str) -> Optional[Jump]:

@@ -3,6 +3,7 @@
 from typing import Mapping, Optional, Sequence
 
 from ..machine.repeats import note_superseded
+from ..machine.site import route_of
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..places.jump_path import JumpPath
@@ -10,7 +11,6 @@ from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery.endings import leaving_outcome
-from ..recovery.failure import route_of
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at

@@ -14,13 +14,13 @@ import smach
 from ..checkpoint.resuming import forget_resumed
 from ..control.hold import HeldPlace, Hold, LetGo
 from ..control.holding import Wait, wait_until_let_go
+from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
 from ..places.place import TreePlace
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
 from ..recovery.endings import ending_at_once, route_at_preempt
-from ..recovery.failure import Route, route_of
 from ..recovery.operator_wait import clocks_stand_still
 from ..recovery.stop import is_asked_around
 from ..settings.failing_outcomes import PREEMPTED

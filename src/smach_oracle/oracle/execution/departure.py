@@ -10,7 +10,7 @@ from typing import List, Optional, cast
 import smach
 from smach_oracle.foreign import repr_of
 
-from ..branches.border import IteratorBorder, border_of
+from ..branches.wrapper import wrapper_of
 from ..machine.nesting import machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..places.handing_over import links_to
@@ -122,9 +122,9 @@ def _leave_way(left: List[TreeNode]) -> None:
     """
     around = [link.below for node in reversed(left) for link in links_to(node)]
     for container in around[:-1]:
-        border = border_of(container)
-        if isinstance(border, IteratorBorder):
-            border.note_left()
+        wrapper = wrapper_of(container)
+        if wrapper is not None:
+            wrapper.note_left()
         if not container.preempt_requested():
             _preempt(container)
 

@@ -8,7 +8,7 @@ from typing import Any, Iterator, Optional, Tuple
 
 import smach
 
-from ..branches.border import border_of
+from ..branches.wrapper import wrapper_of
 from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
@@ -47,8 +47,8 @@ def place_gates(node: TreeNode) -> None:
     """
     for below, container in _bare_containers(node.machine, ()):
         children = container.get_children().values()
-        border = border_of(container)
-        if border is not None and border.machines:
+        wrapper = wrapper_of(container)
+        if wrapper is not None and wrapper.machines:
             _remove(container)
             continue
         if isinstance(container, smach.Iterator) and not any(

@@ -6,17 +6,13 @@ that is started over has its userdata as it was at first, in all containers of t
 
 from typing import Collection, NamedTuple, Tuple
 
-import smach
-
-from ..branches.border import IteratorBorder, border_of
+from ..branches.around import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
 from ..machine.nesting import nodes_of
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath, missing_on
-from ..recovery.failure import Failure, judge
-from ..settings.failing_outcomes import is_preempted
 
 
 class JumpEntry(NamedTuple):
@@ -42,7 +38,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
         restore(node.machine.userdata._data, snapshot, written, node.in_force.deep_copy_keys)
     leave_for(node, target, way.down[1:])
     for place in way.down:
-        _ask_to_go_on(place.node, place.label)
+        ask_to_go_on(place.node, place.label)
     if missing:
         place = way.down[-1]
         place.node.warn(
@@ -65,30 +61,6 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     return tuple(key for key in missing if remapping.get(key, key) not in written)
 
 
-# -- an Iterator that goes on
-
-
-def _ask_to_go_on(node: TreeNode, target: str) -> None:
-    """Note that the oracle goes to a state: an Iterator that has failed or was left goes on there.
-
-    Any other Iterator of the container begins again when it is entered.
-    """
-    for label, state in list(node.machine._states.items()):
-        border = border_of(state) if isinstance(state, smach.Container) else None
-        if isinstance(border, IteratorBorder):
-            border.ask_to_go_on(label == target and _has_stopped_early(node, label, border))
-
-
-def _has_stopped_early(node: TreeNode, label: str, border: IteratorBorder) -> bool:
-    """Whether an Iterator has failed or was left, when it was executed last."""
-    outcome = border.outcome_before()
-    return (
-        outcome is None
-        or is_preempted(outcome)
-        or isinstance(judge(node, node.record(label), outcome, None), Failure)
-    )
-
-
 # -- a script that is started over
 
 
@@ -106,7 +78,7 @@ def keep_start(node: TreeNode) -> None:
     Concurrences and Iterators have no userdata of their own.
     """
     node.tree.restarts.keep(
-        {id(each): each.snapshot() for each in nodes_of(node.machine) if each.branch is None}
+        {id(each): each.snapshot() for each in nodes_of(node.machine) if each.site.is_container}
     )
 
 
@@ -119,4 +91,4 @@ def start_over(node: TreeNode, target: str) -> None:
         if userdata is not None:
             restore(each.machine.userdata._data, userdata, (), each.in_force.deep_copy_keys)
     leave_for(node, target)
-    _ask_to_go_on(node, target)
+    ask_to_go_on(node, target)

@@ -178,7 +178,7 @@ def _known_names(top: TreeNode) -> Set[str]:
 
 
 def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:
-    if node.branch is None:
+    if node.site.is_container:
         return node.settings_of(label).preconditions
     # labels given for all states of this label are meant for others: none is beside a branch
     path = '{}/{}'.format(node.relative_path, label)

@@ -14,6 +14,7 @@ from ..decision.policy import FailureContext
 from ..machine.execution import ends_program
 from ..machine.learned_rates import save_rates
 from ..machine.resumed import Unfinished
+from ..machine.site import Route
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..places.levels import failure_context
@@ -31,8 +32,6 @@ from ..recovery.endings import (
 from ..recovery.failure import (
     Failure,
     Overrun,
-    Route,
-    author_recovers,
     judge,
     tell_failure,
     visit_result,
@@ -258,7 +257,7 @@ class Step:
         record.learn(True)
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
-            self._tell_passed_over(failure)
+            node.site.tell_passed_over(node, failure.state, failure.outcome)
             return self._end(failure, natural_ending(node, failure))
         if is_settled(node, failure):
             ending = natural_ending(node, failure)
@@ -277,33 +276,10 @@ class Step:
         return failure_context(self._node, self._record)
 
     def _author_recovers(self, failure: Failure) -> bool:
-        settings = self._record.settings
-        branch = self._node.branch
-        if branch is not None:
-            return (
-                failure.route is not None
-                and settings.author_recoveries != 'override'
-                and branch.foresees(self._node, failure.outcome)
-            )
-        return failure.route is not None and author_recovers(
-            failure.outcome,
-            failure.route,
-            failure.kind,
-            settings.failure_outcomes,
-            settings.author_recoveries,
+        node = self._node
+        return failure.route is not None and node.site.foresees(
+            node, failure.outcome, failure.route, failure.kind, self._record.settings
         )
-
-    def _tell_passed_over(self, failure: Failure) -> None:
-        """Say which item is passed over, where the author's loop outcomes have this failing one."""
-        branch = self._node.branch
-        item = branch.passes_over(failure.outcome) if branch is not None else ''
-        if item:
-            self._node.warn(
-                '{} is passed over with {}, as its author has drawn it'.format(
-                    item, failure.outcome
-                ),
-                failure.state,
-            )
 
     # -- without the oracle
 
@@ -341,11 +317,12 @@ class Step:
         node, label = self._node, self._record.label
         self._record.left_by(outcome, route.target)
         node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target, **facts)
-        if not route.is_state:
-            return Stop(terminate(node, label, outcome, route.target))
-        message = message_of(label, outcome, route.target)
+        message = message_of(label, outcome, route.target) if route.is_state else None
         if learn:
-            node.records.add_edge(self._record, outcome, route.target, message)
+            drawn = self._machine._transitions[label].get(outcome)
+            node.records.add_edge(self._record, outcome, route.target, drawn, message)
+        if message is None:
+            return Stop(terminate(node, label, outcome, route.target))
         go_to(node, message, route.target)
         return Stop()
 

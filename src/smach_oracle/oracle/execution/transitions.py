@@ -69,9 +69,6 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
     ):
         machine.service_preempt()
     machine._set_current_state(None)
-    if node.branch is None:  # else its container tells
-        smach.loginfo(
-            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
-        )
+    node.site.tell_end(label, outcome, container_outcome)
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome

@@ -134,13 +134,22 @@ class ContainerRecords:
         record.visit_ended()
         self.history.visited(Visit(record.label, outcome, result), record.has_preconditions)
 
-    def add_edge(self, record: StateRecord, outcome: str, target: str, message: str) -> None:
-        """Let the next success of this kind take the short way through the records."""
+    def add_edge(
+        self,
+        record: StateRecord,
+        outcome: str,
+        target: str,
+        drawn: Optional[str],
+        message: Optional[str],
+    ) -> None:
+        """Let the next success of this kind take the short way through the records.
+
+        `drawn`: see `FastEdge`. `message`: for the log, None where it ends the container.
+        """
         if outcome in record.fast:
             record.retire_edge(outcome)
-        record.fast[outcome] = FastEdge(
-            target, message, Visit(record.label, outcome, VisitResult.SUCCESS)
-        )
+        visit = Visit(record.label, outcome, VisitResult.SUCCESS)
+        record.fast[outcome] = FastEdge(target, drawn, message is None, message or '', visit)
 
     def count_oracle_edge(self, target: str) -> None:
         """Count a way out of the meta state."""

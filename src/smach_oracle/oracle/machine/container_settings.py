@@ -58,10 +58,12 @@ class ContainerSettings:
         return self._sets('autonomy', RUN)
 
     def _sets(self, key: str, usual: str) -> bool:
-        given = list(self.of_machine.states.values()) + list(self.given_with_add.values())
-        return getattr(self.of_machine.defaults, key) != usual or any(
-            each.get(key, usual) != usual for each in given
-        )
+        if getattr(self.of_machine.defaults, key) != usual:
+            return True
+        if not (self.of_machine.states or self.given_with_add):
+            return False
+        given = [*self.of_machine.states.values(), *self.given_with_add.values()]
+        return any(each.get(key, usual) != usual for each in given)
 
     def of_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state of the container at `path`, relative to the top machine.

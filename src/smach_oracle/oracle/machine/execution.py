@@ -66,15 +66,8 @@ class Execution:
 
         Return whether it still may.
         """
-        found = list(runs_of_thread())  # and, as a Concurrence has threads of its own, those above
-        node, under_way = self._node, self._node.tree.workers.under_way
-        while under_way and node.parent is not None:
-            run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
-            if run is not None and run not in found:
-                found.append(run)
-            node = node.parent
-        self.runs_around = tuple(found)
-        for run in found:
+        self.runs_around = runs = runs_around(self._node)
+        for run in runs:
             run.hold(self._node.engine)
         return not self.is_left_behind()
 
@@ -114,9 +107,9 @@ class Execution:
         self.starts_in = node.start_from_above(take=True)
         entry = node.tree.resumed.entry_of(node)
         begins_in = self.starts_in if entry is None else entry.label
-        node.emit(
-            EventKind.CONTAINER_START, state=begins_in or node.machine._initial_state_label or ''
-        )
+        if node.events.observers:
+            state = begins_in or node.machine._initial_state_label or ''
+            node.emit(EventKind.CONTAINER_START, state=state)
 
     def end(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Be over, with an outcome or an error, or with neither."""
@@ -126,15 +119,12 @@ class Execution:
             node.machine._is_running = False
             if ends_program(error):
                 node.tree.early_end.of_program = error
-        dropped = node.tree.control.leave(node.engine, node.key)
+        dropped = node.tree.control.leave(node.engine, lambda: node.key)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
-        if self._is_whole:
-            node.emit(
-                EventKind.CONTAINER_END,
-                outcome=outcome or '',
-                text=why_no_outcome(outcome, error),
-            )
+        if self._is_whole and node.events.observers:
+            why = why_no_outcome(outcome, error)
+            node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
         self.runs_around = ()
         node.records.drop_snapshots()
 
@@ -176,6 +166,20 @@ class Execution:
     def __reduce__(self) -> Tuple[Any, ...]:
         """A copied or pickled machine is not being executed."""
         return Execution, (self._node,)
+
+
+def runs_around(node: 'TreeNode') -> Tuple[LimitedRun, ...]:
+    """Return the watched executions inside which a container would execute now.
+
+    Those of its thread, and, as a Concurrence has threads of its own, those of the states above it.
+    """
+    runs, under_way = runs_of_thread(), node.tree.workers.under_way
+    while under_way and node.parent is not None:
+        run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
+        if run is not None and run not in runs:
+            runs += (run,)
+        node = node.parent
+    return runs
 
 
 def why_no_outcome(outcome: object, error: Optional[BaseException]) -> str:

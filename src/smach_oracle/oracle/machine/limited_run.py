@@ -8,7 +8,7 @@ from typing import Any, ContextManager, Iterable, Iterator, Optional, Set, Tuple
 from ..scope.clock import Clock, PausableClock, paused
 from ..scope.reason import Reason
 from ..scope.scope import Scope
-from .engine_probe import EngineProbe
+from .protocols import EngineProbe
 
 
 class LimitedRun(Scope):

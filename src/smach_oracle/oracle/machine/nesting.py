@@ -1,6 +1,7 @@
 """Finds the machines nested in others, and those of them that are under an oracle."""
 
-from typing import Any, Iterator, List, Mapping, Tuple, cast
+from collections import deque
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
 
 import smach
 
@@ -8,7 +9,27 @@ from ..identity import own_mark
 from .protocols import Labels
 from .tree_node import TreeNode, WrappedMachine
 
-BORDER = '_oracle_border'  # the mark of a Concurrence or an Iterator of a wrapped tree
+WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
+
+
+class Wrapper(Protocol):
+    """The data kept for a Concurrence or an Iterator (`branches.wrapper`)."""
+
+    container: smach.Container
+    machines: Dict[str, WrappedMachine]
+
+    def in_words(self) -> str:
+        """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
+
+
+def wrapper_of(state: object) -> Optional[Wrapper]:
+    """Return the wrapper of a Concurrence or an Iterator, None for anything else.
+
+    A shallow copy has the mark of another one.
+    """
+    mark = own_mark(state, WRAPPER)
+    is_own = mark is not None and own_mark(mark, 'container') is state
+    return cast(Wrapper, mark) if is_own else None
 
 
 def machines_below(
@@ -20,9 +41,11 @@ def machines_below(
     plain state of those it yields the hidden machine, if it has one, with the labels of the
     Concurrence or Iterator.
     """
-    border = own_mark(container, BORDER)
-    if border is not None:
-        yield from ((below, machine) for machine in list(border.machines.values()))
+    wrapper = wrapper_of(container)
+    if wrapper is not None:
+        yield from (
+            (below, cast(smach.StateMachine, each)) for each in [*wrapper.machines.values()]
+        )
     for label, state in list(children_of(container).items()):
         path = below + (label,)
         if isinstance(state, smach.StateMachine):
@@ -31,7 +54,7 @@ def machines_below(
             yield from machines_below(state, path)
 
 
-def borders_below(
+def branching_below(
     container: object, below: Labels = ()
 ) -> Iterator[Tuple[Labels, smach.Container]]:
     """Yield the Concurrences and Iterators in a container, each with the labels that lead to it.
@@ -43,7 +66,7 @@ def borders_below(
         if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
                 yield path, state
-            yield from borders_below(state, path)
+            yield from branching_below(state, path)
 
 
 def children_of(container: object) -> Mapping[str, smach.State]:
@@ -77,11 +100,11 @@ def items_under_way(node: TreeNode) -> str:
         state: Any = node.parent.machine._states.get(node.below[0])
         around: List[str] = []
         for label in node.below[1:] + ('',):
-            border = own_mark(state, BORDER)
-            words = border.in_words() if border is not None else ''
+            wrapper = wrapper_of(state)
+            words = wrapper.in_words() if wrapper is not None else ''
             if words:
                 around.append(words)
-            state = border.container.get_children().get(label) if border is not None else None
+            state = wrapper.container.get_children().get(label) if wrapper is not None else None
         found += reversed(around)
         node = node.parent
     return ' of '.join(found)
@@ -90,18 +113,14 @@ def items_under_way(node: TreeNode) -> str:
 def containers_in(machine: WrappedMachine) -> List[WrappedMachine]:
     """Return a wrapped machine and all wrapped machines nested in it, each once."""
     wrapped = machine._oracle.tree.container_class
-    found: List[WrappedMachine] = []
-    waiting: List[WrappedMachine] = [machine]
+    found: Dict[int, WrappedMachine] = {id(machine): machine}
+    waiting = deque(found.values())
     while waiting:
-        container = waiting.pop(0)
-        if not any(container is each for each in found):
-            found.append(container)
-            waiting.extend(
-                cast(WrappedMachine, child)
-                for _, child in machines_below(container)
-                if isinstance(child, wrapped)
-            )
-    return found
+        for _, child in machines_below(waiting.popleft()):
+            if id(child) not in found and isinstance(child, wrapped):
+                found[id(child)] = cast(WrappedMachine, child)
+                waiting.append(found[id(child)])
+    return list(found.values())
 
 
 def nodes_of(machine: WrappedMachine) -> Iterator[TreeNode]:

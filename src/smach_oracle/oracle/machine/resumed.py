@@ -156,6 +156,10 @@ class ResumedTrial:
             or any(record in self._unfinished for record in node.records.by_label.values())
         )
 
+    def concerns(self, node: 'TreeNode') -> bool:
+        """Whether anything waits for the next execution of a container."""
+        return node in self._asked or self.goes_on(node)
+
     def forget(self, node: 'TreeNode') -> None:
         """Let a container begin from the start."""
         self._entries.pop(node, None)

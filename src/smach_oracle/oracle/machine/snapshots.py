@@ -99,7 +99,7 @@ class UserdataGate(MutableMapping):
         self._open = True
         self.written: Set[str] = set()
 
-    def branch(self) -> 'UserdataGate':
+    def fork(self) -> 'UserdataGate':
         """Return a gate that can be shut alone and records into the same set."""
         other = UserdataGate(self._machine, self._on_late_write)
         other.written = self.written

@@ -1,7 +1,6 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 
 import copy
-from dataclasses import replace
 from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, Tuple
 
 import smach
@@ -13,9 +12,9 @@ from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
-from .engine_probe import EngineProbe
 from .execution import Execution
-from .protocols import Labels, Machine
+from .protocols import EngineProbe, Labels, Machine
+from .site import Site
 from .snapshots import NOT_COPIED, take_snapshot
 from .tree import Tree
 
@@ -39,6 +38,9 @@ class WrappedMachine(Machine, Protocol):
     def _update_once(self) -> Optional[str]:
         """Execute the current state and go on. Return the container's outcome, None before it."""
 
+    def _state_ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
+        """Go on behind the current state, which was executed. See `_update_once`."""
+
     def new_trial_id(self) -> str:
         """Return the id of the trial about to begin."""
 
@@ -57,40 +59,16 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
     return smach.InvalidStateError('{!r} is entered by failures alone'.format(label))
 
 
-class BranchPort(Protocol):
-    """A branch as the node of its hidden machine sees it (`branches.branch`)."""
-
-    @property
-    def container(self) -> smach.Container:
-        """The Concurrence or Iterator that holds it."""
-
-    def settings_here(self, settings: Settings) -> Settings:
-        """Return the settings of the whole machine as they are in force for the branch."""
-
-    def foresees(self, node: 'TreeNode', outcome: str) -> bool:
-        """Whether the author has said what is to happen at this failing outcome."""
-
-    def leads_to(self, outcome: str) -> str:
-        """Say where an outcome leads, for people."""
-
-    def goes_on_after(self, outcome: str) -> bool:
-        """Whether an outcome leads to the next item."""
-
-    def passes_over(self, outcome: str) -> str:
-        """Say what is passed over where this failing outcome is foreseen, or '' for nothing."""
-
-
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
     `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
     that lead here from the parent, those of a Concurrence or Iterator in between included.
     `in_force`: its settings. `records`: what it has learned and remembers. `engine`: how its engine
-    steps. `execution`: the present one, or the latest. `branch`: of a plain state of a Concurrence
-    or an Iterator, else None.
+    steps. `execution`: the present one, or the latest. `site`: where its states run.
     """
 
-    branch: Optional[BranchPort] = None
+    site = Site()
 
     def __init__(self, machine: WrappedMachine, tree: Tree, settings: Settings, name: str) -> None:
         self.machine = machine
@@ -150,9 +128,8 @@ class TreeNode:
     @property
     def key(self) -> str:
         """Its path, and of a branch the label, too: all branches of a Concurrence have one path."""
-        if self.branch is None:
-            return self.path
-        return '{}/{}'.format(self.path, next(iter(self.machine._states), ''))
+        label = self.site.label
+        return '{}/{}'.format(self.path, label) if label else self.path
 
     @property
     def relative_path(self) -> str:
@@ -168,7 +145,12 @@ class TreeNode:
 
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""
-        return any(True for _ in self.running_around())
+        above = self.parent
+        while above is not None:
+            if above.machine._is_running:
+                return True
+            above = above.parent
+        return False
 
     def running_around(self) -> Iterator['TreeNode']:
         """Yield the wrapped containers above this one that are being executed."""
@@ -193,6 +175,18 @@ class TreeNode:
         """
         return self.execution.is_left_behind()
 
+    def ends_specially(self) -> bool:
+        """Whether an execution that comes to its end now may not just end with its outcome.
+
+        A stop, an operator or a departure may have a say, and an early end of the trial.
+        """
+        return bool(
+            self.engine.attentive
+            or self.execution.departure is not None
+            or self.tree.early_end.is_near
+            or smach.is_shutdown()
+        )
+
     def why_left_behind(self) -> str:
         """Say why, where it is left behind."""
         return (
@@ -201,11 +195,16 @@ class TreeNode:
             else 'the state around it was abandoned'
         )
 
+    @property
+    def runs_in_branch(self) -> bool:
+        """Whether a Concurrence or an Iterator lies between it and the wrapped container above."""
+        return len(self.below) > 1 or not self.site.is_container
+
     def runs_beside_others(self) -> bool:
         """Whether a Concurrence or an Iterator is around it."""
         node = self
         while node.parent is not None:
-            if node.branch is not None or len(node.below) > 1:
+            if node.runs_in_branch:
                 return True
             node = node.parent
         return False
@@ -224,25 +223,14 @@ class TreeNode:
 
     def configure(self, settings: Settings) -> None:
         """Go on under these settings with what was learned."""
-        self.in_force.use(settings if self.branch is None else self.branch.settings_here(settings))
+        self.in_force.use(self.site.settings_here(settings))
         self.records.history.resize(settings.history_length)
         for label, record in self.records.by_label.items():
             record.configure(self.settings_of(label), self.is_special())
 
     def settings_of(self, label: str) -> StateSettings:
         """Return the settings of a state."""
-        settings = self.in_force.of_state(self.relative_path, label)
-        if self.branch is None or not any(spec.labels() for spec in settings.preconditions):
-            return settings
-        # beside a branch is no state that could be run for it. A path names one elsewhere
-        return replace(
-            settings,
-            preconditions=tuple(
-                spec
-                for spec in settings.preconditions
-                if all('/' in label for label in spec.labels())
-            ),
-        )
+        return self.site.settings_of_state(self.in_force.of_state(self.relative_path, label))
 
     def is_special(self) -> bool:
         """Whether more is to be done at each of its states than to execute it."""

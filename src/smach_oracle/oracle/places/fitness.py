@@ -16,7 +16,7 @@ def why_unfit(node: TreeNode, label: str, name: str) -> str:
 
     A name without '/' is a label of the state's own container, any other one a path.
     """
-    if '/' not in name and (name not in node.labels() or node.branch is not None):
+    if '/' not in name and not (node.site.is_container and name in node.labels()):
         return _where_it_is(node, name) or _unknown(node, label, name)
     place = place_named(node, name, at_rest=True)
     if place is None:
@@ -25,7 +25,7 @@ def why_unfit(node: TreeNode, label: str, name: str) -> str:
         return 'it is the state itself'
     if _is_around(place, node):
         return 'it is a container around the state, and runs meanwhile'
-    if place.node is not node and place.node.branch is not None:
+    if place.node is not node and not place.node.site.is_container:
         return 'a state of a Concurrence or an Iterator cannot be run alone'
     if _is_in_iterator(place, node):
         return 'it is in an Iterator, and there is no item where it is run alone'
@@ -35,7 +35,7 @@ def why_unfit(node: TreeNode, label: str, name: str) -> str:
 def allowed_for(node: TreeNode, label: str) -> str:
     """Say which names may be preconditions of a state."""
     elsewhere = 'PATH/LABEL of a state of another container'
-    if node.branch is not None:
+    if not node.site.is_container:
         return elsewhere
     return 'the labels of the other states of {}: {}; or {}'.format(
         node.path, ', '.join(sorted(other for other in node.labels() if other != label)), elsewhere
@@ -48,7 +48,7 @@ def _unknown(node: TreeNode, label: str, name: str) -> str:
         for each in nodes_of(node.top().machine)
         for state in each.labels()
     }
-    if node.branch is None:
+    if node.site.is_container:
         names.update(node.labels())
     own = {label, '{}/{}'.format(node.relative_path, label)}
     return 'there is no such state' + did_you_mean(name, names - own)

@@ -29,7 +29,7 @@ def _executes(above: TreeNode, child: TreeNode) -> bool:
 
 def is_direct(node: TreeNode) -> bool:
     """Whether nothing lies between a container and the wrapped one above it."""
-    return node.parent is not None and len(node.below) == 1 and node.branch is None
+    return node.parent is not None and not node.runs_in_branch
 
 
 def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:

@@ -45,6 +45,11 @@ class EarlyEnd:
             with self._lock:
                 self._asking -= 1
 
+    @property
+    def is_near(self) -> bool:
+        """Whether it has come, or may come at a shutdown, since a question is open."""
+        return self._asking > 0 or self.why is not None
+
     def note_end_of_state(self) -> None:
         """Note that a state has ended: next to an open question a shutdown may have ended it."""
         if self._asking:

@@ -72,7 +72,8 @@ class History:
         if isinstance(self.visits, _CountedVisits):
             self.visits.added = 0
         self.unconditioned = self.succeeded = self.succeeded_other = None
-        self._streak = self._streak._replace(anchor=None, anchored=False)
+        if self._streak.anchored:
+            self._streak = self._streak._replace(anchor=None, anchored=False)
 
     def resize(self, length: int) -> None:
         """Keep the latest `length` visits from now on."""

@@ -20,12 +20,19 @@ class RateReading(NamedTuple):
 
 
 class FastEdge:
-    """A transition to another state without any failure, with all that its next use needs."""
+    """A transition without any failure, with all that its next use needs.
 
-    __slots__ = ('target', 'count', 'message', 'visit')
+    `drawn`: its entry among the author's transitions. `is_end`: whether it ends the container.
+    """
 
-    def __init__(self, target: str, message: str, visit: Visit) -> None:
+    __slots__ = ('target', 'drawn', 'is_end', 'count', 'message', 'visit')
+
+    def __init__(
+        self, target: str, drawn: Optional[str], is_end: bool, message: str, visit: Visit
+    ) -> None:
         self.target = target
+        self.drawn = drawn
+        self.is_end = is_end
         self.count = 0
         self.message = message
         self.visit = visit

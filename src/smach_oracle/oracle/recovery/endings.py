@@ -6,10 +6,11 @@ from typing import NamedTuple, Optional, Sequence
 import smach
 
 from ..machine.protocols import Machine
+from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode
 from ..scope.reason import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
-from .failure import Failure, Route, route_of
+from .failure import Failure
 
 
 class ContainerEnding(NamedTuple):
@@ -116,10 +117,6 @@ def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str
 
     It wants one, and nobody goes by it.
     """
-    if (
-        outcome is not None
-        or node.tree.early_end.why is None
-        or not (node.branch is not None or len(node.below) > 1)
-    ):
+    if outcome is not None or node.tree.early_end.why is None or not node.runs_in_branch:
         return outcome
     return leaving_outcome(node)

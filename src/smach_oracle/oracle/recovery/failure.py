@@ -13,20 +13,13 @@ from smach_oracle.foreign import error_text, repr_of
 
 from ..asking.question import names
 from ..machine.nesting import items_under_way
-from ..machine.protocols import Machine
 from ..machine.resumed import Unfinished
+from ..machine.site import Route, failure_kind, route_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import RateReading, StateRecord
 from ..records.visits import VisitResult
-from ..settings.failing_outcomes import FailingNames, is_preempted
-
-
-class Route(NamedTuple):
-    """The target of an outcome, as the machine's author drew it."""
-
-    target: str  # a state, a container outcome, or '' where it leads nowhere
-    is_state: bool
+from ..settings.failing_outcomes import is_preempted
 
 
 class Failure(NamedTuple):
@@ -65,52 +58,6 @@ def is_registered(state: smach.State, outcome: object) -> bool:
         return bool(outcome in state.get_registered_outcomes())
     except Exception:  # an array, or an object that compares in its own way
         return False
-
-
-def route_of(machine: Machine, label: str, outcome: str) -> Route:
-    """Follow an outcome of a state.
-
-    It leads to a state, to a container outcome by its target's or its own name, or nowhere.
-    """
-    transitions = machine._transitions.get(label) or {}
-    if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
-        return Route('', False)
-    target = transitions[outcome]
-    if target is not None and target in machine._states:
-        return Route(target, True)
-    container_outcomes = machine.get_registered_outcomes()
-    for name in (target, outcome):
-        if name is not None and name in container_outcomes:
-            return Route(name, False)
-    return Route('', False)
-
-
-def failure_kind(
-    outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames
-) -> FailureKind:
-    """Classify a registered outcome, without regard to who recovers from it."""
-    if outcome in listed:
-        return FailureKind.FAILING_OUTCOME
-    if route.is_state:
-        return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
-    if not route.target:
-        return FailureKind.UNREGISTERED_OUTCOME
-    if route.target in failing:
-        return FailureKind.FELL_THROUGH
-    return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
-
-
-def author_recovers(
-    outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...], author_recoveries: str
-) -> bool:
-    """Whether the author's own transition from this failing outcome stays.
-
-    It does where it leads to another state, or, for an outcome that only sounds like a failure, to
-    a container outcome that does not.
-    """
-    if author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
-        return False
-    return route.is_state or outcome not in listed
 
 
 def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult:
@@ -208,8 +155,7 @@ def _judge(
         return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
     if not is_registered(state, outcome):
         text = unregistered_text(label, state, outcome)
-        if node.branch is not None and isinstance(outcome, str):
-            # Concurrences and Iterators go on with such an outcome
+        if node.site.goes_on_with_any and isinstance(outcome, str):
             return Failure(
                 label, FailureKind.UNREGISTERED_OUTCOME, outcome, text, Route(outcome, False)
             )

@@ -7,6 +7,7 @@ import smach
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.protocols import Labels
+from ..machine.site import Route, author_recovers, failure_kind, route_of
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import jump_path_to
 from ..places.levels import failure_context, is_direct, levels_above
@@ -18,10 +19,6 @@ from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending
 from .failure import (
     Failure,
-    Route,
-    author_recovers,
-    failure_kind,
-    route_of,
     tell_failure,
 )
 from .verdict import JumpTo
@@ -45,7 +42,7 @@ class Foreseen(NamedTuple):
 
 def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     """Whether an Iterator around a container goes on after it has ended with an outcome."""
-    if node.branch is not None:
+    if not node.site.is_container:
         return False
     around: Any = above.machine._states[node.below[0]]
     for label in node.below[1:-1]:

@@ -18,6 +18,7 @@ from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
 from ..machine.limited_run import standing_still
+from ..machine.protocols import Labels, Machine, Transitions
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath, why_closed_on
@@ -316,6 +317,10 @@ def _obey(recovering: Recovering, answer: Answer) -> Verdict:
     )
 
 
+_Led = Tuple[Labels, Labels, Optional[Transitions], int]
+_NOTHING: _Led = ((), (), None, 0)
+
+
 class OracleState(smach.State):
     """The ORACLE state of one container.
 
@@ -327,11 +332,28 @@ class OracleState(smach.State):
         self._lock = threading.Lock()
         self._recovering: Optional[Recovering] = None
         self._verdict: Optional[Verdict] = None
+        self._led: _Led = _NOTHING
 
     def lead_to(self, labels: Tuple[str, ...]) -> Dict[str, Optional[str]]:
         """Have these outcomes and no others, and return the transitions, each to its own name."""
         self._outcomes = set(labels)
         return {label: label for label in labels}
+
+    def note_led(self, machine: Machine, label: str, outcomes: Labels) -> None:
+        """Note for what of the container, where it is `label`, it leads to all that there is."""
+        transitions = machine._transitions[label]
+        self._led = tuple(machine._states), outcomes, transitions, len(transitions)
+
+    def leads_on(self, machine: Machine, label: str, outcomes: Labels) -> bool:
+        """Whether nothing of that has changed since."""
+        states, ends, drawn, count = self._led
+        return (
+            drawn is not None
+            and machine._transitions.get(label) is drawn
+            and len(drawn) == count
+            and ends == outcomes
+            and states == tuple(machine._states)
+        )
 
     def begin(self, recovering: Recovering) -> None:
         """Be ready to recover from a failure.
@@ -388,7 +410,7 @@ class OracleState(smach.State):
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
-        state.update(_lock=None, _recovering=None, _verdict=None)
+        state.update(_lock=None, _recovering=None, _verdict=None, _led=_NOTHING)
         return state
 
     def __setstate__(self, state: Dict[str, object]) -> None:

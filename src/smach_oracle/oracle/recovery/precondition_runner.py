@@ -12,6 +12,7 @@ from smach_oracle.foreign import repr_of
 
 from ..identity import truth_of
 from ..machine.repeats import note_precondition, repeated_by_running
+from ..machine.site import failure_kind, route_of
 from ..machine.snapshots import UserdataGate, WriteWatch, behind
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of, view_behind, write_constants
@@ -22,12 +23,12 @@ from ..scope.scope import Scope
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import RUN, StateSettings
-from .failure import failure_kind, is_registered, route_of
+from .failure import is_registered
 from .operator_wait import wait_for_operator
 from .precondition_elsewhere import NotMet, RunElsewhere
 
 
-class _Site(NamedTuple):
+class _RunIn(NamedTuple):
     """A container of which a state is run, and what its userdata is written through."""
 
     node: TreeNode
@@ -52,7 +53,7 @@ class PreconditionRunner:
         self._node = node
         self._watch = watch
         self._gate = watch.gate
-        self._own = _Site(node, watch.gate)
+        self._own = _RunIn(node, watch.gate)
         self._elsewhere: List[RunElsewhere] = []
         self._lock = threading.Lock()
         self._running: Optional[Any] = None
@@ -104,7 +105,7 @@ class PreconditionRunner:
     def _call(self, spec: PreconditionSpec) -> None:
         self._wait_for_operator(self._node, spec.name)
         self._check_free(spec.target)
-        gate = self._gate.branch()
+        gate = self._gate.fork()
         ended = self._node.tree.workers.call(
             spec.target,
             behind(gate),
@@ -146,10 +147,10 @@ class PreconditionRunner:
             return
         elsewhere = RunElsewhere(self._node, place, self._gate)
         self._elsewhere.append(elsewhere)
-        self._run_in(_Site(place.node, elsewhere.gate), place.label)
+        self._run_in(_RunIn(place.node, elsewhere.gate), place.label)
         elsewhere.hand_over()
 
-    def _run_in(self, site: _Site, label: str) -> None:
+    def _run_in(self, site: _RunIn, label: str) -> None:
         state = site.node.machine._states[label]
         with self._noted(site, label):
             self._judge(site, state, label, self._execute(site, state, label))
@@ -162,7 +163,7 @@ class PreconditionRunner:
         )
 
     @contextlib.contextmanager
-    def _noted(self, site: _Site, label: str) -> Iterator[None]:
+    def _noted(self, site: _RunIn, label: str) -> Iterator[None]:
         """Note that a state of the container is executed.
 
         :raises NotMet: where it, or a state within, would be repeated and is not to be.
@@ -183,7 +184,7 @@ class PreconditionRunner:
             if label:
                 note_precondition(site.node, label)
 
-    def _execute(self, site: _Site, state: smach.State, label: str) -> object:
+    def _execute(self, site: _RunIn, state: smach.State, label: str) -> object:
         self._wait_for_operator(site.node, label or type(state).__name__, label)
         self._check_free(state)
         with self._lock:
@@ -205,13 +206,13 @@ class PreconditionRunner:
             site.node.tree.end_precondition(site.node, state)
             self._ended(state)
 
-    def _with_limit(self, site: _Site, state: smach.State, label: str) -> object:
+    def _with_limit(self, site: _RunIn, state: smach.State, label: str) -> object:
         machine, settings = site.node.machine, self._settings
         if label:
             settings = site.node.settings_of(label)
         if settings.time_limit_s is None:
             return state.execute(view_behind(site.gate, machine, label, state))
-        gate = site.gate.branch()
+        gate = site.gate.fork()
         result = self._node.tree.workers.run(
             state,
             view_behind(gate, machine, label, state),
@@ -233,7 +234,7 @@ class PreconditionRunner:
         if cancelled and not self._node.tree.workers.blocked(state):
             state.recall_preempt()  # the meta state services the request in its place
 
-    def _judge(self, site: _Site, state: smach.State, label: str, outcome: Any) -> None:
+    def _judge(self, site: _RunIn, state: smach.State, label: str, outcome: Any) -> None:
         if self._scope.told is not None:
             raise NotMet('preempted')
         if not is_registered(state, outcome):

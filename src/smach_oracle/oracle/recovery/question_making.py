@@ -5,14 +5,14 @@ from typing import Any, Collection, Dict, Iterator, Mapping, NamedTuple, Tuple
 import smach
 
 from ..asking.answer_rules import Target
-from ..asking.question import LevelOutcome, OutcomeChoice, Question, StateChoice
+from ..asking.question import LevelOutcome, Question, StateChoice
 from ..machine.protocols import Machine
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..places.levels import levels_above
 from ..places.place import places_of
 from ..records.state_record import StateRecord
-from .failure import Failure, route_of
+from .failure import Failure
 from .precondition_probe import LivePreconditionProbe
 
 
@@ -48,10 +48,7 @@ def make_question(
         tried=account.tried,
         history=node.records.history.latest(),
         choices=tuple(_state_choices(node, account.written)),
-        supersede_outcomes=(
-            _outcomes_of_branch(node, state)
-            or tuple(_supersede_outcomes(machine, record.label, state))
-        ),
+        supersede_outcomes=node.site.choices(node, record.label),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
         give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
         interfaces=node.settings.offers_for(node.relative_path, record.label),
@@ -106,15 +103,6 @@ def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
             yield LevelOutcome(level.path, outcome)
 
 
-def _supersede_outcomes(
-    machine: Machine, label: str, state: smach.State
-) -> Iterator[OutcomeChoice]:
-    for outcome in sorted(state.get_registered_outcomes(), key=str):
-        route = route_of(machine, label, outcome)
-        if route.target:
-            yield OutcomeChoice(outcome, route.target)
-
-
 def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, object]:
     data = dict(machine.userdata._data)
     remapping = machine._remappings.get(label) or {}
@@ -126,21 +114,6 @@ def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, objec
 
 
 # -- Concurrences and Iterators
-
-
-def _outcomes_of_branch(node: TreeNode, state: smach.State) -> Tuple[OutcomeChoice, ...]:
-    """Return the outcomes of a branch, and in words where they lead. None where it is no branch.
-
-    Those that go on with the next item come first.
-    """
-    branch = node.branch
-    if branch is None:
-        return ()
-    last = [
-        (not branch.goes_on_after(outcome), str(outcome), outcome)
-        for outcome in state.get_registered_outcomes()
-    ]
-    return tuple(OutcomeChoice(outcome, branch.leads_to(outcome)) for _, _, outcome in sorted(last))
 
 
 def _running_again(way: JumpPath) -> Tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Concurrences and Iterators of a wrapped tree: their branches, and where an Iterator goes on."""
 
 import threading
+from types import TracebackType
 from typing import (
     Any,
     Callable,
@@ -13,27 +14,30 @@ from typing import (
     Optional,
     Sequence,
     Tuple,
+    Type,
     cast,
 )
 
 import smach
 
-from ..identity import own_mark
+from ..machine import nesting
 from ..machine.execution import why_no_outcome
-from ..machine.nesting import BORDER, machines_below
+from ..machine.nesting import machines_below
 from ..machine.tree_node import TreeNode, WrappedMachine, node_of
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
+from ..recovery.failure import Failure, judge
+from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..settings.failing_outcomes import is_preempted
 from .branch import loops
 from .branch_machine import BranchMachine
 from .item_userdata import ItemUserdata
 from .items import TrackedItems
-from .stand_in import StandIn, real
+from .runner import BranchRunner, ItemRunner, Runner
 
 
 class _ResumedItem(NamedTuple):
-    """The values with which a container that was under way goes on. See `Border.resume`."""
+    """The values with which a container that was under way goes on. See `resume`."""
 
     keys: Dict[str, Any]
     gone: Tuple[str, ...]
@@ -42,16 +46,18 @@ class _ResumedItem(NamedTuple):
     trial_id: str
 
 
-class Border:
+class ContainerWrapper:
     """The data kept for a Concurrence or an Iterator of a wrapped tree.
 
-    `machines`: the hidden machines of its branches, by label. It takes their states' places while
-    the container executes, once at a time.
+    It is the `smach.hooks.ExecutionHook` of the container. `machines`: the hidden machines of its
+    branches, by label. `runners`: what executes its states in their place, by label, while the
+    container executes, once at a time.
     """
 
     def __init__(self, container: smach.Container) -> None:
         self.container: Any = container
         self.machines: Dict[str, WrappedMachine] = {}
+        self.runners: Dict[str, Runner] = {}
         self.top: Optional[TreeNode] = None  # the node of the wrapped machine around it
         self.below: Tuple[str, ...] = ()  # labels that lead to it from there
         self._lock = threading.Lock()
@@ -62,30 +68,64 @@ class Border:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
         return ''
 
+    @property
+    def item_number(self) -> int:
+        """Return the number of the item under way, from 1. 0 means none is."""
+        return 0
+
+    def ask_to_go_on(self, go_on: bool) -> None:
+        """Let the next execution of an Iterator go on where the one before has stopped."""
+
+    def has_stopped_early(self, node: TreeNode, label: str) -> bool:
+        """Whether an Iterator has failed or was left, when it was executed last.
+
+        `node`, `label`: where it is a state.
+        """
+        return False
+
+    def note_left(self) -> None:
+        """Note that it is left for a state elsewhere."""
+
     def nodes(self) -> List[TreeNode]:
         """Return the nodes of its branches."""
         return [machine._oracle for machine in self.machines.values()]
 
-    def enter(self) -> bool:
-        """Put the branches in their places.
+    # -- the hook
 
-        Return False where that cannot be, so that it runs bare.
-        """
+    def execution(self, container: smach.Container) -> 'WrappedExecution':
+        """Return the context in which the container executes, its branches under their oracles."""
+        return WrappedExecution(self, container)
+
+    def take_inputs(
+        self, container: smach.Container, copy: Callable[[], None], parent_ud: Any
+    ) -> None:
+        """Take the inputs, by `copy()`, and the userdata that `resume` was given."""
+        copy()
+        if container is self.container:
+            self._take_over_userdata()
+
+    def items(self, container: smach.Container, items: Any) -> Any:
+        """Return what an Iterator goes through in place of its items."""
+        return items
+
+    def enter(self) -> bool:
+        """Make the runners. Return False where that cannot be, so that it runs bare."""
         with self._lock:
             nodes = self.nodes()
             if self._is_in_use or not self._runs_in_tree():
                 return False
             self._is_in_use = True
-        for node in nodes:
-            self._renew(node)
-            node.begin_execution()
+        states = dict(self.states())
+        for machine in self.machines.values():
+            self._renew(machine, states)
+            machine._oracle.begin_execution()
         if nodes:
             nodes[0].emit(
                 EventKind.CONTAINER_START,
                 state=', '.join(self.machines),
                 data={BRANCHES: list(self.machines)},
             )
-        self._take_places()
+        self.runners = self._make_runners(states)
         return True
 
     # -- going on after the program was stopped
@@ -118,7 +158,7 @@ class Border:
         resumed = self._resumed
         return resumed if resumed is not None and resumed.trial_id == self._trial_now() else None
 
-    def take_over_userdata(self) -> None:
+    def _take_over_userdata(self) -> None:
         """Have the userdata that `resume` was given, at the first execution after it."""
         resumed, self._resumed = self._to_resume(), None
         if resumed is not None:
@@ -135,15 +175,23 @@ class Border:
         top = self.top
         return top is not None and (top.machine._is_running or top.has_running_ancestor())
 
-    def _renew(self, node: TreeNode) -> None:
-        machine = cast(BranchMachine, node.machine)
-        label = machine._branch_label
-        machine.take(self._state_of(label), self.container.userdata, self._remapping_of(label))
+    def _renew(self, machine: WrappedMachine, states: Mapping[str, smach.State]) -> None:
+        branch = cast(BranchMachine, machine)
+        label = branch._branch_label
+        branch.take(states[label], self.container.userdata, self._remapping_of(label))
 
-    def tell_cause(self, error: BaseException) -> None:
-        """Have an error of the container say that a branch has ended the program by it."""
-        if self.top is not None and isinstance(error, smach.InvalidStateError):
+    def explain(self, error: BaseException) -> None:
+        """Have an error of the container say that a branch has ended the program by it.
+
+        :raises TooDeepError: in its place, where too many containers lie in each other.
+        """
+        if self.top is None:
+            return
+        if isinstance(error, smach.InvalidStateError):
             error.__cause__ = error.__cause__ or self.top.tree.early_end.of_program
+        too_deep = too_deep_here(self.top, error) if too_deep_below(error) is None else None
+        if too_deep is not None:
+            raise too_deep from None
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
@@ -156,8 +204,10 @@ class Border:
             )
 
     def leave(self) -> None:
-        """Give the states their places back."""
-        self._give_places_back()
+        """Let the states execute by themselves again."""
+        for runner in self.runners.values():
+            runner.rest()
+        self.runners = {}
         with self._lock:
             self._is_in_use = False
 
@@ -166,24 +216,14 @@ class Border:
         children: Mapping[str, Optional[smach.State]] = self.container.get_children()
         yield from ((label, state) for label, state in list(children.items()) if state is not None)
 
-    def _state_of(self, label: str) -> smach.State:
-        return dict(self.states())[label]
-
     def _remapping_of(self, label: str) -> Mapping[str, str]:
         raise NotImplementedError
 
-    def _take_places(self) -> None:
-        raise NotImplementedError
-
-    def _give_places_back(self) -> None:
-        raise NotImplementedError
-
-    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
-        """Return the attributes of its container for a copy, as they are while it is at rest."""
+    def _make_runners(self, states: Mapping[str, smach.State]) -> Dict[str, Runner]:
         raise NotImplementedError
 
     def __getstate__(self) -> Dict[str, Any]:
-        state = dict(self.__dict__, _is_in_use=False)
+        state = dict(self.__dict__, _is_in_use=False, runners={})
         del state['_lock']
         return state
 
@@ -192,44 +232,62 @@ class Border:
         self._lock = threading.Lock()
 
 
-class ConcurrenceBorder(Border):
-    """The data kept for a Concurrence."""
+class WrappedExecution:
+    """One execution of a Concurrence or an Iterator. `outcome`: with which it has ended.
 
-    _own: Optional[Dict[str, Any]] = None  # its table of states, while another has its place
+    It runs bare where its branches cannot have their oracles.
+    """
+
+    outcome: Optional[str] = None
+
+    def __init__(self, wrapper: ContainerWrapper, container: smach.Container) -> None:
+        self._wrapper = wrapper
+        self._container = container
+        self._is_entered = False
+
+    def __enter__(self) -> 'WrappedExecution':
+        wrapper = self._wrapper
+        self._is_entered = wrapper.container is self._container and wrapper.enter()
+        return self
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        error: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        if not self._is_entered:
+            return
+        try:
+            if error is not None:
+                self._wrapper.explain(error)
+        finally:
+            self._wrapper.ended(self.outcome, error)
+            self._wrapper.leave()
+
+
+class ConcurrenceWrapper(ContainerWrapper):
+    """The data kept for a Concurrence."""
 
     def _remapping_of(self, label: str) -> Mapping[str, str]:
         return self.container._remappings[label]
 
-    def _take_places(self) -> None:
-        own = self._own = self.container._states
-        self.container._states = {
-            label: StandIn(state, self.machines[label], _forget)
-            if label in self.machines
-            else state
-            for label, state in own.items()
+    def _make_runners(self, states: Mapping[str, smach.State]) -> Dict[str, Runner]:
+        return {
+            label: BranchRunner(states[label], machine) for label, machine in self.machines.items()
         }
 
-    def _give_places_back(self) -> None:
-        self.container._states, self._own = self._own, None
 
-    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
-        """Return the attributes of its container for a copy, as they are while it is at rest."""
-        return attributes if self._own is None else dict(attributes, _states=self._own)
-
-    def __getstate__(self) -> Dict[str, Any]:
-        return dict(super().__getstate__(), _own=None)
-
-
-class IteratorBorder(Border):
+class IteratorWrapper(ContainerWrapper):
     """The data kept for an Iterator."""
 
     def __init__(self, container: smach.Container) -> None:
         super().__init__(container)
-        self._items: Optional[TrackedItems] = None
-        self._trial_id = ''  # that of `_items`
+        self.tracked: Optional[TrackedItems] = None
+        self._trial_id = ''  # that of `tracked`
         self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
-        self._userdata = ItemUserdata(container)
+        self.item_userdata = ItemUserdata(container)
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_left = False
         self._is_asked_to_go_on = False
@@ -237,12 +295,12 @@ class IteratorBorder(Border):
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
-        return self._items.in_words() if self._is_in_use and self._items is not None else ''
+        return self.tracked.in_words() if self._is_in_use and self.tracked is not None else ''
 
     @property
     def item_number(self) -> int:
         """Return the number of the item under way, from 1. 0 means none is."""
-        return self._items.number if self._is_in_use and self._items is not None else 0
+        return self.tracked.number if self._is_in_use and self.tracked is not None else 0
 
     # -- going on
 
@@ -250,9 +308,14 @@ class IteratorBorder(Border):
         """Let the next execution go on where the one before has stopped, or begin again."""
         self._is_asked_to_go_on = go_on
 
-    def outcome_before(self) -> Optional[str]:
-        """Return how the execution before has ended. None means by an error, or it was left."""
-        return self._ended_with
+    def has_stopped_early(self, node: TreeNode, label: str) -> bool:
+        """Whether it has failed or was left, when it was executed last."""
+        outcome = self._ended_with
+        return (
+            outcome is None
+            or is_preempted(outcome)
+            or isinstance(judge(node, node.record(label), outcome, None), Failure)
+        )
 
     def note_left(self) -> None:
         """Note that it is left for a state elsewhere: the outcome it gets is no word of its own."""
@@ -261,12 +324,28 @@ class IteratorBorder(Border):
     def _remapping_of(self, label: str) -> Mapping[str, str]:
         return {}
 
-    def _take_places(self) -> None:
-        iterator = self.container
-        items, trial_id = self._items, self._trial_now()
-        inside = tuple(border.mark() for border in self._iterators_around())
-        if items is None or items.given is not iterator._items:
-            items = TrackedItems(iterator._items, self._tell)
+    def items(self, container: smach.Container, items: Any) -> Any:
+        """Return what the Iterator goes through in place of its items."""
+        is_own = container is self.container and self._is_in_use
+        return self.tracked if is_own and self.tracked is not None else items
+
+    def _make_runners(self, states: Mapping[str, smach.State]) -> Dict[str, Runner]:
+        self._begin()
+        runners: Dict[str, Runner] = {}
+        for label, state in states.items():
+            machine = self.machines.get(label)
+            if machine is None:
+                runners[label] = ItemRunner(state, self)
+            else:
+                runners[label] = BranchRunner(state, machine, self)
+        return runners
+
+    def _begin(self) -> None:
+        """Find out where it begins, and whether it goes on."""
+        items, trial_id = self.tracked, self._trial_now()
+        inside = tuple(wrapper.mark() for wrapper in self._iterators_around())
+        if items is None or items.given is not self.container._items:
+            items = TrackedItems(self.container._items, self._tell)
         has_rest = items.has_rest() and (trial_id, inside) == (self._trial_id, self._inside)
         self.goes_on = items.goes_on = self._is_asked_to_go_on and has_rest
         self._is_asked_to_go_on = False
@@ -278,42 +357,33 @@ class IteratorBorder(Border):
             self._pass_on(dict(self.states()))
         else:
             self._rounds += 1
-        self._items, self._trial_id, self._ended_with = items, trial_id, None
+        self.tracked, self._trial_id, self._ended_with = items, trial_id, None
         self._is_left = False
         self._inside = inside
-        iterator._items = items
-        state = iterator._state
-        if state is not None:
-            iterator._state = StandIn(
-                state,
-                self.machines.get(iterator._state_label),
-                self._note_outcome,
-                self._begin_item,
-            )
 
     def mark(self) -> Tuple[int, int]:
         """Return what is different for each item: its number, and that of the round."""
-        return self._rounds, self._items.number if self._items is not None else 0
+        return self._rounds, self.tracked.number if self.tracked is not None else 0
 
-    def _iterators_around(self) -> Iterator['IteratorBorder']:
+    def _iterators_around(self) -> Iterator['IteratorWrapper']:
         node: Optional[TreeNode] = self.top
         below: Tuple[str, ...] = self.below
         while node is not None:
             container: Any = node.machine
             for label in below[:-1]:
                 container = _children_of(container)[label]
-                border = border_of(container)
-                if isinstance(border, IteratorBorder):
-                    yield border
+                wrapper = wrapper_of(container)
+                if isinstance(wrapper, IteratorWrapper):
+                    yield wrapper
             below = node.below
             node = node.parent
 
     def _pass_on(self, states: Mapping[str, smach.State]) -> None:
         """Let an Iterator directly inside go on too: its items belong to the unfinished one."""
         for state in states.values():
-            inner = border_of(state)
-            if isinstance(inner, IteratorBorder) and self._items is not None:
-                inner.ask_to_go_on(not self._items.is_finished)
+            inner = wrapper_of(state)
+            if isinstance(inner, IteratorWrapper) and self.tracked is not None:
+                inner.ask_to_go_on(not self.tracked.is_finished)
 
     def _tell(self, text: str) -> None:
         if self.top is None:
@@ -321,69 +391,74 @@ class IteratorBorder(Border):
         else:
             self.top.warn(text, '/'.join(self.below))
 
-    def _note_outcome(self, outcome: object) -> None:
-        if self._items is not None and isinstance(outcome, str):
-            # one that is left for a state elsewhere, or preempted, has ended by no word of its own
-            self._items.is_finished = (
-                loops(self.container, outcome)
-                and not is_preempted(outcome)
-                and not self.container._preempt_requested
-            )
+    # -- what its runner tells
 
-    def _begin_item(self) -> None:
-        machine = self.machines.get(self.container._state_label)
+    def begin_item(self) -> None:
+        """Note that an item begins."""
+        label = self.container._state_label
+        machine = self.machines.get(label)
         node = None if machine is None else machine._oracle
-        record = None if node is None else node.records.by_label.get(self.container._state_label)
+        record = None if node is None else node.records.by_label.get(label)
         unfinished = None
         if node is not None and record is not None:
             unfinished = node.tree.resumed.unfinished(record)
         begun = None if unfinished is None else unfinished.snapshot
-        self._userdata.begin_item(begun, self._deep_copy_keys(), self._warn_not_copied)
+        self.item_userdata.begin_item(begun, self._deep_copy_keys(), self._warn_not_copied)
+
+    def end_item(self, outcome: object) -> None:
+        """Note with which outcome of its state an item ends."""
+        if self.tracked is not None and isinstance(outcome, str):
+            self.tracked.is_finished = (
+                self.finishes(outcome) and not self.container._preempt_requested
+            )
+
+    def finishes(self, outcome: str) -> bool:
+        """Whether an item is finished by an outcome of its state.
+
+        One that is left for a state elsewhere, or preempted, has ended by no word of its own.
+        """
+        return loops(self.container, outcome) and not is_preempted(outcome)
 
     def ended(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, with an outcome or an error."""
         self._ended_with = outcome if isinstance(outcome, str) and not self._is_left else None
-        if self._items is not None and self._items.is_exhausted:
+        if self.tracked is not None and self.tracked.is_exhausted:
             _forget_given_up(self.container)  # the author has gone on behind it
         super().ended(outcome, error)
 
-    def _give_places_back(self) -> None:
-        iterator = self.container
-        if iterator._items is self._items and self._items is not None:
-            iterator._items = self._items.given
-        iterator._state = real(iterator._state)
-
-    def without_places(self, attributes: Dict[str, Any]) -> Dict[str, Any]:
-        """Return the attributes of its container for a copy, as they are while it is at rest."""
-        items = attributes.get('_items')
-        return dict(
-            attributes,
-            _state=real(attributes.get('_state')),
-            _items=items.given if isinstance(items, TrackedItems) else items,
-        )
-
     def __getstate__(self) -> Dict[str, Any]:
-        return dict(super().__getstate__(), _items=None, _ended_with=None, _is_asked_to_go_on=False)
+        return dict(
+            super().__getstate__(), tracked=None, _ended_with=None, _is_asked_to_go_on=False
+        )
 
     # -- userdata
 
-    def keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
+    def take_inputs(
+        self, container: smach.Container, copy: Callable[[], None], parent_ud: Any
+    ) -> None:
+        """Take the inputs, but keep what finished items have left, where it goes on."""
+        kept = self._keys_to_keep(parent_ud) if container is self.container else {}
+        super().take_inputs(container, copy, parent_ud)
+        for key, value in kept.items():
+            container.userdata[key] = value
+
+    def _keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
         """Return the values of its keys that its inputs do not replace, as it begins or goes on.
 
         `userdata`: what the inputs are copied from.
         """
         deep = self._deep_copy_keys()
         if not self.goes_on:
-            self._userdata.begin(userdata, deep, self._warn_not_copied)
+            self.item_userdata.begin(userdata, deep, self._warn_not_copied)
             return {}
         if (
-            self._items is not None
-            and not self._items.is_finished
+            self.tracked is not None
+            and not self.tracked.is_finished
             and self.top is not None
             and self.top.settings.userdata == 'restore'
         ):
-            self._userdata.take_back(deep)
-        return self._userdata.to_keep(userdata)
+            self.item_userdata.take_back(deep)
+        return self.item_userdata.to_keep(userdata)
 
     def _warn_not_copied(self, key: str, why: str) -> None:
         if self.top is not None:
@@ -393,10 +468,10 @@ class IteratorBorder(Border):
         return self.top.in_force.deep_copy_keys if self.top is not None else ()
 
 
-def border_of(state: object) -> Optional[Border]:
+def wrapper_of(state: object) -> Optional[ContainerWrapper]:
     """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
-    border = own_mark(state, BORDER)
-    return border if isinstance(border, Border) else None
+    wrapper = nesting.wrapper_of(state)
+    return wrapper if isinstance(wrapper, ContainerWrapper) else None
 
 
 def _children_of(container: Any) -> Mapping[str, Any]:
@@ -412,7 +487,3 @@ def _forget_given_up(container: smach.Container) -> None:
         node = node_of(machine)
         if node is not None:
             node.execution.forget_unrecovered()
-
-
-def _forget(outcome: object) -> None:
-    """Nobody needs to know with what a branch has ended."""

@@ -1,0 +1,153 @@
+"""The place where the states of a wrapped container run, and where outcomes lead there."""
+
+from typing import TYPE_CHECKING, NamedTuple, Optional, Tuple, cast
+
+import smach
+
+from ..asking.question import OutcomeChoice
+from ..records.events import Event, EventKind, FailureKind
+from ..settings.failing_outcomes import FailingNames
+from ..settings.settings import Settings, StateSettings
+from .protocols import Machine
+
+if TYPE_CHECKING:
+    from .tree_node import TreeNode
+
+
+class Route(NamedTuple):
+    """The target of an outcome, as the machine's author drew it."""
+
+    target: str  # a state, a container outcome, or '' where it leads nowhere
+    is_state: bool
+
+
+def route_of(machine: Machine, label: str, outcome: str) -> Route:
+    """Follow an outcome of a state.
+
+    It leads to a state, to a container outcome by its target's or its own name, or nowhere.
+    """
+    transitions = machine._transitions.get(label) or {}
+    if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
+        return Route('', False)
+    target = transitions[outcome]
+    if target is not None and target in machine._states:
+        return Route(target, True)
+    container_outcomes = machine.get_registered_outcomes()
+    for name in (target, outcome):
+        if name is not None and name in container_outcomes:
+            return Route(name, False)
+    return Route('', False)
+
+
+def failure_kind(
+    outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames
+) -> FailureKind:
+    """Classify a registered outcome, without regard to who recovers from it."""
+    if outcome in listed:
+        return FailureKind.FAILING_OUTCOME
+    if route.is_state:
+        return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
+    if not route.target:
+        return FailureKind.UNREGISTERED_OUTCOME
+    if route.target in failing:
+        return FailureKind.FELL_THROUGH
+    return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
+
+
+def author_recovers(
+    outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...], author_recoveries: str
+) -> bool:
+    """Whether the author's own transition from this failing outcome stays.
+
+    It does where it leads to another state, or, for an outcome that only sounds like a failure, to
+    a container outcome that does not.
+    """
+    if author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
+        return False
+    return route.is_state or outcome not in listed
+
+
+class Site:
+    """A place where states run: this one is a StateMachine.
+
+    `branches` has those of the plain states of Concurrences and Iterators. There the oracle
+    knows one state alone, which works on the userdata of the container. Whoever does something
+    that depends on the place asks the site of the node.
+
+    `is_container`: whether it is a container that its author made. It begins and ends by its own
+    events, and its states have userdata and neighbours. `label`: of the only state, else ''.
+    `goes_on_with_any`: whether it goes on by an outcome that its state has not registered.
+    `begins_by`: the event by which it begins.
+    """
+
+    is_container = True
+    label = ''
+    goes_on_with_any = False
+    begins_by = EventKind.CONTAINER_START
+
+    def shown(self, node: 'TreeNode') -> smach.Container:
+        """Return the container that people see."""
+        return cast(smach.Container, node.machine)
+
+    # -- settings
+
+    def settings_here(self, settings: Settings) -> Settings:
+        """Return the settings of the whole machine as they are in force here."""
+        return settings
+
+    def settings_of_state(self, settings: StateSettings) -> StateSettings:
+        """Return the settings of a state as they are in force here."""
+        return settings
+
+    # -- where outcomes lead
+
+    def foresees(
+        self,
+        node: 'TreeNode',
+        outcome: str,
+        route: Route,
+        kind: FailureKind,
+        settings: StateSettings,
+    ) -> bool:
+        """Whether the author has said what is to happen at this failing outcome of a state."""
+        return author_recovers(
+            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
+        )
+
+    def in_words(self, route: Route, outcome: str) -> Route:
+        """Return where an outcome leads, for people."""
+        return route
+
+    def choices(self, node: 'TreeNode', label: str) -> Tuple[OutcomeChoice, ...]:
+        """Return the outcomes of a state that lead on, and where, as an expert is shown them."""
+        routes = (
+            (outcome, route_of(node.machine, label, outcome))
+            for outcome in _outcomes_of(node, label)
+        )
+        return tuple(
+            OutcomeChoice(outcome, route.target) for outcome, route in routes if route.target
+        )
+
+    # -- what is told
+
+    def tell_passed_over(self, node: 'TreeNode', label: str, outcome: str) -> None:
+        """Say what the author passes over by a failing outcome that is foreseen."""
+
+    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
+        """Log that the container ends."""
+        smach.loginfo(
+            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
+        )
+
+    def ended_by(self, node: 'TreeNode', event: Event) -> Optional[str]:
+        """Return the outcome with which it ends at an event of its own, None for other events."""
+        is_end = event.kind is EventKind.CONTAINER_END and event.outcome
+        return event.outcome if is_end else None
+
+    def is_line_over(self, node: 'TreeNode', event: Event) -> bool:
+        """Whether no state follows in its thread, that of a Concurrence, after an event."""
+        return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
+
+
+def _outcomes_of(node: 'TreeNode', label: str) -> Tuple[str, ...]:
+    return tuple(sorted(node.machine._states[label].get_registered_outcomes(), key=str))

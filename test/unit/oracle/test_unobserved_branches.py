@@ -1,0 +1,126 @@
+"""Branches go the same way whether somebody observes or not: a plain one takes the short way."""
+
+import random
+import re
+import threading
+
+import pytest
+from branch_machines import Item, both, inside, iterator_over
+from machines import FakeExpert, Scripted, chain_of, give_up, goto, supersede
+from test_pinned_branches import rows_of
+
+import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+
+OUTCOMES = ('done', 'aborted', 'preempted')
+STEPS = ('ok', 'ok', 'ok', 'aborted', ValueError('slipped'), 'unheard_of', 'preempted')
+
+
+def scripts(draw):
+    """For some items, what their tries end with."""
+    return {
+        'item{}'.format(number): [draw.choice(STEPS) for _ in range(draw.randint(0, 2))]
+        for number in range(1, 7)
+    }
+
+
+def plan(seed):
+    """A machine, an expert and settings, drawn from a seed."""
+    draw = random.Random(seed)
+    loops = draw.choice((['ok'], ['ok', 'aborted']))
+    iterator = iterator_over(Item(**scripts(draw)), items=range(1, 7), loop_outcomes=loops)
+    machine = inside(iterator)
+    with machine:
+        concurrence = both(
+            Scripted(*[draw.choice(STEPS) for _ in range(draw.randint(0, 3))]), Scripted()
+        )
+        smach.StateMachine.add('BOTH', concurrence, {'done': 'done', 'aborted': 'aborted'})
+        smach.StateMachine.add(
+            'AGAIN', Scripted(), {'ok': draw.choice(('ALL', 'BOTH')), 'aborted': 'aborted'}
+        )
+    machine._transitions['ALL']['done'] = 'BOTH'
+    answers = [
+        draw.choice((goto('EACH'), goto('LEFT'), supersede('ok'), give_up('aborted')))
+        for _ in range(6)
+    ]
+    settings = {
+        'max_recoveries': draw.choice((0, 1, 3)),
+        'userdata': draw.choice(('restore', 'keep')),
+        'memory': draw.choice((10, 1000)),
+    }
+    return machine, FakeExpert(*answers), settings
+
+
+def run(seed, observed):
+    """All that is left of some trials of a machine."""
+    machine, expert, settings = plan(seed)
+    wrapped = OracleContainer.wrap(machine, name='TOP', expert=expert, settings=settings)
+    if observed:
+        oracle_of(wrapped).events.observers.append(lambda event: None)
+    left = []
+    for _ in range(3):
+        wrapped.userdata.done = []
+        try:
+            left.append(wrapped.execute())
+        except (smach.InvalidUserCodeError, smach.InvalidTransitionError) as err:
+            left.append(type(err).__name__)
+        left.append(dict(wrapped.userdata._data))
+        # where LEFT raises, or is left, RIGHT is preempted, and may have ended before
+        left += [row for row in rows_of(wrapped) if not re.search('/RIGHT|BOTH [(]', row)]
+    return left, [(each.failed_state, each.userdata, each.history) for each in expert.questions]
+
+
+@pytest.mark.parametrize('seed', range(60))
+def test_what_is_left_is_the_same_with_an_observer_and_without(seed):
+    assert run(seed, observed=False) == run(seed, observed=True)
+
+
+class Waits(smach.State):
+    """Ends at once, but at item 5 once it is preempted, with an outcome, which may service it."""
+
+    def __init__(self, outcome):
+        smach.State.__init__(self, ['ok', 'preempted'], input_keys=['item'])
+        self.done, self.begun, self._outcome = [], threading.Event(), outcome
+
+    def execute(self, ud):
+        if ud.item == 5:
+            self.begun.set()
+            while not self.preempt_requested():
+                pass
+            if self._outcome == 'preempted':
+                self.service_preempt()
+        self.done.append(ud.item)
+        return self._outcome if ud.item == 5 else 'ok'
+
+
+@pytest.mark.parametrize('outcome', ['ok', 'preempted'])
+def test_a_preempt_on_the_short_way_reaches_the_state_and_its_visit_teaches_nothing(outcome):
+    state = Waits(outcome)
+    iterator = iterator_over(state, items=range(1, 9), outcomes=(*OUTCOMES, 'ok'))
+    machine = OracleContainer.wrap(inside(iterator, transitions={'ok': 'preempted'}))
+    thread = threading.Thread(target=lambda: state.begun.wait(20) and machine.request_preempt())
+    thread.start()
+    machine.execute()
+    thread.join()
+    assert state.done == [1, 2, 3, 4, 5]
+    assert {row.state: row.successes for row in machine.rates()}['EACH'] == 4
+
+
+def test_an_item_that_fails_on_the_short_way_finds_its_userdata_restored():
+    def spoils(state, ud):
+        ud.done = ud.done + ['spoiled']
+        return 'aborted'
+
+    machine = OracleContainer.wrap(
+        inside(iterator_over(Item(item4=[spoils]), items=(1, 2, 3, 4, 5))),
+        settings={'userdata': 'restore'},
+    )
+    assert machine.execute() == 'done'
+    assert machine.userdata.done == [1, 2, 3, 4, 5]
+
+
+def test_the_end_of_a_machine_on_the_short_way_is_counted():
+    machine = OracleContainer.wrap(chain_of(Scripted(), Scripted()))
+    assert [machine.execute() for _ in range(4)] == ['done'] * 4
+    assert [row.successes for row in machine.rates()] == [4, 4]
+    assert sum(row.count for row in machine.transition_counts()) == 8
