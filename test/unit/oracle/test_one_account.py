@@ -303,7 +303,7 @@ def test_the_traceback_of_an_exception_is_one_error_in_the_log_on_all_levels(err
 
 
 def test_a_level_above_that_has_been_left_tells_no_failure_and_spends_nothing(monkeypatch):
-    monkeypatch.setattr(levels, 'way_to', lambda below, place: None)
+    monkeypatch.setattr(levels, 'jump_path_to', lambda below, place: None)
     machine = Watched(
         three_levels(Scripted('aborted', 'aborted')),
         name='TOP',

@@ -214,9 +214,17 @@ def test_a_machine_that_does_not_run_begins_there() -> None:
 
 
 def test_what_waits_in_another_branch_does_not_wait_here() -> None:
+    # who is held first holds the other before its first state, too
+    def wait_for_a(state: Any, ud: Any) -> str:
+        assert gate.entered.wait(20)
+        return 'ok'
+
     gate, there = Gate(), Scripted()
     machine = chain(
-        BOTH=both(HELD=chain(H=Scripted()), RUNS=chain(A=Scripted(gate), B=Scripted(), C=there))
+        BOTH=both(
+            HELD=chain(W=Scripted(wait_for_a), H=Scripted()),
+            RUNS=chain(A=Scripted(gate), B=Scripted(), C=there),
+        )
     )
     held = Held(machine)
     held.hand.set_breakpoint('H')
