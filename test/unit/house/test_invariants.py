@@ -109,7 +109,7 @@ def test_no_module_but_its_own_writes_a_field_of_a_tree_node():
         and getattr(each.value, 'id', '') == 'self'
     }
     assert {'records', 'in_force', 'tree'} < fields and len(fields) <= 12
-    others = {'self', 'border', 'container', 'twin'}  # objects of other classes
+    others = {'self', 'wrapper', 'container', 'twin'}  # objects of other classes
     found = [
         (path.name, each.lineno, each.attr)
         for path in sorted(EXECUTIVE.rglob('*.py'))

@@ -242,8 +242,7 @@ def run_branch(machine: WrappedMachine, end: Optional[End]) -> Optional[str]:
     if outcome is not None:
         return outcome
     if end is not None:
-        with node.tree.departures_lock:  # it has come while the state was executed
-            run.departure, node.execution = node.execution.departure, run
+        run.begin_at_the_end()
     error: Optional[BaseException] = None
     run.begin()
     try:

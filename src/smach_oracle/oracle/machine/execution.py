@@ -128,6 +128,15 @@ class Execution:
         self.runs_around = ()
         node.records.drop_snapshots()
 
+    def begin_at_the_end(self) -> None:
+        """Be the present execution where the state was executed already, by another.
+
+        A verdict that has come meanwhile is for this one.
+        """
+        with self._node.tree.departures_lock:
+            self.departure = self._node.execution.departure
+            self._node.execute_as(self)
+
     # -- where the containers in the present state begin
 
     def start_below(self, places: Iterable[Tuple['TreeNode', str]]) -> None:
