@@ -8,7 +8,7 @@ from .asking.question import Expert, names
 from .errors import SettingsError
 from .execution.boundary import before_step
 from .execution.step import Step
-from .execution.transitions import terminate
+from .execution.transitions import end_plainly
 from .execution.trial import ContainerRun
 from .execution.unwrapping import execute_bare
 from .execution.visiting import execute_observed, execute_watched
@@ -438,13 +438,13 @@ class OracleContainer(smach.StateMachine):
                 try:
                     edge = record.fast[outcome]
                     target = edge.target
-                    plain = transitions[outcome] is edge.drawn and not self._preempt_requested
-                    plain = plain and not (edge.is_end and node.ends_specially())
+                    plain = transitions[outcome] is target and not self._preempt_requested
                 except Exception:
                     # seen for the first time, no plain success, or no outcome at all
                     plain = False
                 if not plain:
-                    return Step(node, record).ended(outcome, error)
+                    ended = end_plainly(node, record, outcome, error)
+                    return ended or Step(node, record).ended(outcome, error)
                 edge.count += 1
                 history = records.history
                 history.visits.append(edge.visit)
@@ -455,8 +455,6 @@ class OracleContainer(smach.StateMachine):
                     history.succeeded = label
                 if observed:
                     node.events.emit(TRANSITION, node.path, node.trial_id, label, outcome, target)
-                if edge.is_end:
-                    return terminate(node, label, outcome, target)
                 self._current_label = target
                 self._current_state = self._states[target]
                 self._current_transitions = self._transitions[target]

@@ -155,13 +155,7 @@ class BranchRunner:
             ):
                 return self._run((outcome, None))
             edge.count += 1
-            history = node.records.history
-            history.visits.append(edge.visit)
-            if not record.has_preconditions:
-                history.unconditioned = self._label
-            if history.succeeded != self._label:
-                history.succeeded_other = history.succeeded
-                history.succeeded = self._label
+            node.records.history.visited(edge.visit, record.has_preconditions)
             record.snapshot = None
             tracked = self._tracked
             if item is None or tracked is None:

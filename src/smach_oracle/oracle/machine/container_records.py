@@ -149,7 +149,7 @@ class ContainerRecords:
         if outcome in record.fast:
             record.retire_edge(outcome)
         visit = Visit(record.label, outcome, VisitResult.SUCCESS)
-        record.fast[outcome] = FastEdge(target, drawn, message is None, message or '', visit)
+        record.fast[outcome] = FastEdge(target, drawn, message or '', visit)
 
     def count_oracle_edge(self, target: str) -> None:
         """Count a way out of the meta state."""

@@ -19,20 +19,23 @@ class RateReading(NamedTuple):
     tried: str  # what the oracle did after its latest failure, '' where it has succeeded since
 
 
+_ENDS = object()  # no transition is drawn to it, so no machine goes on by it
+
+
 class FastEdge:
     """A transition without any failure, with all that its next use needs.
 
-    `drawn`: its entry among the author's transitions. `is_end`: whether it ends the container.
+    `target`: the state that is next, nothing where the container ends. `leads_to`: that state, or
+    the container outcome. `drawn`: its entry among the author's transitions.
     """
 
-    __slots__ = ('target', 'drawn', 'is_end', 'count', 'message', 'visit')
+    __slots__ = ('target', 'leads_to', 'drawn', 'count', 'message', 'visit')
 
-    def __init__(
-        self, target: str, drawn: Optional[str], is_end: bool, message: str, visit: Visit
-    ) -> None:
-        self.target = target
+    def __init__(self, leads_to: str, drawn: Optional[str], message: str, visit: Visit) -> None:
+        """`message`: for the log, '' where it ends the container."""
+        self.target: Any = leads_to if message else _ENDS
+        self.leads_to = leads_to
         self.drawn = drawn
-        self.is_end = is_end
         self.count = 0
         self.message = message
         self.visit = visit
@@ -289,7 +292,7 @@ class StateRecord:
         """Return how often each (outcome, target) was taken."""
         counts = dict(self._edges)
         for outcome, edge in list(self.fast.items()):
-            counts[outcome, edge.target] = counts.get((outcome, edge.target), 0) + edge.count
+            counts[outcome, edge.leads_to] = counts.get((outcome, edge.leads_to), 0) + edge.count
         return counts
 
     def restore(self, learned: Mapping[str, object]) -> None:
@@ -329,6 +332,6 @@ class StateRecord:
             edge = self.fast.pop(outcome)
             self._retired += edge.count
         if edge.count:
-            self._edges[outcome, edge.target] = (
-                self._edges.get((outcome, edge.target), 0) + edge.count
+            self._edges[outcome, edge.leads_to] = (
+                self._edges.get((outcome, edge.leads_to), 0) + edge.count
             )
