@@ -444,7 +444,9 @@ class OracleContainer(smach.StateMachine):
                     plain = False
                 if not plain:
                     ended = end_plainly(node, record, outcome, error)
-                    return ended or Step(node, record).ended(outcome, error)
+                    if ended is not None:
+                        return ended
+                    return Step(node, record).ended(outcome, error)
                 edge.count += 1
                 history = records.history
                 history.visits.append(edge.visit)
