@@ -27,6 +27,7 @@ GROWTH_LIMIT = 1.5
 # steps. That is missed. The limit is what is reached, 2260, and a fifth.
 AIM, LIMIT = 1200.0, 2700.0
 ROUNDS = 15
+MACHINES = 4  # with many visits: one that meets a busy moment is no measure
 FAILURES = 300
 
 
@@ -97,7 +98,7 @@ def main() -> int:
     for policy in sorted(set(POLICIES).difference(each.name for each in BASELINES)):
         rounds = [(bare_step_s(20000), min(machine_after(10, policy)[1])) for _ in range(ROUNDS)]
         bare, few = (min(column) for column in zip(*rounds))
-        many = min(machine_after(args.visits, policy)[1])
+        many = min(min(machine_after(args.visits, policy)[1]) for _ in range(MACHINES))
         steps, growth = few / bare, many / few
         is_missed = is_missed or steps > LIMIT or growth > GROWTH_LIMIT
         print(
