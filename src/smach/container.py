@@ -241,7 +241,7 @@ class Container(State):
     def _runner(self, label: str, state: Any) -> Any:
         """Return what executes a state: the state itself, or whatever the hook names."""
         hook = self.execution_hook
-        return state if hook is None else hook.runners.get(label, state)
+        return state if hook is None else hook.runner_of(self, label, state)
 
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
         """Copy this container's output keys to the parent's userdata. A missing one is a

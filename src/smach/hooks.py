@@ -47,6 +47,13 @@ class ExecutionHook(object):
     def __init__(self) -> None:
         self.runners: Dict[str, Any] = {}
 
+    def runner_of(self, container: Any, label: str, state: Any) -> Any:
+        """Return what executes a state of the container, the state itself where nothing does.
+
+        It is asked before each execution, as the state at a label may be another by then.
+        """
+        return self.runners.get(label, state)
+
     def execution(self, container: Any) -> 'HookedExecution':
         """Return the context in which the container executes once.
 

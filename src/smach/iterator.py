@@ -168,7 +168,7 @@ class Iterator(Container):
                 'Iterator.set_contained_state().'
             )
         hook = self.execution_hook
-        runner = state if hook is None else hook.runners.get(self._state_label, state)
+        runner = state if hook is None else hook.runner_of(self, self._state_label, state)
         # before the first item: later ones are not reached with a preempt pending
         if self.preempt_requested():
             runner.request_preempt()

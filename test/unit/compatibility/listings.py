@@ -119,16 +119,19 @@ def is_put_together(name: str, texts: Sequence[str]) -> bool:
 
 
 def texts_of_the_code() -> List[str]:
-    """Every string in the product's code."""
-    paths = sorted((ROOT / 'src/smach_oracle').rglob('*.py'))
-    return sorted(
-        {
-            node.value
-            for path in paths
-            for node in ast.walk(ast.parse(_text(path)))
-            if isinstance(node, ast.Constant) and isinstance(node.value, str)
-        }
-    )
+    """Every string in the product's code, and every field, after which a parameter may be named."""
+    nodes = [
+        node
+        for path in sorted((ROOT / 'src/smach_oracle').rglob('*.py'))
+        for node in ast.walk(ast.parse(_text(path)))
+    ]
+    strings = {node.value for node in nodes if isinstance(node, ast.Constant)}
+    fields = {
+        node.target.id
+        for node in nodes
+        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
+    }
+    return sorted({each for each in strings if isinstance(each, str)} | fields)
 
 
 def public(place: str) -> Dict[str, Any]:

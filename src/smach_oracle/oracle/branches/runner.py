@@ -46,8 +46,11 @@ class Runner(Protocol):
     def recall_preempt(self) -> None:
         """Take a request back."""
 
-    def rest(self) -> None:
-        """Note that nothing of it runs any more."""
+    def is_of(self, state: smach.State) -> bool:
+        """Whether it executes this state."""
+
+    def retire(self) -> None:
+        """Note that an execution of the container is over."""
 
 
 class ItemRunner:
@@ -76,8 +79,12 @@ class ItemRunner:
         """Take a request back."""
         self._state.recall_preempt()
 
-    def rest(self) -> None:
-        """Note that nothing of it runs any more."""
+    def is_of(self, state: smach.State) -> bool:
+        """Whether it executes this state."""
+        return state is self._state
+
+    def retire(self) -> None:
+        """Note that an execution of the container is over."""
 
 
 class BranchRunner:
@@ -134,7 +141,7 @@ class BranchRunner:
             record.snapshot = snapshot = machine.userdata._data.copy()
             if item is not None:
                 item.item_userdata.at_item = snapshot
-            if machine._current_state is not state:
+            if machine._current_state is not state or not machine._is_running:
                 self._be_current()
                 if machine._preempt_requested:  # nobody has passed that on
                     return self._run(None)
@@ -159,7 +166,7 @@ class BranchRunner:
             record.snapshot = None
             tracked = self._tracked
             if item is None or tracked is None:
-                self.rest()
+                self._rest()
             else:
                 finishes = self._finishes.get(outcome)
                 if finishes is None:
@@ -168,7 +175,8 @@ class BranchRunner:
             return outcome
         except (SystemExit, KeyboardInterrupt) as err:
             self._early_end.of_program = err
-            self.rest()
+            node.records.drop_snapshots()
+            self._rest()
             raise
         finally:
             self._is_under_way = False
@@ -179,8 +187,16 @@ class BranchRunner:
         machine._current_label, machine._current_state = self._label, self._state
         machine._is_running = True
 
-    def rest(self) -> None:
-        """Note that nothing of it runs any more."""
+    def is_of(self, state: smach.State) -> bool:
+        """Whether it executes this state."""
+        return state is self._state
+
+    def retire(self) -> None:
+        """Note that an execution of the container is over: another thread may have one, too."""
+        if not self._is_under_way:
+            self._rest()
+
+    def _rest(self) -> None:
         self._machine._is_running = False
         self._machine._current_state = None
 
@@ -195,7 +211,7 @@ class BranchRunner:
         try:
             outcome = run_branch(machine, end)
         finally:
-            self.rest()
+            self._rest()
             machine._preempted_label = machine._preempted_state = None
             self._record = self._node.records.by_label.get(self._label)
         if item is not None:

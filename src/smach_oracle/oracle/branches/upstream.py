@@ -20,9 +20,9 @@ _OWN = '_made_of'  # the class of the user
 def asks_hook(cls: type) -> bool:
     """Whether containers of a class ask their `execution_hook`, as those of our engine do."""
     execute = getattr(cls, 'execute', None)
-    return hasattr(smach.Container, HOOK) and execute in (
-        smach.Concurrence.execute,
-        smach.Iterator.execute,
+    return hasattr(smach.Container, HOOK) and any(
+        execute is kind.execute and cls.request_preempt is kind.request_preempt
+        for kind in (smach.Concurrence, smach.Iterator)
     )
 
 
@@ -91,7 +91,7 @@ class _Asking:
         hook = self._oracle_wrapper
 
         with hook.execution(self) as execution:
-            tables = _stand_in(self, hook) if hook.runners else {}
+            tables = _stand_in(self, hook) if execution.is_entered else {}
             try:
                 execution.outcome = base.execute(*args, **kwargs)
             finally:

@@ -15,6 +15,7 @@ from typing import (
     Sequence,
     Tuple,
     Type,
+    Union,
     cast,
 )
 
@@ -107,6 +108,17 @@ class ContainerWrapper:
     def items(self, container: smach.Container, items: Any) -> Any:
         """Return what an Iterator goes through in place of its items."""
         return items
+
+    def runner_of(
+        self, container: smach.Container, label: str, state: smach.State
+    ) -> Union[Runner, smach.State]:
+        """Return what executes a state.
+
+        A state that has been added since is executed as it is, and so is one of a shallow copy.
+        """
+        runner = self.runners.get(label)
+        is_its_own = runner is not None and container is self.container and runner.is_of(state)
+        return runner if runner is not None and is_its_own else state
 
     def enter(self) -> bool:
         """Make the runners. Return False where that cannot be, so that it runs bare."""
@@ -206,7 +218,7 @@ class ContainerWrapper:
     def leave(self) -> None:
         """Let the states execute by themselves again."""
         for runner in self.runners.values():
-            runner.rest()
+            runner.retire()
         self.runners = {}
         with self._lock:
             self._is_in_use = False
@@ -243,11 +255,11 @@ class WrappedExecution:
     def __init__(self, wrapper: ContainerWrapper, container: smach.Container) -> None:
         self._wrapper = wrapper
         self._container = container
-        self._is_entered = False
+        self.is_entered = False
 
     def __enter__(self) -> 'WrappedExecution':
         wrapper = self._wrapper
-        self._is_entered = wrapper.container is self._container and wrapper.enter()
+        self.is_entered = wrapper.container is self._container and wrapper.enter()
         return self
 
     def __exit__(
@@ -256,7 +268,7 @@ class WrappedExecution:
         error: Optional[BaseException],
         trace: Optional[TracebackType],
     ) -> None:
-        if not self._is_entered:
+        if not self.is_entered:
             return
         try:
             if error is not None:

@@ -93,6 +93,7 @@ def end_plainly(
         error is not None
         or edge.message
         or drawn is not edge.drawn
+        or edge.leads_to in machine._states
         or machine._preempt_requested
         or node.ends_specially()
     ):

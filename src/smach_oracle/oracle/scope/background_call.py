@@ -2,6 +2,7 @@
 
 import contextvars
 import functools
+import os
 import queue
 import threading
 from typing import Callable, Optional
@@ -16,6 +17,7 @@ class KeptThread:
     """
 
     def __init__(self, name: str) -> None:
+        self._pid = os.getpid()
         self._calls: 'queue.SimpleQueue[Optional[Callable[[], None]]]' = queue.SimpleQueue()
         self.thread = threading.Thread(target=self._work, name=name, daemon=True)
         self.thread.start()
@@ -31,6 +33,9 @@ class KeptThread:
     def _work(self) -> None:
         for call in iter(self._calls.get, None):
             call()
+            del call  # with what it holds: its result may be large
+            if os.getpid() != self._pid:
+                return  # the call has forked, and nobody in the child has another
 
 
 class BackgroundCall:
