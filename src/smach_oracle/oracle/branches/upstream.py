@@ -18,11 +18,15 @@ _OWN = '_made_of'  # the class of the user
 
 
 def asks_hook(cls: type) -> bool:
-    """Whether containers of a class ask their `execution_hook`, as those of our engine do."""
+    """Whether containers of a class ask their `execution_hook`, as those of our engine do.
+
+    A class that preempts the states by itself finds no runners there.
+    """
     execute = getattr(cls, 'execute', None)
+    request_preempt = getattr(cls, 'request_preempt', None)
+    kinds: Tuple[Any, ...] = (smach.Concurrence, smach.Iterator)
     return hasattr(smach.Container, HOOK) and any(
-        execute is kind.execute and cls.request_preempt is kind.request_preempt
-        for kind in (smach.Concurrence, smach.Iterator)
+        execute is kind.execute and request_preempt is kind.request_preempt for kind in kinds
     )
 
 

@@ -82,7 +82,7 @@ _NO_VIEW = _NoView()
 class StateRecord:
     """Learned rate, counts and latest snapshot of one state.
 
-    Successes by way of an `FastEdge` are counted there and reach the estimator when somebody asks
+    Successes by way of a `FastEdge` are counted there and reach the estimator when somebody asks
     for it: their order among each other does not matter, and a failure is always learned after
     them.
     """

@@ -1,0 +1,100 @@
+"""States that come in the place of others between two executions, or during one."""
+
+import copy
+import os
+import signal
+from typing import Any, List
+
+import pytest
+from machines import Scripted, Watched
+from waiting import wait_for
+
+import smach
+from smach_oracle.oracle import OracleContainer
+
+
+def items_of(state: smach.State, *items: Any) -> smach.Iterator:
+    """An Iterator over items, which ends with 'done'."""
+    iterator = smach.Iterator(
+        outcomes=['done', 'aborted'],
+        input_keys=[],
+        output_keys=[],
+        it=list(items),
+        it_label='item',
+        exhausted_outcome='done',
+    )
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', state, loop_outcomes=['ok'])
+    return iterator
+
+
+def machine_of(state: smach.State) -> smach.StateMachine:
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('ALL', state)
+    return machine
+
+
+@pytest.mark.parametrize('is_wrapped', [False, True])
+def test_an_outcome_that_has_become_a_state_is_entered(is_wrapped: bool) -> None:
+    machine = smach.StateMachine(outcomes=['ok', 'CLEAN', 'done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(outcomes=['ok']), {'ok': 'CLEAN'})
+    if is_wrapped:
+        OracleContainer.wrap(machine)
+    assert [machine.execute() for _ in range(3)] == ['CLEAN'] * 3
+    clean = Scripted(outcomes=['ok'])
+    with machine:
+        smach.StateMachine.add('CLEAN', clean, {'ok': 'done'})
+    assert machine.execute() == 'done' and clean.runs == 1
+
+
+@pytest.mark.parametrize('is_wrapped', [False, True])
+def test_a_state_that_takes_the_place_of_an_item_is_executed(is_wrapped: bool) -> None:
+    def replace(*args: Any) -> None:
+        with iterator:
+            smach.Iterator.set_contained_state('EACH', second, loop_outcomes=['ok'])
+
+    first, second = Scripted(outcomes=['ok']), Scripted(outcomes=['ok'])
+    iterator = items_of(first, 1, 2, 3)
+    iterator.register_transition_cb(replace)
+    machine = machine_of(iterator)
+    if is_wrapped:
+        OracleContainer.wrap(machine)
+    assert machine.execute() == 'done'
+    assert (first.runs, second.runs) == (1, 2)
+
+
+def test_a_shallow_copy_executes_its_own_state_while_the_original_runs() -> None:
+    def run_the_copy(state: smach.State, ud: Any) -> str:
+        twin = copy.copy(iterator)
+        with twin:
+            smach.Iterator.set_contained_state('EACH', of_the_copy, loop_outcomes=['ok'])
+        assert twin.execute() == 'done'
+        return 'ok'
+
+    original, of_the_copy = Scripted(run_the_copy, outcomes=['ok']), Scripted(outcomes=['ok'])
+    iterator = items_of(original, 1, 2)
+    assert OracleContainer.wrap(machine_of(iterator)).execute() == 'done'
+    assert (original.runs, of_the_copy.runs) == (2, 2)
+
+
+def test_a_child_that_a_precondition_forks_ends_with_its_function() -> None:
+    children: List[int] = []
+
+    def fork(ud: Any) -> bool:
+        child = os.fork()
+        if child:
+            children.append(child)
+        return True
+
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted('aborted'), {'ok': 'done'})
+    assert Watched(machine, preconditions={'A': [fork]}).run() == 'done'
+    (child,) = children
+    try:
+        assert wait_for(lambda: os.waitpid(child, os.WNOHANG) == (child, 0))
+    except AssertionError:
+        os.kill(child, signal.SIGKILL)
+        raise
