@@ -116,9 +116,8 @@ class ContainerWrapper:
 
         A state that has been added since is executed as it is, and so is one of a shallow copy.
         """
-        runner = self.runners.get(label)
-        is_its_own = runner is not None and container is self.container and runner.is_of(state)
-        return runner if runner is not None and is_its_own else state
+        runner = self.runners.get(label) if container is self.container else None
+        return runner if runner is not None and runner.is_of(state) else state
 
     def enter(self) -> bool:
         """Make the runners. Return False where that cannot be, so that it runs bare."""

@@ -1,8 +1,8 @@
 """What may end early: a trial, a container that executes, a recovery, a question.
 
-A scope lies in one scope or in several. It ends early with each of them. `trio.CancelScope` is the model, in
-threads: nothing is raised, but each wait in a scope ends when the scope is cancelled, and who works
-in it looks at `reason`.
+A scope lies in one scope or in several. It ends early with each of them. `trio.CancelScope` is the
+model, in threads: nothing is raised, but each wait in a scope ends when the scope is cancelled, and
+who works in it looks at `reason`.
 """
 
 import threading
