@@ -154,7 +154,7 @@ class Asking:
     def answer(self, question, decision):
         self.answers.append((question.goal.query_id, decision.state))
         self.free.remove(question.goal.query_id)
-        return SimpleNamespace(ok=True)
+        return SimpleNamespace(ok=True, message='')
 
     def release(self, question):
         self.released.append(question.goal.query_id)
