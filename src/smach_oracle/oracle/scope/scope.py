@@ -14,8 +14,7 @@ from .bell import Bell, Bells, Flag
 from .clock import Clock, MonotonicClock, PausableClock
 from .reason import Reason
 
-# how soon a wait sees a reason of which nobody tells it, such as `smach.is_shutdown`. This is the
-# only period of the executive
+# how soon a wait sees a reason of which nobody tells it, such as `smach.is_shutdown`
 LOOK_S = 0.05
 
 Look = Callable[[], Optional[Reason]]
