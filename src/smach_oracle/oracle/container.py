@@ -16,7 +16,6 @@ from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
 from .execution.wrapping import wrap_machine
 from .machine.learned_rates import read_by_hand, write_by_hand
 from .machine.oracle import oracle_of
-from .machine.protocols import Transitions
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
@@ -27,6 +26,7 @@ from .settings.health import HealthFunction
 from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
 from .settings.unfit_names import Strictness
+from .smach_private import Transitions
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once

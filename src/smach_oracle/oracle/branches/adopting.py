@@ -6,8 +6,8 @@ import smach
 
 from ..identity import own_attributes
 from ..machine.nesting import WRAPPER, branching_below
-from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode, WrappedMachine
+from ..smach_private import Labels
 from .branch import BranchSite, ConcurrenceSite, IteratorSite
 from .branch_machine import BranchMachine
 from .upstream import HOOK, ask_no_more, asks_hook, have_asked

@@ -21,7 +21,7 @@ from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
 from smach_oracle.store.names import KEPT_OUT, KEY
 from smach_oracle.store.rows import Fact
 
-from ..machine.protocols import Machine
+from ..smach_private import Machine
 from .container_facts import fact_of
 
 # a version of marshal's format that writes what stands in several places once: data that hold

@@ -9,11 +9,11 @@ from typing import Any, Iterator, Optional, Tuple
 import smach
 
 from ..branches.wrapper import wrapper_of
-from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
 from ..scope.reason import Reason
 from ..scope.scope import Scope
+from ..smach_private import Labels
 
 
 class ItemGate:

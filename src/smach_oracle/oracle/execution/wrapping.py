@@ -9,12 +9,12 @@ from ..errors import SettingsError
 from ..identity import own_attributes
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
-from ..machine.protocols import Labels
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..settings.patterns import Nested
 from ..settings.settings import Settings
 from ..settings.unfit_names import Strictness
+from ..smach_private import Labels
 from .item_gates import place_gates
 from .settings_check import check_names, check_preconditions
 from .unwrapping import strip_alone

@@ -8,7 +8,7 @@ from typing import Any, ContextManager, Iterable, Iterator, Optional, Set, Tuple
 from ..scope.clock import Clock, PausableClock, paused
 from ..scope.reason import Reason
 from ..scope.scope import Scope
-from .protocols import EngineProbe
+from ..smach_private import EngineProbe
 
 
 class LimitedRun(Scope):

@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
 import smach
 
 from ..identity import own_mark
-from .protocols import Labels
+from ..smach_private import Labels
 from .tree_node import TreeNode, WrappedMachine
 
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree

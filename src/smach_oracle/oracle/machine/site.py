@@ -8,7 +8,7 @@ from ..asking.question import OutcomeChoice
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.failing_outcomes import FailingNames
 from ..settings.settings import Settings, StateSettings
-from .protocols import Machine
+from ..smach_private import Machine
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode

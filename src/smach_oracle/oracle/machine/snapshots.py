@@ -15,7 +15,7 @@ import smach
 from smach_oracle.foreign import ends_program, error_text
 
 from ..identity import own_mark
-from .protocols import Machine
+from ..smach_private import Machine
 
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 

@@ -10,10 +10,10 @@ from ..records.events import EventKind
 from ..records.state_record import RateReading, StateRecord
 from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
+from ..smach_private import EngineProbe, Labels, Machine
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .execution import Execution
-from .protocols import EngineProbe, Labels, Machine
 from .site import Site
 from .snapshots import NOT_COPIED, take_snapshot
 from .tree import Tree

@@ -5,7 +5,7 @@ from typing import Collection, Iterable, Mapping, Tuple, cast
 import smach
 
 from ..identity import own_mark
-from .protocols import Machine
+from ..smach_private import Machine
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 

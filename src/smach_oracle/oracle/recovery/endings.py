@@ -5,11 +5,11 @@ from typing import NamedTuple, Optional, Sequence
 
 import smach
 
-from ..machine.protocols import Machine
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode
 from ..scope.reason import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
+from ..smach_private import Machine
 from .failure import Failure
 
 

@@ -6,7 +6,6 @@ import smach
 
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
-from ..machine.protocols import Labels
 from ..machine.site import Route, author_recovers, failure_kind, route_of
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import jump_path_to
@@ -15,6 +14,7 @@ from ..places.place import TreePlace
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
 from ..records.state_record import StateRecord
+from ..smach_private import Labels
 from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending
 from .failure import (

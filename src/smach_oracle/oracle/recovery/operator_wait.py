@@ -6,10 +6,10 @@ from typing import Iterator
 from ..control.hold import HeldPlace
 from ..control.holding import Wait, wait_until_let_go
 from ..machine.limited_run import standing_still
-from ..machine.protocols import Labels
 from ..machine.tree_node import TreeNode
 from ..scope.scope import Scope
 from ..settings.settings import CONFIRM_FIRST
+from ..smach_private import Labels
 
 
 @contextlib.contextmanager

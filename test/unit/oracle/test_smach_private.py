@@ -7,7 +7,7 @@ import typing
 import pytest
 
 import smach
-from smach_oracle.oracle.machine.protocols import Machine, StepLock
+from smach_oracle.oracle.smach_private import Machine, StepLock
 
 OURS_ALONE = {'_is_preempt_passed_on'}  # set, never read, on upstream's engine
 

@@ -1,0 +1,422 @@
+"""SMACH's private names: the one file of the executive that uses them on another object.
+
+Upstream's engine and our own have the same names, which public scripts and tools use too. Where
+they differ, the docstring says so. A class of ours that extends one of SMACH's reads its own by
+`self`. On Python 3.11 a call of one of these costs 15 ns, a seventieth of a wrapped transition.
+"""
+
+from types import TracebackType
+from typing import (
+    Any,
+    Collection,
+    Dict,
+    List,
+    Mapping,
+    MutableMapping,
+    Optional,
+    Protocol,
+    Set,
+    Tuple,
+    Type,
+    TypeVar,
+)
+
+import smach
+
+from .identity import WeakIdentityMap, own_attributes, own_mark
+
+Labels = Tuple[str, ...]
+Transitions = Dict[str, Optional[str]]
+Node = TypeVar('Node')
+
+
+class StepLock(Protocol):
+    """The lock that a machine holds while it moves from one state to the next."""
+
+    def acquire(self) -> bool:
+        """Wait for the lock."""
+
+    def release(self) -> None:
+        """Give the lock back."""
+
+    def __enter__(self) -> bool:
+        """Acquire it."""
+
+    def __exit__(
+        self,
+        kind: Optional[Type[BaseException]],
+        err: Optional[BaseException],
+        trace: Optional[TracebackType],
+    ) -> None:
+        """Release it."""
+
+
+class Machine(Protocol):
+    """A `smach.StateMachine` as the executive sees it."""
+
+    userdata: smach.UserData
+    _states: Dict[str, smach.State]
+    _transitions: Dict[str, Transitions]
+    _remappings: Dict[str, Mapping[str, str]]
+    _constants: Dict[str, Mapping[str, Any]]
+    _initial_state_label: Optional[str]
+    _current_label: Optional[str]
+    _current_state: Optional[smach.State]
+    _current_transitions: Optional[Transitions]
+    _is_running: bool
+    _preempt_requested: bool
+    _preempted_label: Optional[str]
+    _preempted_state: Optional[smach.State]
+    _is_preempt_passed_on: bool  # our engine's alone. Upstream's never reads it
+
+    @property
+    def _state_transitioning_lock(self) -> StepLock:
+        """Re-entrant on our engine, plain on upstream's."""
+
+    def get_registered_outcomes(self) -> Tuple[str, ...]:
+        """Return the container outcomes."""
+
+    def is_running(self) -> bool:
+        """Whether it is being executed."""
+
+    def preempt_requested(self) -> bool:
+        """Whether somebody has asked it to stop."""
+
+    def request_preempt(self) -> None:
+        """Ask it to stop."""
+
+    def service_preempt(self) -> None:
+        """Note that the request was obeyed."""
+
+    def call_transition_cbs(self) -> None:
+        """Tell the transition callbacks."""
+
+    def call_termination_cbs(self, terminal_states: List[str], outcome: Any) -> None:
+        """Tell the termination callbacks."""
+
+    def _set_current_state(self, state_label: Optional[str]) -> None:
+        """Make a state the current one. None means none."""
+
+    def _update_once(self) -> Optional[str]:
+        """Execute the current state and go on."""
+
+
+class Marked(Protocol[Node]):
+    """A machine with the mark of an oracle: all of ours that is set on a user's machine."""
+
+    _oracle: Node
+
+
+def marked_node(machine: Marked[Node]) -> Node:
+    """Return the node of a machine that is known to be under an oracle."""
+    return machine._oracle
+
+
+def mark_of(thing: object) -> object:
+    """Return the mark of an object, None where it has none. Its `__getattr__` is not asked."""
+    return own_mark(thing, '_oracle')
+
+
+def set_mark(machine: object, node: object) -> None:
+    """Mark a machine, whatever its class says of `__setattr__`."""
+    own_attributes(machine)['_oracle'] = node
+
+
+def remove_mark(machine: object) -> None:
+    """Take the mark away."""
+    del own_attributes(machine)['_oracle']
+
+
+# -- the states of a container, and what lies between them
+
+
+def states_of(container: Any) -> Dict[str, smach.State]:
+    """Return the states of a StateMachine or a Concurrence by label, in the author's order."""
+    states: Dict[str, smach.State] = container._states
+    return states
+
+
+def transitions_of(machine: Machine) -> Dict[str, Transitions]:
+    """Return where each outcome leads, by the label of the state. None leads nowhere."""
+    return machine._transitions
+
+
+def remapping_of(container: Any, label: str) -> Mapping[str, str]:
+    """Return the container's names of a state's keys.
+
+    It is empty for an unknown label, and on upstream where the author gave None.
+    """
+    return container._remappings.get(label) or {}
+
+
+def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
+    """Return what is written into the userdata before each visit of a state."""
+    return machine._constants.get(label) or {}
+
+
+def initial_label_of(machine: Machine) -> str:
+    """Return the label of the state in which a machine begins, '' while it has none."""
+    return machine._initial_state_label or ''
+
+
+def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
+    """Return the sets of a state's input and output keys themselves.
+
+    A state that registers a key gets new sets.
+    """
+    return state._input_keys, state._output_keys
+
+
+def has_keys(state: smach.State, input_keys: object, output_keys: object) -> bool:
+    """Whether these are the very sets of a state."""
+    return state._input_keys is input_keys and state._output_keys is output_keys
+
+
+def data_of(userdata: smach.UserData) -> Dict[str, Any]:
+    """Return the values of userdata by key, to read and to write."""
+    data: Dict[str, Any] = userdata._data
+    return data
+
+
+def hold_data(userdata: smach.UserData, data: MutableMapping[str, Any]) -> None:
+    """Have userdata keep its values in another mapping."""
+    held: Any = userdata
+    held._data = data
+
+
+def opened_container() -> Optional[smach.Container]:
+    """Return the container of the innermost `with` block."""
+    container: Optional[smach.Container] = smach.StateMachine._currently_opened_container()
+    return container
+
+
+def transition_callbacks(container: Any) -> List[Tuple[Any, Any]]:
+    """Return the transition callbacks of a container, each with its arguments."""
+    callbacks: List[Tuple[Any, Any]] = container._transition_cbs
+    return callbacks
+
+
+# -- a machine that executes. Its thread alone writes
+
+
+def lock_of(machine: Machine) -> StepLock:
+    """Return the lock of a machine, which is free while a state executes."""
+    return machine._state_transitioning_lock
+
+
+def is_executing(machine: Machine) -> bool:
+    """Whether it is being executed, whatever its class says of `is_running`."""
+    return machine._is_running
+
+
+def set_executing(machine: Any, is_running: bool) -> None:
+    """Have the engine go on, or stop, at the next step."""
+    machine._is_running = is_running
+
+
+def current_label_of(machine: Machine) -> str:
+    """Return the label of the current state, '' where none is."""
+    return machine._current_label or ''
+
+
+def current_state_of(machine: Machine) -> Optional[smach.State]:
+    """Return the current state."""
+    return machine._current_state
+
+
+def set_current_label(machine: Machine, label: Optional[str]) -> None:
+    """Make a state the current one, with its transitions. None means none."""
+    machine._set_current_state(label)
+
+
+def set_current_state(machine: Machine, label: str, state: Optional[smach.State]) -> None:
+    """Make a state the current one for preempt requests, and nothing else."""
+    machine._current_label, machine._current_state = label, state
+
+
+def step_once(machine: Machine) -> Optional[str]:
+    """Execute the current state and go on. Return the outcome of the machine at its end.
+
+    The lock is held. See `OracleContainer._update_once`.
+    """
+    return machine._update_once()
+
+
+# -- its preempt
+
+
+def has_preempt_flag(container: Any) -> bool:
+    """Whether it has a request, whatever its class says of `preempt_requested`."""
+    requested: bool = container._preempt_requested
+    return requested
+
+
+def set_preempt_flag(machine: Machine, is_requested: bool) -> None:
+    """Have a request, or none, without passing it on to the current state."""
+    machine._preempt_requested = is_requested
+
+
+def preempted_state_of(machine: Machine) -> Optional[smach.State]:
+    """Return the state to which a request was passed on last, until it was seen to obey."""
+    return machine._preempted_state
+
+
+def set_preempted_state(
+    machine: Machine, state: Optional[smach.State], label: Optional[str]
+) -> None:
+    """Note to which state a request was passed on. None means none."""
+    machine._preempted_state, machine._preempted_label = state, label
+
+
+def note_passed_on(machine: Machine) -> None:
+    """Tell our engine that a request was passed on.
+
+    A thread that has made it, and now waits for the lock, does not pass it on once more.
+    Upstream's engine never reads that.
+    """
+    machine._is_preempt_passed_on = True
+
+
+# -- Concurrences and Iterators
+
+
+def outcome_map_of(concurrence: Any) -> Mapping[str, Mapping[str, str]]:
+    """Return which outcomes of its states a Concurrence maps to which of its own."""
+    outcomes: Mapping[str, Mapping[str, str]] = concurrence._outcome_map
+    return outcomes
+
+
+def final_outcomes_of(iterator: Any) -> Mapping[str, str]:
+    """Return which outcome of the last item an Iterator maps to which of its own."""
+    outcomes: Mapping[str, str] = iterator._final_outcome_map
+    return outcomes
+
+
+def loop_outcomes_of(iterator: Any) -> Collection[str]:
+    """Return the outcomes after which an Iterator goes on. If there are none, all not to break."""
+    outcomes: Collection[str] = iterator._loop_outcomes
+    return outcomes
+
+
+def break_outcomes_of(iterator: Any) -> Collection[str]:
+    """Return the outcomes after which an Iterator ends."""
+    outcomes: Collection[str] = iterator._break_outcomes
+    return outcomes
+
+
+def items_of(iterator: Any) -> Any:
+    """Return what an Iterator was given to iterate over: an iterable, or a function of one."""
+    return iterator._items
+
+
+def iterated_label_of(iterator: Any) -> str:
+    """Return the label of the state that an Iterator executes, '' while it has none."""
+    label: str = iterator._state_label
+    return label
+
+
+def set_items(iterator: Any, items: object, state: Optional[smach.State]) -> None:
+    """Have an Iterator iterate over other items, and execute another state."""
+    iterator._items, iterator._state = items, state
+
+
+def set_states(concurrence: Any, states: Mapping[str, smach.State]) -> None:
+    """Have a Concurrence execute other states."""
+    concurrence._states = states
+
+
+def iterated_state_of(iterator: Any) -> Optional[smach.State]:
+    """Return the state that an Iterator executes."""
+    state: Optional[smach.State] = iterator._state
+    return state
+
+
+# -- of any container, empty where it has none
+
+
+def items_label_of(container: object) -> Optional[str]:
+    """Return the key of an Iterator's userdata that has the item, None for other containers."""
+    label: Optional[str] = own_mark(container, '_items_label')
+    return label
+
+
+def initial_label_in(container: object) -> str:
+    """Return the label of the state in which a container begins."""
+    return str(own_mark(container, '_initial_state_label') or '')
+
+
+def transitions_in(container: object, label: str) -> Transitions:
+    """Return where the outcomes of a state lead."""
+    return (own_mark(container, '_transitions') or {}).get(label) or {}
+
+
+def remapping_in(container: object, label: str) -> Mapping[str, str]:
+    """Return the container's names of a state's keys."""
+    return (own_mark(container, '_remappings') or {}).get(label) or {}
+
+
+_STEP_AS_DRAWN: WeakIdentityMap[type, bool] = WeakIdentityMap()
+
+
+class EngineProbe:
+    """Finds out how the SMACH engine steps, when an execution comes to its first state.
+
+    `lock_is_held`: whether the engine holds the machine's lock around a step. `attentive`: whether
+    a step begins with a closer look at preempt requests and at what an operator wants.
+    `stays_attentive`: whether it does so in any case. `tells_transitions`: whether the machine's
+    class wants every transition told. `has_own_loop`: whether the engine itself calls for the next
+    step, and no class of a user's. `stepped`: whether this execution has come to a state.
+    """
+
+    __slots__ = (
+        'stepped',
+        'lock_is_held',
+        'attentive',
+        'stays_attentive',
+        'tells_transitions',
+        'has_own_loop',
+    )
+
+    def __init__(self) -> None:
+        self.stepped = False
+        self.lock_is_held = False
+        self.attentive = True
+        self.stays_attentive = True
+        self.tells_transitions = True
+        self.has_own_loop = False
+
+    def begin_execution(self) -> None:
+        """Forget what was seen: the next step looks again."""
+        self.stepped = False
+        self.attentive = True
+
+    def look(self, machine: Machine) -> None:
+        """Find out how this engine steps.
+
+        Some engines hold the lock around a step, with a plain lock all do. Others leave it to the
+        step.
+        """
+        self.stepped = True
+        # of a re-entrant lock
+        is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
+        self.lock_is_held = is_owned is None or is_owned()
+        cls = type(machine)
+        self.stays_attentive = cls.preempt_requested is not smach.State.preempt_requested
+        self.attentive = self.stays_attentive
+        self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
+        # nobody but SMACH and this package has a say in how the machine steps
+        step = getattr(machine, '_update_once', None)
+        self.has_own_loop = getattr(step, '__func__', None) is getattr(
+            cls, '_update_once', None
+        ) and _steps_as_drawn(cls)
+
+
+def _steps_as_drawn(cls: type) -> bool:
+    known = _STEP_AS_DRAWN.get(cls)
+    if known is None:
+        known = _STEP_AS_DRAWN[cls] = all(
+            each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+            for each in cls.__mro__
+            if 'execute' in vars(each) or '_update_once' in vars(each)
+        )
+    return known
