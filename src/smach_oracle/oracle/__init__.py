@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .container import OracleContainer
     from .errors import CheckpointError
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
-    from .execution.unwrapping import unwrap
+    from .execution.wrapping import unwrap
     from .machine.oracle import oracle_of
     from .operator_hand import OperatorHand
     from .settings.settings import Settings
@@ -35,7 +35,7 @@ _LAZY = {
     'Question': 'asking.question',
     'OperatorHand': 'operator_hand',
     'register_codec': 'checkpoint.storable',
-    'unwrap': 'execution.unwrapping',
+    'unwrap': 'execution.wrapping',
     'CheckpointError': 'errors',
 }
 __all__ = [

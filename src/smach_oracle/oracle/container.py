@@ -4,16 +4,21 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import smach
 
-from .asking.question import Expert, names
+from .asking.question import Expert
 from .errors import SettingsError
 from .execution.boundary import before_step
 from .execution.step import Step
 from .execution.transitions import end_plainly
 from .execution.trial import ContainerRun
-from .execution.unwrapping import execute_bare
 from .execution.visiting import execute_observed, execute_watched
-from .execution.wrapped_classes import rebuild, renew_attributes, two_classes
-from .execution.wrapping import wrap_machine
+from .execution.wrapping import (
+    execute_bare,
+    rebuild,
+    renew_attributes,
+    sync_oracle,
+    two_classes,
+    wrap_machine,
+)
 from .machine.learned_rates import read_by_hand, write_by_hand
 from .machine.oracle import oracle_of
 from .machine.tree import Tree, new_id
@@ -21,12 +26,11 @@ from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.rate_rows import StateRateRow, TransitionRow
-from .recovery.phases import OracleState
 from .settings.health import HealthFunction
 from .settings.patterns import Nested, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
 from .settings.unfit_names import Strictness
-from .smach_private import Transitions
+from .smach_private import Transitions, data_of, has_keys, marked_node, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -181,7 +185,7 @@ class OracleContainer(smach.StateMachine):
             'autonomy': autonomy,
         }
         given = {key: value for key, value in own.items() if value is not None}
-        machine = smach.StateMachine._currently_opened_container()
+        machine: Any = opened_container()
         if given and not isinstance(machine, OracleContainer):
             raise SettingsError(
                 'add',
@@ -189,11 +193,11 @@ class OracleContainer(smach.StateMachine):
                 'these settings in an OracleContainer, not {!r}'.format(machine),
             )
         if given:
-            machine._oracle.settings.with_states({label: given})
+            marked_node(machine).settings.with_states({label: given})
         more = {} if constants is None else {'constants': constants}
         added: smach.State = smach.StateMachine.add(label, state, transitions, remapping, **more)
         if given:
-            machine._oracle.in_force.given_with_add[label] = given
+            marked_node(machine).in_force.given_with_add[label] = given
         return state if added is None else added
 
     # -- what adapters read. See oracle_of
@@ -248,7 +252,7 @@ class OracleContainer(smach.StateMachine):
 
         :raises SettingsError: where ORACLE's name is another's.
         """
-        self._sync_oracle()
+        sync_oracle(self._oracle)
         children: Dict[str, smach.State] = super().get_children()
         return children
 
@@ -259,7 +263,7 @@ class OracleContainer(smach.StateMachine):
 
         :raises SettingsError: where ORACLE's name is another's.
         """
-        self._sync_oracle()
+        sync_oracle(self._oracle)
         edges = list(super().get_internal_edges())
         if self._oracle.tree.recover:
             meta = self._oracle.settings.oracle_label
@@ -287,50 +291,8 @@ class OracleContainer(smach.StateMachine):
 
         :raises SettingsError: where ORACLE's name is another's.
         """
-        self._sync_oracle()
+        sync_oracle(self._oracle)
         super().check_consistency()
-
-    def _sync_oracle(self) -> None:
-        """Have an ORACLE state that leads to the states and outcomes there are now.
-
-        :raises SettingsError: where its name is another's.
-        """
-        node = self._oracle
-        states = self._states
-        if not node.tree.recover or not states:
-            return
-        label = node.settings.oracle_label
-        meta = states.get(label)
-        outcomes = self.get_registered_outcomes()
-        if isinstance(meta, OracleState) and meta.leads_on(self, label, outcomes):
-            return
-        if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
-            raise SettingsError(
-                'oracle_label',
-                label,
-                'a name that is no state or outcome of {}, which has {}'.format(
-                    node.path, names(set(states).union(outcomes))
-                ),
-            )
-        if meta is None:
-            meta = OracleState()
-            self._remappings[label] = {}
-        if set(self._transitions.get(label, ())) != set(states).union(outcomes).difference(
-            (label,)
-        ):
-            self._transitions[label] = meta.lead_to(
-                tuple(node.labels())
-                + tuple(name for name in sorted(outcomes, key=str) if name not in states)
-            )
-        states[label] = meta
-        meta.note_led(self, label, outcomes)
-
-    def _remove_oracle(self) -> None:
-        label = self._oracle.settings.oracle_label
-        if isinstance(self._states.get(label), OracleState):
-            tables: List[Any] = [self._states, self._transitions, self._remappings]
-            for table in tables:
-                table.pop(label, None)
 
     # -- execution
 
@@ -409,11 +371,10 @@ class OracleContainer(smach.StateMachine):
                 view.state is not state
                 or view.userdata is not userdata
                 or view.remapping is not self._remappings[label]
-                or view.input_keys is not state._input_keys
-                or view.output_keys is not state._output_keys
+                or not has_keys(state, view.input_keys, view.output_keys)
             ):
                 view = record.view = StateView(self, label, state)
-            record.snapshot = userdata._data.copy()
+            record.snapshot = data_of(userdata).copy()
             observed = node.events.observers
             transitions: Transitions = self._current_transitions  # type: ignore[assignment]
             outcome: Any  # a user's state may return anything

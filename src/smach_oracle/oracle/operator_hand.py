@@ -20,6 +20,7 @@ from .machine.tree_node import TreeNode, node_of
 from .places.place import TreePlace
 from .records.events import EventKind
 from .settings.settings import AUTONOMY_LEVELS
+from .smach_private import current_label_of
 
 
 class ActiveState(NamedTuple):
@@ -224,7 +225,7 @@ class OperatorHand:
 
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
         control = self._top.tree.control
-        label = node.machine._current_label
+        label = current_label_of(node.machine)
         is_held = any(hold.may_be_sent and hold.key == node.key for hold in control.holds())
         control.ask_jump(node.key, jump)
         if is_held:
@@ -322,7 +323,7 @@ class OperatorHand:
         at_boundary = {hold.key for hold in held if hold.may_be_sent}
         found = []
         for node in nodes_of(self._top.machine):
-            label = node.machine._current_label
+            label = current_label_of(node.machine)
             if node.machine.is_running() and label is not None and node.key not in at_boundary:
                 found.append(ActiveState(node.path, str(label), '', False))
         return found + [

@@ -13,6 +13,7 @@ from .records.events import FailureKind
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
+from .smach_private import initial_label_of, states_of
 
 Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
 
@@ -94,7 +95,7 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
 
 def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     machine: Any = node.machine
-    initial = machine._initial_state_label or next(iter(node.labels()), '')
+    initial = initial_label_of(machine) or next(iter(node.labels()), '')
     shown = node.site.shown(node)
     return ContainerProspect(
         node.path,
@@ -119,7 +120,7 @@ def _guarded(node: TreeNode) -> Iterator[str]:
 
 
 def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
-    state, settings = node.machine._states[label], node.settings_of(label)
+    state, settings = states_of(node.machine)[label], node.settings_of(label)
     return StateProspect(
         label,
         state,

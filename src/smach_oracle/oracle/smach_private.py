@@ -141,6 +141,12 @@ def transitions_of(machine: Machine) -> Dict[str, Transitions]:
     return machine._transitions
 
 
+def remappings_of(container: Any) -> Dict[str, Mapping[str, str]]:
+    """Return the container's names of its states' keys, by the label of the state."""
+    remappings: Dict[str, Mapping[str, str]] = container._remappings
+    return remappings
+
+
 def remapping_of(container: Any, label: str) -> Mapping[str, str]:
     """Return the container's names of a state's keys.
 

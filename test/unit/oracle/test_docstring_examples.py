@@ -12,7 +12,7 @@ import smach_oracle.oracle
 import smach_oracle.testing
 from smach_oracle.oracle.asking import question
 from smach_oracle.oracle.decision import failure_rate, situation
-from smach_oracle.oracle.execution import unwrapping
+from smach_oracle.oracle.execution import wrapping
 from smach_oracle.oracle.machine import oracle
 from smach_oracle.oracle.records import events
 
@@ -24,7 +24,7 @@ SHOWN = [
     smach_oracle.oracle.Settings,
     smach_oracle.oracle.OperatorHand,
     smach_oracle.oracle.register_codec,
-    unwrapping.unwrap,
+    wrapping.unwrap,
     oracle.Oracle,
     question.Expert,
     events,

@@ -14,6 +14,7 @@ from ..recovery.endings import leaving_outcome
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at
+from ..smach_private import data_of
 from .jump_entry import prepare_entry, start_over
 from .transitions import (
     be_back,
@@ -164,7 +165,7 @@ class Applying:
         """Leave the meta state for a state."""
         node = self._node
         if missing is None:
-            missing = missing_keys(self._machine, target, self._machine.userdata._data)
+            missing = missing_keys(self._machine, target, data_of(self._machine.userdata))
         if self._is_told(target, by):
             data = {'missing_keys': list(missing), 'userdata': userdata, **(across or {})}
             self._tell_jump(target, by, text, data)

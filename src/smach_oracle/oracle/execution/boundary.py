@@ -25,6 +25,18 @@ from ..recovery.operator_wait import clocks_stand_still
 from ..recovery.stop import is_asked_around
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
+from ..smach_private import (
+    current_label_of,
+    current_state_of,
+    initial_label_of,
+    lock_of,
+    marked_node,
+    note_passed_on,
+    preempted_state_of,
+    set_preempt_flag,
+    set_preempted_state,
+    states_of,
+)
 from .jump_entry import keep_start
 from .sending import make_jump
 from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
@@ -66,19 +78,18 @@ def _heed_preempt(node: TreeNode) -> None:
 def _pass_preempt_on(node: TreeNode) -> None:
     machine = node.machine
     node.execution.tell_preempt()
-    last = machine._preempted_state
+    last = preempted_state_of(machine)
     if last is not None and not last.preempt_requested():
-        machine._preempt_requested = False
-        machine._preempted_state = machine._preempted_label = None
+        set_preempt_flag(machine, False)
+        set_preempted_state(machine, None, None)
         node.execution.note_no_preempt()
         return
     if last is not None:
         last.recall_preempt()
-    current = machine._current_state
-    machine._preempted_state = current
-    machine._preempted_label = machine._current_label
+    current = current_state_of(machine)
+    set_preempted_state(machine, current, current_label_of(machine))
     # to our engine: who asked, and now waits for the lock, need not ask again
-    machine._is_preempt_passed_on = True
+    note_passed_on(machine)
     if current is not None:
         current.request_preempt()
 
@@ -86,7 +97,7 @@ def _pass_preempt_on(node: TreeNode) -> None:
 @contextlib.contextmanager
 def _locked(node: TreeNode) -> Iterator[None]:
     """Hold the machine's lock as the engine does around a step."""
-    lock = node.machine._state_transitioning_lock
+    lock = lock_of(node.machine)
     if not node.engine.lock_is_held:
         lock.acquire()
     try:
@@ -112,7 +123,7 @@ def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]
     jump = None if stops else control.take_jump(node.key)
     if jump is not None and make_jump(node, jump):
         return Stop()  # to the next boundary, which is before that state
-    place = HeldPlace(node.path, str(machine._current_label))
+    place = HeldPlace(node.path, current_label_of(machine))
     autonomy = node.record(place.state).settings.autonomy
     level = control.level_of(place, autonomy)
     # what an author does at a preempt waits for no confirmation, and at no breakpoint
@@ -158,7 +169,7 @@ def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
 
 
 def _wait(node: TreeNode, hold: Hold) -> LetGo:
-    lock = node.machine._state_transitioning_lock
+    lock = lock_of(node.machine)
     lock.release()  # who asks for a preempt takes it
     try:
         return wait_until_let_go(
@@ -176,10 +187,10 @@ def _end_preempted(node: TreeNode) -> Optional[Stop]:
     machine, outcome = node.machine, ending_at_once(node)
     if outcome is None:
         return None
-    label = str(machine._current_label)
+    label = current_label_of(machine)
     if machine.preempt_requested():
         node.execution.tell_preempt()
-    for state in (machine._preempted_state, machine._current_state):
+    for state in (preempted_state_of(machine), current_state_of(machine)):
         if state is not None:
             recall_preempts(state)
     machine.service_preempt()
@@ -193,11 +204,11 @@ def _pass_by(node: TreeNode) -> Optional[Stop]:
     of its own is entered, and begins behind its first state.
     """
     machine = node.machine
-    label = str(machine._current_label)
+    label = current_label_of(machine)
     route, down = _behind(node, label)
     if not route.target:
         return None
-    state = machine._states[label]
+    state = states_of(machine)[label]
     node.execution.tell_preempt()
     forget_resumed(node)
     record = node.record(label)
@@ -224,7 +235,7 @@ def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
     inner = _machine_in(node, label)
     if inner is not None:
         led = [place.label for place in node.record(label).way_down if place.node is inner]
-        route, down = _behind(inner, led[0] if led else str(inner.machine._initial_state_label))
+        route, down = _behind(inner, led[0] if led else initial_label_of(inner.machine))
         if route.is_state:
             return Route(label, True), (TreePlace(inner, route.target), *down)
         if route.target:
@@ -234,9 +245,9 @@ def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
 
 def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
     """Return the node of a machine that is a state itself, and begins from its start."""
-    state = node.machine._states[label]
+    state = states_of(node.machine)[label]
     if not isinstance(state, node.tree.container_class):
         return None
-    inner = cast(WrappedMachine, state)._oracle
+    inner = marked_node(cast(WrappedMachine, state))
     goes_on = node.tree.resumed.entry_of(inner) is not None
     return inner if inner.parent is node and not goes_on else None

@@ -21,6 +21,7 @@ from ..records.visits import VisitResult
 from ..recovery.failure import Failure
 from ..recovery.occasions import FromBelow
 from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
+from ..smach_private import current_label_of, current_state_of, marked_node, states_of
 
 
 class Departure:
@@ -90,9 +91,11 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
         _leave_way(nodes[: -len(others)])
         return False
     smach.loginfo(
-        '{}/{} is left for {}'.format(level.path, level.machine._current_label, _in_words(verdict))
+        '{}/{} is left for {}'.format(
+            level.path, current_label_of(level.machine), _in_words(verdict)
+        )
     )
-    _preempt(level.machine._current_state)
+    _preempt(current_state_of(level.machine))
     _leave_way(left)
     return True
 
@@ -154,7 +157,7 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
         for each in nodes[:first]:
             each.execution.depart_by(leaving)
     for each in nodes[1:first]:
-        record = each.records.by_label.get(each.machine._current_label or '')
+        record = each.records.by_label.get(current_label_of(each.machine))
         if record is not None:
             record.retire_edges()  # its visit ends by no plain success
     return others
@@ -196,7 +199,7 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     That failure has had its account: no level above recovers from it, or asks about it again. An
     overrun of the state is a failure of its own.
     """
-    state = node.machine._states[failure.state]
+    state = states_of(node.machine)[failure.state]
     if not isinstance(state, smach.Container):
         return False
     below = (
@@ -205,7 +208,7 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
         else [machine for _, machine in machines_below(state)]
     )
     nodes = [
-        cast(WrappedMachine, machine)._oracle
+        marked_node(cast(WrappedMachine, machine))
         for machine in below
         if isinstance(machine, node.tree.container_class)
     ]

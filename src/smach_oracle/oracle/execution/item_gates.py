@@ -13,7 +13,7 @@ from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
 from ..scope.reason import Reason
 from ..scope.scope import Scope
-from ..smach_private import Labels
+from ..smach_private import Labels, states_of, transition_callbacks
 
 
 class ItemGate:
@@ -68,20 +68,24 @@ def remove_gates(machine: smach.StateMachine) -> None:
 
 def _gates_of(container: Any) -> Iterator[ItemGate]:
     return (
-        callback[0] for callback in container._transition_cbs if isinstance(callback[0], ItemGate)
+        callback[0]
+        for callback in transition_callbacks(container)
+        if isinstance(callback[0], ItemGate)
     )
 
 
 def _remove(container: Any) -> None:
-    container._transition_cbs[:] = [
-        each for each in container._transition_cbs if not isinstance(each[0], ItemGate)
+    transition_callbacks(container)[:] = [
+        each for each in transition_callbacks(container) if not isinstance(each[0], ItemGate)
     ]
 
 
 def _bare_containers(container: Any, below: Labels) -> Iterator[Tuple[Labels, Any]]:
     """Yield the containers within that are no machines, each with the labels that lead to it."""
     children = (
-        container._states if isinstance(container, smach.StateMachine) else container.get_children()
+        states_of(container)
+        if isinstance(container, smach.StateMachine)
+        else container.get_children()
     )
     for label, state in list(children.items()):
         if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):

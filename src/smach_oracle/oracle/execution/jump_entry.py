@@ -13,6 +13,7 @@ from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath, missing_on
+from ..smach_private import data_of, remapping_of
 
 
 class JumpEntry(NamedTuple):
@@ -35,7 +36,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
     missing = missing_for(way, written)
     snapshot = node.record(target).snapshot if node.settings.userdata == 'restore' else None
     if snapshot is not None:
-        restore(node.machine.userdata._data, snapshot, written, node.in_force.deep_copy_keys)
+        restore(data_of(node.machine.userdata), snapshot, written, node.in_force.deep_copy_keys)
     leave_for(node, target, way.down[1:])
     for place in way.down:
         ask_to_go_on(place.node, place.label)
@@ -57,7 +58,7 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     node, label = way.down[-1]
     if not missing or node is not way.meets:  # keys of its own may have the same names
         return missing
-    remapping = node.machine._remappings.get(label) or {}
+    remapping = remapping_of(node.machine, label)
     return tuple(key for key in missing if remapping.get(key, key) not in written)
 
 
@@ -89,6 +90,6 @@ def start_over(node: TreeNode, target: str) -> None:
     for each in nodes_of(node.machine):
         userdata = restarts.userdata_of(each)
         if userdata is not None:
-            restore(each.machine.userdata._data, userdata, (), each.in_force.deep_copy_keys)
+            restore(data_of(each.machine.userdata), userdata, (), each.in_force.deep_copy_keys)
     leave_for(node, target)
     ask_to_go_on(node, target)

@@ -9,6 +9,7 @@ from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath, jump_path_to, repeated_on, why_closed_on
 from ..places.place import TreePlace, place_at
 from ..records.events import EventKind
+from ..smach_private import current_label_of, is_executing
 from .jump_entry import missing_for, prepare_entry
 from .transitions import go_to
 
@@ -27,7 +28,7 @@ def jump_path_for(place: TreePlace) -> JumpPath:
     It is that from its own container where none runs.
     """
     sent: Optional[TreeNode] = place.node
-    while sent is not None and not sent.machine._is_running:
+    while sent is not None and not is_executing(sent.machine):
         sent = sent.parent
     way = jump_path_to(sent, place) if sent is not None else None
     return way or JumpPath((), place.node, (place,))
@@ -63,7 +64,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     To be called at a state boundary, with the machine's lock held where the engine holds it. What
     has come in between may prevent it. A warning tells so.
     """
-    label = str(node.machine._current_label)
+    label = current_label_of(node.machine)
     place = place_at(node, jump.container, jump.state)
     way = jump_path_to(node, place) if place is not None else None
     why_not = _why_not(way, jump)

@@ -12,6 +12,7 @@ from ..settings.on_resume import STATE
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec
 from ..settings.unfit_names import UnfitKind, UnfitName, did_you_mean
+from ..smach_private import states_of
 
 # settings that keep a state from being run where, or for longer than, its author wants
 PROTECTIONS = ('on_retry', 'preconditions', 'time_limit_s')
@@ -154,7 +155,7 @@ def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
         path = node.relative_path
         for label in node.labels():
             if matches(name, '{}/{}'.format(path, label) if path else label):
-                state: Any = node.machine._states[label]
+                state: Any = states_of(node.machine)[label]
                 found.update(state.get_registered_outcomes())
     return {each for each in found if isinstance(each, str)}
 

@@ -43,6 +43,7 @@ from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import EndedByAnswer
 from ..recovery.stop import note_end_under_preempt, winds_down
 from ..recovery.verdict import Preempted, Verdict, arrives_at
+from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
 from .departure import Departure, depart, is_settled, take_departure
 from .transitions import (
@@ -54,6 +55,7 @@ from .transitions import (
     stop_left_behind,
     terminate,
 )
+from .wrapping import sync_oracle
 
 NO_FACTS: Mapping[str, Any] = {}
 
@@ -142,7 +144,7 @@ class Step:
         if departure.arrives_at is not node:
             return self._advance(told, Route(leaving_outcome(node), False), facts=LEFT)
         if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
-            recall_preempts(self._machine._states[record.label])
+            recall_preempts(states_of(self._machine)[record.label])
         failure = Failure(
             record.label,
             FailureKind.TIME_LIMIT,
@@ -164,7 +166,7 @@ class Step:
     def _ended_by_answer(self, taken: EndedByAnswer) -> Occasion:
         """Go as an expert has answered while the state still ran. What it ended with is nothing."""
         record, answer = self._record, taken.answer
-        recall_preempts(self._machine._states[record.label])
+        recall_preempts(states_of(self._machine)[record.label])
         if taken.error is not None:
             self._warn_raised(taken.error, 'preempted')
         outcome = taken.outcome if isinstance(taken.outcome, str) else ''
@@ -181,7 +183,7 @@ class Step:
         """Go on at a state that is not to be repeated: that was no visit, and teaches nothing."""
         node = self._node
         if stopping:
-            recall_preempts(self._machine._states[failure.state])  # it services none
+            recall_preempts(states_of(self._machine)[failure.state])  # it services none
             return self._end_preempted(failure)
         if node.tree.is_resumed:  # nobody has said whether it was done before the program stopped
             before = Unfinished(failure.kind, '', failure.text, failure.text)
@@ -209,7 +211,7 @@ class Step:
         nothing is a failure then.
         """
         scope = self._node.execution.scope
-        lock = self._machine._state_transitioning_lock
+        lock = lock_of(self._machine)
         lock.release()
         try:
             why = self._node.tree.health.unwell_after(scope)
@@ -234,7 +236,7 @@ class Step:
             return self._end(failure, natural_ending(node, failure), UNCOUNTED if why else NO_FACTS)
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
-        state = self._machine._states[record.label]
+        state = states_of(self._machine)[record.label]
         if not why and state.preempt_requested():
             recall_preempts(state)  # it came after the state's end: the meta state services it
         return occasions.unwell(failure, self._context(), why)
@@ -242,7 +244,7 @@ class Step:
     def _failed(self, failure: Failure, why_unwell: str = '') -> Union[Occasion, Stop]:
         """Count the failure and recover from it. `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
-        state = self._machine._states[record.label]
+        state = states_of(self._machine)[record.label]
         if (
             node.tree.recover
             and failure.kind is not FailureKind.TIME_LIMIT
@@ -293,7 +295,7 @@ class Step:
             return self._end(failure, natural_ending(node, failure))
         ending = preempted_ending(node, failure)
         if ending.obeys:
-            obey_preempt(node, self._machine._states[failure.state])
+            obey_preempt(node, states_of(self._machine)[failure.state])
         return self._end(failure, ending)
 
     def _end(
@@ -319,7 +321,7 @@ class Step:
         node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target, **facts)
         message = message_of(label, outcome, route.target) if route.is_state else None
         if learn:
-            drawn = self._machine._transitions[label].get(outcome)
+            drawn = transitions_of(self._machine)[label].get(outcome)
             node.records.add_edge(self._record, outcome, route.target, drawn, message)
         if message is None:
             return Stop(terminate(node, label, outcome, route.target))
@@ -336,10 +338,10 @@ class Step:
         """
         node, machine = self._node, self._machine
         meta = self._enter_oracle(occasion)
-        lock = machine._state_transitioning_lock
+        lock = lock_of(machine)
         try:
             meta.begin(Recovering(node, self._record, occasion))
-            if machine._preempt_requested:
+            if has_preempt_flag(machine):
                 meta.request_preempt()  # it came from a callback on the way here
             lock.release()
             try:
@@ -355,7 +357,7 @@ class Step:
     def _enter_oracle(self, occasion: Occasion) -> OracleState:
         node, record, meta_label = self._node, self._record, self._node.settings.oracle_label
         occasions.log_occasion(occasion, '{}/{}'.format(node.path, record.label))
-        self._machine._sync_oracle()
+        sync_oracle(node)
         if occasion.is_told:
             record.left_by(occasion.what, meta_label)
             save_rates(node)
@@ -366,8 +368,8 @@ class Step:
                 target=meta_label,
                 **(NO_FACTS if occasion.below is None else LEFT),
             )
-        # _sync_oracle refuses any other state of this name
-        meta = cast(OracleState, self._machine._states[meta_label])
+        # sync_oracle refuses any other state of this name
+        meta = cast(OracleState, states_of(self._machine)[meta_label])
         go_to(node, message_of(record.label, occasion.what, meta_label), meta_label)
         return meta
 

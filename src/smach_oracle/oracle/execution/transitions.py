@@ -10,6 +10,18 @@ from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..recovery.stop import note_obeyed
 from ..settings.failing_outcomes import PREEMPTED
+from ..smach_private import (
+    current_label_of,
+    current_state_of,
+    has_preempt_flag,
+    preempted_state_of,
+    set_current_label,
+    set_executing,
+    set_preempt_flag,
+    set_preempted_state,
+    states_of,
+    transitions_of,
+)
 
 
 class Stop(NamedTuple):
@@ -21,15 +33,15 @@ class Stop(NamedTuple):
 def go_to(node: TreeNode, message: str, target: str) -> None:
     """Make `target` the current state, log the transition, tell the callbacks."""
     machine = node.machine
-    machine._set_current_state(target)
+    set_current_label(machine, target)
     smach.loginfo(message)
     machine.call_transition_cbs()
 
 
 def be_back(node: TreeNode, label: str) -> None:
     """Have a state as the current one again, as without an oracle, if it is there still."""
-    if label in node.machine._states:
-        node.machine._set_current_state(label)
+    if label in states_of(node.machine):
+        set_current_label(node.machine, label)
 
 
 def message_of(source: str, outcome: str, target: str) -> str:
@@ -45,32 +57,32 @@ def obey_preempt(node: TreeNode, state: smach.State, cleans_within: bool = False
     """
     recall_preempts(state)
     machine = node.machine
-    machine._preempt_requested = True
-    note_obeyed(node, str(machine._current_label), cleans_within)
+    set_preempt_flag(machine, True)
+    note_obeyed(node, current_label_of(machine), cleans_within)
     node.records.note_drawn()
-    machine._preempted_state, machine._preempted_label = state, machine._current_label
+    set_preempted_state(machine, state, current_label_of(machine))
 
 
 def stop_left_behind(node: TreeNode) -> Stop:
     """End the execution without an outcome. Nobody waits for one."""
     log = smach.logwarn if node.tree.early_end.why is None else smach.loginfo
     log('{}: stops, as {}'.format(node.path, node.why_left_behind()))
-    node.machine._is_running = False
+    set_executing(node.machine, False)
     return Stop()
 
 
 def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
     """End the container. A preempt that its last state has serviced is serviced."""
     machine = node.machine
-    last = machine._current_state
+    last = current_state_of(machine)
     if (
-        machine._preempt_requested
+        has_preempt_flag(machine)
         and last is not None
         and not last.preempt_requested()
-        and (machine._preempted_state is not None or container_outcome == PREEMPTED)
+        and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
     ):
         machine.service_preempt()
-    machine._set_current_state(None)
+    set_current_label(machine, None)
     node.site.tell_end(label, outcome, container_outcome)
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome
@@ -86,15 +98,15 @@ def end_plainly(
     machine, label = node.machine, record.label
     try:
         edge = record.fast[outcome]
-        drawn = machine._transitions[label][outcome]
+        drawn = transitions_of(machine)[label][outcome]
     except (KeyError, TypeError):  # seen for the first time, or no outcome at all
         return None
     if (
         error is not None
         or edge.message
         or drawn is not edge.drawn
-        or edge.leads_to in machine._states
-        or machine._preempt_requested
+        or edge.leads_to in states_of(machine)
+        or has_preempt_flag(machine)
         or node.ends_specially()
     ):
         return None

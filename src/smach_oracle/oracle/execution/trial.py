@@ -23,6 +23,7 @@ from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.endings import outcome_of_early_end
+from ..smach_private import initial_label_of, marked_node, states_of
 from .jump_entry import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
@@ -40,7 +41,7 @@ class ContainerRun:
 
     def __init__(self, machine: WrappedMachine) -> None:
         self._machine = machine
-        self._node = machine._oracle
+        self._node = marked_node(machine)
         self._execution = Execution(self._node)
         self._is_executed = self._is_trial = False
         self._store: Optional[TrialStore] = None
@@ -94,7 +95,7 @@ class ContainerRun:
             node.emit(
                 EventKind.TRIAL_START,
                 data={
-                    'initial': [node.machine._initial_state_label or ''],
+                    'initial': [initial_label_of(node.machine)],
                     'recovers': node.tree.recover,
                     'settings': _settings(node),
                 },
@@ -135,7 +136,7 @@ def _end_trial(
     why = _trial_end(node, outcome, error)
     if why is TrialEnd.KEPT:
         node.machine.service_preempt()
-        for state in node.machine._states.values():
+        for state in states_of(node.machine).values():
             recall_preempts(state)
     node.emit(
         EventKind.TRIAL_END,

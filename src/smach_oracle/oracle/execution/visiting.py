@@ -12,6 +12,7 @@ from ..records.events import EventKind
 from ..records.state_record import StateRecord
 from ..recovery.failure import HeldBack, Overrun
 from ..recovery.still_running import EndedByAnswer, WatchedVisit
+from ..smach_private import has_preempt_flag
 
 STATE_START = EventKind.STATE_START  # looked up once
 
@@ -31,7 +32,7 @@ def execute_observed(
         return state.execute(userdata)
     finally:
         took_s = monotonic() - begun_s
-        if took_s > (record.longest_s or 0.0) and not node.machine._preempt_requested:
+        if took_s > (record.longest_s or 0.0) and not has_preempt_flag(node.machine):
             record.longest_s = took_s
 
 
@@ -76,7 +77,7 @@ def execute_watched(
         finally:
             took_s = monotonic() - begun_s
             if took_s > (record.longest_s or 0.0) and not (
-                isinstance(outcome, (Overrun, EndedByAnswer)) or node.machine._preempt_requested
+                isinstance(outcome, (Overrun, EndedByAnswer)) or has_preempt_flag(node.machine)
             ):
                 record.longest_s = took_s
     finally:

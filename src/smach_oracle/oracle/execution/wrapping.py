@@ -1,24 +1,114 @@
-"""Whole trees: puts a machine, and the machines nested in it, under one oracle each."""
+"""Puts a machine, and the machines nested in it, under one oracle each, and takes them out again.
 
-from typing import cast
+A wrapped machine has a class made of OracleContainer and of its own class.
+"""
+
+from typing import Any, Dict, List, Optional, Tuple, cast
 
 import smach
 
-from ..branches.adopting import adopt_branches
-from ..errors import SettingsError
-from ..identity import own_attributes
+from ..asking.question import names
+from ..branches.adopting import adopt_branches, release_branches
+from ..errors import SettingsError, TrialError
+from ..identity import own_attributes, set_class
 from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.tree import Tree
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, WrappedMachine, node_of
+from ..recovery.phases import OracleState
 from ..settings.patterns import Nested
 from ..settings.settings import Settings
 from ..settings.unfit_names import Strictness
-from ..smach_private import Labels
-from .item_gates import place_gates
+from ..smach_private import (
+    Labels,
+    marked_node,
+    remappings_of,
+    remove_mark,
+    set_mark,
+    states_of,
+    transitions_of,
+)
+from .item_gates import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
-from .unwrapping import strip_alone
-from .wrapped_classes import change_class, two_classes
+
+_MADE: Dict[Tuple[int, int], type] = {}  # by ids of both classes, which it keeps
+# static in StateMachine, so that the order of bases alone does not find the user's
+_STATIC = ('add', 'add_auto')
+
+
+def wrapped_class(oracle_class: type, base: type) -> type:
+    """Return the class of machines of class `base` under `oracle_class`, the same one each time."""
+    key = id(oracle_class), id(base)
+    made = _MADE.get(key)
+    if made is None:
+        namespace: Dict[str, object] = {
+            '__module__': base.__module__,
+            '__qualname__': base.__qualname__,
+            '__doc__': base.__doc__,
+            '_wrapped_of': (oracle_class, base),
+        }
+        for name in _STATIC + _new_names(oracle_class):
+            own = _static(base, name)
+            if own is not _static(smach.StateMachine, name):
+                namespace[name] = own
+        metaclass: Any = type(base)
+        made = metaclass(base.__name__, (oracle_class, base), namespace)
+        made = _MADE.setdefault(key, made)
+    return made
+
+
+def _new_names(oracle_class: type) -> Tuple[str, ...]:
+    """Return the public names that no StateMachine has: a user's class that uses one keeps it."""
+    return tuple(
+        name
+        for name in dir(oracle_class)
+        if not name.startswith('_') and not hasattr(smach.StateMachine, name)
+    )
+
+
+def _static(cls: type, name: str) -> object:
+    for each in cls.__mro__:
+        if name in each.__dict__:
+            return each.__dict__[name]
+    return None
+
+
+def two_classes(cls: type) -> Optional[Tuple[type, type]]:
+    """Return what a class made by wrapping is made of, None for other classes."""
+    made_of: Optional[Tuple[type, type]] = cls.__dict__.get('_wrapped_of')
+    return made_of
+
+
+def rebuild(oracle_class: type, base: type) -> object:
+    """Return a new, empty object of a wrapped class: for unpickling and copying."""
+    cls: Any = wrapped_class(oracle_class, base)
+    return cls.__new__(cls)
+
+
+def change_class(machine: smach.StateMachine, oracle_class: type) -> None:
+    """Make a machine one of `oracle_class` and of its own class.
+
+    :raises SettingsError: where its class cannot be extended.
+    """
+    try:
+        set_class(machine, wrapped_class(oracle_class, type(machine)))
+    except TypeError as err:
+        raise SettingsError(
+            'machine', machine, 'a machine whose class can be extended ({})'.format(err)
+        ) from err
+    renew_attributes(machine)
+
+
+def renew_attributes(machine: object) -> None:
+    """Give an object a fresh dictionary of its attributes.
+
+    CPython reads from it much faster than from one that was looked at, or whose object has changed
+    its class.
+    """
+    object.__setattr__(machine, '__dict__', dict(own_attributes(machine)))
+
+
+# -- wrapping
 
 
 def wrap_machine(
@@ -55,14 +145,14 @@ def _put_under(
 ) -> WrappedMachine:
     change_class(machine, oracle_class)
     wrapped = cast(WrappedMachine, machine)
-    node = own_attributes(machine)['_oracle'] = TreeNode(wrapped, tree, settings, name)
-    return node.machine
+    set_mark(machine, TreeNode(wrapped, tree, settings, name))
+    return wrapped
 
 
 def _put_in_order(
     machine: WrappedMachine, settings: Settings, nested: Nested, strict: Strictness
 ) -> None:
-    top = machine._oracle
+    top = marked_node(machine)
     top.in_force.wrap_with(strict, nested)
     adopt(machine)
     _configure(machine, settings)
@@ -77,9 +167,9 @@ def bring_up_to_date(node: TreeNode) -> None:
 
     :raises SettingsError: where the settings do not fit them.
     """
-    node.machine._sync_oracle()
+    sync_oracle(node)
     place_gates(node)
-    states = len(node.machine._states)
+    states = len(states_of(node.machine))
     if node.in_force.is_unchecked(states):
         if node.parent is None:
             check_names(node)
@@ -103,11 +193,11 @@ def _wrap_again(
     name: str,
     strict: Strictness,
 ) -> WrappedMachine:
-    top = machine._oracle
+    top = marked_node(machine)
     before = top.settings
     try:
         for container in containers_in(machine):
-            container._remove_oracle()
+            remove_oracle(marked_node(container))
         top.tree.recover = tree.recover
         top.take_name(name)
         if tree.expert is not None:
@@ -128,7 +218,9 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
         return
     for container in containers_in(cast(WrappedMachine, machine)):
         made_of = two_classes(type(container))
-        if made_of is not None and (container is machine or container._oracle.in_force.inherits):
+        if made_of is not None and (
+            container is machine or marked_node(container).in_force.inherits
+        ):
             strip_alone(container)
 
 
@@ -137,7 +229,7 @@ def adopt(machine: WrappedMachine) -> None:
 
     :raises SettingsError: for a machine whose class cannot be extended.
     """
-    parent = machine._oracle
+    parent = marked_node(machine)
     adopt_branches(parent, _put_below)
     for below, child in machines_below(machine):
         if isinstance(child, parent.tree.container_class):
@@ -146,7 +238,7 @@ def adopt(machine: WrappedMachine) -> None:
             container = _put_below(child, parent)
         else:
             continue
-        node = container._oracle
+        node = marked_node(container)
         if container is not machine and (node.parent is None or node.tree is not parent.tree):
             _move_below(node, parent, below)
         node.in_force.wrap_with(nested=parent.in_force.nested)
@@ -155,7 +247,7 @@ def adopt(machine: WrappedMachine) -> None:
 
 def _put_below(child: smach.StateMachine, parent: TreeNode) -> WrappedMachine:
     container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
-    container._oracle.in_force.wrap_with(parent.in_force.strict, inherits=True)
+    marked_node(container).in_force.wrap_with(parent.in_force.strict, inherits=True)
     return container
 
 
@@ -164,9 +256,156 @@ def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
 
     It may have been on its own, or below another machine, before.
     """
-    node.machine._remove_oracle()  # it may go by another name here, or not be wanted
+    remove_oracle(node)  # it may go by another name here, or not be wanted
     node.lie_below(parent, below)
     node.join(parent.tree)
     if node.in_force.inherits:
         node.in_force.wrap_with(parent.in_force.strict)
     node.configure(parent.settings if node.in_force.inherits else node.settings)
+
+
+# -- the meta state
+
+
+def sync_oracle(node: TreeNode) -> None:
+    """Have an ORACLE state that leads to the states and outcomes there are now.
+
+    :raises SettingsError: where its name is another's.
+    """
+    machine = node.machine
+    states = states_of(machine)
+    if not node.tree.recover or not states:
+        return
+    label = node.settings.oracle_label
+    meta = states.get(label)
+    outcomes = machine.get_registered_outcomes()
+    if isinstance(meta, OracleState) and meta.leads_on(machine, label, outcomes):
+        return
+    if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
+        raise SettingsError(
+            'oracle_label',
+            label,
+            'a name that is no state or outcome of {}, which has {}'.format(
+                node.path, names(set(states).union(outcomes))
+            ),
+        )
+    if meta is None:
+        meta = OracleState()
+        remappings_of(machine)[label] = {}
+    transitions = transitions_of(machine)
+    if set(transitions.get(label, ())) != set(states).union(outcomes).difference((label,)):
+        transitions[label] = meta.lead_to(
+            tuple(node.labels())
+            + tuple(name for name in sorted(outcomes, key=str) if name not in states)
+        )
+    states[label] = meta
+    meta.note_led(machine, label, outcomes)
+
+
+def remove_oracle(node: TreeNode) -> None:
+    """Take the ORACLE state out."""
+    machine, label = node.machine, node.settings.oracle_label
+    if isinstance(states_of(machine).get(label), OracleState):
+        tables: List[Any] = [states_of(machine), transitions_of(machine), remappings_of(machine)]
+        for table in tables:
+            table.pop(label, None)
+
+
+# -- unwrapping
+
+
+def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
+    """Undo `OracleContainer.wrap` of a machine and of those wrapped with it.
+
+    It stays the same object. Its learned rates are lost. A nested machine that was wrapped
+    separately stays wrapped.
+
+    >>> import smach
+    >>> from smach_oracle.oracle import OracleContainer, unwrap
+    >>> sm = smach.StateMachine(['succeeded', 'aborted'])
+    >>> with sm:
+    ...     _ = smach.StateMachine.add(
+    ...         'PICK', smach.CBState(lambda userdata: 'aborted', outcomes=['succeeded', 'aborted'])
+    ...     )
+    >>> unwrap(OracleContainer.wrap(sm)) is sm
+    True
+    >>> sm.execute()  # nothing recovers from the failure
+    'aborted'
+
+    :raises TrialError: for a machine that was not wrapped, that runs, or that was wrapped together
+        with a machine around it.
+    """
+    node = node_of(machine)
+    if node is None or two_classes(type(machine)) is None:
+        raise TrialError('{!r} was not wrapped: there is nothing to undo'.format(machine))
+    if machine.is_running():
+        raise TrialError('{} runs; it can be unwrapped when it has ended'.format(node.path))
+    if node.in_force.inherits:
+        raise TrialError('{} was wrapped with {}; unwrap that'.format(node.path, node.top().path))
+    _strip(cast(WrappedMachine, machine))
+    return machine
+
+
+def _strip(machine: WrappedMachine) -> None:
+    container_class = marked_node(machine).tree.container_class
+    for _, child in list(machines_below(machine)):
+        if not isinstance(child, container_class):
+            continue
+        wrapped = cast(WrappedMachine, child)
+        if marked_node(wrapped).in_force.inherits:
+            _strip(wrapped)
+        else:
+            _stand_alone(wrapped)
+    strip_alone(machine)
+
+
+def strip_alone(machine: WrappedMachine) -> None:
+    """Give a machine back as it was before it was wrapped, but not those that are nested in it."""
+    release_branches(machine)
+    remove_oracle(marked_node(machine))
+    remove_gates(cast(smach.StateMachine, machine))
+    made_of = two_classes(type(machine))
+    if made_of is not None:
+        set_class(machine, made_of[1])
+        remove_mark(machine)
+
+
+def _stand_alone(machine: WrappedMachine) -> None:
+    """Make a machine the top of a tree of its own, as before the machine around it was wrapped."""
+    node = marked_node(machine)
+    tree = Tree(node.tree.container_class, node.tree.recover, node.tree.expert)
+    for each in nodes_of(machine):
+        each.join(tree)
+    node.lie_below(None, ())
+
+
+def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -> Optional[str]:
+    """Execute a machine in a child process of its program, as its author wrote it.
+
+    All that is kept of the machine belongs to the program, and its threads are not in the child.
+    """
+    wrapped = cast(WrappedMachine, machine)
+    smach.logwarn(
+        '{}: runs in a child process of the program, and without an oracle there'.format(
+            marked_node(wrapped).path
+        )
+    )
+    _make_bare(wrapped)
+    outcome: Optional[str] = machine.execute(*args, **kwargs)
+    return outcome
+
+
+def _make_bare(machine: WrappedMachine) -> None:
+    """Take a machine, and those nested in it, out of the oracle.
+
+    One that was built as an OracleContainer gets an oracle that only observes.
+    """
+    tree, name = marked_node(machine).tree, marked_node(machine).name
+    for _, child in list(machines_below(machine)):
+        if isinstance(child, tree.container_class):
+            _make_bare(cast(WrappedMachine, child))
+    strip_alone(machine)
+    if isinstance(machine, tree.container_class):
+        machine._oracle = TreeNode(
+            machine, Tree(tree.container_class, recover=False), Settings(), name
+        )

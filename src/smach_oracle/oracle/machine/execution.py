@@ -8,6 +8,7 @@ from smach_oracle.foreign import error_text
 from ..records.events import NO_OUTCOME, EventKind
 from ..scope.reason import Reason
 from ..scope.scope import Scope
+from ..smach_private import current_label_of, initial_label_of, set_executing, states_of
 from .limited_run import LimitedRun, runs_of_thread
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ class Execution:
         entry = node.tree.resumed.entry_of(node)
         begins_in = self.starts_in if entry is None else entry.label
         if node.events.observers:
-            state = begins_in or node.machine._initial_state_label or ''
+            state = begins_in or initial_label_of(node.machine)
             node.emit(EventKind.CONTAINER_START, state=state)
 
     def end(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
@@ -116,7 +117,7 @@ class Execution:
         node = self._node
         if error is not None:
             # also after what no engine cleans up after, such as Ctrl-C
-            node.machine._is_running = False
+            set_executing(node.machine, False)
             if ends_program(error):
                 node.tree.early_end.of_program = error
         dropped = node.tree.control.leave(node.engine, lambda: node.key)
@@ -166,7 +167,7 @@ class Execution:
         """Emit PREEMPT, once for each request."""
         if not self._is_preempt_told:
             self._is_preempt_told = True
-            self._node.emit(EventKind.PREEMPT, state=self._node.machine._current_label or '')
+            self._node.emit(EventKind.PREEMPT, state=current_label_of(self._node.machine))
 
     def note_no_preempt(self) -> None:
         """Note that a request was serviced: the next one is another."""
@@ -184,7 +185,7 @@ def runs_around(node: 'TreeNode') -> Tuple[LimitedRun, ...]:
     """
     runs, under_way = runs_of_thread(), node.tree.workers.under_way
     while under_way and node.parent is not None:
-        run = under_way.get(id(node.parent.machine._states.get(node.below[0])))
+        run = under_way.get(id(states_of(node.parent.machine).get(node.below[0])))
         if run is not None and run not in runs:
             runs += (run,)
         node = node.parent

@@ -101,7 +101,7 @@ class Tree:
         # states that are executed as preconditions now, each with its container
         self._preconditions: List[Tuple[object, smach.State]] = []
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
-        self._process = os.getpid()
+        self.process = os.getpid()
         self._be_at_rest(health)
 
     def _be_at_rest(self, health: Optional[HealthFunction] = None) -> None:
@@ -122,12 +122,12 @@ class Tree:
     @property
     def is_parents(self) -> bool:
         """Whether this is a child process of the program to which the tree belongs."""
-        return self._process != os.getpid() and is_child()
+        return self.process != os.getpid() and is_child()
 
     def silent_twin(self) -> 'Tree':
         """Return a tree for the same machines in a child process, with nothing of this one."""
         twin = Tree(self.container_class, recover=False)
-        twin.trial_id, twin._process = self.trial_id, self._process
+        twin.trial_id, twin.process = self.trial_id, self.process
         return twin
 
     def begin_trial(self, trial_id: str) -> None:

@@ -5,12 +5,11 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 
 import smach
 
-from ..identity import own_mark
 from ..records.events import EventKind
 from ..records.state_record import RateReading, StateRecord
 from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import EngineProbe, Labels, Machine
+from ..smach_private import EngineProbe, Labels, Machine, data_of, is_executing, mark_of, states_of
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .execution import Execution
@@ -26,18 +25,6 @@ class WrappedMachine(Machine, Protocol):
 
     _oracle: 'TreeNode'
 
-    def _sync_oracle(self) -> None:
-        """Have an ORACLE state that leads to the states and outcomes there are now."""
-
-    def _remove_oracle(self) -> None:
-        """Take the ORACLE state out."""
-
-    def request_preempt(self) -> None:
-        """Ask it to stop."""
-
-    def _update_once(self) -> Optional[str]:
-        """Execute the current state and go on. Return the container's outcome, None before it."""
-
     def _state_ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
         """Go on behind the current state, which was executed. See `_update_once`."""
 
@@ -50,7 +37,7 @@ class WrappedMachine(Machine, Protocol):
 
 def node_of(machine: object) -> Optional['TreeNode']:
     """Return the node of a wrapped machine, None for anything else."""
-    node = own_mark(machine, '_oracle')
+    node = mark_of(machine)
     return node if isinstance(node, TreeNode) else None
 
 
@@ -147,7 +134,7 @@ class TreeNode:
         """Whether a wrapped container above this one is being executed."""
         above = self.parent
         while above is not None:
-            if above.machine._is_running:
+            if is_executing(above.machine):
                 return True
             above = above.parent
         return False
@@ -156,7 +143,7 @@ class TreeNode:
         """Yield the wrapped containers above this one that are being executed."""
         above = self.parent
         while above is not None:
-            if above.machine._is_running:
+            if is_executing(above.machine):
                 yield above
             above = above.parent
 
@@ -242,11 +229,11 @@ class TreeNode:
 
     def labels(self) -> Iterator[str]:
         """Yield the labels of the container's states, the meta state not among them."""
-        return (label for label in list(self.machine._states) if not self.is_oracle(label))
+        return (label for label in list(states_of(self.machine)) if not self.is_oracle(label))
 
     def has(self, label: str) -> bool:
         """Whether the container has a state of that label, the meta state not among them."""
-        return label in self.machine._states and not self.is_oracle(label)
+        return label in states_of(self.machine) and not self.is_oracle(label)
 
     def record(self, label: str) -> StateRecord:
         """Return the record of a state, made when it is first needed.
@@ -255,7 +242,7 @@ class TreeNode:
         """
         record = self.records.by_label.get(label)
         if record is None:
-            if label not in self.machine._states:
+            if label not in states_of(self.machine):
                 raise smach.InvalidStateError('{!r} is no state of {}'.format(label, self.path))
             if self.is_oracle(label):
                 raise entered_by_failures_alone(label)
@@ -339,7 +326,7 @@ class TreeNode:
     def snapshot(self) -> Dict[str, object]:
         """Return the userdata as it is now."""
         return take_snapshot(
-            self.machine.userdata._data, self.in_force.deep_copy_keys, self.warn_not_copied
+            data_of(self.machine.userdata), self.in_force.deep_copy_keys, self.warn_not_copied
         )
 
     # -- learned rates, for a rates file (rates_file.Learner)

@@ -4,9 +4,9 @@ from typing import Any, Iterator, Mapping, NamedTuple, Sequence, Set, Tuple
 
 import smach
 
-from ..identity import own_mark
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of
+from ..smach_private import data_of, remapping_in, states_of
 
 
 class Link(NamedTuple):
@@ -19,8 +19,7 @@ class Link(NamedTuple):
     @property
     def remapping(self) -> Mapping[str, str]:
         """Key of the container above by key of the one below, where they differ."""
-        remappings = own_mark(self.above, '_remappings') or {}
-        return remappings.get(self.label) or {}
+        return remapping_in(self.above, self.label)
 
 
 def links_to(node: TreeNode) -> Iterator[Link]:
@@ -38,13 +37,13 @@ def links_to(node: TreeNode) -> Iterator[Link]:
 def child_of(container: Any, label: str) -> Any:
     """Return a state of a container of whatever kind."""
     if isinstance(container, smach.StateMachine):
-        return container._states[label]
+        return states_of(container)[label]
     return container.get_children()[label]
 
 
 def hand_down(link: Link) -> None:
     """Give a container its input keys, as when it begins."""
-    given = {**link.above.userdata._data, **_constants(link)}
+    given = {**data_of(link.above.userdata), **_constants(link)}
     for key, named in _inputs(link):
         if named in given:
             link.below.userdata[key] = given[named]
@@ -58,9 +57,9 @@ def hand_up(link: Link, written: Set[str], into: Any) -> Set[str]:
     """
     found = set()
     for key in link.below.get_registered_output_keys():
-        if key in written and key in link.below.userdata._data:
+        if key in written and key in data_of(link.below.userdata):
             named = link.remapping.get(key, key)
-            into[named] = link.below.userdata._data[key]
+            into[named] = data_of(link.below.userdata)[key]
             found.add(named)
     return found
 
@@ -73,8 +72,8 @@ def hand_on(link: Link, written: Set[str], into: Any) -> Set[str]:
     """
     found = set()
     for key, named in _inputs(link):
-        if named in written and named in link.above.userdata._data:
-            into[key] = link.above.userdata._data[named]
+        if named in written and named in data_of(link.above.userdata):
+            into[key] = data_of(link.above.userdata)[named]
             found.add(key)
     return found
 

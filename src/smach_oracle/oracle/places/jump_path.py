@@ -2,11 +2,11 @@
 
 from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-from ..identity import own_mark
 from ..machine.repeats import repeated_by_going_to, why_closed
 from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import keys_after_jump, missing_keys
+from ..smach_private import data_of, items_label_of, states_of
 from .handing_over import links_to
 from .levels import levels_above
 from .place import TreePlace
@@ -88,7 +88,7 @@ def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
     :param written: keys of the container `meets` that survive a restore.
     """
     node, label = way.down[-1]
-    if not node.machine._states[label].get_registered_input_keys():
+    if not states_of(node.machine)[label].get_registered_input_keys():
         return ()
     keys = set(keys_after_jump(way.meets, way.first, tuple(written)))
     for below in way.down[1:]:
@@ -100,10 +100,10 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
     """Return the userdata keys of a container when it begins, from those of the one above it."""
     for link in links_to(below):
         child = link.below
-        keys = set(child.userdata._data).union(
+        keys = set(data_of(child.userdata)).union(
             key for key in child.get_registered_input_keys() if link.remapping.get(key, key) in keys
         )
-        item = own_mark(child, '_items_label')
+        item = items_label_of(child)
         if item is not None:  # an Iterator: its state works on its own userdata
             keys.add(item)
     return keys

@@ -10,6 +10,7 @@ from ..decision.policy import FailureContext
 from ..machine.nesting import nodes_of
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
+from ..smach_private import current_state_of, initial_label_of, is_executing, states_of
 
 
 def levels_above(node: TreeNode) -> Iterator[TreeNode]:
@@ -23,8 +24,8 @@ def levels_above(node: TreeNode) -> Iterator[TreeNode]:
 def _executes(above: TreeNode, child: TreeNode) -> bool:
     """Whether a container is now in the state that holds the one below it."""
     machine = above.machine
-    state = machine._states.get(child.below[0])
-    return machine._is_running and state is not None and machine._current_state is state
+    state = states_of(machine).get(child.below[0])
+    return is_executing(machine) and state is not None and current_state_of(machine) is state
 
 
 def is_direct(node: TreeNode) -> bool:
@@ -47,7 +48,7 @@ def failure_context(node: TreeNode, record: StateRecord) -> FailureContext:
     With `step_back_across` its initial state is that before the container, in the levels above,
     where there is one.
     """
-    context = node.records.failure_context(record, node.machine._initial_state_label or '')
+    context = node.records.failure_context(record, initial_label_of(node.machine))
     before = _state_before(node) if node.settings.step_back_across else ''
     return context._replace(initial=before) if before else context
 

@@ -7,6 +7,7 @@ from typing import Any, Dict, List, Optional, Tuple
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.execution.wrapping import sync_oracle
 from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.phases import OracleState
@@ -116,7 +117,7 @@ class _InTurn(OracleState):
         machine._states[label] = cls(world, node)
         machine._remappings[label] = {}
         machine._transitions.pop(label, None)
-        machine._sync_oracle()
+        sync_oracle(node)
 
     def execute(self, ud: Any) -> str:
         """Recover, as its class does."""
