@@ -391,6 +391,10 @@ class EngineProbe:
         self.tells_transitions = True
         self.has_own_loop = False
 
+    def ring(self) -> None:
+        """Look closely from now on: a state around the machine was abandoned."""
+        self.attentive = True
+
     def begin_execution(self) -> None:
         """Forget what was seen: the next step looks again."""
         self.stepped = False

@@ -11,6 +11,7 @@ from typing import Callable, List, TypeVar
 import rospy
 
 from smach_oracle.oracle.scope.background_call import BackgroundCall
+from smach_oracle.oracle.scope.scope import Scope
 
 _LOOK_S = 0.1
 SHUTDOWN_WAIT_S = 2.0  # for a call that had begun before the shutdown was requested
@@ -33,7 +34,7 @@ def outside_main_thread(function: Callable[[], Result]) -> Result:
     call = BackgroundCall(lambda: results.append(function()), 'calls the master')
     call.start()
     looks_left = SHUTDOWN_WAIT_S / _LOOK_S
-    while not call.done.wait(_LOOK_S):
+    while not Scope().wait(_LOOK_S, call.done):
         looks_left -= rospy.core.is_shutdown_requested()
         if looks_left <= 0:
             raise rospy.ROSInterruptException('the node shuts down; the master has not answered')

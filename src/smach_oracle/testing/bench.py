@@ -15,6 +15,7 @@ from smach_oracle.oracle.errors import TrialError
 from smach_oracle.oracle.identity import remove_identical
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.scope.background_call import BackgroundCall
+from smach_oracle.oracle.scope.scope import Scope
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 from smach_oracle.oracle.settings.settings import (
@@ -217,7 +218,7 @@ class Bench:
         injection.put_in()
         try:
             call.start()
-            if call.done.wait(self._limit_s):
+            if Scope().wait(self._limit_s, call.done):
                 return True
             self._stop(call, injection)
             return False
@@ -231,7 +232,7 @@ class Bench:
         """Preempt the machine, let go of what hangs, and wait a little for the end."""
         self.machine.request_preempt()
         injection.take_out()
-        if not call.done.wait(_GRACE_S):
+        if not Scope().wait(_GRACE_S, call.done):
             call.leave()
 
 

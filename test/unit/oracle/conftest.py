@@ -9,9 +9,10 @@ import pytest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+from fake_clock import FakeClock
+
 import smach
 from smach_oracle.oracle.machine import tree
-from smach_oracle.oracle.scope.clock import FakeClock
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +33,7 @@ def log(monkeypatch):
 def clock(monkeypatch):
     """The clock of every machine that the test wraps: only the test has its time pass."""
     clock = FakeClock()
-    monkeypatch.setattr(tree, 'MonotonicClock', lambda: clock)
+    monkeypatch.setattr(tree, 'Clock', lambda: clock)
     return clock
 
 

@@ -1,6 +1,7 @@
 """The autonomy of states: run, announce, confirm; by settings and at run time."""
 
 import pytest
+from fake_clock import FakeClock
 from held_machines import Gate, Held, eventually
 from machines import Scripted, chain_of
 
@@ -12,7 +13,6 @@ from smach_oracle.oracle.control.path_pattern import PathPattern
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.scope.clock import FakeClock
 from smach_oracle.oracle.scope.scope import Scope
 
 

@@ -11,7 +11,7 @@ import smach
 import smach_oracle.oracle
 import smach_oracle.testing
 from smach_oracle.oracle.asking import question
-from smach_oracle.oracle.decision import failure_rate, situation
+from smach_oracle.oracle.decision import failure_rate, policy
 from smach_oracle.oracle.execution import wrapping
 from smach_oracle.oracle.machine import oracle
 from smach_oracle.oracle.records import events
@@ -28,7 +28,7 @@ SHOWN = [
     oracle.Oracle,
     question.Expert,
     events,
-    situation.Policy,
+    policy.Policy,
     failure_rate.FailureRate,
     failure_rate.ExponentialFailureRate,
     smach_oracle.testing.Bench,

@@ -2,8 +2,7 @@
 
 from smach_oracle.oracle.records.early_end import EarlyEnd
 from smach_oracle.oracle.records.facts import TrialEnd
-from smach_oracle.oracle.scope.reason import Reason
-from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.scope.scope import Reason, Scope
 
 
 def test_a_trial_that_is_kept_says_so_unless_it_has_ended_before():

@@ -1,9 +1,9 @@
 """A robot that is well at every other moment is not well, however quickly it changes."""
 
 import pytest
+from fake_clock import FakeClock
 
 from smach_oracle.oracle.machine.health_watch import HealthWatch
-from smach_oracle.oracle.scope.clock import FakeClock
 from smach_oracle.oracle.scope.scope import Scope
 
 SETTLE_S = 0.5

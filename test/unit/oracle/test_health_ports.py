@@ -13,8 +13,7 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.machine import health_ports
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.scope.reason import Reason
-from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.scope.scope import Reason, Scope
 
 SETTINGS = {'health_settle_s': 0.05}
 

@@ -4,18 +4,17 @@ import threading
 import time
 
 import pytest
+from fake_clock import FakeClock
 from machines import in_thread
 
 from smach_oracle.oracle.scope.background_call import BackgroundCall
-from smach_oracle.oracle.scope.bell import Flag
-from smach_oracle.oracle.scope.clock import FakeClock, MonotonicClock, PausableClock, paused
-from smach_oracle.oracle.scope.reason import Reason
-from smach_oracle.oracle.scope.scope import LOOK_S, CallEnd, Scope
+from smach_oracle.oracle.scope.clock import Clock, Flag, PausableClock, paused
+from smach_oracle.oracle.scope.scope import LOOK_S, CallEnd, Reason, Scope
 
 BRIEF_S = 0.1  # waited for in full
 
 
-class SlowPoll(MonotonicClock):
+class SlowPoll(Clock):
     """A clock that is looked at only when a bell rings, or when the time is over."""
 
     def wait(self, bell, left_s, longest_s, is_pause):
@@ -159,7 +158,7 @@ def run(work, limit_s=None, grace_s=0.0, scope=None):
     """Run a call; return how it ended, whether it was left, and the call."""
     stopped = threading.Event()
     call = BackgroundCall(lambda: work(stopped), 'a test')
-    end = (scope or Scope()).run(call, limit_s, grace_s, stopped.set)
+    end = Scope(scope or Scope(), limit_s=limit_s).run(call, grace_s, stopped.set)
     return end, call.left, call
 
 
@@ -189,22 +188,22 @@ def test_a_cancel_stops_a_call_at_once():
 
 
 def test_ctrl_c_in_the_thread_that_waits_leaves_the_call_behind_without_a_grace():
-    class Interrupted(MonotonicClock):
+    class Interrupted(Clock):
         def wait(self, bell, left_s, longest_s, is_pause):
             raise KeyboardInterrupt
 
     go, stopped = threading.Event(), threading.Event()
     call = BackgroundCall(lambda: go.wait(20.0), 'a test')
     with pytest.raises(KeyboardInterrupt):
-        Scope(clock=Interrupted()).run(call, 300.0, 300.0, stopped.set)
+        Scope(clock=Interrupted(), limit_s=300.0).run(call, 300.0, stopped.set)
     assert call.left and stopped.is_set()
     go.set()
 
 
 def test_the_time_of_a_limit_that_others_pause_is_given_back():
     clock, go = FakeClock(), threading.Event()
-    scope = Scope(clock=clock)
     limit = PausableClock(clock)
+    scope = Scope(clock=clock, limit_s=30.0, time=limit)
 
     def work():
         with limit.paused():
@@ -212,7 +211,7 @@ def test_the_time_of_a_limit_that_others_pause_is_given_back():
         go.wait(20.0)
 
     call = BackgroundCall(work, 'a test')
-    ended = in_thread(lambda: scope.run(call, 30.0, 20.0, go.set, limit))
+    ended = in_thread(lambda: scope.run(call, 20.0, go.set))
     time.sleep(0.05)  # as long as it takes to look
     assert not go.is_set()
     clock.advance(31.0)

@@ -7,10 +7,10 @@ from held_machines import Held, eventually
 from machines import FakeExpert, FakeHealth, Scripted, Watched, chain_of, watched
 
 import smach
-from smach_oracle.oracle.machine.limited_run import LimitedRun, inside
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.scope import scope
-from smach_oracle.oracle.scope.reason import Reason
+from smach_oracle.oracle.scope.clock import Clock, PausableClock
+from smach_oracle.oracle.scope.scope import Reason, Scope, inside
 
 SOON_S = 15.0  # much less than the period below
 
@@ -177,12 +177,12 @@ def test_of_a_machine_that_is_left_behind_nothing_else_counts():
     """Its preempt, which came before, does not send it to the clean-up that its author drew."""
     machine = Watched(chain_of(Scripted(), Scripted()))
     node = machine.machine._oracle
-    run = LimitedRun()
+    run = Scope(time=PausableClock(Clock()))
     with inside(run):
         node.execution.look_around()
     machine.machine.request_preempt()
     assert node.execution.scope.reason is Reason.PREEMPTED and not node.is_left_behind()
-    run.abandon()
+    run.cancel(Reason.LEFT_BEHIND)
     assert node.execution.scope.reason is Reason.LEFT_BEHIND and node.is_left_behind()
     node.tree.early_end.keep()
     assert node.execution.scope.reason is Reason.EARLY_END

@@ -13,8 +13,7 @@ from killed_machines import KilledMachine
 from killed_trees import flat
 from machines import Scripted, Watched, chain_of
 
-from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
-from smach_oracle.oracle.decision.merged_rates import base_of, merged
+from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
 from smach_oracle.oracle.records import folder_lock as lock_module
 from smach_oracle.oracle.records.folder_lock import folder_lock
 

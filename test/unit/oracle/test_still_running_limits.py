@@ -12,7 +12,8 @@ from smach_oracle.oracle.places import jump_path
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 from smach_oracle.oracle.scope.alarm_clock import AlarmClock
-from smach_oracle.oracle.scope.clock import MonotonicClock
+from smach_oracle.oracle.scope.clock import Clock
+from smach_oracle.oracle.scope.scope import Scope
 
 
 def warned_once(machine, gate, clock=None):
@@ -80,7 +81,7 @@ def test_an_answer_to_a_state_that_ends_at_that_moment_is_told_of(answer, warnin
     take_out = WatchedVisit._take_out
 
     def take_out_late(visit, answer):
-        assert visit._ended.wait(20)
+        assert Scope().wait(20, visit._ended)
         take_out(visit, answer)
 
     monkeypatch.setattr(WatchedVisit, '_take_out', take_out_late)
@@ -124,7 +125,7 @@ def test_a_state_that_is_held_back_is_no_longer_one_that_the_oracle_has_entered(
 
 
 def test_the_clock_lives_on_after_an_alarm_that_fails(log):
-    clock, rung = AlarmClock(MonotonicClock()), threading.Event()
+    clock, rung = AlarmClock(Clock()), threading.Event()
 
     def fails():
         raise RuntimeError('no more threads')

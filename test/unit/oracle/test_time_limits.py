@@ -5,6 +5,7 @@ import time
 from typing import List
 
 import pytest
+from fake_clock import FakeClock
 from machines import (
     FakeExpert,
     Gate,
@@ -21,9 +22,8 @@ from waiting import wait_for
 
 import smach
 import smach_oracle.oracle.machine.workers as worker
-from smach_oracle.oracle.machine.limited_run import LimitedRun
 from smach_oracle.oracle.records.events import EventKind, FailureKind
-from smach_oracle.oracle.scope.clock import FakeClock
+from smach_oracle.oracle.scope.scope import Scope
 
 LIMITED = {'time_limit_s': 30.0, 'grace_period_s': 5.0}
 ABANDONING = {'time_limit_s': 30.0, 'grace_period_s': 0.1}
@@ -39,7 +39,9 @@ class LimitClock(FakeClock):
     def __init__(self, monkeypatch):
         FakeClock.__init__(self)
         self._over: List[threading.Event] = []
-        monkeypatch.setattr(worker, 'LimitedRun', lambda clock: LimitedRun(self))
+        monkeypatch.setattr(
+            worker, 'Scope', lambda *around, **of: Scope(*around, **{**of, 'clock': self})
+        )
 
     def end(self, waits, once):
         """Let the next so many waits (a limit, then a grace period) be over once `once` is set."""

@@ -5,8 +5,7 @@ import types
 import pytest
 import rospy
 
-from smach_oracle.oracle.scope.reason import Reason
-from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.scope.scope import Reason, Scope
 from smach_oracle.ros.service_calls import ServerGoneError
 from smach_oracle.ros.waiting import service_waiting
 from smach_oracle.ros.waiting.service_waiting import ServiceWaiting

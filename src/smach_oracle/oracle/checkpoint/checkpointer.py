@@ -17,7 +17,7 @@ from ..places.place import TreePlace
 from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
-from ..scope.reason import Reason
+from ..scope.scope import Reason
 from .container_facts import ContainerFacts, fact_of
 from .stored_tree import StoredTree
 from .userdata_facts import KeptOut, UserdataFacts, WeakIds, keys_of

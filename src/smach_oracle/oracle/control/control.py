@@ -7,10 +7,10 @@ engines, `attentive`, which they look at in any case. Without a request a step c
 import contextlib
 import math
 import threading
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 from ..scope.clock import Clock
-from ..scope.scope import Scope
+from ..scope.scope import Reason, Scope
 from ..settings.settings import CONFIRM_FIRST
 from .hold import HeldBy, HeldPlace, Hold, LetGo
 from .path_pattern import PathPattern
@@ -167,7 +167,7 @@ class Control:
         with self._changed:
             self._holds.remove(hold)
 
-    def wait(self, hold: Hold, scope: Scope) -> LetGo:
+    def wait(self, hold: Hold, scope: Scope) -> Union[LetGo, Reason]:
         """Wait until a hold that has begun is let go, and return by what.
 
         :param scope: ends the wait, as a preempt does.
@@ -178,14 +178,14 @@ class Control:
                 let_go, stop = self._let_go(hold), self._stop
             reason = scope.reason  # a user's machine has a say in it: not under the lock
             if reason is not None:
-                return LetGo.by(reason)  # it goes before what an operator has asked for since
+                return reason  # it goes before what an operator has asked for since
             if let_go is not None:
                 return let_go
             scope.wait(None if stop is None else stop.ends_s - self._clock.now(), hold.changed)
 
-    def _let_go(self, hold: Hold) -> Optional[LetGo]:
+    def _let_go(self, hold: Hold) -> Union[LetGo, Reason, None]:
         if self._stop is not None:  # the preempt is on its way, and lets go what it comes to
-            return LetGo.PREEMPTED if self._clock.now() >= self._stop.ends_s else None
+            return Reason.PREEMPTED if self._clock.now() >= self._stop.ends_s else None
         if hold.may_be_sent and hold.key in self._jumps:
             return LetGo.SENT
         if hold.stepped:

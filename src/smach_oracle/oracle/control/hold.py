@@ -3,8 +3,7 @@
 from enum import Enum
 from typing import NamedTuple
 
-from ..scope.bell import Flag
-from ..scope.reason import Reason
+from ..scope.clock import Flag
 
 
 class HeldBy(str, Enum):
@@ -16,20 +15,12 @@ class HeldBy(str, Enum):
 
 
 class LetGo(str, Enum):
-    """The reason why a wait is over."""
+    """What an operator lets a container go by. A `Reason` may end its wait, too."""
 
     RESUMED = 'resumed'
     STEPPED = 'stepped'
     CONFIRMED = 'confirmed'
     SENT = 'sent'  # to another state
-    PREEMPTED = 'preempted'
-    SHUTDOWN = 'shutdown'
-    LEFT_BEHIND = 'left behind'  # the state around it was abandoned, or its trial ends early
-
-    @classmethod
-    def by(cls, reason: Reason) -> 'LetGo':
-        """Return what the end of the work around a wait is for the wait."""
-        return cls.LEFT_BEHIND if reason is Reason.EARLY_END else cls(reason.text)
 
 
 class HeldPlace(NamedTuple):

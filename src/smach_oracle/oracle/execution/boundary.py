@@ -13,7 +13,6 @@ import smach
 
 from ..checkpoint.resuming import forget_resumed
 from ..control.hold import HeldPlace, Hold, LetGo
-from ..control.holding import Wait, wait_until_let_go
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
@@ -21,8 +20,9 @@ from ..places.place import TreePlace
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
 from ..recovery.endings import ending_at_once, route_at_preempt
-from ..recovery.operator_wait import clocks_stand_still
+from ..recovery.operator_wait import wait_until_let_go
 from ..recovery.stop import is_asked_around
+from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
 from ..smach_private import (
@@ -151,10 +151,16 @@ def _announce(node: TreeNode, place: HeldPlace) -> None:
 
 
 def _hold(node: TreeNode, hold: Hold) -> Optional[Stop]:
-    let_go = _wait(node, hold)
-    if let_go in (LetGo.SENT, LetGo.SHUTDOWN, LetGo.LEFT_BEHIND):
-        return Stop()  # whoever calls for the next step finds out
-    return _preempted_before(node, True) if let_go is LetGo.PREEMPTED else None
+    lock = lock_of(node.machine)
+    lock.release()  # who asks for a preempt takes it
+    try:
+        let_go = wait_until_let_go(node, hold, node.execution.scope)
+    finally:
+        lock.acquire()
+    if let_go is Reason.PREEMPTED:
+        return _preempted_before(node, True)
+    # whoever calls for the next step finds out
+    return Stop() if let_go is LetGo.SENT or isinstance(let_go, Reason) else None
 
 
 def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
@@ -166,17 +172,6 @@ def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
     """
     stop = _pass_by(node) if asked and not node.tree.control.holds_all else None
     return stop or _end_preempted(node)
-
-
-def _wait(node: TreeNode, hold: Hold) -> LetGo:
-    lock = lock_of(node.machine)
-    lock.release()  # who asks for a preempt takes it
-    try:
-        return wait_until_let_go(
-            node.tree.control, hold, Wait(node, clocks_stand_still(node), node.execution.scope)
-        )
-    finally:
-        lock.acquire()
 
 
 def _end_preempted(node: TreeNode) -> Optional[Stop]:

@@ -11,8 +11,7 @@ import smach
 from ..branches.wrapper import wrapper_of
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
-from ..scope.reason import Reason
-from ..scope.scope import Scope
+from ..scope.scope import Reason, Scope
 from ..smach_private import Labels, states_of, transition_callbacks
 
 

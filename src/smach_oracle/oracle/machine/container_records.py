@@ -3,7 +3,7 @@
 import copy
 from typing import Dict, Mapping, Optional, Tuple
 
-from ..decision.merged_rates import base_of
+from ..decision.failure_rate import base_of
 from ..decision.policy import FailureContext
 from ..records.history import History
 from ..records.state_record import FastEdge, StateRecord

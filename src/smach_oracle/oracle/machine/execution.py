@@ -6,10 +6,8 @@ import smach
 from smach_oracle.foreign import error_text
 
 from ..records.events import NO_OUTCOME, EventKind
-from ..scope.reason import Reason
-from ..scope.scope import Scope
+from ..scope.scope import Reason, Scope, scopes_of_thread
 from ..smach_private import current_label_of, initial_label_of, set_executing, states_of
-from .limited_run import LimitedRun, runs_of_thread
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -49,7 +47,7 @@ class Execution:
         """`is_whole`: it is told of, and begins a history. What holds a branch does so for it."""
         self._node = node
         self._is_whole = is_whole
-        self.runs_around: Tuple[LimitedRun, ...] = ()
+        self.runs_around: Tuple[Scope, ...] = ()
         self.renew()
 
     def renew(self) -> None:
@@ -69,7 +67,7 @@ class Execution:
         """
         self.runs_around = runs = runs_around(self._node)
         for run in runs:
-            run.hold(self._node.engine)
+            run.tell(self._node.engine)
         return not self.is_left_behind()
 
     def is_left_behind(self) -> bool:
@@ -178,12 +176,12 @@ class Execution:
         return Execution, (self._node,)
 
 
-def runs_around(node: 'TreeNode') -> Tuple[LimitedRun, ...]:
+def runs_around(node: 'TreeNode') -> Tuple[Scope, ...]:
     """Return the watched executions inside which a container would execute now.
 
     Those of its thread, and, as a Concurrence has threads of its own, those of the states above it.
     """
-    runs, under_way = runs_of_thread(), node.tree.workers.under_way
+    runs, under_way = scopes_of_thread(), node.tree.workers.under_way
     while under_way and node.parent is not None:
         run = under_way.get(id(states_of(node.parent.machine).get(node.below[0])))
         if run is not None and run not in runs:

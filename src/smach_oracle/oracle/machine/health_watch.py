@@ -8,8 +8,7 @@ import smach
 
 from ..identity import is_same, name_of
 from ..records.events import EventKind
-from ..scope.bell import Flag
-from ..scope.clock import Clock
+from ..scope.clock import Clock, Flag
 from ..scope.scope import Scope
 from ..settings.health import (
     HealthCondition,

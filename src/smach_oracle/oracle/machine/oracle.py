@@ -8,7 +8,7 @@ from ..asking.question import Expert
 from ..errors import TrialError
 from ..records.events import EventSource
 from ..records.rate_rows import StateRateRow, TransitionRow
-from ..scope.waiting import Waiting
+from ..scope.scope import Waiting
 from ..settings.health import HealthFunction
 from ..settings.settings import Settings
 from .health_watch import ListenToHealth

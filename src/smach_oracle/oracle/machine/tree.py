@@ -18,10 +18,8 @@ from ..records.early_end import EarlyEnd
 from ..records.events import EventSource
 from ..records.restarts import Restarts
 from ..scope.alarm_clock import AlarmClock
-from ..scope.clock import MonotonicClock
-from ..scope.reason import Reason
-from ..scope.scope import Scope
-from ..scope.waiting import MonotonicWaiting, Waiting
+from ..scope.clock import Clock
+from ..scope.scope import Reason, Scope, Waiting
 from ..settings.health import HealthFunction
 from .health_watch import HealthWatch
 from .resumed import ResumedTrial
@@ -106,12 +104,12 @@ class Tree:
 
     def _be_at_rest(self, health: Optional[HealthFunction] = None) -> None:
         """Have nothing under way, nothing asked by an operator, and locks that nobody holds."""
-        clock = MonotonicClock()
+        clock = Clock()
         self.scope = Scope(look=look_for_shutdown, clock=clock)
         self.workers = Workers(clock)
         self.budget = TrialBudget(clock)
         self.early_end = EarlyEnd(self.scope)
-        self.waiting: Waiting = MonotonicWaiting()
+        self.waiting: Waiting = Waiting()
         self.health = HealthWatch(health)
         self.alarms = AlarmClock(clock)
         self.control = Control(clock)

@@ -15,8 +15,7 @@ from smach_oracle.foreign import repr_of
 from ..identity import attribute_of, own_mark
 from ..scope.background_call import BackgroundCall, KeptThread
 from ..scope.clock import Clock
-from ..scope.scope import CallEnd, Scope
-from .limited_run import LimitedRun, inside
+from ..scope.scope import CallEnd, Reason, Scope, inside
 from .snapshots import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
@@ -49,7 +48,7 @@ class Workers:
         self.abandoned: Dict[int, _Left] = {}
         # states with a time limit whose thread lives, and those that are asked about if they take
         # long
-        self.under_way: Dict[int, LimitedRun] = {}
+        self.under_way: Dict[int, Scope] = {}
         self._idle: List[KeptThread] = []  # of functions that have ended, for the next ones
 
     def blocked(self, target: object) -> str:
@@ -80,7 +79,7 @@ class Workers:
         `gate` is what `userdata` writes through. What the state raises is told in the result, not
         raised.
         """
-        run = LimitedRun(self._clock)
+        run = Scope(clock=self._clock, limit_s=limit_s)
         call = BackgroundCall(
             functools.partial(_execute_inside, run, state, userdata),
             'smach_oracle worker of {}'.format(label),
@@ -94,11 +93,11 @@ class Workers:
         self.under_way[id(state)] = run
         end = None
         try:
-            end = run.run(call, limit_s, grace_s, stop, run.time)
+            end = run.run(call, grace_s, stop)
         finally:
             if call.left:
                 self._block(state, call, _LATE)
-                run.abandon()
+                run.cancel(Reason.LEFT_BEHIND)
                 _stop_bare_machines(state)
             else:
                 self.under_way.pop(id(state), None)
@@ -138,7 +137,7 @@ class Workers:
         call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
         end = None
         try:
-            end = scope.run(call, limit_s, grace_s, gate.shut)
+            end = Scope(scope, limit_s=limit_s).run(call, grace_s, gate.shut)
         finally:
             if call.left:
                 is_late = end is CallEnd.OVERRUN and scope.reason is None
@@ -176,7 +175,7 @@ class Workers:
             self.abandoned[id(target)] = _Left(target, call, why)
 
 
-def _execute_inside(run: LimitedRun, state: smach.State, userdata: smach.Remapper) -> object:
+def _execute_inside(run: Scope, state: smach.State, userdata: smach.Remapper) -> object:
     with inside(run):
         return state.execute(userdata)
 

@@ -7,8 +7,7 @@ import contextlib
 import threading
 from typing import Iterator, Optional
 
-from ..scope.reason import Reason
-from ..scope.scope import Scope
+from ..scope.scope import Reason, Scope
 from .facts import TrialEnd
 
 

@@ -3,8 +3,14 @@
 import threading
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
-from ..decision.failure_rate import Estimator, FailureClass, classify, make_estimator
-from ..decision.merged_rates import base_of, merged
+from ..decision.failure_rate import (
+    Estimator,
+    FailureClass,
+    base_of,
+    classify,
+    make_estimator,
+    merged,
+)
 from ..records.visits import Visit
 from ..settings.settings import StateSettings
 

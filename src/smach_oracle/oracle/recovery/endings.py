@@ -7,7 +7,7 @@ import smach
 
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode
-from ..scope.reason import Reason
+from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
 from ..smach_private import Machine
 from .failure import Failure

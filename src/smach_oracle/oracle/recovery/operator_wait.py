@@ -1,22 +1,22 @@
-"""Waits for an operator where no machine's lock is held: before a precondition, between items."""
+"""Waits for an operator: before a state, before a precondition, between items."""
 
-import contextlib
-from typing import Iterator
+import time
+from typing import Union
 
-from ..control.hold import HeldPlace
-from ..control.holding import Wait, wait_until_let_go
-from ..machine.limited_run import standing_still
+import smach
+
+from ..control.hold import HeldBy, HeldPlace, Hold, LetGo
 from ..machine.tree_node import TreeNode
-from ..scope.scope import Scope
+from ..records.events import EventKind
+from ..scope.scope import Reason, Scope, standing_still
 from ..settings.settings import CONFIRM_FIRST
 from ..smach_private import Labels
 
-
-@contextlib.contextmanager
-def clocks_stand_still(node: TreeNode) -> Iterator[None]:
-    """Let the time limits around a container stand still, and the minutes of its trial."""
-    with standing_still(node.execution.runs_around), node.tree.budget.time.paused():
-        yield
+_WHY = {
+    HeldBy.PAUSE: 'paused',
+    HeldBy.BREAKPOINT: 'paused by a breakpoint',
+    HeldBy.CONFIRM: 'waits for a confirmation',
+}
 
 
 def wait_for_operator(
@@ -37,4 +37,58 @@ def wait_for_operator(
     hold = control.hold_before(place, confirms, scope.reason is None)
     if hold is not None:
         hold.may_be_sent, hold.autonomy = False, autonomy
-        wait_until_let_go(control, hold, Wait(node, clocks_stand_still(node), scope))
+        wait_until_let_go(node, hold, scope)
+
+
+def wait_until_let_go(node: TreeNode, hold: Hold, scope: Scope) -> Union[LetGo, Reason]:
+    """Wait until a hold is let go, or `scope` is cancelled, and return by what.
+
+    No lock of a machine is held. The time limits around the container stand still, and the minutes
+    of its trial.
+    """
+    control = node.tree.control
+    control.begin(hold)
+    since_s = time.monotonic()
+    let_go = None
+    try:
+        _tell_begin(node, hold)
+        with standing_still(node.execution.runs_around), node.tree.budget.time.paused():
+            let_go = control.wait(hold, scope)
+            return let_go
+    finally:
+        control.end(hold)
+        _tell_end(node, hold, _in_words(let_go), time.monotonic() - since_s)
+
+
+def _in_words(let_go: Union[LetGo, Reason, None]) -> str:
+    if let_go is None:
+        return 'stopped'  # by Ctrl-C in this thread
+    if isinstance(let_go, LetGo):
+        return let_go.value
+    return (Reason.LEFT_BEHIND if let_go is Reason.EARLY_END else let_go).text
+
+
+def _tell_begin(node: TreeNode, hold: Hold) -> None:
+    why, place = _WHY[hold.held_by], hold.place
+    smach.logwarn('{}: {} before {}'.format(place.path, why, place.state))
+    node.emit(
+        EventKind.HOLD_START,
+        state=place.state,
+        outcome=hold.held_by.value,
+        by='' if hold.held_by is HeldBy.CONFIRM else node.tree.control.paused_by,
+        text='{} before {}'.format(why, place.state),
+    )
+
+
+def _tell_end(node: TreeNode, hold: Hold, outcome: str, waited_s: float) -> None:
+    state = hold.place.state
+    smach.loginfo(
+        '{}: {} before {}, after {:.1f} s'.format(hold.place.path, outcome, state, waited_s)
+    )
+    node.emit(
+        EventKind.HOLD_END,
+        state=state,
+        outcome=outcome,
+        text='{} after {:.1f} s'.format(outcome, waited_s),
+        data={'waited_s': round(waited_s, 3)},
+    )

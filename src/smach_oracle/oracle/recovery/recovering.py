@@ -14,7 +14,7 @@ from ..machine.tree_node import TreeNode
 from ..places.jump_path import JumpPath
 from ..records.events import EventKind
 from ..records.state_record import StateRecord
-from ..scope.reason import Reason
+from ..scope.scope import Reason
 from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending, preempted_ending
 from .failure import Failure

@@ -13,14 +13,12 @@ from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry, Reply
 from ..asking.question import Answer, AnswerKind, Expert, Question
 from ..decision.sentence import ran_in_words, still_running_sentence
-from ..machine.limited_run import WatchedRun, inside, standing_still
 from ..machine.tree_node import TreeNode
 from ..machine.workers import request_preempt
 from ..records.events import EventKind, FailureKind
 from ..records.state_record import StateRecord
-from ..scope.bell import Flag
-from ..scope.reason import Reason
-from ..scope.scope import Scope
+from ..scope.clock import Flag, PausableClock
+from ..scope.scope import Reason, Scope, inside, standing_still
 from .failure import Failure
 from .question_making import Account, make_question, targets_of
 from .stop import in_words
@@ -48,7 +46,8 @@ class WatchedVisit:
         self._machine = node.machine
         self._record = record
         self._state: smach.State = node.machine._states[record.label]
-        self._run = WatchedRun(clock)  # its time stands still while a person is asked inside
+        self._time = PausableClock(clock)  # stands still while a person is asked inside
+        self._run = Scope(clock=clock, time=self._time)
         self._now = clock.now
         self._begun_s = clock.now()
         self._lock = threading.Lock()
@@ -111,11 +110,11 @@ class WatchedVisit:
         with self._lock:
             self._due_s = due_s
             if not self._ended.is_set():
-                left_s = self._run.time.left_s(due_s)
+                left_s = self._time.left_s(due_s)
                 self._node.tree.alarms.ring_in(left_s, self._ring)
 
     def _ring(self) -> None:
-        if self._run.time.left_s(self._due_s):
+        if self._time.left_s(self._due_s):
             self._ask_at(self._due_s)
         else:
             threading.Thread(
@@ -124,7 +123,7 @@ class WatchedVisit:
 
     def _ask(self) -> None:
         if self._asks_again():
-            self._ask_at(self._run.time.now() + self._ran_s())  # once it has run twice as long
+            self._ask_at(self._time.now() + self._ran_s())  # once it has run twice as long
 
     def _look_for_end(self) -> Optional[Reason]:
         return Reason.ENDED if self._ended.is_set() else None
@@ -159,7 +158,7 @@ class WatchedVisit:
     def _inquire(self, expert: Expert) -> Reply:
         # the state runs on, and so do the time limits around it. Whoever looks whether a state
         # around still runs has its answer in this question
-        watched = [run for run in self._node.execution.runs_around if isinstance(run, WatchedRun)]
+        watched = [run for run in self._node.execution.runs_around if run.limit_s is None]
         with standing_still(watched), self._node.tree.early_end.asking():
             return Inquiry(self, expert, self._budget.within(0.0)[0]).run()
 

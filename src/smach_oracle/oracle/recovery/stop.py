@@ -2,11 +2,9 @@
 
 from typing import Optional, Sequence
 
-from ..machine.limited_run import standing_still
 from ..machine.tree_node import TreeNode
 from ..records.state_record import StateRecord
-from ..scope.reason import Reason
-from ..scope.scope import Scope
+from ..scope.scope import Reason, Scope, standing_still
 from ..settings.failing_outcomes import is_preempted
 
 

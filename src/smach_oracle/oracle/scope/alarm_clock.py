@@ -6,8 +6,7 @@ from typing import Callable, Dict, Optional
 import smach
 from smach_oracle.foreign import repr_of
 
-from .bell import Bell
-from .clock import Clock
+from .clock import Bell, Clock
 
 Ring = Callable[[], None]
 

@@ -7,7 +7,7 @@ import queue
 import threading
 from typing import Callable, Optional
 
-from .bell import Flag
+from .clock import Flag
 
 
 class KeptThread:

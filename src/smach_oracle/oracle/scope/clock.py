@@ -1,20 +1,71 @@
-"""The time that the executive goes by: monotonic time, or that of a test. Clocks that pause."""
+"""The time that the executive goes by, and clocks that pause. What wakes those who wait."""
 
 import contextlib
 import threading
 import time
-from typing import Any, Iterable, Iterator, List, Protocol, Tuple
-
-from .bell import Bell
+from typing import Iterable, Iterator, Set, Tuple, Type
 
 _LEAST_S = 0.05  # how soon a paused clock is looked at again
 
 
-class Clock(Protocol):
-    """Shows the time, and lets it pass."""
+class Bell:
+    """Wakes the one thread that waits for it.
+
+    It is a bare lock, which is held until somebody rings. A `threading.Event` has a lock of its own
+    around its flag: the handler of a signal that preempts a machine, and meets its thread in there,
+    would wait for itself.
+    """
+
+    def __init__(self) -> None:
+        self._silence = threading.Lock()
+        self._silence.acquire()
+
+    def ring(self) -> None:
+        """Wake who waits for it, or will."""
+        try:
+            self._silence.release()
+        except RuntimeError:
+            pass  # it has been rung, and nobody has heard it yet
+
+    def hush(self) -> None:
+        """Forget that it was rung."""
+        self._silence.acquire(blocking=False)
+
+    def wait(self, seconds: float) -> None:
+        """Wait until it is rung, at most so long."""
+        self._silence.acquire(timeout=min(seconds, threading.TIMEOUT_MAX))
+
+
+class Flag:
+    """Something that comes once, or that is cleared, and for which a scope can wait."""
+
+    __slots__ = ('bells', '_is_set')
+
+    def __init__(self) -> None:
+        self.bells: Set[Bell] = set()
+        self._is_set = False
+
+    def is_set(self) -> bool:
+        """Whether it has come."""
+        return self._is_set
+
+    def set(self) -> None:
+        """Have it come, and wake who waits for it."""
+        self._is_set = True
+        for bell in tuple(self.bells):
+            bell.ring()
+
+    def clear(self) -> None:
+        """Have it not come yet."""
+        self._is_set = False
+
+
+class Clock:
+    """Shows monotonic time, and lets it pass. A test has one of its own."""
 
     def now(self) -> float:
         """Return monotonic time, in s."""
+        return time.monotonic()
 
     def wait(self, bell: Bell, left_s: float, longest_s: float, is_pause: bool) -> None:
         """Wait until the bell rings, and not beyond the time that is left.
@@ -24,63 +75,7 @@ class Clock(Protocol):
         :param longest_s: of real time, after which who waits wants to look again.
         :param is_pause: whether nothing but the time is waited for.
         """
-
-
-class MonotonicClock:
-    """Shows monotonic time."""
-
-    def now(self) -> float:
-        """Return monotonic time, in s."""
-        return time.monotonic()
-
-    def wait(self, bell: Bell, left_s: float, longest_s: float, is_pause: bool) -> None:
-        """Wait until the bell rings, and not beyond the time that is left."""
         bell.wait(min(left_s, longest_s))
-
-
-class FakeClock:
-    """A clock for tests, in which only the test has time pass.
-
-    A pause, in which nothing but the time is waited for, is over at once, and the clock shows then
-    that its time has passed. A wait for anything else lasts until that comes, or until `advance`
-    has brought the clock to its end. No test waits for real seconds so, and none depends on how
-    busy the machine is::
-
-        clock = FakeClock()
-        scope = Scope(clock=clock)
-        scope.wait(300.0)  # returns at once
-        assert clock.now() == 1300.0
-
-    :param now_s: the time that it shows at first.
-    """
-
-    def __init__(self, now_s: float = 1000.0) -> None:
-        self._now_s = now_s
-        self._lock = threading.Lock()
-        self._bells: List[Bell] = []
-
-    def now(self) -> float:
-        """Return the time that it shows, in s."""
-        return self._now_s
-
-    def advance(self, seconds: float) -> None:
-        """Have so much time pass, and have all that wait look whether their time is over."""
-        with self._lock:
-            self._now_s += seconds
-            for bell in self._bells:
-                bell.ring()
-
-    def wait(self, bell: Bell, left_s: float, longest_s: float, is_pause: bool) -> None:
-        """Have the time of a pause pass, or wait for the bell."""
-        if is_pause:
-            self.advance(left_s)
-            return
-        with self._lock:
-            self._bells.append(bell)
-        # a test that advances between the look of who waits and this line rings no bell
-        bell.wait(min(longest_s, _LEAST_S))
-        with self._lock:
-            self._bells.remove(bell)
 
 
 class PausableClock:
@@ -139,9 +134,9 @@ class PausableClock:
         self._since_s = now_s
         return self._shown_s
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> Tuple[Type['PausableClock'], Tuple[Clock]]:
         """Time does not travel with a copied or pickled machine."""
-        return PausableClock, (MonotonicClock(),)
+        return PausableClock, (Clock(),)
 
 
 @contextlib.contextmanager

@@ -5,19 +5,58 @@ model, in threads: nothing is raised, but each wait in a scope ends when the sco
 who works in it looks at `reason`.
 """
 
+import contextlib
+import contextvars
 import threading
-from enum import Enum
-from typing import Any, Callable, Optional, Set, Tuple
+from enum import Enum, IntEnum
+from typing import (
+    Callable,
+    ContextManager,
+    Iterable,
+    Iterator,
+    Optional,
+    Protocol,
+    Set,
+    Tuple,
+    Type,
+)
 
 from .background_call import BackgroundCall
-from .bell import Bell, Bells, Flag
-from .clock import Clock, MonotonicClock, PausableClock
-from .reason import Reason
+from .clock import Bell, Clock, Flag, PausableClock, paused
 
 # how soon a wait sees a reason of which nobody tells it, such as `smach.is_shutdown`
 LOOK_S = 0.05
 
+
+class Reason(IntEnum):
+    """A reason to end early. If there are several, the first of this order counts.
+
+    The first two come first, as nobody waits for an outcome then, and no other state begins. A
+    preempt comes before a shutdown: where both are there, the process that goes down has preempted
+    its machines.
+    """
+
+    EARLY_END = 1  # of the trial, which goes on later from its store
+    LEFT_BEHIND = 2  # the state around it was abandoned
+    PREEMPTED = 3
+    SHUTDOWN = 4  # of the process
+    TIME_OVER = 5  # the minutes of the trial's budget
+    ENDED = 6  # what it was about is over
+
+    @property
+    def text(self) -> str:
+        """Return it in words."""
+        return self.name.lower().replace('_', ' ')
+
+
 Look = Callable[[], Optional[Reason]]
+
+
+class Ringable(Protocol):
+    """Something that is told of a cancel: a bell, or the engine of a machine."""
+
+    def ring(self) -> None:
+        """Look at the reason now, or soon."""
 
 
 class CallEnd(Enum):
@@ -42,21 +81,34 @@ class Scope:
     :param around: the scopes with each of which this one ends.
     :param look: returns a reason of which nobody tells, or None. A wait asks it again and again.
     :param clock: that of the waits, by default that of the first scope around.
+    :param limit_s: of a call that runs in it (`run`), in seconds of its `time`.
+    :param time: has passed in it, except where others have paused it. It has one with a limit.
     """
+
+    __slots__ = ('clock', 'time', 'limit_s', '_line', '_looks', '_cancelled', '_bells')
 
     def __init__(
         self,
         *around: 'Scope',
         look: Optional[Look] = None,
         clock: Optional[Clock] = None,
+        limit_s: Optional[float] = None,
+        time: Optional[PausableClock] = None,
     ) -> None:
-        self.clock: Clock = clock or (around[0].clock if around else MonotonicClock())
-        self._line: Tuple['Scope', ...] = (self,)  # it and all around it
+        self.clock: Clock = clock or (around[0].clock if around else Clock())
+        self.limit_s = limit_s
+        self.time = PausableClock(self.clock) if time is None and limit_s is not None else time
+        line: Tuple['Scope', ...] = (self,)  # it and all around it
+        looks: Tuple[Look, ...] = () if look is None else (look,)
         for each in around:
-            self._line += each._line
-        self._look = look
+            line += each._line
+            looks += each._looks
+        self._line: Tuple['Scope', ...] = line
+        self._looks: Tuple[Look, ...] = looks
         self._cancelled: Optional[Reason] = None
-        self._bells = Bells()
+        # of all who wait. To add one, to remove one and to copy them are one step each: no lock is
+        # held, in which the handler of a signal could meet its own thread
+        self._bells: Set[Ringable] = set()
 
     def cancel(self, reason: Reason) -> None:
         """End it early, and wake all that wait in it. A reason that counts more stays."""
@@ -69,7 +121,14 @@ class Scope:
 
     def wake(self) -> None:
         """Have all that wait in it look at its reason now."""
-        self._bells.ring()
+        for bell in tuple(self._bells):
+            bell.ring()
+
+    def tell(self, bell: Ringable) -> None:
+        """Ring this, too, when it is cancelled, or now where it was."""
+        self._bells.add(bell)
+        if self.told is not None:
+            bell.ring()
 
     @property
     def told(self) -> Optional[Reason]:
@@ -87,8 +146,8 @@ class Scope:
         reason = self.told
         # a look may be the code of a user: nobody takes it where it cannot count
         if reason is None or reason > Reason.LEFT_BEHIND:
-            for each in self._line:
-                seen = None if each._look is None else each._look()
+            for look in self._looks:
+                seen = look()
                 if seen is not None and (reason is None or seen < reason):
                     reason = seen
         return reason
@@ -96,8 +155,7 @@ class Scope:
     @property
     def reasons(self) -> Set[Reason]:
         """Return all reasons for which it is to end."""
-        found = [each._cancelled for each in self._line]
-        found += [each._look() for each in self._line if each._look is not None]
+        found = [each._cancelled for each in self._line] + [look() for look in self._looks]
         return {each for each in found if each is not None}
 
     def wait(self, seconds: Optional[float] = None, until: Optional[Flag] = None) -> bool:
@@ -106,15 +164,13 @@ class Scope:
         :param seconds: at most, None for without end. Without a flag that is a pause.
         :returns: whether the flag is set, or whether the pause is over.
         """
-        bell = Bell()
-        ends_s = float('inf') if seconds is None else self.clock.now() + seconds
-        looks = any(each._look is not None for each in self._line)
-        longest_s = LOOK_S if looks else threading.TIMEOUT_MAX
-        rung_by = [each._bells for each in self._line]
+        bell, now = Bell(), self.clock.now
+        ends_s = float('inf') if seconds is None else now() + seconds
+        longest_s = LOOK_S if self._looks else threading.TIMEOUT_MAX
+        for each in self._line:
+            each._bells.add(bell)
         if until is not None:
-            rung_by.append(until.bells)
-        for bells in rung_by:
-            bells.add(bell)
+            until.bells.add(bell)
         try:
             while True:
                 bell.hush()  # before the look: what comes after that rings it again
@@ -122,36 +178,28 @@ class Scope:
                     return True
                 if self.reason is not None:
                     return False
-                left_s = ends_s - self.clock.now()
+                left_s = ends_s - now()
                 if left_s <= 0:
                     return until is None
                 self.clock.wait(bell, left_s, longest_s, until is None)
         finally:
-            for bells in rung_by:
-                bells.remove(bell)
+            for each in self._line:
+                each._bells.discard(bell)
+            if until is not None:
+                until.bells.discard(bell)
 
-    def run(
-        self,
-        call: BackgroundCall,
-        limit_s: Optional[float],
-        grace_s: float,
-        stop: Callable[[], None],
-        time: Optional[PausableClock] = None,
-    ) -> CallEnd:
+    def run(self, call: BackgroundCall, grace_s: float, stop: Callable[[], None]) -> CallEnd:
         """Run a call in its thread, and wait for its end.
 
         Once its time is over, or this scope is cancelled, `stop` is called. The call has a grace
         period then in which to end, and is left to itself after that. Where this thread itself is
         interrupted, as by Ctrl-C, it has none.
 
-        :param limit_s: None for without end.
-        :param time: the clock by which the limit goes, which others may pause.
         :returns: how it has ended. `call.left` says whether it has not.
         """
-        time = time or PausableClock(self.clock)
         call.start()
         try:
-            end = self._wait_for_end(call.done, limit_s, time)
+            end = self._wait_for_end(call.done)
             if end is not CallEnd.BY_ITSELF:
                 stop()
         except BaseException:
@@ -165,14 +213,55 @@ class Scope:
                 call.leave()
         return end
 
-    def _wait_for_end(self, done: Flag, limit_s: Optional[float], time: PausableClock) -> CallEnd:
-        while not self.wait(None if limit_s is None else time.left_s(limit_s), done):
-            if limit_s is not None and not time.left_s(limit_s):
+    def _wait_for_end(self, done: Flag) -> CallEnd:
+        limit_s, time = self.limit_s, self.time
+        if limit_s is None or time is None:
+            return CallEnd.BY_ITSELF if self.wait(None, done) else CallEnd.STOPPED
+        while not self.wait(time.left_s(limit_s), done):
+            if not time.left_s(limit_s):
                 return CallEnd.OVERRUN
             if self.reason is not None:
                 return CallEnd.STOPPED
         return CallEnd.BY_ITSELF
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> Tuple[Type['Scope'], Tuple[()]]:
         """Nothing that is under way travels with a copied or pickled machine."""
         return Scope, ()
+
+
+class Waiting:
+    """Waits of an oracle before it goes on. Derive from it to have the time pass otherwise."""
+
+    def wait(self, seconds: float, what: str, scope: Scope) -> None:
+        """Wait so many seconds, or until `scope` is cancelled, in the machine's thread.
+
+        :param what: takes the time, as records of it add it up.
+        """
+        scope.wait(seconds)
+
+
+# -- executions of states whose time is watched, as the machines see them that run inside
+
+_AROUND: 'contextvars.ContextVar[Tuple[Scope, ...]]' = contextvars.ContextVar(
+    'smach_oracle_scopes', default=()
+)
+
+
+def scopes_of_thread() -> Tuple[Scope, ...]:
+    """Return the scopes inside which this thread runs, the innermost last."""
+    return _AROUND.get()
+
+
+@contextlib.contextmanager
+def inside(scope: Scope) -> Iterator[None]:
+    """Be inside `scope` within it, in the caller's own thread."""
+    token = _AROUND.set(_AROUND.get() + (scope,))
+    try:
+        yield
+    finally:
+        _AROUND.reset(token)
+
+
+def standing_still(scopes: Iterable[Scope]) -> ContextManager[None]:
+    """Let the time of several scopes stand still."""
+    return paused(each.time for each in scopes if each.time is not None)

@@ -9,8 +9,7 @@ from typing import Optional
 
 import rospy
 
-from smach_oracle.oracle.scope.scope import Scope
-from smach_oracle.oracle.scope.waiting import MonotonicWaiting
+from smach_oracle.oracle.scope.scope import Scope, Waiting
 from smach_oracle.srv import PassTime, PassTimeRequest
 
 from ..log.said_once import warn_once
@@ -22,13 +21,13 @@ _LIMIT_S = 60.0  # of one call. Physics may have to be computed
 _ENOUGH = 0.99  # share of the time, for what the clock's messages are late
 
 
-class ServiceWaiting:
+class ServiceWaiting(Waiting):
     """Lets time pass by a service, and by waiting where that has let none pass."""
 
     def __init__(self, service: str) -> None:
         """`service`: resolved name of a PassTime service."""
         self._service = service
-        self._by_itself = MonotonicWaiting()
+        self._by_itself = Waiting()
 
     def wait(self, seconds: float, what: str, scope: Scope) -> None:
         """Wait so many seconds, or until `scope` is cancelled."""
