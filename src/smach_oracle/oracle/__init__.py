@@ -2,7 +2,7 @@
 
 From the top down, each package above all that follow it: `prospects`, which lists what the oracle
 may do; `operator_hand`, for operators; `container`, the public face; `execution`, `checkpoint`,
-`branches`, `recovery`, `places`, `machine`, `control`, `asking`, `records`, `settings`, `decision`.
+`branches`, `recovery`, `machine`, `control`, `asking`, `records`, `settings`, `decision`.
 Pure are `decision`, `settings`, all of `records` except the rates file, the question of `asking`,
 `errors`, `background`, `waiting` and `number_checks`.
 

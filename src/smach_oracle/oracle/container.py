@@ -19,8 +19,7 @@ from .execution.wrapping import (
     two_classes,
     wrap_machine,
 )
-from .machine.learned_rates import read_by_hand, write_by_hand
-from .machine.oracle import oracle_of
+from .machine.oracle import oracle_of, read_by_hand, write_by_hand
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants

@@ -15,9 +15,9 @@ from .control.path_pattern import PathPattern
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.sending import Prospect, jump_path_for, prospect_of
 from .machine.nesting import nodes_of
+from .machine.places import TreePlace
 from .machine.repeats import note_initial
 from .machine.tree_node import TreeNode, node_of
-from .places.place import TreePlace
 from .records.events import EventKind
 from .settings.settings import AUTONOMY_LEVELS
 from .smach_private import current_label_of

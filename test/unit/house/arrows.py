@@ -123,7 +123,6 @@ INSIDE = {
     'oracle.checkpoint',
     'oracle.branches',
     'oracle.recovery',
-    'oracle.places',
     'oracle.machine',
 }
 # what runs where no ROS is installed

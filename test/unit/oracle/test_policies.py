@@ -389,7 +389,7 @@ def test_an_unknown_policy_is_refused_by_name():
         'records.history',
         'records.events',
         'records.visits',
-        'records.state_record',
+        'machine.state_record',
         'asking.question',
     ],
 )

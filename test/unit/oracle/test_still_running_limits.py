@@ -8,7 +8,7 @@ from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, su
 from test_still_running import asked, told
 from waiting import wait_for
 
-from smach_oracle.oracle.places import jump_path
+from smach_oracle.oracle.machine import jump_path
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 from smach_oracle.oracle.scope.alarm_clock import AlarmClock

@@ -12,8 +12,8 @@ from smach_oracle.store.store_writer import StoreWriter
 from ..branches.around import wrappers_around, wrappers_in
 from ..branches.wrapper import ContainerWrapper
 from ..machine.nesting import nodes_of
+from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
-from ..places.place import TreePlace
 from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS

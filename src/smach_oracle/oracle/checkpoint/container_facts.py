@@ -7,9 +7,9 @@ from smach_oracle.store.codecs import Encoded
 from smach_oracle.store.names import EXECUTION, HISTORY, MARK, STATE, VISIT
 from smach_oracle.store.rows import Fact
 
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.history import History
-from ..records.state_record import StateRecord
 from ..records.visits import Visit
 from .stored_container import StoredContainer
 

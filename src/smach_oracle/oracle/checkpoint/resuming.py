@@ -11,16 +11,16 @@ from ..branches.around import wrappers_in
 from ..branches.items import can_be_indexed
 from ..branches.wrapper import wrapper_of
 from ..errors import SettingsError
+from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.nesting import branching_below, nodes_of
+from ..machine.places import TreePlace, place_named, places_of
 from ..machine.repeats import leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
-from ..places.jump_path import JumpPath, jump_path_to
-from ..places.place import TreePlace, place_named, places_of
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
-from ..records.state_record import StateRecord
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_container import StoredContainer
 from .stored_marks import Marks, let_repeat, take_over_marks

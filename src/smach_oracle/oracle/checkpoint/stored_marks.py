@@ -9,9 +9,9 @@ from typing import Callable, Dict, Mapping, Optional, Sequence, Tuple
 import smach
 
 from ..errors import SettingsError
+from ..machine.places import TreePlace, place_named
 from ..machine.repeats import begin_once_more
 from ..machine.tree_node import TreeNode
-from ..places.place import TreePlace, place_named
 from ..records.visit_marks import VisitMark
 from ..settings.settings import ALLOW
 from .stored_container import StoredContainer

@@ -2,13 +2,13 @@
 
 from typing import Mapping, Optional, Sequence
 
+from ..machine.jump_path import JumpPath
 from ..machine.repeats import note_superseded
 from ..machine.site import route_of
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
-from ..places.jump_path import JumpPath
 from ..records.events import EventKind
-from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery.endings import leaving_outcome
 from ..recovery.occasions import FirstStep, Occasion, Superseding

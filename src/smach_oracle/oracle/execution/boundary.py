@@ -13,10 +13,10 @@ import smach
 
 from ..checkpoint.resuming import forget_resumed
 from ..control.hold import HeldPlace, Hold, LetGo
+from ..machine.places import TreePlace
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts
-from ..places.place import TreePlace
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
 from ..recovery.endings import ending_at_once, route_at_preempt

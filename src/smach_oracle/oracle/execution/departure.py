@@ -11,11 +11,10 @@ import smach
 from smach_oracle.foreign import repr_of
 
 from ..branches.wrapper import wrapper_of
+from ..machine.jump_path import repeated_on, why_closed_on
 from ..machine.nesting import machines_below
+from ..machine.places import levels_above, links_to
 from ..machine.tree_node import TreeNode, WrappedMachine
-from ..places.handing_over import links_to
-from ..places.jump_path import repeated_on, why_closed_on
-from ..places.levels import levels_above
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure

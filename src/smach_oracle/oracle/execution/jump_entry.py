@@ -8,11 +8,11 @@ from typing import Collection, NamedTuple, Tuple
 
 from ..branches.around import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
+from ..machine.jump_path import JumpPath, missing_on
 from ..machine.nesting import nodes_of
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, missing_on
 from ..smach_private import data_of, remapping_of
 
 

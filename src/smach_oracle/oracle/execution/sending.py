@@ -4,10 +4,10 @@ from typing import NamedTuple, Optional, Tuple
 
 from ..asking.question import names
 from ..control.control import Jump
+from ..machine.jump_path import JumpPath, jump_path_to, repeated_on, why_closed_on
+from ..machine.places import TreePlace, place_at
 from ..machine.repeats import why_closed
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, jump_path_to, repeated_on, why_closed_on
-from ..places.place import TreePlace, place_at
 from ..records.events import EventKind
 from ..smach_private import current_label_of, is_executing
 from .jump_entry import missing_for, prepare_entry

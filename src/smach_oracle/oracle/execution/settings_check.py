@@ -6,8 +6,8 @@ import smach
 
 from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
+from ..machine.places import allowed_for, why_unfit
 from ..machine.tree_node import TreeNode
-from ..places.fitness import allowed_for, why_unfit
 from ..settings.on_resume import STATE
 from ..settings.patterns import matches
 from ..settings.preconditions import PreconditionSpec

@@ -12,15 +12,15 @@ from smach_oracle.foreign import repr_of
 from ..asking.question import AnswerKind
 from ..decision.policy import FailureContext
 from ..machine.execution import ends_program
-from ..machine.learned_rates import save_rates
+from ..machine.oracle import save_rates
+from ..machine.places import failure_context
 from ..machine.resumed import Unfinished
 from ..machine.site import Route
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
-from ..places.levels import failure_context
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
-from ..records.state_record import StateRecord
 from ..records.visits import VisitResult
 from ..recovery import occasions
 from ..recovery.endings import (

@@ -4,10 +4,10 @@ from typing import Any, NamedTuple, Optional
 
 import smach
 
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
-from ..records.state_record import StateRecord
 from ..recovery.stop import note_obeyed
 from ..settings.failing_outcomes import PREEMPTED
 from ..smach_private import (

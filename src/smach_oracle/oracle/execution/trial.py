@@ -13,8 +13,8 @@ from smach_oracle.forking import in_child
 from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.execution import Execution, ends_program, why_no_outcome
-from ..machine.learned_rates import save_rates
 from ..machine.nesting import nodes_of
+from ..machine.oracle import save_rates
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode, WrappedMachine
 from ..machine.workers import recall_preempts

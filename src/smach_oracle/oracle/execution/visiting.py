@@ -6,10 +6,10 @@ import smach
 
 from ..machine.repeats import note_visit
 from ..machine.snapshots import UserdataGate
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import view_behind
 from ..records.events import EventKind
-from ..records.state_record import StateRecord
 from ..recovery.failure import HeldBack, Overrun
 from ..recovery.still_running import EndedByAnswer, WatchedVisit
 from ..smach_private import has_preempt_flag

@@ -11,8 +11,8 @@ from ..asking.question import names
 from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError, TrialError
 from ..identity import own_attributes, set_class
-from ..machine.learned_rates import load_rates
 from ..machine.nesting import containers_in, machines_below, nodes_of
+from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine, node_of
 from ..recovery.phases import OracleState

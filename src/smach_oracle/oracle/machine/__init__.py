@@ -1,1 +1,1 @@
-"""The data of one wrapped machine beside its states: its place in the tree, records, userdata."""
+"""One wrapped machine, its records, settings and userdata, and the places of its whole tree."""

@@ -6,10 +6,10 @@ from typing import Dict, Mapping, Optional, Tuple
 from ..decision.failure_rate import base_of
 from ..decision.policy import FailureContext
 from ..records.history import History
-from ..records.state_record import FastEdge, StateRecord
 from ..records.visit_marks import VisitMarks
 from ..records.visits import Visit, VisitResult
 from ..settings.settings import StateSettings
+from .state_record import FastEdge, StateRecord
 
 
 class ContainerRecords:

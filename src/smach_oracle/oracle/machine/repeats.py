@@ -7,10 +7,10 @@ are not repeats.
 
 from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 
-from ..records.state_record import StateRecord
 from ..records.visit_marks import VisitMark
 from ..settings.settings import ALLOW, NEVER
 from .nesting import nodes_of
+from .state_record import StateRecord
 from .tree_node import TreeNode
 
 

@@ -14,7 +14,7 @@ from typing import (
 )
 
 from ..records.events import FailureKind
-from ..records.state_record import StateRecord
+from .state_record import StateRecord
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode

@@ -6,7 +6,6 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 import smach
 
 from ..records.events import EventKind
-from ..records.state_record import RateReading, StateRecord
 from ..settings.patterns import is_nested_at
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import EngineProbe, Labels, Machine, data_of, is_executing, mark_of, states_of
@@ -15,6 +14,7 @@ from .container_settings import ContainerSettings
 from .execution import Execution
 from .site import Site
 from .snapshots import NOT_COPIED, take_snapshot
+from .state_record import RateReading, StateRecord
 from .tree import Tree
 
 DEFAULT_NAME = 'SM_ROOT'

@@ -5,15 +5,14 @@ from typing import Any, Callable, List, Optional, Tuple
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, FailureContext, Past, Preconditions, Situation
 from ..decision.sentence import DecisionFacts, goes, going_would_repeat
+from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
+from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.repeats import has_visited
 from ..machine.snapshots import WriteWatch
+from ..machine.state_record import RateReading, StateRecord
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
-from ..places.levels import levels_above
-from ..places.place import TreePlace, place_named
 from ..records.events import EventKind
 from ..records.facts import Decider
-from ..records.state_record import RateReading, StateRecord
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from .failure import Failure

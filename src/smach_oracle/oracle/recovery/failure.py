@@ -15,9 +15,9 @@ from ..asking.question import names
 from ..machine.nesting import items_under_way
 from ..machine.resumed import Unfinished
 from ..machine.site import Route, failure_kind, route_of
+from ..machine.state_record import RateReading, StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
-from ..records.state_record import RateReading, StateRecord
 from ..records.visits import VisitResult
 from ..settings.failing_outcomes import is_preempted
 

@@ -3,8 +3,8 @@
 from typing import TYPE_CHECKING, Optional
 
 from ..asking.question import names
-from ..places.jump_path import JumpPath, jump_path_to, why_closed_on
-from ..places.place import place_named
+from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
+from ..machine.places import place_named
 from .verdict import Verdict
 
 if TYPE_CHECKING:

@@ -6,14 +6,13 @@ import smach
 
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
+from ..machine.jump_path import jump_path_to
+from ..machine.places import TreePlace, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, route_of
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import jump_path_to
-from ..places.levels import failure_context, is_direct, levels_above
-from ..places.place import TreePlace
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
-from ..records.state_record import StateRecord
 from ..smach_private import Labels
 from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending

@@ -17,10 +17,10 @@ from ..decision.policy import Action
 from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
+from ..machine.jump_path import JumpPath, why_closed_on
+from ..machine.places import TreePlace
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, why_closed_on
-from ..places.place import TreePlace
 from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from ..scope.scope import standing_still

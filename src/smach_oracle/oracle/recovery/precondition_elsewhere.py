@@ -7,11 +7,10 @@ down through the input keys of the containers around the failed state.
 
 from typing import Any, Dict, List, Tuple
 
+from ..machine.jump_path import JumpPath, hand_down, hand_on, hand_up, jump_path_to
+from ..machine.places import TreePlace, links_to
 from ..machine.snapshots import UserdataGate, WriteWatch
 from ..machine.tree_node import TreeNode
-from ..places.handing_over import hand_down, hand_on, hand_up, links_to
-from ..places.jump_path import JumpPath, jump_path_to
-from ..places.place import TreePlace
 from ..settings.settings import ALLOW
 
 

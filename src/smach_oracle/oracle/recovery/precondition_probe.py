@@ -11,9 +11,9 @@ from smach_oracle.foreign import repr_of
 
 from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..identity import truth_of
+from ..machine.places import place_named
 from ..machine.snapshots import UserdataGate, behind
 from ..machine.tree_node import TreeNode
-from ..places.place import place_named
 from ..records.short_text import shortened
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec

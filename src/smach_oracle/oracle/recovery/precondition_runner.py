@@ -11,13 +11,12 @@ import smach
 from smach_oracle.foreign import repr_of
 
 from ..identity import truth_of
+from ..machine.places import place_named, why_unfit
 from ..machine.repeats import note_precondition, repeated_by_running
 from ..machine.site import failure_kind, route_of
 from ..machine.snapshots import UserdataGate, WriteWatch, behind
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import constants_of, view_behind, write_constants
-from ..places.fitness import why_unfit
-from ..places.place import place_named
 from ..records.events import FailureKind
 from ..scope.scope import Scope
 from ..settings.failing_outcomes import is_preempted

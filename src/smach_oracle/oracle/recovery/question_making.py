@@ -6,11 +6,10 @@ import smach
 
 from ..asking.answer_rules import Target
 from ..asking.question import LevelOutcome, Question, StateChoice
+from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
+from ..machine.places import levels_above, places_of
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
-from ..places.levels import levels_above
-from ..places.place import places_of
-from ..records.state_record import StateRecord
 from ..smach_private import Machine
 from .failure import Failure
 from .precondition_probe import LivePreconditionProbe

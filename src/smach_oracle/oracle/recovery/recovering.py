@@ -10,10 +10,10 @@ from ..asking.answer_rules import Target
 from ..asking.question import Question
 from ..decision.policy import Action
 from ..decision.sentence import cause_of
+from ..machine.jump_path import JumpPath
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath
 from ..records.events import EventKind
-from ..records.state_record import StateRecord
 from ..scope.scope import Reason
 from .deciding import Decided, Deciding
 from .endings import ContainerEnding, natural_ending, preempted_ending

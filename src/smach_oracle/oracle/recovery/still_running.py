@@ -13,10 +13,10 @@ from ..asking.answer_rules import Target
 from ..asking.inquiry import Inquiry, Reply
 from ..asking.question import Answer, AnswerKind, Expert, Question
 from ..decision.sentence import ran_in_words, still_running_sentence
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import request_preempt
 from ..records.events import EventKind, FailureKind
-from ..records.state_record import StateRecord
 from ..scope.clock import Flag, PausableClock
 from ..scope.scope import Reason, Scope, inside, standing_still
 from .failure import Failure

@@ -2,8 +2,8 @@
 
 from typing import Optional, Sequence
 
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..records.state_record import StateRecord
 from ..scope.scope import Reason, Scope, standing_still
 from ..settings.failing_outcomes import is_preempted
 

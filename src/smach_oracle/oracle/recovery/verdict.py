@@ -8,11 +8,10 @@ from typing import Callable, FrozenSet, NamedTuple, Optional, Union
 import smach
 
 from ..asking.question import Answer, AnswerKind
+from ..machine.jump_path import JumpPath, jump_path_to
+from ..machine.places import levels_above, place_at
 from ..machine.snapshots import WriteWatch
 from ..machine.tree_node import TreeNode
-from ..places.jump_path import JumpPath, jump_path_to
-from ..places.levels import levels_above
-from ..places.place import place_at
 from .endings import ContainerEnding
 
 

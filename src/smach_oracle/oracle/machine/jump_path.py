@@ -1,15 +1,29 @@
-"""The way from a failure to a place, and what is told of it before the machine goes there."""
+"""The way from a failure to a place: what is told of it before, and userdata on its way between.
 
-from typing import FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
+Userdata goes from container to container through the input and output keys of its author.
+"""
 
-from ..machine.repeats import repeated_by_going_to, why_closed
-from ..machine.snapshots import WriteWatch
-from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import keys_after_jump, missing_keys
-from ..smach_private import data_of, items_label_of, states_of
-from .handing_over import links_to
-from .levels import levels_above
-from .place import TreePlace
+from typing import (
+    Any,
+    FrozenSet,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+)
+
+import smach
+
+from ..smach_private import constants_of, data_of, items_label_of, states_of
+from .places import Link, TreePlace, levels_above, links_to
+from .repeats import repeated_by_going_to, why_closed
+from .snapshots import WriteWatch
+from .tree_node import TreeNode
+from .userdata_view import keys_after_jump, missing_keys
 
 
 class JumpPath(NamedTuple):
@@ -107,3 +121,53 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
         if item is not None:  # an Iterator: its state works on its own userdata
             keys.add(item)
     return keys
+
+
+# -- userdata between containers
+
+
+def hand_down(link: Link) -> None:
+    """Give a container its input keys, as when it begins."""
+    given = {**data_of(link.above.userdata), **_constants(link)}
+    for key, named in _inputs(link):
+        if named in given:
+            link.below.userdata[key] = given[named]
+
+
+def hand_up(link: Link, written: Set[str], into: Any) -> Set[str]:
+    """Hand output keys of a container that were written to the one above it.
+
+    :param into: where they are written, by keys of the container above.
+    :returns: the keys written there.
+    """
+    found = set()
+    for key in link.below.get_registered_output_keys():
+        if key in written and key in data_of(link.below.userdata):
+            named = link.remapping.get(key, key)
+            into[named] = data_of(link.below.userdata)[key]
+            found.add(named)
+    return found
+
+
+def hand_on(link: Link, written: Set[str], into: Any) -> Set[str]:
+    """Hand what was written in a container to the one below it that runs, by its input keys.
+
+    :param into: where it is written, by keys of the container below.
+    :returns: the keys written there.
+    """
+    found = set()
+    for key, named in _inputs(link):
+        if named in written and named in data_of(link.above.userdata):
+            into[key] = data_of(link.above.userdata)[named]
+            found.add(key)
+    return found
+
+
+def _inputs(link: Link) -> Sequence[Tuple[str, str]]:
+    return [(key, link.remapping.get(key, key)) for key in link.below.get_registered_input_keys()]
+
+
+def _constants(link: Link) -> Mapping[str, Any]:
+    return (
+        constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine) else {}
+    )

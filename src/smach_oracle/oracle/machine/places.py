@@ -1,0 +1,241 @@
+"""Places: the states of all containers of a tree, the levels around them, the links between them.
+
+The *levels* of a failure are the wrapped containers that are being executed around it: its own, the
+one above it, and so on to the top.
+"""
+
+from typing import Any, Iterator, List, Mapping, NamedTuple, Optional
+
+import smach
+
+from ..decision.policy import FailureContext
+from ..settings.unfit_names import did_you_mean
+from ..smach_private import (
+    current_state_of,
+    initial_label_of,
+    is_executing,
+    remapping_in,
+    states_of,
+)
+from .nesting import nodes_of
+from .state_record import StateRecord
+from .tree_node import TreeNode
+
+
+class Link(NamedTuple):
+    """A container in the container around it, which may be a Concurrence or an Iterator."""
+
+    above: Any
+    label: str
+    below: Any
+
+    @property
+    def remapping(self) -> Mapping[str, str]:
+        """Key of the container above by key of the one below, where they differ."""
+        return remapping_in(self.above, self.label)
+
+
+def links_to(node: TreeNode) -> Iterator[Link]:
+    """Yield the links from the wrapped container above one to it, from above to below.
+
+    The top machine has none.
+    """
+    above: Any = node.parent.machine if node.parent is not None else None
+    for label in node.below:
+        below = child_of(above, label)
+        yield Link(above, label, below)
+        above = below
+
+
+def child_of(container: Any, label: str) -> Any:
+    """Return a state of a container of whatever kind."""
+    if isinstance(container, smach.StateMachine):
+        return states_of(container)[label]
+    return container.get_children()[label]
+
+
+# -- levels
+
+
+def levels_above(node: TreeNode) -> Iterator[TreeNode]:
+    """Yield the wrapped containers that are being executed around this one, innermost first."""
+    child, above = node, node.parent
+    while above is not None and _executes(above, child):
+        yield above
+        child, above = above, above.parent
+
+
+def _executes(above: TreeNode, child: TreeNode) -> bool:
+    """Whether a container is now in the state that holds the one below it."""
+    machine = above.machine
+    state = states_of(machine).get(child.below[0])
+    return is_executing(machine) and state is not None and current_state_of(machine) is state
+
+
+def is_direct(node: TreeNode) -> bool:
+    """Whether nothing lies between a container and the wrapped one above it."""
+    return node.parent is not None and not node.runs_in_branch
+
+
+def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
+    """Yield the container itself, the levels above it, and then the others of the tree."""
+    first = [node, *levels_above(node)]
+    yield from first
+    for each in nodes_of(first[-1].machine):
+        if not any(each is one for one in first):
+            yield each
+
+
+def failure_context(node: TreeNode, record: StateRecord) -> FailureContext:
+    """Return what the visits so far say about a failure of a state of a container.
+
+    With `step_back_across` its initial state is that before the container, in the levels above,
+    where there is one.
+    """
+    context = node.records.failure_context(record, initial_label_of(node.machine))
+    before = _state_before(node) if node.settings.step_back_across else ''
+    return context._replace(initial=before) if before else context
+
+
+def _state_before(node: TreeNode) -> str:
+    """Return the path of the state to which the policies above would step back from a container.
+
+    It is '' where none has run before, or where a Concurrence or an Iterator lies between.
+    """
+    child = node
+    for above in levels_above(node):
+        if not is_direct(child):
+            break
+        context = above.records.failure_context(above.record(child.below[0]), '')
+        name = above.in_force.policy.step_back_target(context)
+        if name:
+            return name if '/' in name else '{}/{}'.format(above.relative_path, name)
+        child = above
+    return ''
+
+
+# -- places
+
+
+class TreePlace(NamedTuple):
+    """One state of one container."""
+
+    node: TreeNode
+    label: str
+
+    @property
+    def path(self) -> str:
+        """Return the path of the container, and the label."""
+        return '{}/{}'.format(self.node.path, self.label)
+
+
+def places_of(node: TreeNode) -> Iterator[TreePlace]:
+    """Yield the places of the tree. Those of the container itself come first."""
+    for each in nodes_of_tree(node):
+        for label in each.labels():
+            yield TreePlace(each, label)
+
+
+def place_at(node: TreeNode, container: str, label: str) -> Optional[TreePlace]:
+    """Return the place of a state in the tree, None where there is none.
+
+    :param container: path of its container, '' for the container itself.
+    """
+    for each in nodes_of_tree(node):
+        if each.path == (container or node.path) and each.has(label):
+            return TreePlace(each, label)
+    return None
+
+
+def place_named(node: TreeNode, name: str, at_rest: bool = False) -> Optional[TreePlace]:
+    """Return the place that a setting names, None where there is none.
+
+    :param name: a label of the container itself, or the path of a state below the top machine,
+        which may begin with '/'.
+    :param at_rest: whether the whole tree is looked through, and not what is being executed.
+    """
+    if node.has(name):
+        return TreePlace(node, name)
+    path = name[1:] if name.startswith('/') else name
+    for each in nodes_of(node.top().machine) if at_rest else nodes_of_tree(node):
+        above = each.relative_path + '/' if each.relative_path else ''
+        if path.startswith(above) and each.has(path[len(above) :]):
+            return TreePlace(each, path[len(above) :])
+    return None
+
+
+# -- which places may be named as preconditions of a state, whatever runs
+
+
+def why_unfit(node: TreeNode, label: str, name: str) -> str:
+    """Say why a name cannot be a precondition of a state, or '' where it can.
+
+    A name without '/' is a label of the state's own container, any other one a path.
+    """
+    if '/' not in name and not (node.site.is_container and name in node.labels()):
+        return _where_it_is(node, name) or _unknown(node, label, name)
+    place = place_named(node, name, at_rest=True)
+    if place is None:
+        return _unknown(node, label, name)
+    if place.node is node and place.label == label:
+        return 'it is the state itself'
+    if _is_around(place, node):
+        return 'it is a container around the state, and runs meanwhile'
+    if place.node is not node and not place.node.site.is_container:
+        return 'a state of a Concurrence or an Iterator cannot be run alone'
+    if _is_in_iterator(place, node):
+        return 'it is in an Iterator, and there is no item where it is run alone'
+    return ''
+
+
+def allowed_for(node: TreeNode, label: str) -> str:
+    """Say which names may be preconditions of a state."""
+    elsewhere = 'PATH/LABEL of a state of another container'
+    if not node.site.is_container:
+        return elsewhere
+    return 'the labels of the other states of {}: {}; or {}'.format(
+        node.path, ', '.join(sorted(other for other in node.labels() if other != label)), elsewhere
+    )
+
+
+def _unknown(node: TreeNode, label: str, name: str) -> str:
+    names = {
+        '{}/{}'.format(each.relative_path, state)
+        for each in nodes_of(node.top().machine)
+        for state in each.labels()
+    }
+    if node.site.is_container:
+        names.update(node.labels())
+    own = {label, '{}/{}'.format(node.relative_path, label)}
+    return 'there is no such state' + did_you_mean(name, names - own)
+
+
+def _where_it_is(node: TreeNode, name: str) -> str:
+    paths = [
+        '{}/{}'.format(each.relative_path, name)
+        for each in nodes_of(node.top().machine)
+        if each is not node and name in each.labels()
+    ]
+    return 'in other containers there is ' + ', '.join(sorted(paths)) if paths else ''
+
+
+def _around(node: TreeNode) -> List[TreeNode]:
+    """Return a container and all wrapped ones around it."""
+    found = [node]
+    while found[-1].parent is not None:
+        found.append(found[-1].parent)
+    return found
+
+
+def _is_around(place: TreePlace, node: TreeNode) -> bool:
+    return any(each.parent is place.node and each.below[0] == place.label for each in _around(node))
+
+
+def _is_in_iterator(place: TreePlace, node: TreeNode) -> bool:
+    """Whether an Iterator lies between a place and what is around both."""
+    common, inner = _around(node), place.node
+    while inner.parent is not None and not any(inner is each for each in common):
+        if any(isinstance(link.above, smach.Iterator) for link in links_to(inner)):
+            return True
+        inner = inner.parent
+    return False

@@ -1,1 +1,0 @@
-"""Places, the states of all containers of a tree, and the ways between them."""
