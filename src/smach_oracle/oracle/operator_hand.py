@@ -7,7 +7,7 @@ run.
 from typing import List, Mapping, NamedTuple, Sequence, Tuple
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from .control.control import Jump
 from .control.hold import HeldPlace, Hold

@@ -15,7 +15,7 @@ COMMON = 'smach_common'  # what the rooms and the stand-ins share
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': {'foreign', 'forking', 'store'},
+    'oracle': {'smach_common.foreign', 'forking', 'store'},
     'store': {'smach_common.foreign', 'forking'},  # no ROS, no SMACH
     'ros': {
         'oracle.asking',
@@ -111,7 +111,6 @@ ARROWS: Dict[str, Set[str]] = {
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'documentation': set(),
-    'foreign': {'smach_common.foreign'},
     'forking': set(),
     'packages': set(),
 }
@@ -142,7 +141,6 @@ ROS_FREE = [
     'inspection_robot/world',
     'inspection_robot/robot',
     'commands',
-    'foreign',
     'forking',
     'packages',
 ]

@@ -3,7 +3,7 @@
 import threading
 from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
 
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..errors import AnswerError
 from ..records.events import EventKind

@@ -2,7 +2,7 @@
 
 from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
 
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..identity import has_attribute, own_mark
 

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Callable
 
 import smach
-from smach_oracle.foreign import ends_program, error_text
+from smach_common.foreign import ends_program, error_text
 from smach_oracle.store.names import BROKEN
 from smach_oracle.store.rows import NewMoment
 from smach_oracle.store.store_writer import StoreWriter

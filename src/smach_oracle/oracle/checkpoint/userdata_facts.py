@@ -16,7 +16,7 @@ from typing import (
     cast,
 )
 
-from smach_oracle.foreign import ends_program, text_of, type_name
+from smach_common.foreign import ends_program, text_of, type_name
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
 from smach_oracle.store.names import KEPT_OUT, KEY
 from smach_oracle.store.rows import Fact

@@ -8,7 +8,7 @@ is preempted, and waited for.
 from typing import List, Optional, cast
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..branches.wrapper import wrapper_of
 from ..machine.jump_path import repeated_on, why_closed_on

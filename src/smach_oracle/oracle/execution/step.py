@@ -7,7 +7,7 @@ with it (paper, section IV-A).
 from typing import Any, Mapping, Optional, Union, cast
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..asking.question import AnswerKind
 from ..decision.policy import FailureContext

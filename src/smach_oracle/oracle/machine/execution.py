@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, Any, Dict, Iterable, Optional, Protocol, Tuple
 
 import smach
-from smach_oracle.foreign import error_text
+from smach_common.foreign import error_text
 
 from ..records.events import NO_OUTCOME, EventKind
 from ..scope.scope import Reason, Scope, scopes_of_thread

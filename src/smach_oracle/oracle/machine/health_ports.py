@@ -2,7 +2,7 @@
 
 from typing import Optional, Protocol
 
-from smach_oracle.foreign import error_text, repr_of
+from smach_common.foreign import error_text, repr_of
 
 from ..scope.background_call import BackgroundCall
 from ..scope.scope import Scope

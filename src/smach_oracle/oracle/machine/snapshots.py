@@ -12,7 +12,7 @@ from collections.abc import MutableMapping
 from typing import Any, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Set
 
 import smach
-from smach_oracle.foreign import ends_program, error_text
+from smach_common.foreign import ends_program, error_text
 
 from ..identity import own_mark
 from ..smach_private import Machine

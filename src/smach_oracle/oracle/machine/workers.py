@@ -10,7 +10,7 @@ import threading
 from typing import Callable, Dict, List, NamedTuple, Optional
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..identity import attribute_of, own_mark
 from ..scope.background_call import BackgroundCall, KeptThread

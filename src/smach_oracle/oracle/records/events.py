@@ -26,7 +26,7 @@ from time import time
 from types import MethodType
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
-from smach_oracle.foreign import ends_program, error_text, repr_of
+from smach_common.foreign import ends_program, error_text, repr_of
 
 NAN = float('nan')
 # Text of the TRIAL_END and CONTAINER_END of an execute() that returned None.

@@ -9,7 +9,7 @@ from functools import lru_cache, partial
 from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
 
 import smach
-from smach_oracle.foreign import error_text, repr_of
+from smach_common.foreign import error_text, repr_of
 
 from ..asking.question import names
 from ..machine.nesting import items_under_way

@@ -7,7 +7,7 @@ that nobody waits for.
 
 from typing import List, NamedTuple, Optional
 
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..asking.question import PreconditionProbe, PreconditionStatus
 from ..identity import truth_of

@@ -8,7 +8,7 @@ import threading
 from typing import Any, Iterator, List, NamedTuple, Optional
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from ..identity import truth_of
 from ..machine.places import place_named, why_unfit

@@ -4,7 +4,7 @@ import threading
 from typing import Callable, Dict, Optional
 
 import smach
-from smach_oracle.foreign import repr_of
+from smach_common.foreign import repr_of
 
 from .clock import Bell, Clock
 

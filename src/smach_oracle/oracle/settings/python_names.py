@@ -2,7 +2,7 @@
 
 from typing import Any, Callable
 
-from smach_oracle.foreign import error_text
+from smach_common.foreign import error_text
 
 from ..errors import SettingsError
 
