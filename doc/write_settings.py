@@ -19,8 +19,7 @@ import yaml
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'src'))
 
-from smach_oracle.oracle.settings.budget import Budget  # noqa: E402
-from smach_oracle.oracle.settings.setting import settings_of  # noqa: E402
+from smach_oracle.oracle.settings.checks import Budget, settings_of  # noqa: E402
 from smach_oracle.oracle.settings.settings import Settings, StateSettings  # noqa: E402
 
 TEMPLATE = ROOT / 'doc/oracle_yaml.in'

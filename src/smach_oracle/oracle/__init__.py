@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .asking.question import Answer, AnswerKind, Expert, Question
-    from .checkpoint.storable import register_codec
+    from smach_oracle.store.codecs import register_codec
     from .container import OracleContainer
     from .errors import CheckpointError
     from .decision.failure_rate import ExponentialFailureRate, FailureClass, FailureRate
@@ -34,7 +34,7 @@ _LAZY = {
     'Expert': 'asking.question',
     'Question': 'asking.question',
     'OperatorHand': 'operator_hand',
-    'register_codec': 'checkpoint.storable',
+    'register_codec': '.store.codecs',
     'unwrap': 'execution.wrapping',
     'CheckpointError': 'errors',
 }
@@ -61,4 +61,4 @@ def __getattr__(name: str) -> object:
         raise AttributeError('module {!r} has no attribute {!r}'.format(__name__, name))
     from importlib import import_module
 
-    return getattr(import_module('{}.{}'.format(__name__, _LAZY[name])), name)
+    return getattr(import_module('.' + _LAZY[name], __name__), name)

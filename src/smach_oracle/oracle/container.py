@@ -24,11 +24,10 @@ from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
-from .records.rate_rows import StateRateRow, TransitionRow
+from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
-from .settings.patterns import Nested, checked_nested
+from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .settings.unfit_names import Strictness
 from .smach_private import Transitions, data_of, has_keys, marked_node, opened_container
 
 EDGE_TO_ORACLE = 'failure'

@@ -9,9 +9,7 @@ from typing import List, Mapping, NamedTuple, Sequence, Tuple
 import smach
 from smach_common.foreign import repr_of
 
-from .control.control import Jump
-from .control.hold import HeldPlace, Hold
-from .control.path_pattern import PathPattern
+from .control.control import HeldPlace, Hold, Jump
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.sending import Prospect, jump_path_for, prospect_of
 from .machine.nesting import nodes_of
@@ -19,6 +17,7 @@ from .machine.places import TreePlace
 from .machine.repeats import note_initial
 from .machine.tree_node import TreeNode, node_of
 from .records.events import EventKind
+from .settings.names import PathPattern
 from .settings.settings import AUTONOMY_LEVELS
 from .smach_private import current_label_of
 

@@ -20,9 +20,8 @@ from smach_oracle.oracle.container import SettingsLike
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.settings.health import HealthFunction
-from smach_oracle.oracle.settings.patterns import Nested
+from smach_oracle.oracle.settings.names import Nested, Strictness
 from smach_oracle.oracle.settings.settings import Settings
-from smach_oracle.oracle.settings.unfit_names import Strictness
 
 from .attachment import attachments
 from .expert.failure_text import describe_failure

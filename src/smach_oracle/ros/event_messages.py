@@ -10,7 +10,7 @@ from std_msgs.msg import Header
 from smach_common.foreign import ends_program, error_text, text_of
 from smach_oracle.msg import OracleEvent, OracleRates, StateRate, TransitionCount
 from smach_oracle.oracle.records.events import Event
-from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
+from smach_oracle.oracle.records.visits import StateRateRow, TransitionRow
 
 from .sendable_text import sendable_text
 

@@ -12,8 +12,8 @@ import rospy
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.identity import is_same
+from smach_oracle.oracle.settings.names import did_you_mean
 from smach_oracle.oracle.settings.paths import path_of
-from smach_oracle.oracle.settings.unfit_names import did_you_mean
 from smach_oracle.oracle.settings.written import plain
 
 from .parameters import read_or_default

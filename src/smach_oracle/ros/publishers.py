@@ -16,7 +16,7 @@ from smach_common.foreign import error_text
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
-from smach_oracle.oracle.records.rate_rows import StateRateRow, TransitionRow
+from smach_oracle.oracle.records.visits import StateRateRow, TransitionRow
 
 from .connections import TOPIC_ERRORS, quiet_at_shutdown
 from .event_messages import rates_to_msg, to_msg

@@ -7,13 +7,12 @@ from machines import Scripted, chain_of
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.control.control import Control
-from smach_oracle.oracle.control.hold import HeldPlace, LetGo
-from smach_oracle.oracle.control.path_pattern import PathPattern
+from smach_oracle.oracle.control.control import Control, HeldPlace, LetGo
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.settings.names import PathPattern
 
 
 def test_a_state_that_is_to_be_confirmed_waits_for_that_alone() -> None:

@@ -5,8 +5,8 @@ import gc
 import os
 import sys
 
-from smach_oracle.oracle.records import name_claims
-from smach_oracle.oracle.records.name_claims import claim, is_claimed
+from smach_oracle.oracle.records import folder_locks
+from smach_oracle.oracle.records.folder_locks import claim, is_claimed
 
 
 class Owner:
@@ -38,12 +38,12 @@ def child_that_waits(does=lambda: None):
 
 
 def lines_of_a_claim(at_line):
-    """Trace what runs in name_claims, and call `at_line` with the number of each line."""
+    """Trace what runs in folder_locks, and call `at_line` with the number of each line."""
     count = 0
 
     def trace(frame, event, arg):
         nonlocal count
-        if frame.f_code.co_filename != name_claims.__file__:
+        if frame.f_code.co_filename != folder_locks.__file__:
             return None
         if event == 'line':
             count += 1

@@ -2,8 +2,8 @@
 
 import pytest
 
-from smach_oracle.oracle.control.path_pattern import PathPattern
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.names import PathPattern
 
 
 @pytest.mark.parametrize(

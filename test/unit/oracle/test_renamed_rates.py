@@ -11,7 +11,7 @@ import pytest
 from machines import Scripted, Watched, chain_of
 
 import smach
-from smach_oracle.oracle.records import name_claims
+from smach_oracle.oracle.records import folder_locks
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = """
@@ -187,7 +187,7 @@ def test_a_child_that_outlives_its_program_keeps_no_name(program):
 def test_where_nobody_can_say_who_lives_nothing_is_inherited(tmp_path, program, monkeypatch):
     with program('OLD', 1):
         pass
-    monkeypatch.setattr(name_claims, '_ask', lambda *_: (_ for _ in ()).throw(OSError(38, 'none')))
+    monkeypatch.setattr(folder_locks, '_ask', lambda *_: (_ for _ in ()).throw(OSError(38, 'none')))
     new = Watched(
         chain_of(Scripted()), name='NEW', settings={'rates_file': str(tmp_path / 'rates.json')}
     )

@@ -8,7 +8,7 @@ import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.settings.patterns import exactness, matches
+from smach_oracle.oracle.settings.names import exactness, matches
 from smach_oracle.oracle.settings.settings import Settings
 
 

@@ -14,8 +14,8 @@ from killed_trees import flat
 from machines import Scripted, Watched, chain_of
 
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
-from smach_oracle.oracle.records import folder_lock as lock_module
-from smach_oracle.oracle.records.folder_lock import folder_lock
+from smach_oracle.oracle.records import folder_locks as lock_module
+from smach_oracle.oracle.records.folder_locks import folder_lock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 

@@ -13,7 +13,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.machine.trial_budget import TrialBudget
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import Decider
-from smach_oracle.oracle.settings.budget import Budget
+from smach_oracle.oracle.settings.checks import Budget
 from smach_oracle.oracle.settings.settings import Settings
 
 

@@ -7,7 +7,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from smach_oracle.msg import ExpertQueryGoal, OpenQuery, RecorderStatus
-from smach_oracle.oracle.records.rate_rows import StateRateRow
+from smach_oracle.oracle.records.visits import StateRateRow
 from smach_oracle.ros.diagnostics import roswtf_plugin, statuses
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

@@ -12,7 +12,7 @@ import pytest
 import smach_oracle
 from smach_oracle.experiment.pool import alone_in
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
-from smach_oracle.oracle.records.folder_lock import folder_lock
+from smach_oracle.oracle.records.folder_locks import folder_lock
 from smach_oracle.ros.disk import bag_folder
 from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.ros.recording.bag_writer import BagWriter
@@ -91,7 +91,7 @@ WAYS = {
     'ros/recording/bag_writer.py': [bag_writer],
     'ros/disk/bag_folder.py': [disk],
     'expert/console/trials/bag_catalogue.py': [catalogue],
-    'oracle/records/folder_lock.py': [rates_folder],
+    'oracle/records/folder_locks.py': [rates_folder],
     'experiment/pool.py': [experiment],
     'store/holding.py': [held_machine, looked_at_machine, looked_at_all_machines],
 }

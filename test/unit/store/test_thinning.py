@@ -7,9 +7,8 @@ from killed_machines import in_a_process
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.checkpoint.storable import CODECS
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
-from smach_oracle.store.codecs import Codecs, Encoded
+from smach_oracle.store.codecs import CODECS, Codecs, Encoded
 from smach_oracle.store.names import EDIT
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile, transaction

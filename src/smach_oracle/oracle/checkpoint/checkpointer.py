@@ -18,9 +18,8 @@ from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
-from .container_facts import ContainerFacts, fact_of
+from .container_facts import ContainerFacts, KeptOut, UserdataFacts, WeakIds, fact_of, keys_of
 from .stored_tree import StoredTree
-from .userdata_facts import KeptOut, UserdataFacts, WeakIds, keys_of
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it

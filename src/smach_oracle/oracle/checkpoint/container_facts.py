@@ -1,17 +1,33 @@
-"""The facts of one container that are to be stored, and those of them that are new."""
+"""The facts of one container and its userdata that are to be stored, and those that are new."""
 
 import json
-from typing import Any, Dict, Iterator, List, Optional, Union
+import marshal
+import weakref
+from typing import (
+    Any,
+    Callable,
+    Dict,
+    FrozenSet,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Tuple,
+    Union,
+    cast,
+)
 
-from smach_oracle.store.codecs import Encoded
-from smach_oracle.store.names import EXECUTION, HISTORY, MARK, STATE, VISIT
+from smach_common.foreign import ends_program, text_of, type_name
+from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
+from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, VISIT
 from smach_oracle.store.rows import Fact
 
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.visits import Visit
-from .stored_container import StoredContainer
+from ..smach_private import Machine
+from .stored_tree import StoredContainer
 
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
 Plain = Union[Dict[str, Any], List[Any], str, int]
@@ -96,3 +112,152 @@ class ContainerFacts:
         if self._stored.get(name) != text:
             self._stored[name] = text
             yield Fact(self._path, name, Encoded(text, None, {}))
+
+
+# a version of marshal's format that writes what stands in several places once: data that hold
+# themselves have an end
+_WITH_REFERENCES = 4
+# ids of types of which the same object has the same value: classes may compare as they like
+_FIXED = frozenset(map(id, (str, int, float, bool, type(None), bytes)))
+
+
+class KeptOut(NamedTuple):
+    """A value that cannot be stored, or one that is stored without some of its attributes."""
+
+    key: str
+    kind: str  # its type
+    why: str
+    value: object
+    attributes: Tuple[str, ...] = ()  # that are not stored, where the rest is
+
+
+class WeakIds:
+    """The objects that were seen. One that has no weak references, such as a list, is kept."""
+
+    def __init__(self) -> None:
+        self._seen: Dict[int, Callable[[], object]] = {}
+
+    def add(self, value: object) -> bool:
+        """Note an object, and return whether it is new."""
+        seen = self._seen.get(id(value))
+        if seen is not None and seen() is value:
+            return False
+        try:
+            self._seen[id(value)] = weakref.ref(cast(Any, value))
+        except TypeError:
+            self._seen[id(value)] = lambda: value
+        return True
+
+
+class _Known(NamedTuple):
+    value: object
+    stored: Union[Encoded, str]  # why not
+    print_: Optional[bytes] = None  # of plain data: differs where the value does
+
+
+class UserdataFacts:
+    """Tells what of the userdata of one container differs from what is stored.
+
+    A key is looked at where it holds another object than before, or one that may have changed
+    inside: a list, an array, a message. Of those it is enough to look at what the states can reach
+    that have run since.
+    """
+
+    def __init__(self, codecs: Codecs, path: str, tell: Callable[[KeptOut], None]) -> None:
+        """`tell` gets each value that cannot be stored, when it is first seen."""
+        self._codecs, self._path, self._tell = codecs, path, tell
+        self._known: Dict[str, _Known] = {}
+
+    def changed(self, data: Dict[str, Any], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
+        """Yield the facts that are new.
+
+        `data`: the userdata. `reached`: keys whose values may have changed inside. None means all.
+        """
+        known = self._known
+        for key, value in list(data.items()):
+            before = known.get(key)
+            if (
+                before is not None
+                and before.value is value
+                and (id(type(value)) in _FIXED or (reached is not None and key not in reached))
+            ):
+                continue
+            yield from self._look(key, value, before)
+        for key in [key for key in known if key not in data]:
+            stored = known.pop(key).stored
+            yield Fact(
+                self._path, (KEPT_OUT if isinstance(stored, str) else KEY) + _told(key), None
+            )
+
+    def _look(self, key: str, value: object, before: Optional[_Known]) -> Iterator[Fact]:
+        print_ = _print_of(value)
+        if before is not None and print_ is not None and print_ == before.print_:
+            if before.value is not value:
+                self._known[key] = before._replace(value=value)
+            return
+        told = _told(key)
+        dropped: List[str] = []
+        try:
+            if told != text_of(key):
+                raise NotStorable('its name is no text in UTF-8')
+            encoded = self._codecs.encode(value, dropped.append)
+        except NotStorable as err:
+            yield from self._keep_out(key, value, str(err), before)
+            return
+        if dropped:
+            self._tell(KeptOut(told, type_name(value), '', value, tuple(sorted(set(dropped)))))
+        self._known[key] = _Known(
+            value, encoded._replace(parts={}), print_ if _is_plain(encoded) else None
+        )
+        if before is None or isinstance(before.stored, str):
+            if before is not None:
+                yield Fact(self._path, KEPT_OUT + told, None)
+        elif before.stored[:2] == encoded[:2]:
+            return
+        yield Fact(self._path, KEY + told, encoded)
+
+    def _keep_out(
+        self, key: str, value: object, why: str, before: Optional[_Known]
+    ) -> Iterator[Fact]:
+        kind, told = type_name(value), _told(key)
+        self._known[key] = _Known(value, kind)
+        if before is not None and before.stored == kind:
+            return
+        if before is not None and not isinstance(before.stored, str):
+            yield Fact(self._path, KEY + told, None)
+        yield fact_of(self._path, KEPT_OUT + told, [kind, why])
+        self._tell(KeptOut(told, kind, why, value))
+
+
+def _told(key: object) -> str:
+    """Return a key as a file can hold it: one made of a file's name may be no UTF-8."""
+    return text_of(key).encode('utf-8', 'backslashreplace').decode('utf-8')
+
+
+def _print_of(value: object) -> Optional[bytes]:
+    """Return bytes that differ where plain data differ, or None for anything else."""
+    try:
+        return marshal.dumps(cast(Any, value), _WITH_REFERENCES)  # to compare, never loaded
+    except BaseException as err:  # a value that lends its memory may raise anything
+        if ends_program(err):
+            raise
+        return None
+
+
+def _is_plain(encoded: Encoded) -> bool:
+    """Whether a value has no bytes and no arrays: marshal does not tell these apart."""
+    parts, whole = encoded.parts, encoded.whole
+    text = encoded.text or ('' if whole is None else parts[whole].decode('ascii'))
+    return len(parts) == (whole is not None) and '"$b' not in text
+
+
+def keys_of(machine: Machine, label: str) -> FrozenSet[str]:
+    """Return the keys of a container that one of its states can read or write."""
+    state = machine._states.get(label)
+    if state is None:
+        return frozenset()
+    remapping = machine._remappings.get(label) or {}
+    return frozenset(
+        remapping.get(key, key)
+        for key in set(state.get_registered_input_keys()).union(state.get_registered_output_keys())
+    )

@@ -22,9 +22,8 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
 from .checkpointer import SEQ_RESERVE, must_stop
-from .stored_container import StoredContainer
 from .stored_marks import Marks, let_repeat, take_over_marks
-from .stored_tree import StoredTree
+from .stored_tree import StoredContainer, StoredTree
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
 GONE = 'the program was stopped at {}, which is not there any more'

@@ -12,10 +12,9 @@ from ..errors import SettingsError
 from ..machine.places import TreePlace, place_named
 from ..machine.repeats import begin_once_more
 from ..machine.tree_node import TreeNode
-from ..records.visit_marks import VisitMark
+from ..records.visits import VisitMark
 from ..settings.settings import ALLOW
-from .stored_container import StoredContainer
-from .stored_tree import StoredTree
+from .stored_tree import StoredContainer, StoredTree
 
 StatePlace = Tuple[str, str]  # path of a container or branch, label
 Marks = Mapping[StatePlace, VisitMark]

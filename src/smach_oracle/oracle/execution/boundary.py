@@ -12,7 +12,7 @@ from typing import Iterator, Optional, Tuple, cast
 import smach
 
 from ..checkpoint.resuming import forget_resumed
-from ..control.hold import HeldPlace, Hold, LetGo
+from ..control.control import HeldPlace, Hold, LetGo
 from ..machine.places import TreePlace
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode, WrappedMachine

@@ -8,10 +8,9 @@ from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
 from ..machine.places import allowed_for, why_unfit
 from ..machine.tree_node import TreeNode
-from ..settings.on_resume import STATE
-from ..settings.patterns import matches
+from ..settings.checks import STATE
+from ..settings.names import UnfitKind, UnfitName, did_you_mean, matches
 from ..settings.preconditions import PreconditionSpec
-from ..settings.unfit_names import UnfitKind, UnfitName, did_you_mean
 from ..smach_private import states_of
 
 # settings that keep a state from being run where, or for longer than, its author wants

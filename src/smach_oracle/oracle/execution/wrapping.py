@@ -16,9 +16,8 @@ from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, WrappedMachine, node_of
 from ..recovery.phases import OracleState
-from ..settings.patterns import Nested
+from ..settings.names import Nested, Strictness
 from ..settings.settings import Settings
-from ..settings.unfit_names import Strictness
 from ..smach_private import (
     Labels,
     marked_node,

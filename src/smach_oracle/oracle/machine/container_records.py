@@ -6,8 +6,7 @@ from typing import Dict, Mapping, Optional, Tuple
 from ..decision.failure_rate import base_of
 from ..decision.policy import FailureContext
 from ..records.history import History
-from ..records.visit_marks import VisitMarks
-from ..records.visits import Visit, VisitResult
+from ..records.visits import Visit, VisitMarks, VisitResult
 from ..settings.settings import StateSettings
 from .state_record import FastEdge, StateRecord
 

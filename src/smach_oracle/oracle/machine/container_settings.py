@@ -4,9 +4,8 @@ from typing import Any, Dict, Optional
 
 from ..decision.policy import Policy, policy_named
 from ..settings.failing_outcomes import FailingNames
-from ..settings.patterns import Nested
+from ..settings.names import Nested, Strictness
 from ..settings.settings import ALLOW, RUN, Settings, StateSettings
-from ..settings.unfit_names import Strictness
 
 
 class ContainerSettings:

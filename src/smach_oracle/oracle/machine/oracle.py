@@ -7,9 +7,9 @@ import smach
 from ..asking.question import Expert
 from ..errors import TrialError
 from ..records.events import EventSource
-from ..records.name_claims import claim
-from ..records.rate_rows import StateRateRow, TransitionRow
+from ..records.folder_locks import claim
 from ..records.rates_file import read_rates, share_rates, write_rates
+from ..records.visits import StateRateRow, TransitionRow
 from ..scope.scope import Waiting
 from ..settings.health import HealthFunction
 from ..settings.settings import Settings

@@ -9,7 +9,7 @@ from typing import Any, Iterator, List, Mapping, NamedTuple, Optional
 import smach
 
 from ..decision.policy import FailureContext
-from ..settings.unfit_names import did_you_mean
+from ..settings.names import did_you_mean
 from ..smach_private import (
     current_state_of,
     initial_label_of,

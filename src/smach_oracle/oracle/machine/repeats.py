@@ -7,7 +7,7 @@ are not repeats.
 
 from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 
-from ..records.visit_marks import VisitMark
+from ..records.visits import VisitMark
 from ..settings.settings import ALLOW, NEVER
 from .nesting import nodes_of
 from .state_record import StateRecord

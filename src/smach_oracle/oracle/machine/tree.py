@@ -14,9 +14,8 @@ from smach_oracle.forking import is_child
 
 from ..asking.question import Expert
 from ..control.control import Control
-from ..records.early_end import EarlyEnd
+from ..records.early_end import EarlyEnd, Restarts
 from ..records.events import EventSource
-from ..records.restarts import Restarts
 from ..scope.alarm_clock import AlarmClock
 from ..scope.clock import Clock
 from ..scope.scope import Reason, Scope, Waiting

@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, T
 import smach
 
 from ..records.events import EventKind
-from ..settings.patterns import is_nested_at
+from ..settings.names import is_nested_at
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import EngineProbe, Labels, Machine, data_of, is_executing, mark_of, states_of
 from .container_records import ContainerRecords

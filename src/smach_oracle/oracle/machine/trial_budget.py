@@ -4,7 +4,7 @@ import threading
 from typing import List, Optional, Sequence, Tuple
 
 from ..scope.clock import Clock, PausableClock
-from ..settings.budget import Budget
+from ..settings.checks import Budget
 
 _LEAST_S = 0.001  # 0 s would be without end
 

@@ -1,11 +1,11 @@
-"""Notes that a trial ends before its machine does, and goes on later from its store.
+"""Notes that a trial ends before its machine does, or is started over.
 
 Pure, and without smach.
 """
 
 import contextlib
 import threading
-from typing import Iterator, Optional
+from typing import Dict, Iterator, Mapping, Optional, Tuple
 
 from ..scope.scope import Reason, Scope
 from .facts import TrialEnd
@@ -81,3 +81,33 @@ class EarlyEnd:
     def _end(self, why: TrialEnd) -> None:
         self.why = self.why or why
         self._scope.cancel(Reason.EARLY_END)
+
+
+class Restarts:
+    """The restarts of one trial of a tree.
+
+    `count`: how often its top machine was started over. `is_due`: whether the userdata of the start
+    is wanted, and not kept yet.
+    """
+
+    def __init__(self) -> None:
+        self.begin_trial(False)
+
+    def begin_trial(self, is_wanted: bool) -> None:
+        """Forget the trial before. `is_wanted`: whether a policy may start this one over."""
+        self.count = 0
+        self.is_due = is_wanted
+        self._userdata: Mapping[int, Dict[str, object]] = {}
+
+    def keep(self, userdata: Mapping[int, Dict[str, object]]) -> None:
+        """Keep snapshots of the userdata of the start, by the id of the node."""
+        self.is_due = False
+        self._userdata = userdata
+
+    def userdata_of(self, node: object) -> Optional[Dict[str, object]]:
+        """Return the userdata with which a container has begun, None where it is not known."""
+        return self._userdata.get(id(node))
+
+    def __reduce__(self) -> Tuple[object, ...]:
+        """A copied or pickled machine has begun no trial."""
+        return Restarts, ()

@@ -31,8 +31,7 @@ from typing import (
 
 import smach
 
-from .folder_lock import folder_lock
-from .name_claims import is_claimed
+from .folder_locks import folder_lock, is_claimed
 
 FORMAT = 'smach_oracle rates'
 VERSION = 1

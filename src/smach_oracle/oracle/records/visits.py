@@ -1,7 +1,7 @@
-"""Visits of states, and how each counts. Pure, and without smach."""
+"""Visits of states, how each counts, and which states a trial has begun. Pure, without smach."""
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Dict, List, NamedTuple, Tuple
 
 
 class VisitResult(IntEnum):
@@ -19,3 +19,73 @@ class Visit(NamedTuple):
     state: str
     outcome: str  # '' where it raised or ran over its time limit
     result: VisitResult
+
+
+class VisitMark:
+    """The marks of one state in one trial.
+
+    `reached`: number of its latest visit, over the whole tree. 0 means none. `executed`: number of
+    the latest visit in which it was executed, and not held back. 0 means none. `done`: whether it
+    was executed, by a visit or as a precondition. `spent`: whether the oracle has left for a place
+    from which the machine may come here again: if it is guarded, it is not executed then.
+    """
+
+    __slots__ = ('reached', 'executed', 'done', 'spent')
+
+    def __init__(self) -> None:
+        self.reached = 0
+        self.executed = 0
+        self.done = False
+        self.spent = False
+
+
+class VisitMarks:
+    """The marks of one container, by label. They are kept where a state of the tree is guarded."""
+
+    def __init__(self) -> None:
+        self._by_label: Dict[str, VisitMark] = {}
+
+    def begin_trial(self) -> None:
+        """Forget everything."""
+        self._by_label = {}
+
+    def of(self, label: str) -> VisitMark:
+        """Return the mark of a state."""
+        mark = self._by_label.get(label)
+        if mark is None:
+            mark = self._by_label[label] = VisitMark()
+        return mark
+
+    def take_over(self, label: str, mark: VisitMark) -> None:
+        """Go on with the mark of a state."""
+        self._by_label[label] = mark
+
+    def told(self) -> List[Tuple[str, List[object]]]:
+        """Return labels and marks as plain data."""
+        return [
+            (label, [mark.reached, mark.executed, mark.done, mark.spent])
+            for label, mark in list(self._by_label.items())
+        ]
+
+
+class StateRateRow(NamedTuple):
+    """The numbers learned of one state. The fields are those of StateRate.msg."""
+
+    path: str
+    state: str
+    rate: float
+    failure_class: int
+    successes: int
+    failures: int
+    recoveries: int
+    has_preconditions: bool
+
+
+class TransitionRow(NamedTuple):
+    """The count of one transition. The fields are those of TransitionCount.msg."""
+
+    path: str
+    state: str
+    outcome: str
+    to: str
+    count: int  # type: ignore[assignment]  # as the message says, not what a tuple does

@@ -5,7 +5,7 @@ from typing import Union
 
 import smach
 
-from ..control.hold import HeldBy, HeldPlace, Hold, LetGo
+from ..control.control import HeldBy, HeldPlace, Hold, LetGo
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..scope.scope import Reason, Scope, standing_still

@@ -1,11 +1,37 @@
-"""Checks of single settings. Pure.
+"""Checks of settings, from single numbers to a budget. Pure.
 
-Each takes the dotted key and the value, and returns the value or raises SettingsError.
+Each takes the dotted key and the value, and returns the value or raises SettingsError. A setting is
+stated once: its default, its check and its text are one field of a dataclass::
+
+    @dataclass(frozen=True)
+    class Oven:
+        heat: float = setting(180.0, number(0, 300, 'degrees from 0 to 300'), 'how hot it is')
+
+    Oven(**checked(Oven, 'oven.', {'heat': 200}))
+
+The text is a line of Markdown, if a page is made of the settings: doc/write_settings.py makes
+launch/oracle.yaml and doc/settings.md of those of the executive.
 """
 
 import math
-from typing import Any, Callable, Collection, Mapping, Optional, Sequence, Tuple
+from dataclasses import dataclass, field, fields
+from typing import (
+    Any,
+    Callable,
+    Collection,
+    Dict,
+    Iterator,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    TypeVar,
+)
 
+from smach_common.foreign import error_text
+
+from ..decision.policy import POLICIES
 from ..errors import SettingsError
 from ..identity import attribute_of
 from ..number_checks import is_number, is_whole
@@ -201,3 +227,186 @@ def time_limit(key: str, value: object) -> Optional[float]:
     :raises SettingsError: for anything else.
     """
     return _limit(key, value) or None
+
+
+T = TypeVar('T')
+
+
+def setting(
+    default: T, check: Callable[..., Any], text: str = '', names_objects: bool = False
+) -> T:
+    """Return the field of a setting. `names_objects`: the check also takes what imports these."""
+    facts = {'check': check, 'text': text, 'names_objects': names_objects}
+    value: Any = {'default_factory': dict} if isinstance(default, dict) else {'default': default}
+    made: T = field(metadata=facts, **value)
+    return made
+
+
+def settings_of(group: type) -> Dict[str, Mapping[str, Any]]:
+    """Return what `setting` was told of each setting of a dataclass."""
+    return {each.name: each.metadata for each in fields(group) if each.metadata}
+
+
+def checked(
+    group: type, prefix: str, given: Mapping[str, Any], resolver: Any = None
+) -> Dict[str, Any]:
+    """Return those of the settings of a dataclass that are given, checked.
+
+    `prefix` stands before their names in errors. `resolver` imports the objects that they name.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    return {
+        name: facts['check'](prefix + name, given[name], *[resolver] * facts['names_objects'])
+        for name, facts in settings_of(group).items()
+        if name in given
+    }
+
+
+PYTHON = 'python:'
+Resolver = Callable[[str], Any]
+_PYTHON_NAME = "'python:module:attribute', which names a {} of a module that can be imported"
+
+
+def named_object(key: str, given: str, wanted: str, resolver: Resolver) -> Any:
+    """Return the object that `given` names.
+
+    `wanted`: what it should be, in a word or two. `resolver`: imports it. It raises ImportError or
+    ValueError with a text for people. Any other exception comes from the module.
+
+    :raises SettingsError: naming `key`, the name, what is wrong with it and what is allowed.
+    """
+    try:
+        return resolver(given)
+    except SettingsError:
+        raise
+    except (ImportError, ValueError) as err:
+        why = str(err)
+    except Exception as err:
+        why = 'importing it raised {}'.format(error_text(err))
+    raise SettingsError(
+        key, given, _PYTHON_NAME.format(wanted), problem='cannot be found: {}'.format(why)
+    )
+
+
+ASK, RECOVER, RESTART, STATE = 'ask', 'recover', 'restart', 'state'
+_MAP = 'a mapping of labels, or of paths of states, to those of now, such as KITCHEN/LOOK: SEARCH'
+_ON_RESUME = 'ask, recover, restart or state:LABEL'
+
+
+def checked_on_resume(key: str, value: object) -> Tuple[str, str]:
+    """Check for what may be done, and return it, and the path of a state where it names one.
+
+    :raises SettingsError: for anything else.
+    """
+    if isinstance(value, str):
+        word, colon, path = value.partition(':')
+        if word == STATE and path.strip():
+            return STATE, path.strip()
+        if word in (ASK, RECOVER, RESTART) and not colon:
+            return word, ''
+    raise SettingsError(key, value, _ON_RESUME)
+
+
+def checked_resume_map(key: str, value: object) -> Dict[str, str]:
+    """Check for paths of states by those that they had in an earlier script, and return them.
+
+    The parameter server makes mappings in mappings of paths. They are put together again.
+
+    :raises SettingsError: for anything else.
+    """
+    return dict(_paths(key, value, ''))
+
+
+def _paths(key: str, value: object, before: str) -> Iterator[Tuple[str, str]]:
+    if not isinstance(value, Mapping):
+        raise SettingsError(key, value, _MAP)
+    for old, new in value.items():
+        if not isinstance(old, str) or not _is_path(old):
+            raise no_name(key, old, _MAP)
+        new = as_text(new)
+        if isinstance(new, Mapping):
+            yield from _paths(key, new, before + old + '/')
+        elif isinstance(new, str) and _is_path(new):
+            yield before + old, new
+        else:
+            raise no_name('{}.{}{}'.format(key, before, old), new, _MAP)
+
+
+def _is_path(text: str) -> bool:
+    return all(part.strip() for part in text.split('/'))
+
+
+_MOST_S = 3600.0
+_MOST = 1000000
+
+
+class PolicyChoice(NamedTuple):
+    """A policy's name, and those of its parameters that are not the defaults."""
+
+    name: str
+    parameters: Mapping[str, float]
+
+
+_TIMES = whole(0, 'a whole number from 0 to {}'.format(_MOST), _MOST)
+_CHECKS: Dict[str, Check] = {
+    'times': _TIMES,
+    'tries': _TIMES,
+    'steps_back': _TIMES,
+    'seed': whole(0, 'a whole number from 0'),
+    'wait_s': number(0, _MOST_S, 'seconds from 0 to {:g}'.format(_MOST_S)),
+}
+_NAMED = choice(sorted(POLICIES))
+
+
+def checked_policy(key: str, given: object) -> PolicyChoice:
+    """Check for the name of a policy, or a mapping with its `name` and parameters.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    if not isinstance(given, Mapping):
+        return PolicyChoice(_NAMED(key, given), {})
+    if 'name' not in given:
+        raise SettingsError(key, given, 'the name of a policy, or a mapping with its name')
+    name = _NAMED(key + '.name', given['name'])
+    allowed = POLICIES[name].parameters
+    parameters: Dict[str, Any] = {}
+    for parameter, value in section(key, given, ['name', *allowed]).items():
+        if parameter != 'name':
+            checked = _CHECKS[parameter]('{}.{}'.format(key, parameter), value)
+            if checked != allowed[parameter]:
+                parameters[parameter] = checked
+    return PolicyChoice(name, parameters)
+
+
+_COUNT = optional(whole(0, 'a whole number from 0'))
+
+
+def _minutes(key: str, value: object) -> float:
+    allowed = 'a number of minutes above 0'
+    minutes = float(number(0, math.inf, allowed)(key, value))
+    if not minutes:
+        raise SettingsError(key, value, allowed)
+    return minutes
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The most that all containers of a machine may spend in one trial. None means no limit."""
+
+    recoveries: Optional[int] = setting(
+        None, _COUNT, "decisions of the oracle's own that led to a state"
+    )
+    minutes: Optional[float] = setting(
+        None, optional(_minutes), 'of monotonic time, from the beginning of the trial'
+    )
+    questions: Optional[int] = setting(None, _COUNT, 'failures that the expert is asked about')
+
+
+def checked_budget(key: str, given: object) -> Budget:
+    """Check for a budget. A limit that is not given, or is None, does not apply.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    limits = vars(given) if isinstance(given, Budget) else given
+    return Budget(**checked(Budget, key + '.', section(key, limits, settings_of(Budget))))

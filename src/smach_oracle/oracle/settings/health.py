@@ -12,7 +12,7 @@ from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tup
 from ..errors import SettingsError
 from ..identity import name_of
 from . import checks as values
-from .python_names import PYTHON, Resolver, named_object
+from .checks import PYTHON, Resolver, named_object
 from .written import as_text, as_value
 
 # no arguments. True or '' is well, else what is wrong

@@ -12,8 +12,7 @@ from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from ..identity import name_of
-from .checks import is_state, no_name
-from .python_names import PYTHON, Resolver, named_object
+from .checks import PYTHON, Resolver, is_state, named_object, no_name
 from .written import as_text
 
 

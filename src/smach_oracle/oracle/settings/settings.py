@@ -12,17 +12,22 @@ from ..decision.failure_rate import ESTIMATORS
 from ..decision.policy import POLICIES
 from ..errors import SettingsError
 from . import checks as values
-from .budget import Budget, checked_budget
+from .checks import (
+    Budget,
+    Resolver,
+    checked,
+    checked_budget,
+    checked_on_resume,
+    checked_policy,
+    checked_resume_map,
+    setting,
+    settings_of,
+)
 from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import START_LIMIT_S, InterfaceOffer, checked_interfaces
-from .on_resume import checked_on_resume, checked_resume_map
-from .patterns import Nested, check_name, checked_nested, exactness, matches
-from .policy_choice import checked_policy
+from .names import Nested, check_name, checked_nested, did_you_mean, exactness, matches
 from .preconditions import PreconditionSpec, parse_preconditions
-from .python_names import Resolver
-from .setting import checked, setting, settings_of
-from .unfit_names import did_you_mean
 
 ALLOW, CONFIRM, NEVER = 'allow', 'confirm', 'never'  # on_retry
 RUN, ANNOUNCE, CONFIRM_FIRST = 'run', 'announce', 'confirm'  # autonomy

@@ -6,7 +6,7 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from smach_oracle.msg import OpenQuery, RecorderStatus
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.records.rate_rows import StateRateRow
+from smach_oracle.oracle.records.visits import StateRateRow
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 

@@ -4,7 +4,7 @@ from typing import List, Set, Tuple
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
+from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
 
 from ..reading.known_names import is_known, names_of_process, with_way_out
 from ..reading.source_labels import is_in_sources

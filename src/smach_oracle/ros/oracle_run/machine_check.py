@@ -9,8 +9,8 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.identity import own_mark
 from smach_oracle.oracle.prospects import ContainerProspect, good_outcome, prospects_of
+from smach_oracle.oracle.settings.names import Strictness
 from smach_oracle.oracle.settings.settings import Settings
-from smach_oracle.oracle.settings.unfit_names import Strictness
 
 from ..container import take_parameters
 from ..machine_names import machine_names

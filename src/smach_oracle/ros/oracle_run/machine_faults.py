@@ -25,7 +25,7 @@ import smach
 from smach_common.foreign import error_text
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings.unfit_names import did_you_mean
+from smach_oracle.oracle.settings.names import did_you_mean
 
 _ENGINE = ('smach', 'smach_ros', 'smach_common', 'smach_oracle')
 # functions of SMACH that build machines

@@ -4,8 +4,8 @@ from typing import Dict, Iterator, List, NamedTuple, Set, Tuple
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.names import did_you_mean
 from smach_oracle.oracle.settings.settings import Settings
-from smach_oracle.oracle.settings.unfit_names import did_you_mean
 
 from ..reading.known_names import children_of
 

@@ -27,9 +27,9 @@ from typing import (
 import smach
 from smach_oracle.oracle.decision.policy import POLICIES
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
 from smach_oracle.oracle.settings.paths import check_writable, path_of
 from smach_oracle.oracle.settings.settings import Settings
-from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
 
 from .. import attachment, shutdown
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python

@@ -3,7 +3,7 @@
 import math
 from typing import Any, Iterator
 
-from smach_oracle.oracle.settings.budget import Budget
+from smach_oracle.oracle.settings.checks import Budget
 from smach_oracle.oracle.settings.health import HealthCondition, HealthKind
 
 

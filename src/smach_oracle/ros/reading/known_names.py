@@ -8,8 +8,7 @@ from typing import Any, Callable, Iterator, List, Mapping, Set
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings.patterns import matches
-from smach_oracle.oracle.settings.unfit_names import UnfitKind, UnfitName
+from smach_oracle.oracle.settings.names import UnfitKind, UnfitName, matches
 
 from .source_labels import is_in_sources
 

@@ -10,7 +10,7 @@ import re
 import sys
 from typing import Iterator, List, Set, Tuple
 
-from smach_oracle.oracle.settings.patterns import matches
+from smach_oracle.oracle.settings.names import matches
 
 # no program's own machines
 _OTHERS = ('smach', 'smach_ros', 'smach_common', 'smach_oracle', 'rospy')

@@ -8,8 +8,8 @@ from rosgraph.names import is_legal_name
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
+from smach_oracle.oracle.settings.checks import checked, setting
 from smach_oracle.oracle.settings.paths import check_writable, path_of
-from smach_oracle.oracle.settings.setting import checked, setting
 
 from ..scenes.cause_draws import LASTING_SHARE
 from ..scenes.tasks import TASKS

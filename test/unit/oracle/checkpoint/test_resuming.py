@@ -8,8 +8,8 @@ from killed_machines import KilledMachine, Noted
 from killed_trees import ALL, ENDS, flat, make, points_of, tree
 
 import smach
-from smach_oracle.oracle.checkpoint.storable import CODECS
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
+from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from smach_oracle.oracle.checkpoint.storable import CODECS
-from smach_oracle.oracle.checkpoint.userdata_facts import UserdataFacts
+from smach_oracle.oracle.checkpoint.container_facts import UserdataFacts
+from smach_oracle.store.codecs import CODECS
 
 
 @pytest.mark.parametrize(

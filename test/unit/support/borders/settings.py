@@ -17,7 +17,7 @@ from smach_oracle.interfaces.manipulation.joy_teleoperation import JoySettings
 from smach_oracle.interfaces.manipulation.settings import TeleoperationSettings
 from smach_oracle.interfaces.perception.output_templates import OUTPUT_PARTS, templates_from
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings.setting import settings_of
+from smach_oracle.oracle.settings.checks import settings_of
 from smach_oracle.oracle.settings.settings import Settings, StateSettings
 from smach_oracle.ros import loaded_settings, parameters
 from smach_oracle.ros.expert import server

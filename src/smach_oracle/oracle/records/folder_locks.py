@@ -1,19 +1,22 @@
-"""The names that machines of running programs use in a rates file.
+"""Locks of the folder of a rates file, and of the names that machines use in that file.
 
-A machine claims its name by a lock on one byte of the file's folder. It leaves no file behind, and
-ends with the machine or its process. Programs on other computers do not see it: a network file
-system keeps the locks of folders to each computer.
+The file is written under the lock of its folder. A machine of a running program claims its name by
+a lock on one byte of the folder. A lock leaves no file behind, and ends with the machine or its
+process. Programs on other computers do not see it: a network file system keeps the locks of folders
+to each computer.
 """
 
 import contextlib
+import errno
 import fcntl
 import hashlib
 import os
 import struct
+import time
 import weakref
-from typing import Dict, MutableMapping, Tuple
+from typing import Dict, Iterator, MutableMapping, Tuple
 
-from smach_oracle.forking import in_child, let_go_of
+from smach_oracle.forking import in_child, let_go_of, unlock
 
 from ..identity import WeakIdentityMap
 
@@ -97,3 +100,41 @@ def _unlock(descriptor: int, key: Key) -> None:
     with contextlib.suppress(OSError):  # a child may have the folder open, too
         _ask(descriptor, _F_OFD_SETLK, fcntl.F_UNLCK, key)
     os.close(descriptor)
+
+
+WAIT_S = 2.0  # who holds it writes one small file
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.EBADF, errno.EINVAL)  # such as on some networks
+
+
+@contextlib.contextmanager
+def folder_lock(folder: str) -> Iterator[None]:
+    """Hold the lock of a folder, against other threads and processes.
+
+    On a file system that has no locks the body runs without one.
+
+    :raises OSError: where there is no such folder, or another holds the lock for too long.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        _lock(descriptor, folder, time.monotonic() + WAIT_S)
+        yield
+    finally:
+        unlock(descriptor)
+        os.close(descriptor)
+
+
+def _lock(descriptor: int, folder: str, until_s: float) -> None:
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError as err:
+            if err.errno in _NO_LOCKS:
+                return
+            if err.errno not in (errno.EWOULDBLOCK, errno.EACCES, errno.EINTR):
+                raise
+            if time.monotonic() > until_s:
+                raise OSError(
+                    errno.EAGAIN, 'another program holds the lock of the folder', folder
+                ) from None
+        time.sleep(0.005)
