@@ -21,14 +21,14 @@ from .execution.wrapping import (
 )
 from .machine.oracle import oracle_of, read_by_hand, write_by_hand
 from .machine.tree import Tree, new_id
-from .machine.tree_node import TreeNode, entered_by_failures_alone
+from .machine.tree_node import TreeNode, entered_by_failures_alone, marked_node
 from .machine.userdata_view import StateView, write_constants
 from .records.events import EventKind
 from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, data_of, has_keys, marked_node, opened_container
+from .smach_private import Transitions, data_of, has_keys, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -301,7 +301,7 @@ class OracleContainer(smach.StateMachine):
         """
         if self._oracle.tree.is_parents and not self.is_running():
             return execute_bare(self, *args, **kwargs)
-        with ContainerRun(self) as run:
+        with ContainerRun(self, self.new_trial_id) as run:
             if run.begins():
                 run.outcome = super().execute(*args, **kwargs)
         return run.outcome

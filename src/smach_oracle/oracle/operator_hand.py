@@ -323,8 +323,8 @@ class OperatorHand:
         found = []
         for node in nodes_of(self._top.machine):
             label = current_label_of(node.machine)
-            if node.machine.is_running() and label is not None and node.key not in at_boundary:
-                found.append(ActiveState(node.path, str(label), '', False))
+            if node.machine.is_running() and label and node.key not in at_boundary:
+                found.append(ActiveState(node.path, label, '', False))
         return found + [
             ActiveState(
                 hold.place.path, hold.place.state, hold.held_by.value, hold.waits_for_confirmation

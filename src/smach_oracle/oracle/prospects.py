@@ -1,6 +1,6 @@
 """Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
 
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple, cast
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
 
 import smach
 
@@ -8,7 +8,7 @@ from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .machine.nesting import nodes_of
 from .machine.site import Route, failure_kind, route_of
-from .machine.tree_node import TreeNode, WrappedMachine
+from .machine.tree_node import TreeNode
 from .records.events import FailureKind
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
@@ -60,7 +60,7 @@ class ContainerProspect(NamedTuple):
 
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
-    nodes = list(nodes_of(cast(WrappedMachine, machine)))
+    nodes = list(nodes_of(machine))
     decides = nodes[0].settings.budget.recoveries != 0  # the budget is that of the top
     found: List[ContainerProspect] = []
     for node in nodes:

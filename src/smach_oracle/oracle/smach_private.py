@@ -5,7 +5,7 @@ they differ, the docstring says so. A class of ours that extends one of SMACH's 
 `self`. On Python 3.11 a call of one of these costs 15 ns, a seventieth of a wrapped transition.
 """
 
-from types import TracebackType
+import threading
 from typing import (
     Any,
     Collection,
@@ -14,11 +14,8 @@ from typing import (
     Mapping,
     MutableMapping,
     Optional,
-    Protocol,
     Set,
     Tuple,
-    Type,
-    TypeVar,
 )
 
 import smach
@@ -27,88 +24,13 @@ from .identity import WeakIdentityMap, own_attributes, own_mark
 
 Labels = Tuple[str, ...]
 Transitions = Dict[str, Optional[str]]
-Node = TypeVar('Node')
 
 
-class StepLock(Protocol):
-    """The lock that a machine holds while it moves from one state to the next."""
-
-    def acquire(self) -> bool:
-        """Wait for the lock."""
-
-    def release(self) -> None:
-        """Give the lock back."""
-
-    def __enter__(self) -> bool:
-        """Acquire it."""
-
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        err: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        """Release it."""
+# -- the mark of an oracle: all of ours that is set on a user's machine
 
 
-class Machine(Protocol):
-    """A `smach.StateMachine` as the executive sees it."""
-
-    userdata: smach.UserData
-    _states: Dict[str, smach.State]
-    _transitions: Dict[str, Transitions]
-    _remappings: Dict[str, Mapping[str, str]]
-    _constants: Dict[str, Mapping[str, Any]]
-    _initial_state_label: Optional[str]
-    _current_label: Optional[str]
-    _current_state: Optional[smach.State]
-    _current_transitions: Optional[Transitions]
-    _is_running: bool
-    _preempt_requested: bool
-    _preempted_label: Optional[str]
-    _preempted_state: Optional[smach.State]
-    _is_preempt_passed_on: bool  # our engine's alone. Upstream's never reads it
-
-    @property
-    def _state_transitioning_lock(self) -> StepLock:
-        """Re-entrant on our engine, plain on upstream's."""
-
-    def get_registered_outcomes(self) -> Tuple[str, ...]:
-        """Return the container outcomes."""
-
-    def is_running(self) -> bool:
-        """Whether it is being executed."""
-
-    def preempt_requested(self) -> bool:
-        """Whether somebody has asked it to stop."""
-
-    def request_preempt(self) -> None:
-        """Ask it to stop."""
-
-    def service_preempt(self) -> None:
-        """Note that the request was obeyed."""
-
-    def call_transition_cbs(self) -> None:
-        """Tell the transition callbacks."""
-
-    def call_termination_cbs(self, terminal_states: List[str], outcome: Any) -> None:
-        """Tell the termination callbacks."""
-
-    def _set_current_state(self, state_label: Optional[str]) -> None:
-        """Make a state the current one. None means none."""
-
-    def _update_once(self) -> Optional[str]:
-        """Execute the current state and go on."""
-
-
-class Marked(Protocol[Node]):
-    """A machine with the mark of an oracle: all of ours that is set on a user's machine."""
-
-    _oracle: Node
-
-
-def marked_node(machine: Marked[Node]) -> Node:
-    """Return the node of a machine that is known to be under an oracle."""
+def mark_on(machine: Any) -> Any:
+    """Return the mark of a machine that is known to have one."""
     return machine._oracle
 
 
@@ -136,7 +58,7 @@ def states_of(container: Any) -> Dict[str, smach.State]:
     return states
 
 
-def transitions_of(machine: Machine) -> Dict[str, Transitions]:
+def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
     """Return where each outcome leads, by the label of the state. None leads nowhere."""
     return machine._transitions
 
@@ -155,12 +77,12 @@ def remapping_of(container: Any, label: str) -> Mapping[str, str]:
     return container._remappings.get(label) or {}
 
 
-def constants_of(machine: Machine, label: str) -> Mapping[str, Any]:
+def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, Any]:
     """Return what is written into the userdata before each visit of a state."""
     return machine._constants.get(label) or {}
 
 
-def initial_label_of(machine: Machine) -> str:
+def initial_label_of(machine: smach.StateMachine) -> str:
     """Return the label of the state in which a machine begins, '' while it has none."""
     return machine._initial_state_label or ''
 
@@ -205,12 +127,12 @@ def transition_callbacks(container: Any) -> List[Tuple[Any, Any]]:
 # -- a machine that executes. Its thread alone writes
 
 
-def lock_of(machine: Machine) -> StepLock:
+def lock_of(machine: smach.StateMachine) -> 'threading.RLock':
     """Return the lock of a machine, which is free while a state executes."""
     return machine._state_transitioning_lock
 
 
-def is_executing(machine: Machine) -> bool:
+def is_executing(machine: smach.StateMachine) -> bool:
     """Whether it is being executed, whatever its class says of `is_running`."""
     return machine._is_running
 
@@ -220,32 +142,40 @@ def set_executing(machine: Any, is_running: bool) -> None:
     machine._is_running = is_running
 
 
-def current_label_of(machine: Machine) -> str:
+def current_label_of(machine: smach.StateMachine) -> str:
     """Return the label of the current state, '' where none is."""
     return machine._current_label or ''
 
 
-def current_state_of(machine: Machine) -> Optional[smach.State]:
+def current_state_of(machine: smach.StateMachine) -> Optional[smach.State]:
     """Return the current state."""
     return machine._current_state
 
 
-def set_current_label(machine: Machine, label: Optional[str]) -> None:
+def set_current_label(machine: smach.StateMachine, label: Optional[str]) -> None:
     """Make a state the current one, with its transitions. None means none."""
     machine._set_current_state(label)
 
 
-def set_current_state(machine: Machine, label: str, state: Optional[smach.State]) -> None:
+def set_current_state(
+    machine: smach.StateMachine, label: str, state: Optional[smach.State]
+) -> None:
     """Make a state the current one for preempt requests, and nothing else."""
     machine._current_label, machine._current_state = label, state
 
 
-def step_once(machine: Machine) -> Optional[str]:
+def step_once(machine: smach.StateMachine) -> Optional[str]:
     """Execute the current state and go on. Return the outcome of the machine at its end.
 
     The lock is held. See `OracleContainer._update_once`.
     """
     return machine._update_once()
+
+
+def state_ended(machine: Any, outcome: object, error: Optional[Exception]) -> Optional[str]:
+    """Go on behind the current state, which was executed. See `OracleContainer._state_ended`."""
+    ended: Optional[str] = machine._state_ended(outcome, error)
+    return ended
 
 
 # -- its preempt
@@ -257,24 +187,24 @@ def has_preempt_flag(container: Any) -> bool:
     return requested
 
 
-def set_preempt_flag(machine: Machine, is_requested: bool) -> None:
+def set_preempt_flag(machine: smach.StateMachine, is_requested: bool) -> None:
     """Have a request, or none, without passing it on to the current state."""
     machine._preempt_requested = is_requested
 
 
-def preempted_state_of(machine: Machine) -> Optional[smach.State]:
+def preempted_state_of(machine: smach.StateMachine) -> Optional[smach.State]:
     """Return the state to which a request was passed on last, until it was seen to obey."""
     return machine._preempted_state
 
 
 def set_preempted_state(
-    machine: Machine, state: Optional[smach.State], label: Optional[str]
+    machine: smach.StateMachine, state: Optional[smach.State], label: Optional[str]
 ) -> None:
     """Note to which state a request was passed on. None means none."""
     machine._preempted_state, machine._preempted_label = state, label
 
 
-def note_passed_on(machine: Machine) -> None:
+def note_passed_on(machine: smach.StateMachine) -> None:
     """Tell our engine that a request was passed on.
 
     A thread that has made it, and now waits for the lock, does not pass it on once more.
@@ -400,7 +330,7 @@ class EngineProbe:
         self.stepped = False
         self.attentive = True
 
-    def look(self, machine: Machine) -> None:
+    def look(self, machine: smach.StateMachine) -> None:
         """Find out how this engine steps.
 
         Some engines hold the lock around a step, with a plain lock all do. Others leave it to the

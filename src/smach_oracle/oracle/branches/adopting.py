@@ -6,14 +6,14 @@ import smach
 
 from ..identity import own_attributes
 from ..machine.nesting import WRAPPER, branching_below
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, marked_node
 from ..smach_private import Labels
 from .branch import BranchSite, ConcurrenceSite, IteratorSite
 from .branch_machine import BranchMachine
 from .upstream import HOOK, ask_no_more, asks_hook, have_asked
 from .wrapper import ConcurrenceWrapper, ContainerWrapper, IteratorWrapper, wrapper_of
 
-PutUnder = Callable[[smach.StateMachine, TreeNode], WrappedMachine]
+PutUnder = Callable[[smach.StateMachine, TreeNode], smach.StateMachine]
 
 
 def adopt_branches(parent: TreeNode, put_under: PutUnder) -> None:
@@ -67,7 +67,7 @@ def _take_notice(
         wrapper.top, wrapper.below = parent, below
     if wrapper.top is not parent:
         return  # it is in two places: the first one is used
-    found: Dict[str, WrappedMachine] = {}
+    found: Dict[str, smach.StateMachine] = {}
     for label, state in _plain_states(wrapper):
         machine = wrapper.machines.get(label)
         if machine is None and parent.wraps(below + (label,)):
@@ -91,7 +91,7 @@ def _new_machine(
     parent: TreeNode,
     below: Labels,
     put_under: PutUnder,
-) -> WrappedMachine:
+) -> smach.StateMachine:
     container = wrapper.container
     is_iterator = isinstance(container, smach.Iterator)
     bare = BranchMachine(label, is_alone=is_iterator)
@@ -100,7 +100,7 @@ def _new_machine(
         IteratorSite if is_iterator else ConcurrenceSite
     )
     machine = put_under(bare, parent)
-    node = machine._oracle
+    node = marked_node(machine)
     node.site = kind(container, label)
     node.lie_below(parent, below)
     node.configure(parent.settings)

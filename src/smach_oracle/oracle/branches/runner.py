@@ -5,8 +5,9 @@ from typing import Any, Dict, Optional, Protocol, Tuple
 import smach
 
 from ..machine.execution import Execution, runs_around
-from ..machine.tree_node import WrappedMachine
+from ..machine.tree_node import marked_node
 from ..recovery.endings import outcome_of_early_end
+from ..smach_private import state_ended
 from .item_userdata import ItemUserdata
 from .items import TrackedItems
 
@@ -95,7 +96,7 @@ class BranchRunner:
     """
 
     def __init__(
-        self, state: smach.State, machine: WrappedMachine, item: Optional[ItemPort] = None
+        self, state: smach.State, machine: smach.StateMachine, item: Optional[ItemPort] = None
     ) -> None:
         """`machine`: the branch's. `item`: the Iterator, None in a Concurrence."""
         self._state = state
@@ -104,7 +105,7 @@ class BranchRunner:
         self._tracked = None if item is None else item.tracked
         self._is_under_way = False
         self._finishes: Dict[object, bool] = {}  # whether an item is finished, by outcome
-        node = self._node = machine._oracle
+        node = self._node = marked_node(machine)
         self._label = node.site.label
         self._record = node.records.by_label.get(self._label)
         self._observers = node.events.observers
@@ -235,13 +236,13 @@ class BranchRunner:
         self._machine._preempt_requested = False
 
 
-def run_branch(machine: WrappedMachine, end: Optional[End]) -> Optional[str]:
+def run_branch(machine: smach.StateMachine, end: Optional[End]) -> Optional[str]:
     """Execute a branch, through its oracle where it fails, and return the outcome of its state.
 
     `end`: of the state, where it was executed already. It raises what the state has raised where
     its oracle gives up.
     """
-    node = machine._oracle
+    node = marked_node(machine)
     run = Execution(node, is_whole=False)
     if not run.look_around() and end is None:
         smach.logwarn(
@@ -269,7 +270,7 @@ def run_branch(machine: WrappedMachine, end: Optional[End]) -> Optional[str]:
     raise raised
 
 
-def _step_to_end(machine: WrappedMachine, end: Optional[End]) -> Optional[str]:
+def _step_to_end(machine: smach.StateMachine, end: Optional[End]) -> Optional[str]:
     with machine._state_transitioning_lock:
         if end is None:
             machine._is_running = True
@@ -277,7 +278,7 @@ def _step_to_end(machine: WrappedMachine, end: Optional[End]) -> Optional[str]:
             machine._set_current_state(machine._initial_state_label)
             outcome = machine._update_once()
         else:
-            outcome = machine._state_ended(*end)
+            outcome = state_ended(machine, *end)
         while outcome is None and machine._is_running and not smach.is_shutdown():
             outcome = machine._update_once()
         return outcome

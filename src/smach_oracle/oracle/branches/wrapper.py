@@ -24,7 +24,7 @@ import smach
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
 from ..machine.nesting import machines_below
-from ..machine.tree_node import TreeNode, WrappedMachine, node_of
+from ..machine.tree_node import TreeNode, marked_node, node_of
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
 from ..recovery.failure import Failure, judge
@@ -57,7 +57,7 @@ class ContainerWrapper:
 
     def __init__(self, container: smach.Container) -> None:
         self.container: Any = container
-        self.machines: Dict[str, WrappedMachine] = {}
+        self.machines: Dict[str, smach.StateMachine] = {}
         self.runners: Dict[str, Runner] = {}
         self.top: Optional[TreeNode] = None  # the node of the wrapped machine around it
         self.below: Tuple[str, ...] = ()  # labels that lead to it from there
@@ -89,7 +89,7 @@ class ContainerWrapper:
 
     def nodes(self) -> List[TreeNode]:
         """Return the nodes of its branches."""
-        return [machine._oracle for machine in self.machines.values()]
+        return [marked_node(machine) for machine in self.machines.values()]
 
     # -- the hook
 
@@ -129,7 +129,7 @@ class ContainerWrapper:
         states = dict(self.states())
         for machine in self.machines.values():
             self._renew(machine, states)
-            machine._oracle.begin_execution()
+            marked_node(machine).begin_execution()
         if nodes:
             nodes[0].emit(
                 EventKind.CONTAINER_START,
@@ -186,7 +186,7 @@ class ContainerWrapper:
         top = self.top
         return top is not None and (top.machine._is_running or top.has_running_ancestor())
 
-    def _renew(self, machine: WrappedMachine, states: Mapping[str, smach.State]) -> None:
+    def _renew(self, machine: smach.StateMachine, states: Mapping[str, smach.State]) -> None:
         branch = cast(BranchMachine, machine)
         label = branch._branch_label
         branch.take(states[label], self.container.userdata, self._remapping_of(label))
@@ -408,7 +408,7 @@ class IteratorWrapper(ContainerWrapper):
         """Note that an item begins."""
         label = self.container._state_label
         machine = self.machines.get(label)
-        node = None if machine is None else machine._oracle
+        node = None if machine is None else marked_node(machine)
         record = None if node is None else node.records.by_label.get(label)
         unfinished = None
         if node is not None and record is not None:

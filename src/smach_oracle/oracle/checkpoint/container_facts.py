@@ -17,6 +17,7 @@ from typing import (
     cast,
 )
 
+import smach
 from smach_common.foreign import ends_program, text_of, type_name
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
 from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, VISIT
@@ -26,7 +27,6 @@ from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.visits import Visit
-from ..smach_private import Machine
 from .stored_tree import StoredContainer
 
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
@@ -251,7 +251,7 @@ def _is_plain(encoded: Encoded) -> bool:
     return len(parts) == (whole is not None) and '"$b' not in text
 
 
-def keys_of(machine: Machine, label: str) -> FrozenSet[str]:
+def keys_of(machine: smach.StateMachine, label: str) -> FrozenSet[str]:
     """Return the keys of a container that one of its states can read or write."""
     state = machine._states.get(label)
     if state is None:

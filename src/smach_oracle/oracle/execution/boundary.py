@@ -7,7 +7,7 @@ operator has held. So none is executed: the machine goes on as if the state had 
 """
 
 import contextlib
-from typing import Iterator, Optional, Tuple, cast
+from typing import Iterator, Optional, Tuple
 
 import smach
 
@@ -15,7 +15,7 @@ from ..checkpoint.resuming import forget_resumed
 from ..control.control import HeldPlace, Hold, LetGo
 from ..machine.places import TreePlace
 from ..machine.site import Route, route_of
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, marked_node
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
@@ -30,7 +30,6 @@ from ..smach_private import (
     current_state_of,
     initial_label_of,
     lock_of,
-    marked_node,
     note_passed_on,
     preempted_state_of,
     set_preempt_flag,
@@ -243,6 +242,6 @@ def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
     state = states_of(node.machine)[label]
     if not isinstance(state, node.tree.container_class):
         return None
-    inner = marked_node(cast(WrappedMachine, state))
+    inner = marked_node(state)
     goes_on = node.tree.resumed.entry_of(inner) is not None
     return inner if inner.parent is node and not goes_on else None

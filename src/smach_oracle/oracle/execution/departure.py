@@ -14,13 +14,13 @@ from ..branches.wrapper import wrapper_of
 from ..machine.jump_path import repeated_on, why_closed_on
 from ..machine.nesting import machines_below
 from ..machine.places import levels_above, links_to
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, marked_node
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
 from ..recovery.occasions import FromBelow
 from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
-from ..smach_private import current_label_of, current_state_of, marked_node, states_of
+from ..smach_private import current_label_of, current_state_of, states_of
 
 
 class Departure:
@@ -207,9 +207,7 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
         else [machine for _, machine in machines_below(state)]
     )
     nodes = [
-        marked_node(cast(WrappedMachine, machine))
-        for machine in below
-        if isinstance(machine, node.tree.container_class)
+        marked_node(machine) for machine in below if isinstance(machine, node.tree.container_class)
     ]
     settled = failure.kind is not FailureKind.TIME_LIMIT and any(
         each.execution.unrecovered for each in nodes

@@ -5,7 +5,7 @@ Also what one execution of any container begins and ends.
 
 import time
 from types import TracebackType
-from typing import Dict, List, Optional, Type
+from typing import Callable, Dict, List, Optional, Type
 
 import smach
 from smach_oracle.forking import in_child
@@ -16,14 +16,14 @@ from ..machine.execution import Execution, ends_program, why_no_outcome
 from ..machine.nesting import nodes_of
 from ..machine.oracle import save_rates
 from ..machine.repeats import begin_watching
-from ..machine.tree_node import TreeNode, WrappedMachine
+from ..machine.tree_node import TreeNode, marked_node
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.endings import outcome_of_early_end
-from ..smach_private import initial_label_of, marked_node, states_of
+from ..smach_private import initial_label_of, states_of
 from .jump_entry import may_start_over
 from .wrapping import adopt, bring_up_to_date
 
@@ -39,8 +39,9 @@ class ContainerRun:
     `outcome`: with which it ends.
     """
 
-    def __init__(self, machine: WrappedMachine) -> None:
+    def __init__(self, machine: smach.StateMachine, new_trial_id: Callable[[], str]) -> None:
         self._machine = machine
+        self._new_trial_id = new_trial_id
         self._node = marked_node(machine)
         self._execution = Execution(self._node)
         self._is_executed = self._is_trial = False
@@ -79,9 +80,7 @@ class ContainerRun:
         store = self._store = open_store(node)
         resumed = None if store is None else store.to_resume()
         node.tree.early_end.begin_trial(is_stored=store is not None)
-        node.tree.begin_trial(
-            self._machine.new_trial_id() if resumed is None else resumed.trial.trial_id
-        )
+        node.tree.begin_trial(self._new_trial_id() if resumed is None else resumed.trial.trial_id)
         for each in nodes_of(self._machine):
             # one that still runs was abandoned in an earlier trial, and is left there
             if not each.machine.is_running():

@@ -3,7 +3,7 @@
 A wrapped machine has a class made of OracleContainer and of its own class.
 """
 
-from typing import Any, Dict, List, Optional, Tuple, cast
+from typing import Any, Dict, List, Optional, Tuple
 
 import smach
 
@@ -14,13 +14,12 @@ from ..identity import own_attributes, set_class
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.oracle import load_rates
 from ..machine.tree import Tree
-from ..machine.tree_node import TreeNode, WrappedMachine, node_of
+from ..machine.tree_node import TreeNode, marked_node, node_of
 from ..recovery.phases import OracleState
 from ..settings.names import Nested, Strictness
 from ..settings.settings import Settings
 from ..smach_private import (
     Labels,
-    marked_node,
     remappings_of,
     remove_mark,
     set_mark,
@@ -118,7 +117,7 @@ def wrap_machine(
     nested: Nested,
     name: str,
     strict: Strictness,
-) -> WrappedMachine:
+) -> smach.StateMachine:
     """Wrap a machine and what is nested in it. See OracleContainer.wrap.
 
     A machine that is wrapped already keeps its tree, and takes over from `tree` what is new.
@@ -129,7 +128,7 @@ def wrap_machine(
     if not isinstance(given, smach.StateMachine):
         raise SettingsError('machine', given, 'a smach.StateMachine')
     if isinstance(given, tree.container_class):
-        return _wrap_again(cast(WrappedMachine, given), tree, settings, nested, name, strict)
+        return _wrap_again(given, tree, settings, nested, name, strict)
     try:
         machine = _put_under(given, oracle_class, tree, settings, name)
         _put_in_order(machine, settings, nested, strict)
@@ -141,15 +140,14 @@ def wrap_machine(
 
 def _put_under(
     machine: smach.StateMachine, oracle_class: type, tree: Tree, settings: Settings, name: str
-) -> WrappedMachine:
+) -> smach.StateMachine:
     change_class(machine, oracle_class)
-    wrapped = cast(WrappedMachine, machine)
-    set_mark(machine, TreeNode(wrapped, tree, settings, name))
-    return wrapped
+    set_mark(machine, TreeNode(machine, tree, settings, name))
+    return machine
 
 
 def _put_in_order(
-    machine: WrappedMachine, settings: Settings, nested: Nested, strict: Strictness
+    machine: smach.StateMachine, settings: Settings, nested: Nested, strict: Strictness
 ) -> None:
     top = marked_node(machine)
     top.in_force.wrap_with(strict, nested)
@@ -177,7 +175,7 @@ def bring_up_to_date(node: TreeNode) -> None:
     load_rates(node)
 
 
-def _configure(machine: WrappedMachine, settings: Settings) -> None:
+def _configure(machine: smach.StateMachine, settings: Settings) -> None:
     """Hand the settings to a machine and to those below it that have none of their own."""
     for node in nodes_of(machine):
         if node.machine is machine or node.in_force.inherits:
@@ -185,13 +183,13 @@ def _configure(machine: WrappedMachine, settings: Settings) -> None:
 
 
 def _wrap_again(
-    machine: WrappedMachine,
+    machine: smach.StateMachine,
     tree: Tree,
     settings: Settings,
     nested: Nested,
     name: str,
     strict: Strictness,
-) -> WrappedMachine:
+) -> smach.StateMachine:
     top = marked_node(machine)
     before = top.settings
     try:
@@ -215,7 +213,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
     """Give a machine that could not be wrapped, and what was wrapped with it, back as it was."""
     if not isinstance(machine, tree.container_class):
         return
-    for container in containers_in(cast(WrappedMachine, machine)):
+    for container in containers_in(machine):
         made_of = two_classes(type(container))
         if made_of is not None and (
             container is machine or marked_node(container).in_force.inherits
@@ -223,7 +221,7 @@ def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
             strip_alone(container)
 
 
-def adopt(machine: WrappedMachine) -> None:
+def adopt(machine: smach.StateMachine) -> None:
     """Wrap what is nested in a wrapped machine and is not wrapped yet, into one tree with it.
 
     :raises SettingsError: for a machine whose class cannot be extended.
@@ -232,7 +230,7 @@ def adopt(machine: WrappedMachine) -> None:
     adopt_branches(parent, _put_below)
     for below, child in machines_below(machine):
         if isinstance(child, parent.tree.container_class):
-            container = cast(WrappedMachine, child)
+            container = child
         elif parent.wraps(below):
             container = _put_below(child, parent)
         else:
@@ -244,7 +242,7 @@ def adopt(machine: WrappedMachine) -> None:
         adopt(container)
 
 
-def _put_below(child: smach.StateMachine, parent: TreeNode) -> WrappedMachine:
+def _put_below(child: smach.StateMachine, parent: TreeNode) -> smach.StateMachine:
     container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
     marked_node(container).in_force.wrap_with(parent.in_force.strict, inherits=True)
     return container
@@ -341,35 +339,34 @@ def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
         raise TrialError('{} runs; it can be unwrapped when it has ended'.format(node.path))
     if node.in_force.inherits:
         raise TrialError('{} was wrapped with {}; unwrap that'.format(node.path, node.top().path))
-    _strip(cast(WrappedMachine, machine))
+    _strip(machine)
     return machine
 
 
-def _strip(machine: WrappedMachine) -> None:
+def _strip(machine: smach.StateMachine) -> None:
     container_class = marked_node(machine).tree.container_class
     for _, child in list(machines_below(machine)):
         if not isinstance(child, container_class):
             continue
-        wrapped = cast(WrappedMachine, child)
-        if marked_node(wrapped).in_force.inherits:
-            _strip(wrapped)
+        if marked_node(child).in_force.inherits:
+            _strip(child)
         else:
-            _stand_alone(wrapped)
+            _stand_alone(child)
     strip_alone(machine)
 
 
-def strip_alone(machine: WrappedMachine) -> None:
+def strip_alone(machine: smach.StateMachine) -> None:
     """Give a machine back as it was before it was wrapped, but not those that are nested in it."""
     release_branches(machine)
     remove_oracle(marked_node(machine))
-    remove_gates(cast(smach.StateMachine, machine))
+    remove_gates(machine)
     made_of = two_classes(type(machine))
     if made_of is not None:
         set_class(machine, made_of[1])
         remove_mark(machine)
 
 
-def _stand_alone(machine: WrappedMachine) -> None:
+def _stand_alone(machine: smach.StateMachine) -> None:
     """Make a machine the top of a tree of its own, as before the machine around it was wrapped."""
     node = marked_node(machine)
     tree = Tree(node.tree.container_class, node.tree.recover, node.tree.expert)
@@ -383,18 +380,17 @@ def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -
 
     All that is kept of the machine belongs to the program, and its threads are not in the child.
     """
-    wrapped = cast(WrappedMachine, machine)
     smach.logwarn(
         '{}: runs in a child process of the program, and without an oracle there'.format(
-            marked_node(wrapped).path
+            marked_node(machine).path
         )
     )
-    _make_bare(wrapped)
+    _make_bare(machine)
     outcome: Optional[str] = machine.execute(*args, **kwargs)
     return outcome
 
 
-def _make_bare(machine: WrappedMachine) -> None:
+def _make_bare(machine: smach.StateMachine) -> None:
     """Take a machine, and those nested in it, out of the oracle.
 
     One that was built as an OracleContainer gets an oracle that only observes.
@@ -402,9 +398,8 @@ def _make_bare(machine: WrappedMachine) -> None:
     tree, name = marked_node(machine).tree, marked_node(machine).name
     for _, child in list(machines_below(machine)):
         if isinstance(child, tree.container_class):
-            _make_bare(cast(WrappedMachine, child))
+            _make_bare(child)
     strip_alone(machine)
     if isinstance(machine, tree.container_class):
-        machine._oracle = TreeNode(
-            machine, Tree(tree.container_class, recover=False), Settings(), name
-        )
+        observing = Tree(tree.container_class, recover=False)
+        set_mark(machine, TreeNode(machine, observing, Settings(), name))

@@ -7,7 +7,7 @@ import smach
 
 from ..identity import own_mark
 from ..smach_private import Labels
-from .tree_node import TreeNode, WrappedMachine
+from .tree_node import TreeNode, marked_node
 
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
 
@@ -16,7 +16,7 @@ class Wrapper(Protocol):
     """The data kept for a Concurrence or an Iterator (`branches.wrapper`)."""
 
     container: smach.Container
-    machines: Dict[str, WrappedMachine]
+    machines: Dict[str, smach.StateMachine]
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -43,9 +43,7 @@ def machines_below(
     """
     wrapper = wrapper_of(container)
     if wrapper is not None:
-        yield from (
-            (below, cast(smach.StateMachine, each)) for each in [*wrapper.machines.values()]
-        )
+        yield from ((below, each) for each in [*wrapper.machines.values()])
     for label, state in list(children_of(container).items()):
         path = below + (label,)
         if isinstance(state, smach.StateMachine):
@@ -110,20 +108,20 @@ def items_under_way(node: TreeNode) -> str:
     return ' of '.join(found)
 
 
-def containers_in(machine: WrappedMachine) -> List[WrappedMachine]:
+def containers_in(machine: smach.StateMachine) -> List[smach.StateMachine]:
     """Return a wrapped machine and all wrapped machines nested in it, each once."""
-    wrapped = machine._oracle.tree.container_class
-    found: Dict[int, WrappedMachine] = {id(machine): machine}
+    wrapped = marked_node(machine).tree.container_class
+    found: Dict[int, smach.StateMachine] = {id(machine): machine}
     waiting = deque(found.values())
     while waiting:
         for _, child in machines_below(waiting.popleft()):
             if id(child) not in found and isinstance(child, wrapped):
-                found[id(child)] = cast(WrappedMachine, child)
+                found[id(child)] = child
                 waiting.append(found[id(child)])
     return list(found.values())
 
 
-def nodes_of(machine: WrappedMachine) -> Iterator[TreeNode]:
+def nodes_of(machine: smach.StateMachine) -> Iterator[TreeNode]:
     """Yield the node of a container and those of all wrapped containers below it, each once."""
     for container in containers_in(machine):
-        yield container._oracle
+        yield marked_node(container)

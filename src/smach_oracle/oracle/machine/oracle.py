@@ -15,10 +15,10 @@ from ..settings.health import HealthFunction
 from ..settings.settings import Settings
 from .health_watch import ListenToHealth
 from .nesting import nodes_of
-from .tree_node import TreeNode, WrappedMachine, node_of
+from .tree_node import TreeNode, node_of
 
 
-def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:
+def rate_rows(machine: smach.StateMachine) -> List[StateRateRow]:
     """Return one row for each state."""
     rows = []
     for node in nodes_of(machine):
@@ -41,7 +41,7 @@ def rate_rows(machine: WrappedMachine) -> List[StateRateRow]:
     return rows
 
 
-def transition_rows(machine: WrappedMachine) -> List[TransitionRow]:
+def transition_rows(machine: smach.StateMachine) -> List[TransitionRow]:
     """Return one row for each edge that was taken, ORACLE's among them."""
     rows = []
     for node in nodes_of(machine):

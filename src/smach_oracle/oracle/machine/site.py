@@ -8,7 +8,6 @@ from ..asking.question import OutcomeChoice
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.failing_outcomes import FailingNames
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import Machine
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -21,7 +20,7 @@ class Route(NamedTuple):
     is_state: bool
 
 
-def route_of(machine: Machine, label: str, outcome: str) -> Route:
+def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
     """Follow an outcome of a state.
 
     It leads to a state, to a container outcome by its target's or its own name, or nowhere.

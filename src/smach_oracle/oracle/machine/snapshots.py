@@ -15,7 +15,6 @@ import smach
 from smach_common.foreign import ends_program, error_text
 
 from ..identity import own_mark
-from ..smach_private import Machine
 
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
@@ -91,7 +90,7 @@ class UserdataGate(MutableMapping):
     """
 
     def __init__(
-        self, machine: Machine, on_late_write: Optional[Callable[[str], None]] = None
+        self, machine: smach.StateMachine, on_late_write: Optional[Callable[[str], None]] = None
     ) -> None:
         self._machine = machine
         self._on_late_write = on_late_write
@@ -168,7 +167,7 @@ class WriteWatch:
     a fingerprint.
     """
 
-    def __init__(self, machine: Machine, deep_copy_keys: Iterable[str]) -> None:
+    def __init__(self, machine: smach.StateMachine, deep_copy_keys: Iterable[str]) -> None:
         self._machine = machine
         self._deep = tuple(deep_copy_keys)
         self.gate = UserdataGate(machine)
@@ -217,7 +216,7 @@ class WriteWatch:
                 data.pop(key, None)
         self.gate.written.clear()
 
-    def written_in(self, machine: Machine) -> Set[str]:
+    def written_in(self, machine: smach.StateMachine) -> Set[str]:
         """Return the keys of this machine's userdata that were written: none of another machine."""
         return self.written() if machine is self._machine else set()
 

@@ -7,7 +7,7 @@ import itertools
 import os
 import threading
 import uuid
-from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple, Type
 
 import smach
 from smach_oracle.forking import is_child
@@ -71,7 +71,7 @@ class Tree:
 
     def __init__(
         self,
-        container_class: type,
+        container_class: Type[smach.StateMachine],
         recover: bool = True,
         expert: Optional[Expert] = None,
         health: Optional[HealthFunction] = None,

@@ -1,14 +1,22 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 
 import copy
-from typing import Any, Dict, Iterator, Mapping, Optional, Protocol, Sequence, Tuple
+from typing import Any, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
 
 from ..records.events import EventKind
 from ..settings.names import is_nested_at
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import EngineProbe, Labels, Machine, data_of, is_executing, mark_of, states_of
+from ..smach_private import (
+    EngineProbe,
+    Labels,
+    data_of,
+    is_executing,
+    mark_of,
+    mark_on,
+    states_of,
+)
 from .container_records import ContainerRecords
 from .container_settings import ContainerSettings
 from .execution import Execution
@@ -20,25 +28,16 @@ from .tree import Tree
 DEFAULT_NAME = 'SM_ROOT'
 
 
-class WrappedMachine(Machine, Protocol):
-    """A machine under an oracle: an OracleContainer."""
-
-    _oracle: 'TreeNode'
-
-    def _state_ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
-        """Go on behind the current state, which was executed. See `_update_once`."""
-
-    def new_trial_id(self) -> str:
-        """Return the id of the trial about to begin."""
-
-    def set_initial_state(self, initial_states: Sequence[str]) -> None:
-        """Begin at this label (one, in a list) from now on."""
-
-
 def node_of(machine: object) -> Optional['TreeNode']:
     """Return the node of a wrapped machine, None for anything else."""
     node = mark_of(machine)
     return node if isinstance(node, TreeNode) else None
+
+
+def marked_node(machine: smach.StateMachine) -> 'TreeNode':
+    """Return the node of a machine that is known to be under an oracle."""
+    node: TreeNode = mark_on(machine)
+    return node
 
 
 def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
@@ -57,7 +56,9 @@ class TreeNode:
 
     site = Site()
 
-    def __init__(self, machine: WrappedMachine, tree: Tree, settings: Settings, name: str) -> None:
+    def __init__(
+        self, machine: smach.StateMachine, tree: Tree, settings: Settings, name: str
+    ) -> None:
         self.machine = machine
         self.parent: Optional['TreeNode'] = None
         self.below: Labels = ()
@@ -338,7 +339,7 @@ class TreeNode:
         """
         self.records.take_over(label, self.settings_of(label), learned, is_shared)
 
-    def twin_for(self, machine: WrappedMachine) -> 'TreeNode':
+    def twin_for(self, machine: smach.StateMachine) -> 'TreeNode':
         """Return a node for a shallow copy of the machine.
 
         It has the same tree and settings, and rates of its own.

@@ -5,12 +5,11 @@ from typing import Collection, Iterable, Mapping, Tuple, cast
 import smach
 
 from ..identity import own_mark
-from ..smach_private import Machine
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 
 
-def constants_of(machine: Machine, label: str) -> Mapping[str, object]:
+def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, object]:
     """Return the constants given with a state, by keys of the container.
 
     Engines without constants have none.
@@ -25,7 +24,7 @@ def write_constants(userdata: smach.UserData, constants: Mapping[str, object]) -
 
 
 def view_of(
-    machine: Machine, label: str, state: smach.State, userdata: smach.UserData
+    machine: smach.StateMachine, label: str, state: smach.State, userdata: smach.UserData
 ) -> smach.Remapper:
     """Return what a state reads and writes, by its own key names.
 
@@ -40,7 +39,7 @@ def view_of(
 
 
 def view_behind(
-    gate: UserdataGate, machine: Machine, label: str, state: smach.State
+    gate: UserdataGate, machine: smach.StateMachine, label: str, state: smach.State
 ) -> smach.Remapper:
     """Return what `view_of` does for the container's userdata, behind a gate."""
     return view_of(machine, label, state, behind(gate))
@@ -69,7 +68,7 @@ class StateView:
 
     __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
 
-    def __init__(self, machine: Machine, label: str, state: smach.State) -> None:
+    def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
         self.state = None  # what no state is: made for one visit
@@ -96,7 +95,9 @@ def _has_plain_keys(state: smach.State) -> bool:
     )
 
 
-def missing_keys(machine: Machine, label: str, available: Iterable[str]) -> Tuple[str, ...]:
+def missing_keys(
+    machine: smach.StateMachine, label: str, available: Iterable[str]
+) -> Tuple[str, ...]:
     """Return the input keys of a state that are not among the `available` keys.
 
     They are named as the state names them. `available` are keys of the container.

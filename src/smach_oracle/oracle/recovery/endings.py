@@ -9,7 +9,6 @@ from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode
 from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
-from ..smach_private import Machine
 from .failure import Failure
 
 
@@ -45,7 +44,7 @@ def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     )
 
 
-def route_at_preempt(machine: Machine, label: str) -> Route:
+def route_at_preempt(machine: smach.StateMachine, label: str) -> Route:
     """Follow the outcome `preempted` of a state that a preempt ends before it has done anything.
 
     It leads nowhere where the state has no such outcome, or where it leads to the state itself.

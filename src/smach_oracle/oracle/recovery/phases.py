@@ -24,7 +24,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from ..scope.scope import standing_still
-from ..smach_private import Labels, Machine, Transitions
+from ..smach_private import Labels, Transitions
 from .deciding import Decided
 from .endings import natural_ending
 from .falling_back import fall_back, fallback_in_words
@@ -339,12 +339,12 @@ class OracleState(smach.State):
         self._outcomes = set(labels)
         return {label: label for label in labels}
 
-    def note_led(self, machine: Machine, label: str, outcomes: Labels) -> None:
+    def note_led(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> None:
         """Note for what of the container, where it is `label`, it leads to all that there is."""
         transitions = machine._transitions[label]
         self._led = tuple(machine._states), outcomes, transitions, len(transitions)
 
-    def leads_on(self, machine: Machine, label: str, outcomes: Labels) -> bool:
+    def leads_on(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> bool:
         """Whether nothing of that has changed since."""
         states, ends, drawn, count = self._led
         return (

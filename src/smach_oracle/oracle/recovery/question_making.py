@@ -10,7 +10,6 @@ from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on,
 from ..machine.places import levels_above, places_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..smach_private import Machine
 from .failure import Failure
 from .precondition_probe import LivePreconditionProbe
 
@@ -102,7 +101,7 @@ def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
             yield LevelOutcome(level.path, outcome)
 
 
-def _inputs(machine: Machine, label: str, state: smach.State) -> Dict[str, object]:
+def _inputs(machine: smach.StateMachine, label: str, state: smach.State) -> Dict[str, object]:
     data = dict(machine.userdata._data)
     remapping = machine._remappings.get(label) or {}
     return {
