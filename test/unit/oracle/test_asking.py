@@ -21,7 +21,7 @@ from machines import (
 )
 
 import smach
-import smach_oracle.oracle.asking.inquiry as inquiry
+import smach_oracle.oracle.recovery.inquiry as inquiry
 from smach_oracle.oracle.errors import AnswerError, InterfaceError
 from smach_oracle.oracle.records.events import EventKind
 

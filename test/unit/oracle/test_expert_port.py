@@ -17,7 +17,7 @@ from machines import (
     watched,
 )
 
-import smach_oracle.oracle.asking.inquiry as inquiry
+import smach_oracle.oracle.recovery.inquiry as inquiry
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.records.events import EventKind
 

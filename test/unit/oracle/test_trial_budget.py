@@ -8,11 +8,11 @@ from guarded_machines import chain, deciders, sentences
 from machines import FakeExpert, Scripted, Watched, give_up, goto, waits
 
 import smach
-from smach_oracle.oracle.asking import inquiry
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.machine.trial_budget import TrialBudget
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import Decider
+from smach_oracle.oracle.recovery import inquiry
 from smach_oracle.oracle.settings.checks import Budget
 from smach_oracle.oracle.settings.settings import Settings
 

@@ -1,68 +1,11 @@
 """Checks that an answer fits its question: one rule for executive, servers and interfaces. Pure."""
 
-from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Protocol, Sequence, Tuple
+from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 from ..errors import AnswerError
-from .question import Answer, AnswerKind, names
+from .question import Answer, AnswerKind, Question, names
 
 Target = Tuple[str, str]  # path of a container, '' for that of the failed state; label in it
-
-
-class _NamedState(Protocol):
-    @property
-    def container(self) -> str: ...
-
-    @property
-    def state(self) -> str: ...
-
-    @property
-    def blocked(self) -> str: ...
-
-
-class _NamedOutcome(Protocol):
-    @property
-    def outcome(self) -> str: ...
-
-
-class _OutcomeAbove(Protocol):
-    @property
-    def container(self) -> str: ...
-
-    @property
-    def outcome(self) -> str: ...
-
-
-class _NamedInterface(Protocol):
-    @property
-    def name(self) -> str: ...
-
-
-class AskedQuestion(Protocol):
-    """The fields that a Question and the ExpertQuery goal that carries it have in common."""
-
-    @property
-    def container_path(self) -> str: ...
-
-    @property
-    def failed_state(self) -> str: ...
-
-    @property
-    def choices(self) -> Sequence[_NamedState]: ...
-
-    @property
-    def supersede_outcomes(self) -> Sequence[_NamedOutcome]: ...
-
-    @property
-    def give_up_outcomes(self) -> Sequence[str]: ...
-
-    @property
-    def give_up_above(self) -> Sequence[_OutcomeAbove]: ...
-
-    @property
-    def interfaces(self) -> Sequence[_NamedInterface]: ...
-
-    @property
-    def output_keys(self) -> Sequence[str]: ...
 
 
 class AnswerChoices(NamedTuple):
@@ -78,8 +21,11 @@ class AnswerChoices(NamedTuple):
     give_up_above: Sequence[Tuple[str, str]] = ()  # path of a level above, and an outcome of it
 
 
-def choices_of(question: AskedQuestion) -> AnswerChoices:
-    """Return what an answer to a question may choose from."""
+def choices_of(question: Question) -> AnswerChoices:
+    """Return what an answer to a question may choose from.
+
+    The ExpertQuery goal that carries a question has the same fields.
+    """
     return AnswerChoices(
         question.container_path,
         question.failed_state,

@@ -6,7 +6,7 @@ import smach
 
 from ..machine.execution import Execution, runs_around
 from ..machine.tree_node import marked_node
-from ..recovery.endings import outcome_of_early_end
+from ..recovery.verdict import outcome_of_early_end
 from ..smach_private import state_ended
 from .item_userdata import ItemUserdata
 from .items import TrackedItems

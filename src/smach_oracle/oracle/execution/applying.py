@@ -10,10 +10,17 @@ from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..records.events import EventKind
 from ..records.visits import VisitResult
-from ..recovery.endings import leaving_outcome
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
-from ..recovery.verdict import GiveUp, JumpTo, Preempted, Supersede, Verdict, arrives_at
+from ..recovery.verdict import (
+    GiveUp,
+    JumpTo,
+    Preempted,
+    Supersede,
+    Verdict,
+    arrives_at,
+    leaving_outcome,
+)
 from ..smach_private import data_of
 from .jump_entry import prepare_entry, start_over
 from .transitions import (

@@ -19,9 +19,9 @@ from ..machine.tree_node import TreeNode, marked_node
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
-from ..recovery.endings import ending_at_once, route_at_preempt
 from ..recovery.operator_wait import wait_until_let_go
 from ..recovery.stop import is_asked_around
+from ..recovery.verdict import ending_at_once, route_at_preempt
 from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST

@@ -23,12 +23,6 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
-from ..recovery.endings import (
-    ContainerEnding,
-    leaving_outcome,
-    natural_ending,
-    preempted_ending,
-)
 from ..recovery.failure import (
     Failure,
     Overrun,
@@ -38,11 +32,19 @@ from ..recovery.failure import (
 )
 from ..recovery.occasions import Occasion
 from ..recovery.phases import OracleState
-from ..recovery.recovering import Recovering
+from ..recovery.recovery import Recovery
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import EndedByAnswer
 from ..recovery.stop import note_end_under_preempt, winds_down
-from ..recovery.verdict import Preempted, Verdict, arrives_at
+from ..recovery.verdict import (
+    ContainerEnding,
+    Preempted,
+    Verdict,
+    arrives_at,
+    leaving_outcome,
+    natural_ending,
+    preempted_ending,
+)
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
 from .departure import Departure, depart, is_settled, take_departure
@@ -340,7 +342,7 @@ class Step:
         meta = self._enter_oracle(occasion)
         lock = lock_of(machine)
         try:
-            meta.begin(Recovering(node, self._record, occasion))
+            meta.begin(Recovery(node, self._record, occasion))
             if has_preempt_flag(machine):
                 meta.request_preempt()  # it came from a callback on the way here
             lock.release()

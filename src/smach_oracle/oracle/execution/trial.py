@@ -22,7 +22,7 @@ from ..records.events import EventKind
 from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
-from ..recovery.endings import outcome_of_early_end
+from ..recovery.verdict import outcome_of_early_end
 from ..smach_private import initial_label_of, states_of
 from .jump_entry import may_start_over
 from .wrapping import adopt, bring_up_to_date

@@ -20,6 +20,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.visits import VisitResult
 from ..settings.failing_outcomes import is_preempted
+from ..smach_private import states_of
 
 
 class Failure(NamedTuple):
@@ -38,6 +39,11 @@ class Failure(NamedTuple):
     def is_held_back(self) -> bool:
         """Whether the state was not executed, since it is not to be repeated: no failure."""
         return self.kind is FailureKind.HELD_BACK
+
+    @property
+    def still_runs(self) -> bool:
+        """Whether the state has not ended, and a person is asked about it: no failure either."""
+        return self.kind is FailureKind.STILL_RUNNING
 
     @property
     def is_counted(self) -> bool:
@@ -136,7 +142,7 @@ def _judge(
     node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
 ) -> Union[Route, Failure]:
     machine = node.machine
-    label, state = record.label, machine._states[record.label]
+    label, state = record.label, states_of(machine)[record.label]
     if error is not None:
         return Failure(
             label,

@@ -1,6 +1,6 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
 
-from typing import TYPE_CHECKING, Any, List, NamedTuple, Optional, Tuple
+from typing import Any, List, NamedTuple, Optional, Tuple
 
 import smach
 
@@ -9,21 +9,22 @@ from ..decision.sentence import cause_of, decision_sentence
 from ..machine.jump_path import jump_path_to
 from ..machine.places import TreePlace, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, route_of
-from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY
-from ..smach_private import Labels
-from .deciding import Decided, Deciding
-from .endings import ContainerEnding, natural_ending
-from .failure import (
-    Failure,
-    tell_failure,
+from ..smach_private import (
+    Labels,
+    current_label_of,
+    current_state_of,
+    is_executing,
+    loop_outcomes_of,
+    states_of,
 )
-from .verdict import JumpTo
-
-if TYPE_CHECKING:
-    from .recovering import Recovering
+from .deciding import decide_on_level
+from .failure import Failure, tell_failure
+from .occasions import failed
+from .recovery import Decided, Recovery
+from .verdict import ContainerEnding, JumpTo, natural_ending
 
 
 def _is_overridden(above: TreeNode, below: Labels) -> bool:
@@ -43,13 +44,13 @@ def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     """Whether an Iterator around a container goes on after it has ended with an outcome."""
     if not node.site.is_container:
         return False
-    around: Any = above.machine._states[node.below[0]]
+    around: Any = states_of(above.machine)[node.below[0]]
     for label in node.below[1:-1]:
         around = around.get_children()[label]
     # what only the settings call a failure its author has not foreseen
     return (
         isinstance(around, smach.Iterator)
-        and outcome in around._loop_outcomes
+        and outcome in loop_outcomes_of(around)
         and not _is_overridden(above, node.below)
         and outcome in node.in_force.failing
     )
@@ -117,13 +118,13 @@ def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
     child, above = node, node.parent
     while above is not None:
-        state = above.machine._states.get(child.below[0])
-        label = above.machine._current_label
+        state = states_of(above.machine).get(child.below[0])
+        label = current_label_of(above.machine)
         if above.tree.is_precondition(above, state):
             return True
-        if above.machine._is_running and label is not None and above.is_oracle(label):
+        if is_executing(above.machine) and label and above.is_oracle(label):
             return True
-        if not above.machine._is_running or above.machine._current_state is not state:
+        if not is_executing(above.machine) or current_state_of(above.machine) is not state:
             return False
         child, above = above, above.parent
     return False
@@ -142,7 +143,7 @@ def levels_that_may_decide(node: TreeNode) -> List[TreeNode]:
 
 
 def decide_above(
-    recovering: 'Recovering', level: TreeNode, failure: Failure
+    recovery: Recovery, level: TreeNode, failure: Failure
 ) -> Optional[Tuple[JumpTo, float]]:
     """Have a level above decide about its own state, as if that had failed.
 
@@ -152,33 +153,29 @@ def decide_above(
     :returns: the jump, and for how long it waits before, s. None where this level asks too, or has
         been left meanwhile.
     """
-    record = level.record(failure.state)
-    below = recovering.node
+    record, below = level.record(failure.state), recovery.node
     if jump_path_to(below, TreePlace(level, record.label)) is None:
         return None
     context = failure_context(level, record)
     continuous = level.in_force.policy.is_continuous(context)
-    deciding = Deciding(level, record, failure, context, continuous, recovering.stop)
+    above = Recovery(level, record, failed(failure, context, continuous), recovery)
     reading = record.read_rate()
     record.learn(True)
-    with recovering.deciding_above(deciding):
-        decider, facts = deciding.decide(lambda: _foreseen_behind(level, failure))
-    recovering.tried += ['{}: {}'.format(level.path, each) for each in deciding.tried]
-    way = jump_path_to(below, deciding.way.down[-1]) if deciding.way is not None else None
-    if deciding.way is None or way is None:
+    decided = decide_on_level(above, lambda: _foreseen_behind(level, failure))
+    facts = decided[1]
+    above.cause = cause_of(facts)
+    recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
+    way = jump_path_to(below, above.way.down[-1]) if above.way is not None else None
+    if above.way is None or way is None:
         record.take_back_failure()
-        recovering.tried.append('{}: {}: asks too'.format(level.path, cause_of(facts)))
+        recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
     level.records.note_failure(record)
-    sentence = decision_sentence(facts, cause_of(facts))
-    smach.loginfo('{}/{}'.format(level.path, sentence))
     tell_failure(level, record, failure, continuous, reading)
-    tell_decision(level, record, (decider, facts), continuous, sentence)
+    sentence = tell_decision(above, decided)
     record.recoveries += 1
-    kept = deciding.way.kept(deciding.watch)
-    restarts = facts.action is Action.RESTART
-    jump = JumpTo(way, text=sentence, written=kept, decided_by=level, restarts=restarts)
-    return jump, facts.wait_s
+    kept, restarts = above.way.kept(above.watch), facts.action is Action.RESTART
+    return JumpTo(way, '', sentence, kept, level, restarts), facts.wait_s
 
 
 def _foreseen_behind(level: TreeNode, failure: Failure) -> str:
@@ -186,19 +183,19 @@ def _foreseen_behind(level: TreeNode, failure: Failure) -> str:
     return foreseen.text if foreseen is not None else ''
 
 
-def tell_decision(
-    node: TreeNode, record: StateRecord, decided: Decided, continuous: bool, sentence: str
-) -> None:
-    """Tell the observers what the oracle of a level has decided."""
-    if not node.events.observers:
-        return
-    decider, facts = decided
-    node.emit_rated(
-        EventKind.DECISION,
-        record,
-        outcome=facts.action.value,
-        target=facts.target,
-        continuous=continuous,
-        text=sentence,
-        data={DECIDED_BY: decider.value},
-    )
+def tell_decision(recovery: Recovery, decided: Decided) -> str:
+    """Log what the oracle of a level has decided, and tell the observers. Return the sentence."""
+    node, (decider, facts) = recovery.node, decided
+    sentence = decision_sentence(facts, recovery.cause)
+    smach.loginfo('{}/{}'.format(node.path, sentence))
+    if node.events.observers:
+        node.emit_rated(
+            EventKind.DECISION,
+            recovery.record,
+            outcome=facts.action.value,
+            target=facts.target,
+            continuous=recovery.occasion.continuous,
+            text=sentence,
+            data={DECIDED_BY: decider.value},
+        )
+    return sentence

@@ -136,6 +136,12 @@ def often_unwell(failure: Failure, context: FailureContext, continuous: bool, wh
     return failed(failure, context, continuous)._replace(first=FirstStep.WAIT_AND_DECIDE, why=why)
 
 
+def still_running(failure: Failure) -> Occasion:
+    """A state runs on, for much longer than ever before. A person is asked meanwhile."""
+    context = FailureContext(failure.state, '', False, False, None, None)
+    return Occasion(failure, context, '', '', FirstStep.ASK)
+
+
 def log_occasion(occasion: Occasion, place: str) -> None:
     """Log why the oracle is entered. `place`: path of the state."""
     if not occasion.is_logged:

@@ -10,24 +10,23 @@ from typing import Dict, FrozenSet, List, Optional, Tuple
 
 import smach
 
-from ..asking.inquiry import Inquiry
 from ..asking.question import Answer, AnswerKind, Expert
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
-from ..decision.sentence import DecisionFacts, cause_of, decision_sentence
+from ..decision.sentence import DecisionFacts, cause_of
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
-from ..machine.jump_path import JumpPath, why_closed_on
-from ..machine.places import TreePlace
+from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
+from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from ..scope.scope import standing_still
-from ..smach_private import Labels, Transitions
-from .deciding import Decided
-from .endings import natural_ending
+from ..smach_private import Labels, Transitions, remapping_of, states_of, transitions_of
+from .deciding import decide_on_level
 from .falling_back import fall_back, fallback_in_words
+from .inquiry import Inquiry
 from .levels import (
     Foreseen,
     decide_above,
@@ -38,209 +37,195 @@ from .levels import (
     tell_decision,
 )
 from .occasions import FirstStep, FromBelow
-from .recovering import Recovering
-from .stop import in_words, preempt_beside
-from .verdict import JumpTo, Verdict, leads_to, verdict_of
+from .recovery import Recovery
+from .stop import preempt_beside
+from .verdict import ContainerEnding, GiveUp, JumpTo, Supersede, Verdict, leads_to, natural_ending
 
 # -- what comes before a decision
 
 
-def obey_given(recovering: Recovering) -> Optional[Verdict]:
+def obey_given(recovery: Recovery) -> Optional[Verdict]:
     """Go as was decided before: by an answer, or in a container below."""
-    occasion = recovering.occasion
+    occasion = recovery.occasion
     if occasion.answer is not None:
-        return _obey_answer(recovering, occasion.answer)
-    return None if occasion.below is None else _follow(recovering, occasion.below)
+        return _obey_answer(recovery, occasion.answer)
+    return None if occasion.below is None else _follow(recovery, occasion.below)
 
 
-def _obey_answer(recovering: Recovering, answer: Answer) -> Optional[Verdict]:
+def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
     """Obey an answer about a state that still ran, unless what it names has closed meanwhile."""
-    if recovering.stopped():
-        return recovering.preempted()
-    verdict = _obey(recovering, answer)
+    if recovery.stopped():
+        return recovery.preempted()
+    verdict = _obey(recovery, answer)
     closed = ''
     if answer.kind is AnswerKind.GOTO and isinstance(verdict, JumpTo):
         closed = why_closed_on(verdict.way)
     if not closed:
         return verdict
-    recovering.ask_at_once(
+    recovery.ask_at_once(
         'cannot go to {}, as was answered: {} {}'.format(answer.state, answer.state, closed)
     )
     # it does not run any more
-    recovering.judge_anew(
-        recovering.failure._replace(
-            kind=FailureKind.TIME_LIMIT, text='was taken out while it still ran'
-        )
+    recovery.failure = recovery.failure._replace(
+        kind=FailureKind.TIME_LIMIT, text='was taken out while it still ran'
     )
-    return recovering.end_unaided() if recovering.budget.why_over() else None
+    return recovery.end_unaided() if recovery.budget.why_over() else None
 
 
-def _follow(recovering: Recovering, below: FromBelow) -> Optional[Verdict]:
+def _follow(recovery: Recovery, below: FromBelow) -> Optional[Verdict]:
     why_not = below.why_not()
-    return _ask_since(recovering, why_not) if why_not else below.verdict
+    return _ask_since(recovery, why_not) if why_not else below.verdict
 
 
-def _ask_since(recovering: Recovering, why: str) -> Optional[Verdict]:
-    if recovering.stop.is_over():
-        return recovering.end_early()
-    recovering.ask_at_once(why)
+def _ask_since(recovery: Recovery, why: str) -> Optional[Verdict]:
+    if recovery.is_over():
+        return recovery.end_early()
+    recovery.ask_at_once(why)
     return None
 
 
-def wait_until_well(recovering: Recovering) -> Optional[Verdict]:
+def wait_until_well(recovery: Recovery) -> Optional[Verdict]:
     """Wait for a robot that was not well when the state failed. It may then enter it again."""
-    first, why = recovering.occasion.first, recovering.occasion.why
+    first, why = recovery.occasion.first, recovery.occasion.why
     if first not in (FirstStep.ENTER_AGAIN, FirstStep.WAIT_AND_DECIDE):
         return None
     if not why:
-        return recovering.preempted()
+        return recovery.preempted()
     again = first is FirstStep.ENTER_AGAIN
-    if recovering.stop.is_over() or not recovering.stop.wait_until_well(
-        FAILED if again else 'failed again', why
-    ):
-        return recovering.end_early()
-    return _enter_again(recovering) if again else None
+    if recovery.is_over() or not recovery.wait_until_well(FAILED if again else 'failed again', why):
+        return recovery.end_early()
+    return _enter_again(recovery) if again else None
 
 
-def _enter_again(recovering: Recovering) -> Optional[Verdict]:
+def _enter_again(recovery: Recovery) -> Optional[Verdict]:
     """Enter the failed state again, now that the robot is well, unless that may repeat it."""
-    node, label = recovering.node, recovering.record.label
+    node, label = recovery.node, recovery.record.label
     if not repeated_by_going_to(node, label):
-        recovering.record.unwell_repeats += 1
-        return recovering.jump(JumpPath((), node, (TreePlace(node, label),)))
-    recovering.judge_anew(
-        recovering.failure._replace(
-            kind=FailureKind.HELD_BACK,
-            text='failed while the robot was not well, and is not repeated by itself',
-        )
+        recovery.record.unwell_repeats += 1
+        return recovery.jump(JumpPath((), node, (TreePlace(node, label),)))
+    recovery.failure = recovery.failure._replace(
+        kind=FailureKind.HELD_BACK,
+        text='failed while the robot was not well, and is not repeated by itself',
     )
     return None
 
 
-def ask_first(recovering: Recovering) -> Optional[Verdict]:
+def ask_first(recovery: Recovery) -> Optional[Verdict]:
     """Leave the decision to a person where the machine is not to move by itself."""
-    occasion = recovering.occasion
-    return _ask_since(recovering, occasion.why) if occasion.first is FirstStep.ASK else None
+    occasion = recovery.occasion
+    return _ask_since(recovery, occasion.why) if occasion.first is FirstStep.ASK else None
 
 
 # -- the decision
 
 
-def decide(recovering: Recovering) -> Optional[Verdict]:
+def decide(recovery: Recovery) -> Optional[Verdict]:
     """Decide as the policy does, and go there. Leave it to the next phases where that is to ask."""
-    if recovering.asks_at_once:
+    if recovery.asks_at_once:
         return None
-    if recovering.budget.why_over():
-        return recovering.end_unaided()
-    decided = recovering.deciding.decide(lambda: _why_left_to_others(recovering))
-    if recovering.stop.is_over():
-        return recovering.end_early()
+    if recovery.budget.why_over():
+        return recovery.end_unaided()
+    decided = decide_on_level(recovery, lambda: _why_left_to_others(recovery))
+    if recovery.is_over():
+        return recovery.end_early()
     _, facts = decided
-    recovering.cause = cause_of(facts)
+    recovery.cause = cause_of(facts)
     if facts.action is Action.ASK:
-        recovering.decided = decided
+        recovery.decided = decided
         return None
-    _tell_decision(recovering, decided)
-    return _follow_policy(recovering, facts)
+    tell_decision(recovery, decided)
+    return _follow_policy(recovery, facts)
 
 
-def _follow_policy(recovering: Recovering, facts: DecisionFacts) -> Verdict:
+def _follow_policy(recovery: Recovery, facts: DecisionFacts) -> Verdict:
     """Carry out a decision that asks nobody."""
-    way = recovering.deciding.way
+    way = recovery.way
     if way is None:
         return _give_way(
-            recovering, _why_nobody_is_asked(recovering) or Foreseen('the policy asks nobody')
+            recovery, _why_nobody_is_asked(recovery) or Foreseen('the policy asks nobody')
         )
-    recovering.record.recoveries += 1
+    recovery.record.recoveries += 1
     restarts = facts.action is Action.RESTART
-    written: FrozenSet[str] = frozenset() if restarts else way.kept(recovering.deciding.watch)
-    return _wait_and_jump(recovering, facts.wait_s, JumpTo(way, written=written, restarts=restarts))
+    written: FrozenSet[str] = frozenset() if restarts else way.kept(recovery.watch)
+    return _wait_and_jump(recovery, facts.wait_s, JumpTo(way, written=written, restarts=restarts))
 
 
-def _wait_and_jump(recovering: Recovering, wait_s: float, jump: JumpTo) -> Verdict:
-    if wait_s and not recovering.stop.has_waited(wait_s):
-        return recovering.end_early()
-    return recovering.when_well(jump)
-
-
-def _tell_decision(recovering: Recovering, decided: Decided) -> None:
-    node, sentence = recovering.node, decision_sentence(decided[1], recovering.cause)
-    smach.loginfo('{}/{}'.format(node.path, sentence))
-    tell_decision(node, recovering.record, decided, recovering.occasion.continuous, sentence)
+def _wait_and_jump(recovery: Recovery, wait_s: float, jump: JumpTo) -> Verdict:
+    if wait_s and not recovery.has_waited(wait_s):
+        return recovery.end_early()
+    return recovery.when_well(jump)
 
 
 # -- the levels above
 
 
-def escalate(recovering: Recovering) -> Optional[Verdict]:
+def escalate(recovery: Recovery) -> Optional[Verdict]:
     """Have the levels above decide before a person is asked, or end where it is left to them."""
-    if recovering.decided is None:
+    if recovery.decided is None:
         return None
-    decider, facts = recovering.decided
-    nobody = _why_nobody_is_asked(recovering)
-    levels = [] if nobody else _levels_that_may_decide(recovering, decider)
+    decider, facts = recovery.decided
+    nobody = _why_nobody_is_asked(recovery)
+    levels = [] if nobody else _levels_that_may_decide(recovery, decider)
     asked = (
         'the oracle above'
         if levels
         else 'nobody, since ' + nobody.text
         if nobody
-        else _asked_in_words(recovering)
+        else _asked_in_words(recovery)
     )
-    _tell_decision(recovering, (decider, facts._replace(asked=asked)))
-    outer = _decided_above(recovering, levels)
-    if recovering.stop.is_over():
-        return recovering.end_early()
+    tell_decision(recovery, (decider, facts._replace(asked=asked)))
+    outer = _decided_above(recovery, levels)
+    if recovery.is_over():
+        return recovery.end_early()
     if outer is not None:
-        recovering.record.recoveries += 1
+        recovery.record.recoveries += 1
         jump, wait_s = outer
-        return _wait_and_jump(recovering, wait_s, jump)
-    return _give_way(recovering, nobody) if nobody else None
+        return _wait_and_jump(recovery, wait_s, jump)
+    return _give_way(recovery, nobody) if nobody else None
 
 
-def _why_nobody_is_asked(recovering: Recovering) -> Optional[Foreseen]:
+def _why_nobody_is_asked(recovery: Recovery) -> Optional[Foreseen]:
     """Return why the end of the container is left to a level above, or None where it is not."""
-    node = recovering.node
+    node = recovery.node
     if runs_as_precondition(node):
         return Foreseen('it runs as a precondition')
-    if recovering.failure.is_held_back:  # no other oracle can confirm that it is repeated
+    if recovery.failure.is_held_back:  # no other oracle can confirm that it is repeated
         return None
-    foreseen = foreseen_above(node, recovering.natural_ending())
+    foreseen = foreseen_above(node, recovery.natural_ending())
     return foreseen and foreseen._replace(
         text='its author goes on from there ({})'.format(foreseen.text)
     )
 
 
-def _why_left_to_others(recovering: Recovering) -> str:
-    nobody = _why_nobody_is_asked(recovering)
+def _why_left_to_others(recovery: Recovery) -> str:
+    nobody = _why_nobody_is_asked(recovery)
     return nobody.text if nobody is not None else ''
 
 
-def _give_way(recovering: Recovering, why: Foreseen) -> Verdict:
+def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
     """End the container, and leave all else to who is above it."""
     if why.passed_over:
-        recovering.warn('its item is passed over with {}'.format(why.passed_over))
-    return recovering.give_up('{}: {}'.format(recovering.cause, why.text))
+        recovery.warn('its item is passed over with {}'.format(why.passed_over))
+    return recovery.give_up('{}: {}'.format(recovery.cause, why.text))
 
 
-def _levels_that_may_decide(recovering: Recovering, decider: Decider) -> List[TreeNode]:
+def _levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNode]:
     """Return them, innermost first. None where the failure is to be asked about at once."""
-    if decider is not Decider.POLICY or (recovering.record.failure_class is FailureClass.HIGH):
+    if decider is not Decider.POLICY or (recovery.record.failure_class is FailureClass.HIGH):
         return []
-    return levels_that_may_decide(recovering.node)
+    return levels_that_may_decide(recovery.node)
 
 
-def _decided_above(
-    recovering: Recovering, levels: List[TreeNode]
-) -> Optional[Tuple[JumpTo, float]]:
+def _decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
     """Return what the innermost level decides that does not ask, or None where all ask."""
-    below, ending = recovering.node, recovering.natural_ending()
+    below, ending = recovery.node, recovery.natural_ending()
     for level in levels:
         failure = failure_above(
-            level, below.below[0], ending, '{}: {}'.format(below.path, recovering.cause)
+            level, below.below[0], ending, '{}: {}'.format(below.path, recovery.cause)
         )
-        if failure is None or recovering.stop.is_over():
+        if failure is None or recovery.is_over():
             return None
-        decision = decide_above(recovering, level, failure)
+        decision = decide_above(recovery, level, failure)
         if decision is not None:
             return decision
         below = level
@@ -251,49 +236,43 @@ def _decided_above(
 # -- the expert
 
 
-def ask_expert(recovering: Recovering) -> Optional[Verdict]:
+def ask_expert(recovery: Recovery) -> Optional[Verdict]:
     """Ask the expert, and do as answered. None where nobody answers."""
-    node = recovering.node
+    node = recovery.node
     expert = node.tree.expert
     if not node.in_force.policy.asks:
-        return recovering.give_up('{}: the policy asks nobody'.format(recovering.cause))
+        return recovery.give_up('{}: the policy asks nobody'.format(recovery.cause))
     if expert is None:
-        recovering.why_no_answer = 'no expert is there to ask'
+        recovery.why_no_answer = 'no expert is there to ask'
         return None
-    recovering.why_no_answer = recovering.budget.take_question()
-    return None if recovering.why_no_answer else _ask(recovering, expert)
+    recovery.why_no_answer = recovery.budget.take_question()
+    return None if recovery.why_no_answer else _ask(recovery, expert)
 
 
-def _ask(recovering: Recovering, expert: Expert) -> Optional[Verdict]:
-    node, budget = recovering.node, recovering.budget
-    deadline_s, recovering.ends_budget = budget.within(node.settings.deadline_s)
+def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
+    node, budget = recovery.node, recovery.budget
+    deadline_s, recovery.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
     with standing_still(node.execution.runs_around), early_end.asking():
-        reply = Inquiry(recovering, expert, deadline_s).run()
-    if recovering.stopped():
+        reply = Inquiry(recovery, expert, deadline_s).run()
+    question_id = recovery.question_id
+    if recovery.stopped():
         if early_end.end_at_shutdown():
             preempt_beside(node)
-        if reply.question_id:
-            recovering.emit(
-                EventKind.QUERY_CANCELLED,
-                query_id=reply.question_id,
-                text=in_words(recovering.scope.reason, node),
-            )
-        return recovering.preempted()
+        if question_id:
+            why = recovery.why_taken_back()
+            recovery.tell(EventKind.QUERY_CANCELLED, text=why, query_id=question_id)
+        return recovery.preempted()
     if reply.answer is not None:
-        return _obey(recovering, reply.answer)
-    why = '; '.join(filter(None, (reply.why_none, budget.why_over())))
-    recovering.emit(
-        EventKind.QUERY_EXPIRED,
-        query_id=reply.question_id,
-        text='{}; fallback: {}'.format(why, fallback_in_words(recovering)),
-    )
-    recovering.why_no_answer = why
+        return _obey(recovery, reply.answer)
+    why = recovery.why_no_answer = '; '.join(filter(None, (reply.why_none, budget.why_over())))
+    text = '{}; fallback: {}'.format(why, fallback_in_words(recovery))
+    recovery.tell(EventKind.QUERY_EXPIRED, text=text, query_id=question_id)
     return None
 
 
-def _asked_in_words(recovering: Recovering) -> str:
-    node, budget = recovering.node, recovering.budget
+def _asked_in_words(recovery: Recovery) -> str:
+    node, budget = recovery.node, recovery.budget
     if node.tree.expert is None:
         return 'nobody, since there is no expert'
     spent = budget.why_no_question()
@@ -305,16 +284,26 @@ def _asked_in_words(recovering: Recovering) -> str:
     return 'an expert, {:g} s'.format(limit_s) if limit_s else 'an expert'
 
 
-def _obey(recovering: Recovering, answer: Answer) -> Verdict:
-    return recovering.when_well(
-        verdict_of(
-            answer,
-            recovering.node,
-            recovering.record.label,
-            recovering.deciding.watch,
-            recovering.natural_ending,
-        )
+def _obey(recovery: Recovery, answer: Answer) -> Verdict:
+    """Write the outputs of an answer, and go as it says."""
+    node, watch = recovery.node, recovery.watch
+    remapping = remapping_of(node.machine, recovery.record.label)
+    for key, value in (answer.outputs or {}).items():
+        watch.gate[remapping.get(key, key)] = value
+    if answer.kind is AnswerKind.GOTO:
+        place = place_at(node, answer.container, answer.state)
+        way = jump_path_to(node, place) if place is not None else None
+        if way is None:  # an answer that was checked has one
+            named = '{}/{}'.format(answer.container or node.path, answer.state)
+            raise smach.InvalidStateError('there is no way to ' + named)
+        return recovery.when_well(JumpTo(way, answer.by, answer.why, way.kept(watch)))
+    if answer.kind is AnswerKind.SUPERSEDE:
+        return Supersede(answer.outcome, answer.by, answer.why)
+    ending = (
+        ContainerEnding(outcome=answer.outcome) if answer.outcome else recovery.natural_ending()
     )
+    above = next((each for each in levels_above(node) if each.path == answer.container), None)
+    return GiveUp(ending, answer.by, answer.why, above)
 
 
 _Led = Tuple[Labels, Labels, Optional[Transitions], int]
@@ -330,7 +319,7 @@ class OracleState(smach.State):
     def __init__(self) -> None:
         smach.State.__init__(self, outcomes=[])
         self._lock = threading.Lock()
-        self._recovering: Optional[Recovering] = None
+        self._recovery: Optional[Recovery] = None
         self._verdict: Optional[Verdict] = None
         self._led: _Led = _NOTHING
 
@@ -341,28 +330,28 @@ class OracleState(smach.State):
 
     def note_led(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> None:
         """Note for what of the container, where it is `label`, it leads to all that there is."""
-        transitions = machine._transitions[label]
-        self._led = tuple(machine._states), outcomes, transitions, len(transitions)
+        transitions = transitions_of(machine)[label]
+        self._led = tuple(states_of(machine)), outcomes, transitions, len(transitions)
 
     def leads_on(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> bool:
         """Whether nothing of that has changed since."""
         states, ends, drawn, count = self._led
         return (
             drawn is not None
-            and machine._transitions.get(label) is drawn
+            and transitions_of(machine).get(label) is drawn
             and len(drawn) == count
             and ends == outcomes
-            and states == tuple(machine._states)
+            and states == tuple(states_of(machine))
         )
 
-    def begin(self, recovering: Recovering) -> None:
+    def begin(self, recovery: Recovery) -> None:
         """Be ready to recover from a failure.
 
         From now on a preempt request reaches the recovery.
         """
         with self._lock:
             self._preempt_requested = False
-            self._recovering = recovering
+            self._recovery = recovery
             self._verdict = None
 
     def execute(self, ud: smach.UserData) -> str:
@@ -371,23 +360,23 @@ class OracleState(smach.State):
         :returns: where the machine goes, '' where it raises. It follows the verdict itself.
         :raises TrialError: where no failure was handed over.
         """
-        recovering = self._recovering
-        if recovering is None:
+        recovery = self._recovery
+        if recovery is None:
             raise TrialError('the meta state is entered by failures alone')
         try:
             self._verdict = (
-                obey_given(recovering)
-                or wait_until_well(recovering)
-                or ask_first(recovering)
-                or decide(recovering)
-                or escalate(recovering)
-                or ask_expert(recovering)
-                or fall_back(recovering)
+                obey_given(recovery)
+                or wait_until_well(recovery)
+                or ask_first(recovery)
+                or decide(recovery)
+                or escalate(recovery)
+                or ask_expert(recovery)
+                or fall_back(recovery)
             )  # every verdict counts as true, and the last phase has one
             return leads_to(self._verdict)
         finally:
             with self._lock:
-                self._recovering = None
+                self._recovery = None
 
     def take_verdict(self) -> Verdict:
         """Return what the recovery that `execute` ran has come to, once.
@@ -403,14 +392,14 @@ class OracleState(smach.State):
         """End the recovery: a precondition that runs is preempted, an open question taken back."""
         smach.State.request_preempt(self)
         with self._lock:
-            recovering = self._recovering
-        if recovering is not None:
-            recovering.cancel()
+            recovery = self._recovery
+        if recovery is not None:
+            recovery.cancel()
 
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to a recovery: neither that nor a lock travels with a machine."""
         state = dict(self.__dict__)
-        state.update(_lock=None, _recovering=None, _verdict=None, _led=_NOTHING)
+        state.update(_lock=None, _recovery=None, _verdict=None, _led=_NOTHING)
         return state
 
     def __setstate__(self, state: Dict[str, object]) -> None:

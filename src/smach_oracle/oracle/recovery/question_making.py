@@ -1,35 +1,40 @@
 """Makes a question of a failure, with everything that an expert needs (paper, section V)."""
 
-from typing import Any, Collection, Dict, Iterator, Mapping, NamedTuple, Tuple
+from typing import Any, Collection, Dict, Iterator, List, Mapping, Optional, Tuple
 
 import smach
+from smach_common.foreign import repr_of
 
 from ..asking.answer_rules import Target
-from ..asking.question import LevelOutcome, Question, StateChoice
+from ..asking.question import (
+    LevelOutcome,
+    PreconditionProbe,
+    PreconditionStatus,
+    Question,
+    StateChoice,
+)
+from ..identity import truth_of
 from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
-from ..machine.places import levels_above, places_of
-from ..machine.state_record import StateRecord
+from ..machine.places import levels_above, place_named, places_of
+from ..machine.snapshots import UserdataGate, behind
 from ..machine.tree_node import TreeNode
-from .failure import Failure
-from .precondition_probe import LivePreconditionProbe
+from ..records.short_text import shortened
+from ..records.visits import VisitResult
+from ..settings.preconditions import PreconditionKind, PreconditionSpec
+from ..smach_private import data_of, remapping_of, states_of
+from .falling_back import fallback_in_words
+from .recovery import Recovery
 
 
-class Account(NamedTuple):
-    """An account of what was done about a failure so far."""
+def make_question(recovery: Recovery, deadline_s: float) -> Question:
+    """Return a new question about a failure. `deadline_s`: seconds left. 0 waits without end.
 
-    continuous: bool
-    reason: str  # why the expert is asked
-    tried: Tuple[str, ...]
-    written: Collection[str]  # userdata keys that the recovery has set
-    fallback: str  # what happens without an answer, in words
-
-
-def make_question(
-    node: TreeNode, record: StateRecord, failure: Failure, account: Account, deadline_s: float
-) -> Question:
-    """Return a question about a failure. `deadline_s`: seconds left. 0 waits without end."""
-    machine = node.machine
-    state = machine._states[record.label]
+    No interface can do the work of a state that still runs, and no function of a user's is called
+    meanwhile.
+    """
+    node, record, failure = recovery.node, recovery.record, recovery.failure
+    machine, still_runs = node.machine, failure.still_runs
+    state = states_of(machine)[record.label]
     return Question(
         question_id=node.tree.resumed.take_question(record) or node.tree.next_question_id(),
         trial_id=node.tree.trial_id,
@@ -40,28 +45,41 @@ def make_question(
         text=failure.text,
         failure_class=int(record.failure_class),
         rate=record.rate,
-        continuous=account.continuous,
+        continuous=recovery.occasion.continuous,
         recoveries=record.recoveries,
-        reason=account.reason,
-        tried=account.tried,
+        reason=recovery.cause,
+        tried=tuple(recovery.tried),
         history=node.records.history.latest(),
-        choices=tuple(_state_choices(node, account.written)),
+        choices=tuple(_state_choices(recovery)),
         supersede_outcomes=node.site.choices(node, record.label),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
-        give_up_outcomes=tuple(sorted(machine.get_registered_outcomes(), key=str)),
-        interfaces=node.settings.offers_for(node.relative_path, record.label),
-        userdata=dict(machine.userdata._data),
+        give_up_outcomes=_outcomes_of(node),
+        interfaces=() if still_runs else node.settings.offers_for(node.relative_path, record.label),
+        userdata=dict(data_of(machine.userdata)),
         input_userdata=_inputs(machine, record.label, state),
         deadline_s=deadline_s,
-        fallback=account.fallback,
-        preconditions=LivePreconditionProbe(node),
-        give_up_above=tuple(_give_up_above(node)),
+        fallback=fallback_in_words(recovery),
+        preconditions=None if still_runs else LivePreconditionProbe(node),
+        give_up_above=tuple(
+            LevelOutcome(level.path, outcome)
+            for level in levels_above(node)
+            for outcome in _outcomes_of(level)
+        ),
     )
 
 
-def targets_of(node: TreeNode) -> Mapping[Target, str]:
-    """Return where a machine could go, and why it cannot go there now, '' where it can."""
-    return {_target(node, way): why_closed_on(way) for way in _jump_paths(node)}
+def targets_of(recovery: Recovery) -> Mapping[Target, str]:
+    """Return where the machine could go, and why it cannot go there now, '' where it can."""
+    node, targets = recovery.node, {}
+    for way in _jump_paths(node):
+        target = _target(node, way)
+        targets[target] = '' if _waits_on(recovery, target) else why_closed_on(way)
+    return targets
+
+
+def _waits_on(recovery: Recovery, target: Target) -> bool:
+    """Whether to go there means to wait on: the own name of a state that still runs."""
+    return recovery.failure.still_runs and target == ('', recovery.record.label)
 
 
 def _jump_paths(node: TreeNode) -> Iterator[JumpPath]:
@@ -77,10 +95,11 @@ def _target(node: TreeNode, way: JumpPath) -> Target:
     return '' if place.node is node else place.node.path, place.label
 
 
-def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateChoice]:
-    for way in _jump_paths(node):
-        container, label = _target(node, way)
-        record = way.down[-1].node.record(label)
+def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
+    written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
+    for way in _jump_paths(recovery.node):
+        container, label = target = _target(recovery.node, way)
+        record, waits_on = way.down[-1].node.record(label), _waits_on(recovery, target)
         yield StateChoice(
             label,
             1.0 - record.rate,
@@ -88,22 +107,19 @@ def _state_choices(node: TreeNode, written: Collection[str]) -> Iterator[StateCh
             record.visits,
             missing_on(way, () if way.left else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            why_closed_on(way),
-            repeated_on(way),
+            '' if waits_on else why_closed_on(way),
+            () if waits_on else repeated_on(way),
             container,
             _running_again(way),
         )
 
 
-def _give_up_above(node: TreeNode) -> Iterator[LevelOutcome]:
-    for level in levels_above(node):
-        for outcome in sorted(level.machine.get_registered_outcomes(), key=str):
-            yield LevelOutcome(level.path, outcome)
+def _outcomes_of(node: TreeNode) -> Tuple[str, ...]:
+    return tuple(sorted(node.machine.get_registered_outcomes(), key=str))
 
 
 def _inputs(machine: smach.StateMachine, label: str, state: smach.State) -> Dict[str, object]:
-    data = dict(machine.userdata._data)
-    remapping = machine._remappings.get(label) or {}
+    data, remapping = dict(data_of(machine.userdata)), remapping_of(machine, label)
     return {
         key: data[remapping.get(key, key)]
         for key in state.get_registered_input_keys()
@@ -131,10 +147,85 @@ def _entered_on(way: JumpPath) -> Iterator[smach.State]:
     Containers between two places, such as a Concurrence in an Iterator, are among them.
     """
     for place, below in zip(way.down, way.down[1:]):
-        around: Any = place.node.machine._states[place.label]
+        around: Any = states_of(place.node.machine)[place.label]
         yield around
         for label in below.node.below[1:]:
             around = around.get_children()[label]
             yield around
     last = way.down[-1]
-    yield last.node.machine._states[last.label]
+    yield states_of(last.node.machine)[last.label]
+
+
+# -- how the preconditions of the choices stand
+
+
+_LAST = {
+    VisitResult.SUCCESS: 'succeeded',
+    VisitResult.FAILURE: 'failed',
+    VisitResult.SUPERSEDED: 'was superseded',
+    VisitResult.PREEMPTED: 'was preempted',
+}
+
+
+class LivePreconditionProbe(PreconditionProbe):
+    """The preconditions of one question's choices.
+
+    Only a callable, and the check of a pair where it is one, can be asked without bringing anything
+    about. A state is never run for it. A user's callable may take forever, so `status` is called in
+    threads that nobody waits for. What a callable writes into the userdata is dropped.
+    """
+
+    def __init__(self, node: TreeNode) -> None:
+        self._node = node
+        self._gate = UserdataGate(node.machine)
+        self._gate.shut()
+        self._specs: List[PreconditionSpec] = []
+        names: List[Tuple[str, str]] = []
+        for label in node.labels():
+            for spec in node.record(label).settings.preconditions:
+                self._specs.append(spec)
+                names.append((label, spec.name))
+        self.names = tuple(names)
+
+    def status(self, number: int) -> PreconditionStatus:
+        """Return how the precondition of that number stands now.
+
+        It calls a user's function, which may take forever.
+        """
+        spec = self._specs[number]
+        if not self._node.settings.watch_preconditions:
+            return PreconditionStatus(None, 'watch_preconditions is off')
+        if spec.kind is not PreconditionKind.PAIR:
+            return self._of(spec)
+        check, achieve = spec.target
+        found = self._of(check)
+        if found.holds is not False:
+            return found
+        return found._replace(text='{}; {} would bring it about'.format(found.text, achieve.name))
+
+    def _of(self, spec: PreconditionSpec) -> PreconditionStatus:
+        name = spec.name
+        if spec.kind is PreconditionKind.LABEL:
+            return PreconditionStatus(
+                None, 'only running {} would tell{}'.format(spec.target, self._last(spec.target))
+            )
+        if spec.kind is not PreconditionKind.CALLABLE:
+            return PreconditionStatus(None, 'only running {} would tell'.format(name))
+        try:
+            result = spec.target(behind(self._gate))
+        except Exception as err:
+            return PreconditionStatus(None, '{} raised {}'.format(name, repr_of(err)))
+        if result is None:
+            return PreconditionStatus(None, '{} returned None; True is met'.format(name))
+        text = shortened('{} returned {}'.format(name, repr_of(result)), 300)
+        return PreconditionStatus(truth_of(result), text)
+
+    def _last(self, name: str) -> str:
+        place = place_named(self._node, name)
+        if place is None:
+            return ''
+        visits = reversed(place.node.records.history.latest())
+        last: Optional[VisitResult] = next(
+            (visit.result for visit in visits if visit.state == place.label), None
+        )
+        return '; its last visit ' + _LAST[last] if last is not None else ''

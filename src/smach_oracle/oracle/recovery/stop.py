@@ -1,19 +1,10 @@
-"""Tells what ends a recovery: a preempt, a shutdown or the budget's minutes. Waits until then."""
+"""A stop of the whole machine: which states have obeyed it, and who winds down since."""
 
 from typing import Optional, Sequence
 
-from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..scope.scope import Reason, Scope, standing_still
 from ..settings.failing_outcomes import is_preempted
-
-
-def in_words(reason: Optional[Reason], node: TreeNode) -> str:
-    """Return why a question is taken back, as the events say it."""
-    early = node.tree.early_end.why
-    if early is not None:
-        return early.value
-    return (reason or Reason.SHUTDOWN).text
+from ..smach_private import states_of
 
 
 def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None:
@@ -23,16 +14,12 @@ def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None
 
     :param cleans_within: the state is entered again, a machine with a clean-up of its own.
     """
-    if _is_stop(node):
+    if _asks_for_stop([node, *node.running_around()]):
         node.records.note_obeyed(label, cleans_within)
 
 
-def _is_stop(node: TreeNode) -> bool:
-    """Whether the outermost container is asked to stop, and not a part of it, which is left."""
-    return _asks_for_stop([node, *node.running_around()])
-
-
 def _asks_for_stop(around: Sequence[TreeNode]) -> bool:
+    """Whether the outermost container is asked to stop, and not a part of it, which is left."""
     return bool(around[-1].machine.preempt_requested())
 
 
@@ -46,7 +33,7 @@ def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -
     is_drawn = outcome is not None and is_preempted(outcome)
     if is_drawn:
         node.records.note_drawn()
-    if outcome is None or is_drawn or not node.machine._states[label].preempt_requested():
+    if outcome is None or is_drawn or not states_of(node.machine)[label].preempt_requested():
         note_obeyed(node, label)
 
 
@@ -83,51 +70,3 @@ def preempt_beside(node: TreeNode) -> None:
     """
     if node.runs_beside_others():
         node.top().machine.request_preempt()
-
-
-class RecoveryStop:
-    """Whether one recovery is over.
-
-    A preempt or a shutdown cancels its `scope`, and so does the end of what goes on around it. The
-    end of the trial's time cancels `timed` as well.
-    """
-
-    def __init__(self, node: TreeNode, record: StateRecord) -> None:
-        self._node = node
-        self._record = record
-        self.scope = Scope(node.execution.scope_around)
-        self.timed = Scope(self.scope, look=self._look_at_budget)
-
-    def _look_at_budget(self) -> Optional[Reason]:
-        return Reason.TIME_OVER if self._node.tree.budget.why_over() else None
-
-    def is_over(self) -> bool:
-        """Whether it is stopped, or the trial's time is over."""
-        return self.timed.reason is not None
-
-    def has_waited(self, seconds: float) -> bool:
-        """Let time pass. Return False where something has ended the recovery meanwhile."""
-        with standing_still(self._node.execution.runs_around):
-            self._node.tree.waiting.wait(seconds, 'waiting', self.timed)
-        return not self.is_over()
-
-    # -- health
-
-    def has_waited_after(self, what: str) -> bool:
-        """Wait where the robot was not well at what has happened.
-
-        Return whether it is well again.
-        """
-        health = self._node.tree.health
-        if not health.is_set:
-            return False
-        why = health.unwell_after(self.scope)
-        return bool(why) and self.wait_until_well(what, why)
-
-    def wait_until_well(self, what: str, why: str) -> bool:
-        """Wait until the robot is well. Return False where something has ended the recovery."""
-        with standing_still(self._node.execution.runs_around):
-            is_well = self._node.tree.health.wait_until_well(
-                self._node, self._record.label, what, why, self.timed
-            )
-        return is_well and not self.is_over()

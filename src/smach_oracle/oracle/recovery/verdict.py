@@ -1,18 +1,30 @@
 """The verdict on one failure: where the machine goes from the meta state (paper, section IV-A).
 
-There are four kinds, and no other way out. `execution.applying` carries them out.
+There are four kinds, and no other way out. `execution.applying` carries them out. An ending is the
+way a container ends, or goes on, where no oracle leads it elsewhere.
 """
 
-from typing import Callable, FrozenSet, NamedTuple, Optional, Union
+import itertools
+from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 
 import smach
 
-from ..asking.question import Answer, AnswerKind
-from ..machine.jump_path import JumpPath, jump_path_to
-from ..machine.places import levels_above, place_at
-from ..machine.snapshots import WriteWatch
+from ..machine.jump_path import JumpPath
+from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode
-from .endings import ContainerEnding
+from ..scope.scope import Reason
+from ..settings.failing_outcomes import PREEMPTED, is_preempted
+from ..smach_private import states_of
+from .failure import Failure
+
+
+class ContainerEnding(NamedTuple):
+    """The way a container would end, or go on, without an oracle: exactly one is set."""
+
+    state: Optional[str] = None
+    outcome: Optional[str] = None
+    error: Optional[Exception] = None
+    obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
 
 
 class JumpTo(NamedTuple):
@@ -80,46 +92,99 @@ def leads_to(verdict: Verdict) -> str:
     return verdict.ending.state or verdict.ending.outcome or ''
 
 
-# -- of an answer
+# -- endings
 
 
-def verdict_of(
-    answer: Answer,
-    node: TreeNode,
-    label: str,
-    watch: WriteWatch,
-    natural_ending: Callable[[], ContainerEnding],
-) -> Verdict:
-    """Write the outputs of an answer about a state, and return the way out of the meta state.
+def _ending_by(route: Route, obeys: bool = False) -> ContainerEnding:
+    if route.is_state:
+        return ContainerEnding(route.target, obeys=obeys)
+    return ContainerEnding(outcome=route.target)
 
-    `natural_ending`: how the container ends where the answer gives up without an outcome.
+
+def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
+    """Return how the failure would have ended the container without an oracle.
+
+    An overrun has no such ending, since the state would still run: the container's own failing
+    outcome, else an error.
     """
-    remapping = node.machine._remappings.get(label) or {}
-    for key, value in (answer.outputs or {}).items():
-        watch.gate[remapping.get(key, key)] = value
-    if answer.kind is AnswerKind.GOTO:
-        way = jump_path_of(answer, node)
-        return JumpTo(way, answer.by, answer.why, way.kept(watch))
-    if answer.kind is AnswerKind.SUPERSEDE:
-        return Supersede(answer.outcome, answer.by, answer.why)
-    ending = ContainerEnding(outcome=answer.outcome) if answer.outcome else natural_ending()
-    return GiveUp(ending, answer.by, answer.why, _level_of(answer, node))
+    if failure.route is not None and failure.route.target:
+        return _ending_by(failure.route)
+    if failure.error is not None:
+        return ContainerEnding(error=failure.error())
+    outcome = failing_outcome(node, node.in_force.failing.words)
+    if outcome is not None:
+        return ContainerEnding(outcome=outcome)
+    return ContainerEnding(
+        error=smach.InvalidUserCodeError('State {!r} {}'.format(failure.state, failure.text))
+    )
 
 
-def jump_path_of(answer: Answer, node: TreeNode) -> JumpPath:
-    """Return the way that an answer sends the machine.
+def route_at_preempt(machine: smach.StateMachine, label: str) -> Route:
+    """Follow the outcome `preempted` of a state that a preempt ends before it has done anything.
 
-    :raises InvalidStateError: where there is none. An answer that was checked has one.
+    It leads nowhere where the state has no such outcome, or where it leads to the state itself.
     """
-    place = place_at(node, answer.container, answer.state)
-    way = jump_path_to(node, place) if place is not None else None
-    if way is None:
-        raise smach.InvalidStateError(
-            'there is no way to {}/{}'.format(answer.container or node.path, answer.state)
-        )
-    return way
+    registered = states_of(machine)[label].get_registered_outcomes()
+    outcome = next((each for each in registered if is_preempted(each)), None)
+    route = Route('', False) if outcome is None else route_of(machine, label, outcome)
+    return Route('', False) if route.is_state and route.target == label else route
 
 
-def _level_of(answer: Answer, node: TreeNode) -> Optional[TreeNode]:
-    """Return the level above that an answer gives up, or None where it is the container itself."""
-    return next((level for level in levels_above(node) if level.path == answer.container), None)
+def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
+    """Return how a container ends, or goes on, where a preempt or a shutdown ends a recovery.
+
+    At a preempt it goes by the outcome `preempted` of the failed state, as its author drew it,
+    unless the state still runs. Else, and once a preempt was obeyed, its own outcome `preempted`
+    ends it.
+    """
+    machine = node.machine
+    is_preempt_alone = node.execution.scope.reasons == {Reason.PREEMPTED}
+    if is_preempt_alone and not node.tree.workers.blocked(states_of(machine)[failure.state]):
+        route = route_at_preempt(machine, failure.state)
+        if route.target:
+            return _ending_by(route, obeys=True)
+    if PREEMPTED in machine.get_registered_outcomes():
+        return ContainerEnding(outcome=PREEMPTED)
+    return natural_ending(node, failure)
+
+
+def failing_outcome(node: TreeNode, first: Sequence[str] = ()) -> Optional[str]:
+    """Return the failing outcome with which a container ends that nobody leads elsewhere.
+
+    None means it has none. `first`: names that come before the order of the alphabet.
+    """
+    outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
+    named = (outcome for outcome in first if outcome in outcomes)
+    return next(
+        itertools.chain(named, (each for each in outcomes if each in node.in_force.failing)), None
+    )
+
+
+def ending_at_once(node: TreeNode) -> Optional[str]:
+    """Return the outcome with which a container ends by a preempt before a state, None for none."""
+    if PREEMPTED in node.machine.get_registered_outcomes():
+        return PREEMPTED
+    return failing_outcome(node)
+
+
+def leaving_outcome(node: TreeNode, failure: Optional[Failure] = None) -> str:
+    """Return an outcome with which a container ends that is left: nobody goes by it.
+
+    :param failure: what would have ended it.
+    """
+    outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
+    wanted = natural_ending(node, failure).outcome if failure is not None else None
+    for outcome in (PREEMPTED, wanted):
+        if outcome in outcomes:
+            return str(outcome)
+    return failing_outcome(node) or outcomes[0]
+
+
+def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str]:
+    """Return an outcome for a Concurrence or an Iterator where its trial has ended early.
+
+    It wants one, and nobody goes by it.
+    """
+    if outcome is not None or node.tree.early_end.why is None or not node.runs_in_branch:
+        return outcome
+    return leaving_outcome(node)

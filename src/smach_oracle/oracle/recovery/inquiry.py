@@ -1,52 +1,33 @@
 """Asking the expert until an answer fits or the deadline is over (paper, section V)."""
 
 import threading
-from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Protocol
+from typing import Callable, NamedTuple, Optional
 
+import smach
 from smach_common.foreign import repr_of
 
+from ..asking.answer_rules import addressed, check_answer, checked_type, choices_of
+from ..asking.question import Answer, AnswerKind, Expert, Progress, Question
 from ..errors import AnswerError
 from ..records.events import EventKind
 from ..scope.background_call import BackgroundCall
 from ..scope.scope import Scope
-from .answer_rules import Target, addressed, check_answer, checked_type, choices_of
-from .question import Answer, AnswerKind, Expert, Progress, Question
+from .falling_back import fallback_in_short
+from .question_making import make_question, targets_of
+from .recovery import Recovery
 
 # how long past the deadline an expert is waited for before its question is taken back
 _OVERTIME_S = 2.0
 # how long an expert's port is waited for once its question has been taken back
 _PATIENCE_S = 1.0
 _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
-
-
-class Asker(Protocol):
-    """The recovery that asks: what an inquiry needs of it."""
-
-    tried: List[str]  # what was tried already, in words. Runs of interfaces are added
-    question_cancelled: threading.Event  # the question is to be taken back
-    scope: Scope  # ends the recovery, as a preempt or a shutdown does
-
-    def make_question(self, deadline_s: float) -> Question:
-        """Return a new question about the failure. `deadline_s`: seconds left, 0 without end."""
-
-    def say_that_it_waits(self, question: Question) -> None:
-        """Log that the machine waits for an answer."""
-
-    def states_now(self) -> Mapping[Target, str]:
-        """Return where the machine could go, and why it cannot go there now, '' where it can."""
-
-    def emit(self, kind: EventKind, **fields: Any) -> None:
-        """Tell the observers."""
-
-    def warn(self, text: str) -> None:
-        """Log what the operator should know, and tell the observers."""
+_TOLD = {'claimed': EventKind.QUERY_CLAIMED, 'released': EventKind.QUERY_RELEASED}
 
 
 class Reply(NamedTuple):
     """The end of an inquiry: with an answer that fits, or without one."""
 
     answer: Optional[Answer]
-    question_id: str = ''  # of the last question, '' where none was put
     why_none: str = ''
 
 
@@ -55,36 +36,36 @@ class _NoAnswer(Exception):
 
 
 class Inquiry:
-    """All questions about one failure. They share one deadline, in monotonic time."""
+    """All questions of one recovery. They share one deadline, in monotonic time."""
 
-    def __init__(self, asker: Asker, expert: Expert, deadline_s: float) -> None:
+    def __init__(self, recovery: Recovery, expert: Expert, deadline_s: float) -> None:
         """`deadline_s`: 0 waits without end."""
-        self._asker = asker
+        self._recovery = recovery
         self._expert = expert
-        self._scope = asker.scope
-        self._now = asker.scope.clock.now
+        self._scope = recovery.scope
+        self._now = recovery.scope.clock.now
         self._end = self._now() + deadline_s if deadline_s else None
-        self._cancelled = asker.question_cancelled
+        self._cancelled = recovery.question_cancelled = threading.Event()
+        if self._scope.told is not None:
+            self._cancelled.set()  # it came before there was an event
         self._unfit = 0
-        self._question_id = ''
 
     def run(self) -> Reply:
         """Ask, and ask again while the answer does not fit, until the deadline."""
         try:
-            return Reply(self._ask_until_it_fits(), self._question_id)
+            while True:
+                left_s = self._remaining_s()
+                self._recovery.begin_question(self._recovery)
+                question = make_question(self._recovery, left_s)
+                self._recovery.question_id = question.question_id
+                self._tell(EventKind.QUERY_OPENED, text=question.reason)
+                _say_that_it_waits(self._recovery, question)
+                answer = self._answer_to(question)
+                if answer is not None:
+                    return Reply(answer)
+                self._pause()
         except _NoAnswer as why:
-            return Reply(None, self._question_id, str(why))
-
-    def _ask_until_it_fits(self) -> Answer:
-        while True:
-            question = self._asker.make_question(self._remaining_s())
-            self._question_id = question.question_id
-            self._emit(EventKind.QUERY_OPENED, text=question.reason)
-            self._asker.say_that_it_waits(question)
-            answer = self._answer_to(question)
-            if answer is not None:
-                return answer
-            self._pause()
+            return Reply(None, str(why))
 
     def _remaining_s(self) -> float:
         if self._scope.reason is not None:
@@ -106,32 +87,27 @@ class Inquiry:
 
     def _answer_to(self, question: Question) -> Optional[Answer]:
         """Return the answer to one question, None where it did not fit."""
+        recovery, cancelled = self._recovery, self._cancelled
         try:
-            given = self._guarded(
-                lambda progress: self._expert.ask(question, self._cancelled, progress)
-            )
+            given = self._guarded(lambda told: self._expert.ask(question, cancelled, told))
             if given is None:
                 raise _NoAnswer('no answer by the deadline')
             answer = addressed(checked_type(given), choices_of(question))
             self._check(answer, question)
-            self._emit(
-                EventKind.QUERY_ANSWERED,
-                outcome=answer.kind.name.lower(),
-                target=answer.named(),
-                by=answer.by,
-                text=answer.why,
-            )
+            if recovery.takes(answer):
+                kind, why = answer.kind.name.lower(), answer.why
+                self._tell(EventKind.QUERY_ANSWERED, kind, answer.named(), why, answer.by)
             if answer.kind is AnswerKind.INTERFACE:
                 return self._try_interface(answer, question)
             return answer
         except AnswerError as err:
-            self._asker.warn('an answer does not fit: {}'.format(err))
+            recovery.warn('an answer does not fit: {}'.format(err))
             return None
 
     def _check(self, answer: Answer, question: Question) -> None:
-        check_answer(answer, choices_of(question)._replace(states=self._asker.states_now()))
+        check_answer(answer, choices_of(question)._replace(states=targets_of(self._recovery)))
 
-    def _guarded(self, call: Callable[[Progress], object]) -> Optional[object]:
+    def _guarded(self, call: Callable[[Progress], Optional[Answer]]) -> object:
         """Call the expert's port in a thread that can be left behind.
 
         What it raises beside AnswerError is its fault and no answer. What it tells or returns too
@@ -139,8 +115,9 @@ class Inquiry:
         """
 
         def progress(what: str, by: str, text: str) -> None:
-            if not port.left:
-                self._progress(what, by, text)
+            # an interface's start and end are told by the oracle itself
+            if what in _TOLD and not port.left:
+                self._tell(_TOLD[what], by=by, text=text)
 
         port = BackgroundCall(lambda: call(progress), 'smach_oracle expert')
         port.start()
@@ -154,7 +131,7 @@ class Inquiry:
             if port.error is not None:
                 raise port.error
             return port.result
-        self._asker.warn("the expert's port failed: {}".format(repr_of(port.error)))
+        self._recovery.warn("the expert's port failed: {}".format(repr_of(port.error)))
         raise _NoAnswer("the expert's port failed") from port.error
 
     def _wait_for(self, port: BackgroundCall) -> None:
@@ -165,7 +142,7 @@ class Inquiry:
         self._cancelled.set()
         patience = Scope(clock=self._scope.clock)  # in which nothing ends it
         if not patience.wait(_PATIENCE_S, port.done) and port.leave():
-            self._asker.warn(
+            self._recovery.warn(
                 "the expert's port goes on although its question was taken back; it is left behind"
             )
             raise _NoAnswer('no answer by the deadline')
@@ -174,40 +151,50 @@ class Inquiry:
         try:
             return self._run_interface(answer, question)
         except AnswerError as err:
-            self._asker.tried.append('interface {}: {}'.format(answer.interface, err))
-            self._asker.warn('interface {}: {}'.format(answer.interface, err))
+            told = 'interface {}: {}'.format(answer.interface, err)
+            self._recovery.tried.append(told)
+            self._recovery.warn(told)
             return None
 
     def _run_interface(self, answer: Answer, question: Question) -> Optional[Answer]:
         offer = next(offer for offer in question.interfaces if offer.name == answer.interface)
-        self._emit(EventKind.INTERFACE_START, target=offer.name, by=answer.by)
+        run, cancelled, by = self._expert.run_interface, self._cancelled, answer.by
+        self._tell(EventKind.INTERFACE_START, target=offer.name, by=by)
         outcome, done = '', None
         try:
-            given = self._guarded(
-                lambda progress: self._expert.run_interface(
-                    offer, question, self._cancelled, progress
-                )
-            )
+            given = self._guarded(lambda told: run(offer, question, cancelled, told))
             if given is not None:
                 done = checked_type(given)
                 self._check_done(done, question)
                 outcome = done.outcome
         finally:
-            self._emit(EventKind.INTERFACE_END, target=offer.name, by=answer.by, outcome=outcome)
-        self._asker.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
-        if done is None or done.by:
-            return done
-        return done._replace(by=answer.by)
+            self._tell(EventKind.INTERFACE_END, outcome, offer.name, by=by)
+        self._recovery.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
+        return done if done is None or done.by else done._replace(by=by)
 
     def _check_done(self, done: Answer, question: Question) -> None:
         if done.kind is not AnswerKind.SUPERSEDE:
             raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
         self._check(done, question)
 
-    def _progress(self, what: str, by: str, text: str) -> None:
-        kinds = {'claimed': EventKind.QUERY_CLAIMED, 'released': EventKind.QUERY_RELEASED}
-        if what in kinds:  # an interface's start and end are told by the oracle itself
-            self._emit(kinds[what], by=by, text=text)
+    def _tell(
+        self, kind: EventKind, outcome: str = '', target: str = '', text: str = '', by: str = ''
+    ) -> None:
+        self._recovery.tell(kind, outcome, target, text, self._recovery.question_id, by)
 
-    def _emit(self, kind: EventKind, **fields: Any) -> None:
-        self._asker.emit(kind, query_id=self._question_id, **fields)
+
+def _say_that_it_waits(recovery: Recovery, question: Question) -> None:
+    """Log that somebody is asked: for minutes a machine that waits would look as if it hung."""
+    place = '{}/{}'.format(recovery.node.path, recovery.record.label)
+    if recovery.failure.still_runs:
+        text = '{}: {} The expert is asked (question {})'
+        smach.logwarn(text.format(place, recovery.failure.text, question.question_id))
+        return
+    limit = 'it waits on'
+    if question.deadline_s:
+        limit = 'within {:.0f} s: {}'.format(question.deadline_s, fallback_in_short(recovery))
+    smach.logwarn(
+        '{}: the expert is asked (question {}); without an answer {}'.format(
+            place, question.question_id, limit
+        )
+    )

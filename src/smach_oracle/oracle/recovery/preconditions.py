@@ -1,0 +1,291 @@
+"""Makes the preconditions of a state hold (paper, IV-B).
+
+They read and write the container's userdata through a gate. A state of the tree keeps its own time
+limit. All else has that of the state whose preconditions they are. Their runs do not count as
+visits. A state of another container runs on the userdata of that one. The containers on the way
+down to it get their input keys, as if they began. Once it has ended well, what it wrote goes up
+through their output keys, and down through the input keys of the containers around the failed
+state.
+"""
+
+from typing import Dict, List, NamedTuple, Tuple, Union, cast
+
+import smach
+from smach_common.foreign import repr_of
+
+from ..identity import truth_of
+from ..machine.jump_path import JumpPath, hand_down, hand_on, hand_up, jump_path_to
+from ..machine.places import TreePlace, links_to, place_named, why_unfit
+from ..machine.repeats import note_precondition, repeated_by_running
+from ..machine.site import failure_kind, route_of
+from ..machine.snapshots import UserdataGate, WriteWatch, behind
+from ..machine.tree_node import TreeNode
+from ..machine.userdata_view import view_behind, write_constants
+from ..records.events import FailureKind
+from ..settings.failing_outcomes import is_preempted
+from ..settings.preconditions import PreconditionKind, PreconditionSpec
+from ..settings.settings import ALLOW, RUN
+from ..smach_private import constants_of, data_of, is_executing, states_of
+from .failure import is_registered
+from .operator_wait import wait_for_operator
+from .recovery import Recovery
+
+
+class NotMet(Exception):
+    """A precondition is not met. The text says why. This error never leaves its module."""
+
+
+class _RunIn(NamedTuple):
+    """A container of which a state is run, and what its userdata is written through."""
+
+    node: TreeNode
+    gate: UserdataGate
+
+
+def why_not_met(recovery: Recovery, spec: PreconditionSpec) -> str:
+    """Make a precondition hold. Return '' where it is met, else why not.
+
+    What an unmet one wrote is taken back.
+    """
+    begun = recovery.watch.begin()
+    elsewhere: List[_Elsewhere] = []
+    try:
+        _achieve(recovery, spec, elsewhere)
+    except NotMet as why:
+        for each in reversed(elsewhere):
+            each.take_back()
+        recovery.watch.take_back(begun)
+        return str(why)
+    return ''
+
+
+def _achieve(recovery: Recovery, spec: PreconditionSpec, elsewhere: 'List[_Elsewhere]') -> None:
+    if spec.kind is PreconditionKind.PAIR:
+        check, achieve = spec.target
+        try:
+            _achieve(recovery, check, elsewhere)
+        except NotMet:
+            _achieve(recovery, achieve, elsewhere)  # it may need what the check has found
+    elif spec.kind is PreconditionKind.CALLABLE:
+        _call(recovery, spec)
+    elif spec.kind is PreconditionKind.STATE:
+        _run(recovery, _RunIn(recovery.node, recovery.watch.gate), spec.target, '')
+    else:
+        _run_place(recovery, spec.target, elsewhere)
+
+
+def _call(recovery: Recovery, spec: PreconditionSpec) -> None:
+    workers, settings = recovery.node.tree.workers, recovery.record.settings
+    wait_for_operator(recovery.node, (), spec.name, RUN, recovery.scope)
+    _check_free(recovery, spec.target)
+    gate = recovery.watch.gate.fork()
+    ended = workers.call(
+        spec.target,
+        behind(gate),
+        gate,
+        settings.time_limit_s,
+        settings.grace_period_s,
+        recovery.scope,
+    )
+    if isinstance(ended.error, Exception):
+        raise NotMet('{} raised {}'.format(spec.name, repr_of(ended.error))) from ended.error
+    if ended.error is not None:
+        raise ended.error
+    if ended.overrun:
+        raise NotMet('{} {}'.format(spec.name, ended.overrun))
+    if ended.outcome is None:
+        raise NotMet('{} returned None; True is met'.format(spec.name))
+    if not truth_of(ended.outcome):
+        raise NotMet('{} returned {}'.format(spec.name, repr_of(ended.outcome)))
+
+
+def _check_free(recovery: Recovery, target: object) -> None:
+    """Check that a state or a function may be entered now.
+
+    :raises NotMet: where it may not.
+    """
+    if recovery.scope.told is not None:
+        raise NotMet('preempted')
+    blocked = recovery.node.tree.workers.blocked(target)
+    if blocked:
+        raise NotMet(blocked)
+
+
+def _run_place(recovery: Recovery, name: str, elsewhere: 'List[_Elsewhere]') -> None:
+    """Run the state of this name, in the container itself or in another one."""
+    node = recovery.node
+    place = place_named(node, name)
+    why_not = why_unfit(node, '', name) if '/' in name else ''
+    if place is None or why_not:
+        raise NotMet('{!r} cannot be run: {}'.format(name, why_not or 'there is no such state'))
+    state, gate = states_of(place.node.machine)[place.label], recovery.watch.gate
+    if place.node is node:
+        _run(recovery, _RunIn(node, gate), state, place.label)
+        return
+    run = _Elsewhere(node, place, gate)
+    elsewhere.append(run)
+    _run(recovery, _RunIn(place.node, run.gate), state, place.label)
+    run.hand_over()
+
+
+def _run(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> None:
+    """Execute a state, and note that. `label`: '' where it was given itself.
+
+    :raises NotMet: where it, or a state within, would be repeated and is not to be.
+    """
+    noted = label or _label_of(recovery.node, state)
+    if noted:
+        repeated = repeated_by_running(site.node, noted)
+        if repeated:
+            raise _not_repeated(', '.join(repeated))
+        _check_free(recovery, states_of(site.node.machine)[noted])
+        note_precondition(site.node, noted)
+    try:
+        _judge(recovery, site.node, state, label, _execute(recovery, site, state, label))
+    finally:
+        if noted:
+            note_precondition(site.node, noted)
+
+
+def _not_repeated(what: str) -> NotMet:
+    return NotMet('{} was done in this trial and is not repeated by itself'.format(what))
+
+
+def _label_of(node: TreeNode, state: smach.State) -> str:
+    """Return the label of a state that was given itself, '' where the container has it not."""
+    states = states_of(node.machine)
+    return next((label for label in node.labels() if states[label] is state), '')
+
+
+def _execute(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> object:
+    node, scope, origin = site.node, recovery.scope, recovery.origin
+    autonomy = node.settings_of(label).autonomy if label else RUN
+    wait_for_operator(node, (), label or type(state).__name__, autonomy, scope)
+    _check_free(recovery, state)
+    with origin.lock:
+        if scope.told is not None:
+            raise NotMet('preempted')
+        origin.running = state
+    if not node.tree.begin_precondition(node, state):
+        origin.running = None
+        raise NotMet('is being run as a precondition already')
+    try:
+        if label:
+            write_constants(behind(site.gate), constants_of(node.machine, label))
+        return _with_limit(recovery, site, state, label)
+    except NotMet:
+        raise
+    except Exception as err:
+        raise NotMet('raised {}'.format(repr_of(err))) from err
+    finally:
+        node.tree.end_precondition(node, state)
+        with origin.lock:
+            origin.running = None
+            cancelled = scope.told is not None
+        if cancelled and not node.tree.workers.blocked(state):
+            state.recall_preempt()  # the meta state services the request in its place
+
+
+def _with_limit(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> object:
+    node = site.node
+    settings = node.settings_of(label) if label else recovery.record.settings
+    if settings.time_limit_s is None:
+        return state.execute(view_behind(site.gate, node.machine, label, state))
+    gate = site.gate.fork()
+    result = node.tree.workers.run(
+        state,
+        view_behind(gate, node.machine, label, state),
+        gate,
+        label,
+        settings.time_limit_s,
+        settings.grace_period_s,
+    )
+    if result.error is not None:
+        raise result.error
+    if result.overrun:
+        raise NotMet(result.overrun)
+    return result.outcome
+
+
+def _judge(
+    recovery: Recovery, node: TreeNode, state: smach.State, label: str, outcome: object
+) -> None:
+    if recovery.scope.told is not None:
+        raise NotMet('preempted')
+    if not is_registered(state, outcome):
+        raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
+    outcome, failing = cast(str, outcome), node.in_force.failing
+    if label:
+        listed = node.settings_of(label).failure_outcomes
+        route = route_of(node.machine, label, outcome)
+        failed = failure_kind(outcome, route, listed, failing) not in (
+            FailureKind.NOT_A_FAILURE,
+            FailureKind.UNREGISTERED_OUTCOME,
+        )
+    else:
+        listed = recovery.node.settings.defaults.failure_outcomes
+        failed = outcome in failing or outcome in listed
+    if failed or is_preempted(outcome):
+        raise NotMet('ended with {!r}'.format(outcome))
+
+
+# -- in another container
+
+
+class _Elsewhere:
+    """One run of a state of another container than that of the failed state."""
+
+    def __init__(self, node: TreeNode, place: TreePlace, own: UserdataGate) -> None:
+        """`node`: the failed state's container. `own`: what its userdata is written through.
+
+        :raises NotMet: where the state cannot be run now.
+        """
+        way = jump_path_to(node, place)
+        if way is None:
+            raise NotMet('{} is in no container that is being executed'.format(place.path))
+        _check(way)
+        self._own = own
+        self._userdata = node.machine.userdata
+        self._down = [link for below in way.down[1:] for link in links_to(below.node)]
+        self._on = [link for left in reversed(way.left) for link in links_to(left)]
+        self._runs = not way.down[1:]  # whether its container is one around the failed state
+        self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
+        self._begun = self._watch.begin()
+        data = [data_of(link.below.userdata) for link in self._down[:-1]]
+        self._before: List[Tuple[Dict[str, object], Dict[str, object]]] = [
+            (each, dict(each)) for each in data
+        ]
+        self.gate = self._watch.gate
+        for link in self._down:
+            hand_down(link)
+
+    def take_back(self) -> None:
+        """Make the userdata what it was."""
+        if self._runs:
+            self._watch.take_back_own(self._begun)
+            return
+        self._watch.take_back(self._begun)
+        for data, before in self._before:
+            data.clear()
+            data.update(before)
+
+    def hand_over(self) -> None:
+        """Hand what the state wrote to the container of the failed state, as its author says."""
+        written = set(self.gate.written)
+        for link in reversed(self._down):
+            written = hand_up(link, written, self._writer_of(link.above))
+        for link in self._on:
+            written = hand_on(link, written, self._writer_of(link.below))
+
+    def _writer_of(self, container: smach.Container) -> Union[UserdataGate, smach.UserData]:
+        return self._own if container.userdata is self._userdata else container.userdata
+
+
+def _check(way: JumpPath) -> None:
+    for place in way.down[1:]:
+        if is_executing(place.node.machine):
+            raise NotMet('{} runs at this time'.format(place.node.path))
+    for place in way.down[:-1]:
+        guarded = place.node.settings_of(place.label).on_retry != ALLOW
+        if guarded and place.node.records.marks.of(place.label).done:
+            raise _not_repeated(place.path)

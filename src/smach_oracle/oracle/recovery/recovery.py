@@ -1,0 +1,254 @@
+"""One recovery under way: what its phases share, and how it ends early."""
+
+import threading
+from typing import Any, Callable, List, Optional, Tuple
+
+import smach
+
+from ..asking.question import Answer
+from ..decision.policy import Action
+from ..decision.sentence import DecisionFacts, cause_of
+from ..machine.jump_path import JumpPath
+from ..machine.snapshots import WriteWatch
+from ..machine.state_record import RateReading, StateRecord
+from ..machine.tree_node import TreeNode
+from ..records.events import EventKind
+from ..records.facts import Decider
+from ..scope.scope import Reason, Scope, standing_still
+from .occasions import Occasion
+from .stop import preempt_beside
+from .verdict import (
+    ContainerEnding,
+    GiveUp,
+    JumpTo,
+    Preempted,
+    Verdict,
+    natural_ending,
+    preempted_ending,
+)
+
+Decided = Tuple[Decider, DecisionFacts]
+
+KEPT = (
+    'nobody has said how the trial goes on ({}). The machine stops where it stands, and the '
+    'trial is kept. The next start asks again. `oracle_run --resume` asks only before a state '
+    'that on_retry protects, if the script has changed (unless --resume-map says how), and if '
+    'the store may have lost something. `oracle_state {} drop` ends the trial'
+)
+
+
+class Recovery:
+    """One recovery under way, of a failure or of a state that still runs.
+
+    A preempt or a shutdown cancels its `scope`, and so does the end of what goes on around it. The
+    phases run in the machine's thread. `cancel` may be called from any thread.
+
+    `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked. `way`:
+    where it has decided to go. `decided`: to ask. `cause`: of the decision. `begin_question`: is
+    called before each question. `takes`: whether an answer comes in time, once it is here.
+    """
+
+    asks_at_once = False  # no policy has a say
+    cause = ''
+    decided: Optional[Decided] = None
+    ends_budget = False  # whether the question's deadline is that of the trial
+    not_met = ''
+    question_cancelled: Optional[threading.Event] = None  # also at a shutdown, or a late deadline
+    question_id = ''  # of the last question
+    reading: Optional[RateReading] = None
+    running: Optional[smach.State] = None  # as a precondition
+    way: Optional[JumpPath] = None
+    why_no_answer = ''
+
+    def __init__(
+        self,
+        node: TreeNode,
+        record: StateRecord,
+        occasion: Occasion,
+        below: Optional['Recovery'] = None,
+        scope: Optional[Scope] = None,
+    ) -> None:
+        """`below`: the recovery in a container below, for which this level decides."""
+        self.node = node
+        self.record = record
+        self.occasion = occasion
+        self.failure = occasion.failure
+        self._below = below
+        self.scope: Scope = scope or (node.execution.scope_around if below is None else below.scope)
+        self.budget = node.tree.budget
+        self.tried: List[str] = []
+        self.met: List[str] = []
+        # who still runs writes meanwhile, and nothing of that is the recovery's
+        keys = () if self.failure.still_runs else node.in_force.deep_copy_keys
+        self.watch = WriteWatch(node.machine, keys)
+        self.lock = threading.Lock()
+        self.takes: Callable[[Answer], bool] = _takes_any
+        self.begin_question: Callable[['Recovery'], None] = _as_it_stands
+
+    @property
+    def origin(self) -> 'Recovery':
+        """Return the recovery that waits, and that a preempt reaches."""
+        return self._below or self
+
+    def cancel(self, reason: Reason = Reason.PREEMPTED) -> None:
+        """End the recovery soon: preempt what runs, take the question back."""
+        self.scope.cancel(reason)
+        if self.question_cancelled is not None:
+            self.question_cancelled.set()
+        with self.lock:
+            running = self.running
+        if running is not None:
+            running.request_preempt()
+
+    def stopped(self) -> bool:
+        """Whether a preempt or a shutdown ends the recovery, or the machine is left behind."""
+        return self.scope.reason is not None
+
+    def is_over(self) -> bool:
+        """Whether it is stopped, or the trial's time is over."""
+        return self.scope.reason is not None or bool(self.budget.why_over())
+
+    def why_taken_back(self) -> str:
+        """Return why its question is taken back, as the events say it."""
+        early = self.node.tree.early_end.why
+        return (self.scope.reason or Reason.SHUTDOWN).text if early is None else early.value
+
+    def ask_at_once(self, why: str) -> None:
+        """Have a person asked, whatever a policy says. `why`: a clause."""
+        self.cause = why
+        self.asks_at_once = True
+        self.warn(why)
+
+    def warn(self, text: str) -> None:
+        """Log what the operator should know of this failure, and tell the observers."""
+        self.node.warn(text, self.record.label)
+
+    def tell(
+        self,
+        kind: EventKind,
+        outcome: str = '',
+        target: str = '',
+        text: str = '',
+        query_id: str = '',
+        by: str = '',
+    ) -> None:
+        """Tell the observers of a step that is about the failed state."""
+        self.node.emit(
+            kind, self.record.label, outcome, target, text=text, query_id=query_id, by=by
+        )
+
+    def facts(self, action: Action, **fields: Any) -> DecisionFacts:
+        """Return what has led to a decision."""
+        record = self.record
+        reading = self.reading or record.read_rate()
+        return DecisionFacts(
+            record.label,
+            reading.recent,
+            reading.rate,
+            self.occasion.continuous,
+            action,
+            met=self.met,
+            not_met=self.not_met,
+            tried=reading.tried,
+            not_failed=self.failure.why_none,
+            **fields,
+        )
+
+    # -- waits
+
+    def has_waited(self, seconds: float) -> bool:
+        """Let time pass. Return False where something has ended the recovery meanwhile."""
+        with standing_still(self.node.execution.runs_around):
+            self.node.tree.waiting.wait(seconds, 'waiting', self._in_time())
+        return not self.is_over()
+
+    def has_waited_after(self, what: str) -> bool:
+        """Wait where the robot was not well at what has happened.
+
+        Return whether it is well again.
+        """
+        health = self.node.tree.health
+        why = health.unwell_after(self.scope) if health.is_set else ''
+        return bool(why) and self.wait_until_well(what, why)
+
+    def wait_until_well(self, what: str, why: str) -> bool:
+        """Wait until the robot is well. Return False where something has ended the recovery."""
+        node = self.node
+        with standing_still(node.execution.runs_around):
+            is_well = node.tree.health.wait_until_well(
+                node, self.record.label, what, why, self._in_time()
+            )
+        return is_well and not self.is_over()
+
+    def _in_time(self) -> Scope:
+        """Return a scope that ends with the recovery, or with the trial's time."""
+        return Scope(self.scope, look=self._look_at_budget)
+
+    def _look_at_budget(self) -> Optional[Reason]:
+        return Reason.TIME_OVER if self.budget.why_over() else None
+
+    # -- verdicts
+
+    def jump(self, way: JumpPath, text: str = '') -> Verdict:
+        """Go to a place, once the robot is well."""
+        return self.when_well(JumpTo(way, text=text, written=way.kept(self.watch)))
+
+    def when_well(self, verdict: Verdict) -> Verdict:
+        """Return a verdict, after a wait where it leads to a state and the robot is not well."""
+        health = self.node.tree.health
+        if not (health.is_set and isinstance(verdict, JumpTo)):
+            return verdict
+        why = health.why_unwell(self.scope)
+        if why and not self.wait_until_well('is left for ' + verdict.way.down[-1].label, why):
+            return self.end_early()
+        return verdict
+
+    def natural_ending(self) -> ContainerEnding:
+        """Return how the failure would have ended the container."""
+        return natural_ending(self.node, self.failure)
+
+    def give_up(self, text: str, outcome: str = '') -> Verdict:
+        """End the container with an outcome, or ('') as the failure would have ended it."""
+        if self.occasion.keeps:
+            return self.keep(text)
+        ending = ContainerEnding(outcome=outcome) if outcome else self.natural_ending()
+        return GiveUp(ending, text=text)
+
+    def keep(self, why: str) -> Verdict:
+        """Stop where the machine stands, and keep the trial for the next start."""
+        node = self.node
+        self.warn(KEPT.format(why, node.settings.checkpoint))
+        node.tree.early_end.keep()
+        preempt_beside(node)
+        return Preempted()
+
+    def end_early(self) -> Verdict:
+        """End the container, where a preempt, a shutdown or the budget has ended the recovery."""
+        return self.preempted() if self.stopped() else self.end_unaided()
+
+    def end_unaided(self) -> Verdict:
+        """End the container as without an oracle, since the trial's time is over."""
+        why_over = self.budget.why_over()
+        if self.occasion.keeps:
+            return self.keep(why_over)
+        cause = cause_of(self.facts(Action.ASK, blocked=why_over))
+        text = '{}: the machine ends as without an oracle'.format(cause)
+        smach.logwarn('{}/{}'.format(self.node.path, text))
+        return self.give_up(text)
+
+    def preempted(self) -> Verdict:
+        """Go where the author sends a preempt of the failed state, or end the container.
+
+        Where the trial ends early, it has no outcome at all.
+        """
+        if self.node.tree.early_end.why is not None:
+            return Preempted()
+        return Preempted(preempted_ending(self.node, self.failure))
+
+
+def _takes_any(answer: Answer) -> bool:
+    return True
+
+
+def _as_it_stands(recovery: Recovery) -> None:
+    """A failure is over, and the next question tells of it what the first one has told."""
