@@ -87,6 +87,16 @@ def initial_label_of(machine: smach.StateMachine) -> str:
     return machine._initial_state_label or ''
 
 
+def names_that_engine_lacks() -> Dict[str, object]:
+    """Return what a machine of this engine has not, with the values of a machine that lacks it.
+
+    Older engines know no constants, and upstream's no pause.
+    """
+    machine = smach.StateMachine(['done'])
+    lacking = {'_constants': {}, '_pause_requested': False}
+    return {name: value for name, value in lacking.items() if not hasattr(machine, name)}
+
+
 def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
     """Return the sets of a state's input and output keys themselves.
 
@@ -95,8 +105,8 @@ def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
     return state._input_keys, state._output_keys
 
 
-def has_keys(state: smach.State, input_keys: object, output_keys: object) -> bool:
-    """Whether these are the very sets of a state."""
+def has_keys(state: smach.State, input_keys: Set[str], output_keys: Set[str]) -> bool:
+    """Whether these are still the very sets of a state. The short way calls that in each step."""
     return state._input_keys is input_keys and state._output_keys is output_keys
 
 

@@ -1,7 +1,7 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
 import threading
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..decision.failure_rate import (
     Estimator,
@@ -13,6 +13,9 @@ from ..decision.failure_rate import (
 )
 from ..records.visits import Visit
 from ..settings.settings import StateSettings
+
+if TYPE_CHECKING:
+    from .userdata_view import StateView
 
 
 class RateReading(NamedTuple):
@@ -45,44 +48,6 @@ class FastEdge:
         self.count = 0
         self.message = message
         self.visit = visit
-
-
-class KeptView(Protocol):
-    """A state's view of the userdata, kept for its next visit (`machine.userdata_view.StateView`).
-
-    It may be used again while all that it was made of is still the same.
-    """
-
-    remapper: Any  # a smach.Remapper, which this module does not know
-
-    @property
-    def state(self) -> object:
-        """The state, None where the view was made for one visit."""
-
-    @property
-    def userdata(self) -> object:
-        """The container's userdata."""
-
-    @property
-    def remapping(self) -> object:
-        """The container's key by the state's own."""
-
-    @property
-    def input_keys(self) -> object:
-        """The state's set of input keys."""
-
-    @property
-    def output_keys(self) -> object:
-        """The state's set of output keys."""
-
-
-class _NoView:
-    """Before the first visit: a view of no state."""
-
-    state = userdata = remapping = input_keys = output_keys = remapper = None
-
-
-_NO_VIEW = _NoView()
 
 
 class StateRecord:
@@ -123,7 +88,7 @@ class StateRecord:
         self.label = label
         self.fast: Dict[Any, FastEdge] = {}
         self.snapshot: Optional[Dict[str, object]] = None
-        self.view: KeptView = _NO_VIEW  # from its last visit
+        self.view: Optional['StateView'] = None  # from its last visit
         self.recoveries = 0  # of this trial
         # of this trial: times that nobody answered and `on_no_answer` led to a state
         self.fallbacks = 0
@@ -318,7 +283,7 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way."""
         state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=_NO_VIEW, way_down=())
+        state.update(snapshot=None, view=None, way_down=())
         del state['_lock']
         return state
 

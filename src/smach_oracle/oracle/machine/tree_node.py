@@ -100,7 +100,7 @@ class TreeNode:
     def path(self) -> str:
         """Return the path: the top machine's name and the labels below it, joined by '/'."""
         if self.parent is None:
-            return self.name
+            return self._name or DEFAULT_NAME
         labels, top = self._labels_from_top()
         return '/'.join((top.name,) + labels)
 

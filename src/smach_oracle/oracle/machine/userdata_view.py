@@ -1,10 +1,11 @@
 """The userdata of a state: the container's userdata by the state's own key names."""
 
-from typing import Collection, Iterable, Mapping, Tuple, cast
+from typing import Collection, Iterable, Mapping, Optional, Tuple, cast
 
 import smach
 
 from ..identity import own_mark
+from ..smach_private import data_of, keys_of
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 
@@ -66,19 +67,20 @@ class StateView:
     each visit.
     """
 
-    __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
+    __slots__ = ('remapper', 'state', 'userdata', 'data', 'remapping', 'input_keys', 'output_keys')
 
     def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
-        self.state = None  # what no state is: made for one visit
+        self.data = data_of(machine.userdata)
+        self.state: Optional[smach.State] = None  # made for one visit
         if (
             _KEEPS_KEY_SETS
             and _has_plain_keys(state)
             and not own_mark(machine, 'hands_on_userdata')
         ):
             self.state = state
-            self.input_keys, self.output_keys = state._input_keys, state._output_keys
+            self.input_keys, self.output_keys = keys_of(state)
             self.remapper = smach.Remapper(
                 machine.userdata, self.input_keys, self.output_keys, self.remapping
             )
