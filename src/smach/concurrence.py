@@ -135,7 +135,12 @@ class Concurrence(Container):
 
     def _run_children(self) -> ParallelRun:
         run = ParallelRun(
-            self._states, self._runner, self._execute_child, self._child_began, self._child_ended
+            self._states,
+            self._runner,
+            self._take_back_preempt,
+            self._execute_child,
+            self._child_began,
+            self._child_ended,
         )
         self._run = run
         if self._preempt_is_over:
@@ -187,10 +192,9 @@ class Concurrence(Container):
         A preempt that came when no child was running any more reached nobody. It stays with the
         container, so that its parent sees that it was not serviced.
         """
-        runners = {label: self._runner(label, state) for label, state in self._states.items()}
-        deaf = [label for label, runner in runners.items() if runner.preempt_requested()]
-        for label in deaf:
-            runners[label].recall_preempt()
+        deaf = [
+            label for label, state in self._states.items() if self._take_back_preempt(label, state)
+        ]
         if not self.preempt_requested():
             return False
         for label in deaf:

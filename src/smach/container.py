@@ -243,6 +243,17 @@ class Container(State):
         hook = self.execution_hook
         return state if hook is None else hook.runner_of(self, label, state)
 
+    def _take_back_preempt(self, label: str, state: Any) -> bool:
+        """Take back a request that a state, or its runner, has not serviced. Whether there was
+        one.
+        """
+        runner = self._runner(label, state)
+        left = [each for each in (runner, state) if each.preempt_requested()]
+        if left:
+            for each in (runner, state):
+                each.recall_preempt()
+        return bool(left)
+
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
         """Copy this container's output keys to the parent's userdata. A missing one is a
         warning.

@@ -198,9 +198,7 @@ class Iterator(Container):
         """
         self._preempt_requested = False
         if self._state is not None:
-            runner = self._runner(self._state_label, self._state)
-            if runner.preempt_requested():
-                runner.recall_preempt()
+            self._take_back_preempt(self._state_label, self._state)
 
     # -- what outsiders may ask
 

@@ -22,7 +22,8 @@ _GRACE_S = 1.0
 class ParallelRun(object):
     """Executes each state in a thread of its own, once.
 
-    ``runner(label, state)`` returns what takes the preempt requests of a state.
+    ``runner(label, state)`` returns what takes the preempt requests of a state, and
+    ``take_back(label, state)`` takes back one that was not serviced.
     ``execute(label)`` runs the state and returns its outcome. ``began(label)`` and ``ended(label)``
     are called in the state's thread, never for two states at once. The first error of any of them
     preempts the other states.
@@ -32,6 +33,7 @@ class ParallelRun(object):
         self,
         states: Mapping[str, State],
         runner: Callable[[str, State], State],
+        take_back: Callable[[str, State], bool],
         execute: Callable[[str], str],
         began: Callable[[str], object],
         ended: Callable[[str], object],
@@ -41,6 +43,7 @@ class ParallelRun(object):
         self.preempted: Set[str] = set()
         self._states = states
         self._runner = runner
+        self._take_back = take_back
         self._execute = execute
         self._began = began
         self._ended = ended
@@ -85,18 +88,17 @@ class ParallelRun(object):
             self._preempt_state(label)
 
     def _preempt_state(self, label: str) -> None:
-        state = self._runner(label, self._states[label])
+        state = self._states[label]
         try:
-            state.request_preempt()
+            self._runner(label, state).request_preempt()
         except Exception:
             smach.logerr("Preempting state '%s' raised:\n%s" % (label, traceback.format_exc()))
         with self._changed:
             ended_meanwhile = label not in self._running
         # It may have ended because of the request, which is then serviced. Else its next execution
         # must not find it.
-        if ended_meanwhile and state.preempt_requested():
+        if ended_meanwhile and self._take_back(label, state):
             self.preempted.discard(label)
-            state.recall_preempt()
 
     # -- in the thread of each state
 

@@ -174,17 +174,23 @@ def set_current_state(
     machine._current_label, machine._current_state = label, state
 
 
-def step_once(machine: smach.StateMachine) -> Optional[str]:
-    """Execute the current state and go on. Return the outcome of the machine at its end.
+def step_once(cls: Any, machine: smach.StateMachine) -> Optional[str]:
+    """Execute the current state and go on, as a class of machines does. The lock is held.
 
-    The lock is held. See `OracleContainer._update_once`.
+    See `OracleContainer._update_once`.
     """
-    return machine._update_once()
+    outcome: Optional[str] = cls._update_once(machine)
+    return outcome
 
 
-def state_ended(machine: Any, outcome: object, error: Optional[Exception]) -> Optional[str]:
-    """Go on behind the current state, which was executed. See `OracleContainer._state_ended`."""
-    ended: Optional[str] = machine._state_ended(outcome, error)
+def state_ended(
+    cls: Any, machine: smach.StateMachine, outcome: object, error: Optional[Exception]
+) -> Optional[str]:
+    """Go on behind the current state, which was executed, as a class of machines does.
+
+    See `OracleContainer._state_ended`.
+    """
+    ended: Optional[str] = cls._state_ended(machine, outcome, error)
     return ended
 
 

@@ -4,6 +4,8 @@ from typing import List, Tuple
 
 from ..machine.nesting import branching_below
 from ..machine.tree_node import TreeNode
+from ..smach_private import states_of
+from .iterator_wrapper import IteratorWrapper
 from .wrapper import ContainerWrapper, wrapper_of
 
 
@@ -36,7 +38,7 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
 
     Any other Iterator of the container begins again when it is entered.
     """
-    for label, state in list(node.machine._states.items()):
+    for label, state in list(states_of(node.machine).items()):
         wrapper = wrapper_of(state)
-        if wrapper is not None:
+        if isinstance(wrapper, IteratorWrapper):
             wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

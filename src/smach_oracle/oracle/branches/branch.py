@@ -1,175 +1,292 @@
-"""The sites of branches: plain states of a Concurrence or an Iterator."""
+"""A branch: a plain state of a Concurrence or an Iterator, under an oracle of its own."""
 
-from dataclasses import replace
-from typing import Any, Optional, Tuple
+import threading
+from typing import Any, Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
 
 import smach
 
-from ..asking.question import OutcomeChoice
-from ..identity import attribute_of
-from ..machine.nesting import wrapper_of
-from ..machine.site import Route, Site, failure_kind, route_of
+from ..control.control import Control
+from ..machine.execution import runs_around
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..records.events import Event, EventKind, FailureKind
-from ..settings.settings import Settings, StateSettings
+from ..machine.workers import request_preempt
+from ..records.early_end import EarlyEnd
+from ..recovery.verdict import outcome_of_early_end
+from ..smach_private import Transitions, data_of, remapping_in, state_ended, step_once
+from .item_userdata import ItemUserdata
 
-_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
-
-
-class BranchSite(Site):
-    """The Concurrence or Iterator that holds a plain state, as the oracle of the state knows it."""
-
-    is_container = False
-    goes_on_with_any = True
-    begins_by = EventKind.STATE_START
-
-    def __init__(self, container: smach.Container, label: str) -> None:
-        self.container: Any = container
-        self.label = label
-
-    def shown(self, node: TreeNode) -> smach.Container:
-        """Return the container that people see."""
-        container: smach.Container = self.container
-        return container
-
-    def settings_of_state(self, settings: StateSettings) -> StateSettings:
-        """Leave out preconditions by label: beside a branch is no state that could be run for it.
-
-        A path names one elsewhere.
-        """
-        if not any(spec.labels() for spec in settings.preconditions):
-            return settings
-        return replace(
-            settings,
-            preconditions=tuple(
-                spec
-                for spec in settings.preconditions
-                if all('/' in label for label in spec.labels())
-            ),
-        )
-
-    def foresees(
-        self,
-        node: TreeNode,
-        outcome: str,
-        route: Route,
-        kind: FailureKind,
-        settings: StateSettings,
-    ) -> bool:
-        """Whether the author has said what is to happen at this failing outcome."""
-        return settings.author_recoveries != 'override' and self._is_drawn(node, outcome)
-
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
-        raise NotImplementedError
-
-    def in_words(self, route: Route, outcome: str) -> Route:
-        """Say where an outcome leads, for people."""
-        return Route(self._leads_to(outcome), True)
-
-    def _leads_to(self, outcome: str) -> str:
-        raise NotImplementedError
-
-    def choices(self, node: TreeNode, label: str) -> Tuple[OutcomeChoice, ...]:
-        """Return the outcomes, and where they lead. Those that lead to the next item come first."""
-        last = [
-            (not self._goes_on_after(outcome), str(outcome), outcome)
-            for outcome in node.machine._states[label].get_registered_outcomes()
-        ]
-        return tuple(
-            OutcomeChoice(outcome, self._leads_to(outcome)) for _, _, outcome in sorted(last)
-        )
-
-    def _goes_on_after(self, outcome: str) -> bool:
-        """Whether an outcome leads to the next item."""
-        return False
-
-    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
-        """Say nothing: the Concurrence or Iterator tells."""
-
-    def ended_by(self, node: TreeNode, event: Event) -> Optional[str]:
-        """Return the outcome with which the branch ends at an event, None for other events."""
-        outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
-        is_end = event.kind in _LEAVES and outcome and not node.is_oracle(outcome)
-        return outcome if is_end and outcome not in node.machine._states else None
-
-    def is_line_over(self, node: TreeNode, event: Event) -> bool:
-        """Whether the branch is over by an event."""
-        return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
+COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
+End = Tuple[object, Optional[Exception]]  # of a state: its outcome, and what it has raised
+# what an execution has, beside what `_be_at_rest` sets
+_OF_EXECUTION = (
+    '_state_transitioning_lock',
+    '_item',
+    '_record',
+    '_observers',
+    '_control',
+    '_early_end',
+    '_abandoned',
+    '_current_state',
+    '_preempted_state',
+)
 
 
-class ConcurrenceSite(BranchSite):
-    """The site of one state of a Concurrence."""
+class ItemPort(Protocol):
+    """The Iterator around a branch."""
 
-    def settings_here(self, settings: Settings) -> Settings:
-        """Keep the userdata at jumps: others write it at the same time."""
-        return replace(settings, userdata='keep', deep_copy_keys=())
+    item_userdata: ItemUserdata
 
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
-        """Whether the outcome map names it for the branch, and leads to what is no failure."""
-        return any(
-            not is_failure_above(node, name)
-            for name, conditions in _entries(self.container._outcome_map)
-            if dict(_entries(conditions)).get(self.label) == outcome
-        )
-
-    def _leads_to(self, outcome: str) -> str:
-        return 'the end of this branch'
+    def begin_item(self) -> None:
+        """Note that an item begins."""
 
 
-class IteratorSite(BranchSite):
-    """The site of the state of an Iterator."""
+class Branch(smach.Container):
+    """Executes a plain state in its place, and is the container that its oracle recovers.
 
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
-        """Whether it leads to the next item, or is mapped to what is no failure."""
-        if loops(self.container, outcome):
-            return True
-        mapped = self.container._final_outcome_map
-        return outcome in mapped and not is_failure_above(node, mapped[outcome])
+    The Concurrence or Iterator executes it in place of the state. To the oracle it is a container
+    of that one state, whose outcomes are the state's own. Its userdata is that of the Concurrence
+    or Iterator itself, so that what a branch writes is seen by the others at once.
 
-    def _leads_to(self, outcome: str) -> str:
-        if loops(self.container, outcome):
-            return 'the next item'
-        return 'the end of the iteration, with {}'.format(
-            self.container._final_outcome_map.get(outcome, outcome)
-        )
-
-    def _goes_on_after(self, outcome: str) -> bool:
-        return loops(self.container, outcome)
-
-    def tell_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
-        """Say which item is passed over where this failing outcome leads to the next one."""
-        wrapper = wrapper_of(self.container)
-        item = wrapper.in_words() if wrapper is not None else ''
-        if item and loops(self.container, outcome):
-            text = '{} is passed over with {}, as its author has drawn it'
-            node.warn(text.format(item, outcome), label)
-
-
-def loops(iterator: smach.Iterator, outcome: str) -> bool:
-    """Whether an outcome of its state leads an Iterator to the next item."""
-    looping, breaking = iterator._loop_outcomes, iterator._break_outcomes
-    return outcome not in breaking and (not looping or outcome in looping)
-
-
-def is_failure_above(node: TreeNode, outcome: str) -> bool:
-    """Whether an outcome of the Concurrence or Iterator of a branch is a failure above it.
-
-    By its name alone where another Concurrence or Iterator is around it.
+    A branch that ends plainly costs what `execute` shows, as a plain success of a machine does in
+    container.py. All else goes by `_run`.
     """
-    parent = node.parent
-    if parent is None or len(node.below) != 1:
-        return outcome in node.in_force.failing
-    (label,) = node.below
-    kind = failure_kind(
-        outcome,
-        route_of(parent.machine, label, outcome),
-        parent.settings_of(label).failure_outcomes,
-        parent.in_force.failing,
-    )
-    return kind is not FailureKind.NOT_A_FAILURE
 
+    _oracle: TreeNode
+    _constants: Dict[str, Mapping[str, Any]] = {}  # none, never written
+    _pause_requested = False
+    _is_preempt_passed_on = False
 
-def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:
-    """Return the entries of an outcome map, or of the conditions in it. None of what is no map."""
-    items = attribute_of(given, 'items')
-    return tuple(items()) if callable(items) else ()
+    def __init__(self, label: str, is_alone: bool) -> None:
+        """`is_alone`: whether no other branch runs at the same time, as in an Iterator."""
+        smach.Container.__init__(self, outcomes=[])
+        # the userdata may be written by others while the state, or its recovery, runs
+        self.shares_userdata = not is_alone
+        # the state gets the userdata itself, as an Iterator hands it over
+        self.hands_on_userdata = is_alone
+        self._initial_state_label = label
+        self._states: Dict[str, smach.State] = {}
+        self._transitions: Dict[str, Transitions] = {}
+        self._remappings: Dict[str, Mapping[str, str]] = {}
+        self._be_at_rest()
+
+    def _be_at_rest(self) -> None:
+        self._state_transitioning_lock = threading.RLock()
+        self._is_under_way = False
+        self._preempt_requested = False
+        self._item: Optional[ItemPort] = None
+        self._record: Optional[StateRecord] = None
+        self._rest()
+
+    def _rest(self) -> None:
+        self._is_running = False
+        self._set_current_state(None)
+        self._preempted_label: Optional[str] = None
+        self._preempted_state: Optional[smach.State] = None
+
+    def take(self, container: smach.Container, state: smach.State) -> None:
+        """Have this state of the Concurrence or Iterator, with the outcomes that it has now."""
+        label, outcomes = self._initial_state_label, state.get_registered_outcomes()
+        self.userdata = container.userdata
+        self._state = self._states[label] = state
+        self._remappings[label] = {} if self.hands_on_userdata else remapping_in(container, label)
+        if set(self._outcomes) != set(outcomes) or label not in self._transitions:
+            self._outcomes = set(outcomes)
+            self._transitions[label] = dict.fromkeys(outcomes)
+
+    def begin(self, item: Optional[ItemPort]) -> None:
+        """Begin an execution of the Concurrence, for which there is no `item`, or Iterator."""
+        node = self._oracle
+        self._item = item
+        self._observers = node.events.observers
+        self._control: Control = node.tree.control
+        self._early_end: EarlyEnd = node.tree.early_end
+        self._abandoned = node.tree.workers.abandoned
+        # the same for all items
+        self._is_watched = bool(
+            node.in_force.limits_autonomy() or node.tree.resumed.concerns(node) or runs_around(node)
+        )
+        self._find_record()
+
+    def _find_record(self) -> None:
+        by_label = self._oracle.records.by_label
+        self._record = None if self._is_watched else by_label.get(self._initial_state_label)
+
+    def end(self) -> None:
+        """Note that an execution of the container is over: another thread may have one, too."""
+        if not self._is_under_way:
+            self._rest()
+
+    def is_of(self, state: smach.State) -> bool:
+        """Whether it executes this state."""
+        return state is self._state
+
+    def execute(self, userdata: smach.UserData) -> object:
+        """Execute the state, and recover where it fails. Return its outcome."""
+        state = self._state
+        if self._is_under_way:  # in another thread
+            return state.execute(userdata)
+        self._preempt_requested = False
+        self._is_under_way = True  # from now on it takes the requests itself
+        try:
+            record = self._record
+            execution = self._oracle.execution
+            if (
+                record is None
+                or record.special
+                or self._observers
+                or self._abandoned
+                or self._control.is_set
+                or self._early_end.why is not None
+                or execution.departure is not None
+                or execution.unrecovered
+                or state.preempt_requested()
+            ):
+                return self._run(None)
+            record.snapshot = snapshot = data_of(self.userdata).copy()
+            if self._item is not None:
+                self._item.item_userdata.at_item = snapshot
+            if self._current_state is not state or not self._is_running:
+                # a request reaches it from now on
+                self._set_current_state(record.label)
+                self._is_running = True
+                if self._preempt_requested:  # nobody has passed that on
+                    return self._run(None)
+            try:
+                outcome = state.execute(userdata)
+            except Exception as err:
+                return self._run((None, err))
+            try:
+                edge = record.fast[outcome]
+            except (KeyError, TypeError):  # seen for the first time, or no outcome at all
+                return self._run((outcome, None))
+            if (
+                self._preempt_requested
+                or self._control.is_set
+                or self._early_end.is_near
+                or execution.departure is not None
+                or smach.is_shutdown()
+            ):
+                return self._run((outcome, None))
+            edge.count += 1
+            self._oracle.records.history.visited(edge.visit, record.has_preconditions)
+            record.snapshot = None
+            if self._item is None:
+                self._rest()
+            return outcome
+        except (SystemExit, KeyboardInterrupt) as err:
+            self._early_end.of_program = err
+            self._oracle.records.drop_snapshots()
+            self._rest()
+            raise
+        finally:
+            self._is_under_way = False
+
+    def _run(self, end: Optional[End]) -> Optional[str]:
+        """Execute the state, through the oracle where it fails, and return its outcome.
+
+        `end`: of the state, where it was executed already. It raises what the state has raised
+        where the oracle gives up.
+        """
+        node = self._oracle
+        if end is None:
+            if self._state.preempt_requested():
+                self._preempt_requested = True
+            if self._item is not None:
+                self._item.begin_item()
+        error: Optional[BaseException] = None
+        try:
+            if not node.execution.begin_branch(has_ended=end is not None) and end is None:
+                smach.logwarn(
+                    '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
+                )
+                return outcome_of_early_end(node, None)
+            outcome = node.tree.resumed.take_outcome(node) if end is None else None
+            if outcome is None:
+                outcome = outcome_of_early_end(node, self._step_to_end(end))
+            return outcome
+        except smach.InvalidUserCodeError as err:
+            error = raised = err
+        except BaseException as err:
+            error = err
+            raise
+        finally:
+            node.execution.end(None, error)
+            self._rest()
+            self._find_record()
+        if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):
+            raise raised.__cause__  # as bare: the container says what state it was
+        raise raised
+
+    def _step_to_end(self, end: Optional[End]) -> Optional[str]:
+        """Step as any wrapped machine does."""
+        step, machine = self._oracle.tree.container_class, cast(smach.StateMachine, self)
+        with self._state_transitioning_lock:
+            self._is_running = True
+            if end is None:
+                self._set_current_state(self._initial_state_label)
+                outcome = step_once(step, machine)
+            else:
+                outcome = state_ended(step, machine, *end)
+            while outcome is None and self._is_running and not smach.is_shutdown():
+                outcome = step_once(step, machine)
+            return outcome
+
+    # -- preempt requests
+
+    def request_preempt(self) -> None:
+        """Preempt the state, or its recovery."""
+        if not self._is_under_way:
+            self._state.request_preempt()
+        if self._is_under_way:  # it may have begun meanwhile, without a look at the request
+            self._is_preempt_passed_on = False
+            self._preempt_requested = True
+            with self._state_transitioning_lock:
+                if not self._is_preempt_passed_on and self._current_state is not None:
+                    self._preempt_requested = True
+                    self._pass_preempt_on(self._current_state)
+            self._oracle.tree.scope.wake()
+
+    def _pass_preempt_on(self, state: smach.State) -> None:
+        """Preempt the current state, unless it was asked before and has not obeyed yet."""
+        asked = self._preempted_state
+        if asked is state and state.preempt_requested():
+            return
+        if asked is not None:
+            asked.recall_preempt()
+        self._preempted_label, self._preempted_state = self._current_label, state
+        self._is_preempt_passed_on = True
+        request_preempt(state)
+
+    def recall_preempt(self) -> None:
+        """Take a request back."""
+        self._state.recall_preempt()
+        smach.Container.recall_preempt(self)
+
+    # -- the container of one state
+
+    def get_children(self) -> Dict[str, smach.State]:
+        """Return the state, and ORACLE."""
+        return self._states
+
+    def is_running(self) -> bool:
+        """Whether it is being executed."""
+        return self._is_running
+
+    def set_initial_state(self, initial_states: Sequence[str], userdata: object = None) -> None:
+        """Do nothing: it begins in its only state."""
+
+    def _set_current_state(self, state_label: Optional[str]) -> None:
+        self._current_label = state_label
+        label = state_label or ''
+        self._current_state = self._states.get(label)
+        self._current_transitions = self._transitions.get(label)
+
+    # -- pickling and copying
+
+    def __getstate__(self) -> Dict[str, object]:
+        """Leave out what belongs to an execution."""
+        return {key: value for key, value in self.__dict__.items() if key not in _OF_EXECUTION}
+
+    def __setstate__(self, state: Dict[str, object]) -> None:
+        self.__dict__.update(state)
+        self._be_at_rest()

@@ -5,6 +5,7 @@ from typing import Any, Callable, Dict, Mapping, Optional, Sequence
 import smach
 
 from ..machine.snapshots import restore, take_snapshot
+from ..smach_private import data_of
 
 Warn = Callable[[str, str], None]
 
@@ -15,7 +16,7 @@ class ItemUserdata:
     `deep_copy_keys`: see the setting. `warn`: see `take_snapshot`.
     """
 
-    def __init__(self, iterator: Any) -> None:
+    def __init__(self, iterator: smach.Container) -> None:
         self._iterator = iterator
         self._given: Dict[str, Any] = {}  # its io keys when it began
         # its userdata as the item under way began
@@ -29,7 +30,7 @@ class ItemUserdata:
         `begun`: the userdata with which its state was begun before the program was stopped. That
         visit has written already.
         """
-        data = self._iterator.userdata._data if begun is None else begun
+        data = data_of(self._iterator.userdata) if begun is None else begun
         self.at_item = take_snapshot(data, deep_copy_keys, warn)
 
     def begin(
@@ -41,7 +42,7 @@ class ItemUserdata:
     def take_back(self, deep_copy_keys: Sequence[str]) -> None:
         """Take back what the unfinished item wrote."""
         if self.at_item is not None:
-            restore(self._iterator.userdata._data, self.at_item, (), deep_copy_keys)
+            restore(data_of(self._iterator.userdata), self.at_item, (), deep_copy_keys)
 
     def to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
         """Return what finished items have left under keys that are inputs and outputs.
@@ -49,7 +50,7 @@ class ItemUserdata:
         It stays where the container above has the value again with which the Iterator began.
         `userdata`: what its inputs are copied from.
         """
-        own = self._iterator.userdata._data
+        own = data_of(self._iterator.userdata)
         return {
             key: own[key]
             for key, value in self._inputs_and_outputs(userdata).items()

@@ -1,5 +1,6 @@
 """The items of an Iterator, with a memory of how far it has come."""
 
+import itertools
 from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, cast
 
 from smach_common.foreign import repr_of
@@ -14,14 +15,16 @@ class TrackedItems:
     """Stands in for what an Iterator was given, while it executes.
 
     An Iterator asks it for an iterator when it begins, and for one item after the other. With
-    `goes_on` set, the next time it goes on with the item that was not finished. To whoever looks at
-    it otherwise it is what the Iterator was given.
+    `goes_on` set, the next time it goes on with the item that was not finished. An item is finished
+    once the Iterator asks for the next one. It does not after an outcome that breaks, nor once it
+    is preempted. To whoever looks at it otherwise it is what the Iterator was given.
     """
 
     def __init__(self, given: Items, tell: Tell) -> None:
         """`given`: an iterable, or a callable that returns one. `tell` takes words for the log."""
         self.given = given
         self.goes_on = False
+        self.begins: Optional[Callable[[], None]] = None  # called as an item begins
         self.begins_with = 1  # number of the item that is the first where it begins again
         self.number = 0  # of the item under way, from 1. 0 means none
         self.is_finished = True  # the item under way
@@ -129,17 +132,20 @@ class TrackedItems:
             next(self._items, None)
 
     def _hand_out(self) -> Iterator[object]:
-        if self._is_pending:
-            self._is_pending = False
-            yield self._item
+        again = [self._item] if self._is_pending else []
+        self._is_pending = False
+        self.number -= len(again)
         try:
-            for item in cast(Iterator[object], self._items):
-                self._item, self.is_finished = item, False
+            for item in itertools.chain(again, cast(Iterator[object], self._items)):
+                self._item = item
                 self.number += 1
+                self.is_finished = False
+                if self.begins is not None:
+                    self.begins()
                 yield item
+                self.is_finished = True
         except Exception as err:  # of whoever makes the items
             self._error = err
-            self.is_finished = True  # the one before
             self._tell(
                 'cannot get the item behind {}: {}'.format(
                     self.in_words() or 'the beginning', repr_of(err)

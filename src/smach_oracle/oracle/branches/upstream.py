@@ -4,17 +4,24 @@ All that stands in there does so here: a class made of the container's own, and 
 tables in which it keeps its states while it executes.
 """
 
-from typing import Any, Dict, Optional, Tuple, cast
+from typing import Any, Dict, Mapping, Optional, Tuple, cast
 
 import smach
 
 from ..identity import set_class
+from ..machine.wrapped_classes import rebuild, two_classes, wrapped_class
+from ..smach_private import (
+    items_of,
+    iterated_label_of,
+    iterated_state_of,
+    set_items,
+    set_states,
+    states_of,
+)
+from .branch import Branch
 from .items import TrackedItems
-from .runner import Runner
 
 HOOK = 'execution_hook'  # the attribute by which our engine asks
-_MADE: Dict[int, type] = {}  # by id of the class that it is made of, and keeps
-_OWN = '_made_of'  # the class of the user
 
 
 def asks_hook(cls: type) -> bool:
@@ -35,54 +42,57 @@ def have_asked(container: smach.Container) -> None:
 
     :raises TypeError: where its class cannot be extended.
     """
-    set_class(container, _class_of(type(container)))
+    set_class(container, wrapped_class(_Asking, type(container)))
 
 
 def ask_no_more(container: smach.Container) -> None:
     """Give a container its own class back."""
-    made_of = type(container).__dict__.get(_OWN)
+    made_of = two_classes(type(container))
     if made_of is not None:
-        set_class(container, made_of)
+        set_class(container, made_of[1])
 
 
-class _OfRunner:
-    """A method of the runner of a stand-in, without a frame of its own on the stack."""
+class _OfBranch:
+    """A method of the branch of a stand-in, without a frame of its own on the stack."""
 
     def __init__(self, name: str) -> None:
         self._name = name
 
     def __get__(self, stand_in: Any, owner: Optional[type] = None) -> Any:
-        return self if stand_in is None else getattr(stand_in._runner, self._name)
+        return self if stand_in is None else getattr(stand_in.branch, self._name)
 
 
 class StandIn:
-    """Executes by a runner. In all else it is the user's state.
+    """Executes by a branch. In all else it is the user's state.
 
     Its place is in the tables of a container alone, and only while that executes. Whoever asks the
     container for its children gets the user's states.
     """
 
-    def __init__(self, runner: Runner, state: smach.State) -> None:
-        self._runner = runner
-        self._state = state
+    def __init__(self, branch: Branch, state: smach.State) -> None:
+        self.branch = branch
+        self.state = state
 
-    execute = _OfRunner('execute')
-    request_preempt = _OfRunner('request_preempt')
-    preempt_requested = _OfRunner('preempt_requested')
-    recall_preempt = _OfRunner('recall_preempt')
+    execute = _OfBranch('execute')
+    request_preempt = _OfBranch('request_preempt')
+    recall_preempt = _OfBranch('recall_preempt')
+
+    def preempt_requested(self) -> bool:
+        """Whether the branch or the state has a request that was not serviced."""
+        return bool(self.branch.preempt_requested() or self.state.preempt_requested())
 
     def __getattr__(self, name: str) -> Any:
-        if name in ('_runner', '_state'):  # while it is copied
+        if name in ('branch', 'state'):  # while it is copied
             raise AttributeError(name)
-        return getattr(self._state, name)
+        return getattr(self.state, name)
 
     # that of the user's state: upstream's Iterator, and users, ask for it by `isinstance`
-    __class__ = cast(Any, property(lambda self: type(self._state)))
+    __class__ = cast(Any, property(lambda self: type(self.state)))
 
 
 def _real(state: object) -> Any:
     """Return the user's state, whatever stands in for it."""
-    return state._state if type(state) is StandIn else state
+    return state.state if type(state) is StandIn else state
 
 
 class _Asking:
@@ -95,11 +105,12 @@ class _Asking:
         hook = self._oracle_wrapper
 
         with hook.execution(self) as execution:
-            tables = _stand_in(self, hook) if execution.is_entered else {}
+            own = _stand_in(self, hook) if execution.is_entered else None
             try:
                 execution.outcome = base.execute(*args, **kwargs)
             finally:
-                _give_back(self, tables)
+                if own is not None:
+                    _give_back(self, own)
         outcome: Optional[str] = execution.outcome
         return outcome
 
@@ -119,9 +130,7 @@ class _Asking:
         """Make the class again on unpickling: a class made here cannot be found by name."""
         base: Any = super()
         reduced = base.__reduce_ex__(max(2, protocol))
-        return (rebuild, (type(self).__dict__[_OWN],), _at_rest(dict(reduced[2]))) + tuple(
-            reduced[3:]
-        )
+        return (rebuild, two_classes(type(self)), _at_rest(dict(reduced[2]))) + tuple(reduced[3:])
 
     def _copy_input_keys(self, parent_ud: Optional[smach.UserData], ud: smach.UserData) -> None:
         base: Any = super()
@@ -130,28 +139,41 @@ class _Asking:
         )
 
 
-def _stand_in(container: Any, hook: Any) -> Dict[str, Any]:
+Tables = Tuple[Any, Optional[smach.State], Mapping[str, smach.State]]
+
+
+def _stand_in(container: Any, hook: Any) -> Tables:
     """Put stand-ins into the tables of a container, and return what was there."""
 
     def of(label: str, state: Optional[smach.State]) -> Any:
-        runner = hook.runners.get(label)
-        return state if runner is None or state is None else StandIn(runner, state)
+        if state is None:
+            return None
+        runner = hook.runner_of(container, label, state)
+        return StandIn(runner, state) if isinstance(runner, Branch) else state
 
+    if isinstance(container, smach.Iterator):
+        own = items_of(container), iterated_state_of(container)
+        set_items(
+            container, hook.items(container, own[0]), of(iterated_label_of(container), own[1])
+        )
+        return (*own, {})
+    states = states_of(container)
+    set_states(container, {label: of(label, state) for label, state in states.items()})
+    return None, None, states
+
+
+def _give_back(container: Any, own: Tables) -> None:
+    """Put back what was there, unless the user has put in something else meanwhile."""
+    items, state, states = own
     if not isinstance(container, smach.Iterator):
-        own = {'_states': container._states}
-        container._states = {label: of(label, state) for label, state in own['_states'].items()}
-        return own
-    own = {'_items': container._items, '_state': container._state}
-    container._items = hook.items(container, container._items)
-    container._state = of(container._state_label, container._state)
-    return own
-
-
-def _give_back(container: Any, tables: Dict[str, Any]) -> None:
-    for name, own in tables.items():
-        now = getattr(container, name)
-        if name == '_states' or isinstance(now, TrackedItems) or type(now) is StandIn:
-            setattr(container, name, own)
+        set_states(container, states)
+        return
+    now = items_of(container), iterated_state_of(container)
+    set_items(
+        container,
+        items if isinstance(now[0], TrackedItems) else now[0],
+        state if type(now[1]) is StandIn else now[1],
+    )
 
 
 def _at_rest(attributes: Dict[str, Any]) -> Dict[str, Any]:
@@ -166,28 +188,3 @@ def _at_rest(attributes: Dict[str, Any]) -> Dict[str, Any]:
     if isinstance(items, TrackedItems):
         attributes['_items'] = items.given
     return attributes
-
-
-def _class_of(base: type) -> type:
-    """Return the class of asking containers of class `base`, the same one each time."""
-    made = _MADE.get(id(base))
-    if made is None:
-        metaclass: Any = type(base)
-        made = metaclass(
-            base.__name__,
-            (_Asking, base),
-            {
-                '__module__': base.__module__,
-                '__qualname__': base.__qualname__,
-                '__doc__': base.__doc__,
-                _OWN: base,
-            },
-        )
-        made = _MADE.setdefault(id(base), made)
-    return made
-
-
-def rebuild(base: type) -> object:
-    """Return a new, empty object of an asking class: for unpickling and copying."""
-    cls: Any = _class_of(base)
-    return cls.__new__(cls)

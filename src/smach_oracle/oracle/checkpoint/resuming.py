@@ -437,7 +437,7 @@ def _is_wrapped_through(state: object) -> bool:
     return (
         wrapper is not None
         and all(
-            label in wrapper.machines or _is_wrapped_through(inner)
+            label in wrapper.branches or _is_wrapped_through(inner)
             for label, inner in wrapper.states()
         )
         and (not isinstance(state, smach.Iterator) or can_be_indexed(state))

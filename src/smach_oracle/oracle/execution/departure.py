@@ -10,11 +10,12 @@ from typing import List, Optional, cast
 import smach
 from smach_common.foreign import repr_of
 
+from ..branches.iterator_wrapper import IteratorWrapper
 from ..branches.wrapper import wrapper_of
 from ..machine.jump_path import repeated_on, why_closed_on
 from ..machine.nesting import machines_below
 from ..machine.places import levels_above, links_to
-from ..machine.tree_node import TreeNode, marked_node
+from ..machine.tree_node import TreeNode, node_of
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
@@ -125,7 +126,7 @@ def _leave_way(left: List[TreeNode]) -> None:
     around = [link.below for node in reversed(left) for link in links_to(node)]
     for container in around[:-1]:
         wrapper = wrapper_of(container)
-        if wrapper is not None:
+        if isinstance(wrapper, IteratorWrapper):
             wrapper.note_left()
         if not container.preempt_requested():
             _preempt(container)
@@ -201,14 +202,9 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     state = states_of(node.machine)[failure.state]
     if not isinstance(state, smach.Container):
         return False
-    below = (
-        [state]
-        if isinstance(state, smach.StateMachine)
-        else [machine for _, machine in machines_below(state)]
-    )
-    nodes = [
-        marked_node(machine) for machine in below if isinstance(machine, node.tree.container_class)
-    ]
+    is_machine = isinstance(state, smach.StateMachine)
+    below = [state] if is_machine else [machine for _, machine in machines_below(state)]
+    nodes = [each for each in map(node_of, below) if each is not None]
     settled = failure.kind is not FailureKind.TIME_LIMIT and any(
         each.execution.unrecovered for each in nodes
     )

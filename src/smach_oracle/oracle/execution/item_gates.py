@@ -47,7 +47,7 @@ def place_gates(node: TreeNode) -> None:
     for below, container in _bare_containers(node.machine, ()):
         children = container.get_children().values()
         wrapper = wrapper_of(container)
-        if wrapper is not None and wrapper.machines:
+        if wrapper is not None and wrapper.branches:
             _remove(container)
             continue
         if isinstance(container, smach.Iterator) and not any(

@@ -1,20 +1,18 @@
-"""Puts a machine, and the machines nested in it, under one oracle each, and takes them out again.
+"""Puts a machine, and those nested in it, under one oracle each, and takes them out again."""
 
-A wrapped machine has a class made of OracleContainer and of its own class.
-"""
-
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, List, Optional
 
 import smach
 
 from ..asking.question import names
 from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError, TrialError
-from ..identity import own_attributes, set_class
+from ..identity import set_class
 from ..machine.nesting import containers_in, machines_below, nodes_of
 from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, marked_node, node_of
+from ..machine.wrapped_classes import change_class, two_classes
 from ..recovery.phases import OracleState
 from ..settings.names import Nested, Strictness
 from ..settings.settings import Settings
@@ -28,85 +26,6 @@ from ..smach_private import (
 )
 from .item_gates import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
-
-_MADE: Dict[Tuple[int, int], type] = {}  # by ids of both classes, which it keeps
-# static in StateMachine, so that the order of bases alone does not find the user's
-_STATIC = ('add', 'add_auto')
-
-
-def wrapped_class(oracle_class: type, base: type) -> type:
-    """Return the class of machines of class `base` under `oracle_class`, the same one each time."""
-    key = id(oracle_class), id(base)
-    made = _MADE.get(key)
-    if made is None:
-        namespace: Dict[str, object] = {
-            '__module__': base.__module__,
-            '__qualname__': base.__qualname__,
-            '__doc__': base.__doc__,
-            '_wrapped_of': (oracle_class, base),
-        }
-        for name in _STATIC + _new_names(oracle_class):
-            own = _static(base, name)
-            if own is not _static(smach.StateMachine, name):
-                namespace[name] = own
-        metaclass: Any = type(base)
-        made = metaclass(base.__name__, (oracle_class, base), namespace)
-        made = _MADE.setdefault(key, made)
-    return made
-
-
-def _new_names(oracle_class: type) -> Tuple[str, ...]:
-    """Return the public names that no StateMachine has: a user's class that uses one keeps it."""
-    return tuple(
-        name
-        for name in dir(oracle_class)
-        if not name.startswith('_') and not hasattr(smach.StateMachine, name)
-    )
-
-
-def _static(cls: type, name: str) -> object:
-    for each in cls.__mro__:
-        if name in each.__dict__:
-            return each.__dict__[name]
-    return None
-
-
-def two_classes(cls: type) -> Optional[Tuple[type, type]]:
-    """Return what a class made by wrapping is made of, None for other classes."""
-    made_of: Optional[Tuple[type, type]] = cls.__dict__.get('_wrapped_of')
-    return made_of
-
-
-def rebuild(oracle_class: type, base: type) -> object:
-    """Return a new, empty object of a wrapped class: for unpickling and copying."""
-    cls: Any = wrapped_class(oracle_class, base)
-    return cls.__new__(cls)
-
-
-def change_class(machine: smach.StateMachine, oracle_class: type) -> None:
-    """Make a machine one of `oracle_class` and of its own class.
-
-    :raises SettingsError: where its class cannot be extended.
-    """
-    try:
-        set_class(machine, wrapped_class(oracle_class, type(machine)))
-    except TypeError as err:
-        raise SettingsError(
-            'machine', machine, 'a machine whose class can be extended ({})'.format(err)
-        ) from err
-    renew_attributes(machine)
-
-
-def renew_attributes(machine: object) -> None:
-    """Give an object a fresh dictionary of its attributes.
-
-    CPython reads from it much faster than from one that was looked at, or whose object has changed
-    its class.
-    """
-    object.__setattr__(machine, '__dict__', dict(own_attributes(machine)))
-
-
-# -- wrapping
 
 
 def wrap_machine(
@@ -130,7 +49,7 @@ def wrap_machine(
     if isinstance(given, tree.container_class):
         return _wrap_again(given, tree, settings, nested, name, strict)
     try:
-        machine = _put_under(given, oracle_class, tree, settings, name)
+        machine = _put_under(given, oracle_class, tree, settings, name).machine
         _put_in_order(machine, settings, nested, strict)
     except SettingsError:  # as if nobody had tried
         _unwrap(given, tree)
@@ -140,10 +59,11 @@ def wrap_machine(
 
 def _put_under(
     machine: smach.StateMachine, oracle_class: type, tree: Tree, settings: Settings, name: str
-) -> smach.StateMachine:
+) -> TreeNode:
     change_class(machine, oracle_class)
-    set_mark(machine, TreeNode(machine, tree, settings, name))
-    return machine
+    node = TreeNode(machine, tree, settings, name)
+    set_mark(machine, node)
+    return node
 
 
 def _put_in_order(
@@ -227,25 +147,23 @@ def adopt(machine: smach.StateMachine) -> None:
     :raises SettingsError: for a machine whose class cannot be extended.
     """
     parent = marked_node(machine)
-    adopt_branches(parent, _put_below)
+    adopt_branches(parent)
     for below, child in machines_below(machine):
-        if isinstance(child, parent.tree.container_class):
-            container = child
-        elif parent.wraps(below):
-            container = _put_below(child, parent)
-        else:
-            continue
-        node = marked_node(container)
-        if container is not machine and (node.parent is None or node.tree is not parent.tree):
+        node = node_of(child)
+        if node is None:
+            if not parent.wraps(below):
+                continue
+            node = _put_below(child, parent)
+        if node.parent is None or node.tree is not parent.tree:
             _move_below(node, parent, below)
         node.in_force.wrap_with(nested=parent.in_force.nested)
-        adopt(container)
+        adopt(node.machine)
 
 
-def _put_below(child: smach.StateMachine, parent: TreeNode) -> smach.StateMachine:
-    container = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
-    marked_node(container).in_force.wrap_with(parent.in_force.strict, inherits=True)
-    return container
+def _put_below(child: smach.StateMachine, parent: TreeNode) -> TreeNode:
+    node = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
+    node.in_force.wrap_with(parent.in_force.strict, inherits=True)
+    return node
 
 
 def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
@@ -344,14 +262,14 @@ def unwrap(machine: smach.StateMachine) -> smach.StateMachine:
 
 
 def _strip(machine: smach.StateMachine) -> None:
-    container_class = marked_node(machine).tree.container_class
     for _, child in list(machines_below(machine)):
-        if not isinstance(child, container_class):
+        node = node_of(child)
+        if node is None:
             continue
-        if marked_node(child).in_force.inherits:
-            _strip(child)
+        if node.in_force.inherits:
+            _strip(node.machine)
         else:
-            _stand_alone(child)
+            _stand_alone(node.machine)
     strip_alone(machine)
 
 
@@ -397,7 +315,7 @@ def _make_bare(machine: smach.StateMachine) -> None:
     """
     tree, name = marked_node(machine).tree, marked_node(machine).name
     for _, child in list(machines_below(machine)):
-        if isinstance(child, tree.container_class):
+        if node_of(child) is not None:
             _make_bare(child)
     strip_alone(machine)
     if isinstance(machine, tree.container_class):

@@ -34,7 +34,6 @@ class Execution:
 
     __slots__ = (
         '_node',
-        '_is_whole',
         'runs_around',
         'departure',
         'unrecovered',
@@ -43,10 +42,8 @@ class Execution:
         '_is_preempt_told',
     )
 
-    def __init__(self, node: 'TreeNode', is_whole: bool = True) -> None:
-        """`is_whole`: it is told of, and begins a history. What holds a branch does so for it."""
+    def __init__(self, node: 'TreeNode') -> None:
         self._node = node
-        self._is_whole = is_whole
         self.runs_around: Tuple[Scope, ...] = ()
         self.renew()
 
@@ -99,9 +96,6 @@ class Execution:
         """Be the present execution of the container from now on."""
         node = self._node
         node.execute_as(self)
-        if not self._is_whole:
-            node.engine.begin_execution()
-            return
         node.begin_execution()
         self.starts_in = node.start_from_above(take=True)
         entry = node.tree.resumed.entry_of(node)
@@ -121,20 +115,25 @@ class Execution:
         dropped = node.tree.control.leave(node.engine, lambda: node.key)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
-        if self._is_whole and node.events.observers:
+        if node.events.observers and node.site.is_container:
             why = why_no_outcome(outcome, error)
             node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
         self.runs_around = ()
         node.records.drop_snapshots()
 
-    def begin_at_the_end(self) -> None:
-        """Be the present execution where the state was executed already, by another.
+    def begin_branch(self, has_ended: bool) -> bool:
+        """Begin as that of a branch, which its Concurrence or Iterator may execute several times.
 
-        A verdict that has come meanwhile is for this one.
+        Return whether it still may.
+
+        :param has_ended: the state was executed already. A verdict that has come is for this one.
         """
-        with self._node.tree.departures_lock:
-            self.departure = self._node.execution.departure
-            self._node.execute_as(self)
+        if has_ended:
+            self._is_preempt_told = False
+        else:
+            self.renew()
+        self._node.engine.begin_execution()
+        return self.look_around()
 
     # -- where the containers in the present state begin
 

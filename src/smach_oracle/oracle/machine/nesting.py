@@ -1,13 +1,13 @@
 """Finds the machines nested in others, and those of them that are under an oracle."""
 
 from collections import deque
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
+from typing import Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
 
 import smach
 
 from ..identity import own_mark
-from ..smach_private import Labels
-from .tree_node import TreeNode, marked_node
+from ..smach_private import Labels, states_of
+from .tree_node import TreeNode, marked_node, node_of
 
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
 
@@ -16,7 +16,7 @@ class Wrapper(Protocol):
     """The data kept for a Concurrence or an Iterator (`branches.wrapper`)."""
 
     container: smach.Container
-    machines: Dict[str, smach.StateMachine]
+    branches: Dict[str, smach.StateMachine]  # each stands for one
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -37,13 +37,12 @@ def machines_below(
 ) -> Iterator[Tuple[Labels, smach.StateMachine]]:
     """Yield the state machines nested in a container, each with the labels that lead to it.
 
-    It looks through Concurrences and Iterators, but not into the machines that it finds. Of a
-    plain state of those it yields the hidden machine, if it has one, with the labels of the
-    Concurrence or Iterator.
+    It looks through Concurrences and Iterators, but not into the machines that it finds. It yields
+    the branches of those, too, with the labels of the Concurrence or Iterator.
     """
     wrapper = wrapper_of(container)
     if wrapper is not None:
-        yield from ((below, each) for each in [*wrapper.machines.values()])
+        yield from ((below, each) for each in [*wrapper.branches.values()])
     for label, state in list(children_of(container).items()):
         path = below + (label,)
         if isinstance(state, smach.StateMachine):
@@ -70,7 +69,7 @@ def branching_below(
 def children_of(container: object) -> Mapping[str, smach.State]:
     """Return the states of a container by label, none of what is no container."""
     if isinstance(container, smach.StateMachine):
-        return container._states
+        return states_of(container)
     return container.get_children() if isinstance(container, smach.Container) else {}
 
 
@@ -95,7 +94,7 @@ def items_under_way(node: TreeNode) -> str:
     """Say which items of the Iterators around a container are under way, the innermost first."""
     found: List[str] = []
     while node.parent is not None:
-        state: Any = node.parent.machine._states.get(node.below[0])
+        state: object = states_of(node.parent.machine).get(node.below[0])
         around: List[str] = []
         for label in node.below[1:] + ('',):
             wrapper = wrapper_of(state)
@@ -110,12 +109,11 @@ def items_under_way(node: TreeNode) -> str:
 
 def containers_in(machine: smach.StateMachine) -> List[smach.StateMachine]:
     """Return a wrapped machine and all wrapped machines nested in it, each once."""
-    wrapped = marked_node(machine).tree.container_class
-    found: Dict[int, smach.StateMachine] = {id(machine): machine}
+    found = {id(machine): machine}
     waiting = deque(found.values())
     while waiting:
         for _, child in machines_below(waiting.popleft()):
-            if id(child) not in found and isinstance(child, wrapped):
+            if id(child) not in found and node_of(child) is not None:
                 found[id(child)] = child
                 waiting.append(found[id(child)])
     return list(found.values())

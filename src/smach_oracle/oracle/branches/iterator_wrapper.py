@@ -1,0 +1,162 @@
+"""Iterators of a wrapped tree: which item is under way, and where one goes on."""
+
+from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
+
+import smach
+
+from ..machine.nesting import children_of, machines_below
+from ..machine.tree_node import TreeNode, node_of
+from ..recovery.failure import Failure, judge
+from ..settings.failing_outcomes import is_preempted
+from ..smach_private import Labels, items_of
+from .item_userdata import ItemUserdata
+from .items import TrackedItems
+from .wrapper import ContainerWrapper, wrapper_of
+
+
+class IteratorWrapper(ContainerWrapper):
+    """The data kept for an Iterator."""
+
+    def __init__(self, container: smach.Container, top: TreeNode, below: Labels) -> None:
+        super().__init__(container, top, below)
+        self._trial_id = ''  # that of `tracked`
+        self._rounds = 0  # how often it has begun again
+        self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
+        self.item_userdata = ItemUserdata(container)
+        self._ended_with: Optional[str] = None  # None: an error, or it was left
+        self._is_left = False
+        self._is_asked_to_go_on = False
+        self.goes_on = False
+
+    # -- going on
+
+    def ask_to_go_on(self, go_on: bool) -> None:
+        """Let the next execution go on where the one before has stopped, or begin again."""
+        self._is_asked_to_go_on = go_on
+
+    def has_stopped_early(self, node: TreeNode, label: str) -> bool:
+        """Whether it has failed or was left, when it was executed last."""
+        outcome = self._ended_with
+        return (
+            outcome is None
+            or is_preempted(outcome)
+            or isinstance(judge(node, node.record(label), outcome, None), Failure)
+        )
+
+    def note_left(self) -> None:
+        """Note that it is left for a state elsewhere: the outcome it gets is no word of its own."""
+        self._is_left = True
+
+    def items(self, container: smach.Container, items: Any) -> Any:
+        """Return what the Iterator goes through in place of its items."""
+        is_own = container is self.container and self._is_in_use
+        return self.tracked if is_own and self.tracked is not None else items
+
+    def _begin(self) -> None:
+        """Find out where it begins, and whether it goes on."""
+        items, trial_id = self.tracked, self._trial_now()
+        inside = tuple(wrapper.mark() for wrapper in self._iterators_around())
+        if items is None or items.given is not items_of(self.container):
+            items = TrackedItems(items_of(self.container), self._tell)
+        has_rest = items.has_rest() and (trial_id, inside) == (self._trial_id, self._inside)
+        self.goes_on = items.goes_on = self._is_asked_to_go_on and has_rest
+        self._is_asked_to_go_on = False
+        if has_rest and self._ended_with is None and not self.goes_on:
+            items.tell_of_repeats()
+        resumed = self._to_resume()
+        items.begins_with = 1 if resumed is None else resumed.item
+        # a branch notes by itself that an item begins
+        items.begins = None if self.branches else self.begin_item
+        if self.goes_on:
+            self._pass_on(items)
+        else:
+            self._rounds += 1
+        self.tracked, self._trial_id, self._ended_with = items, trial_id, None
+        self._is_left = False
+        self._inside = inside
+        for branch in self.branches.values():
+            branch.begin(self)
+
+    def mark(self) -> Tuple[int, int]:
+        """Return what is different for each item: its number, and that of the round."""
+        return self._rounds, self.tracked.number if self.tracked is not None else 0
+
+    def _iterators_around(self) -> Iterator['IteratorWrapper']:
+        node: Optional[TreeNode] = self.top
+        below: Tuple[str, ...] = self.below
+        while node is not None:
+            container: object = node.machine
+            for label in below[:-1]:
+                container = children_of(container)[label]
+                wrapper = wrapper_of(container)
+                if isinstance(wrapper, IteratorWrapper):
+                    yield wrapper
+            below = node.below
+            node = node.parent
+
+    def _pass_on(self, items: TrackedItems) -> None:
+        """Let an Iterator directly inside go on too: its items belong to the unfinished one."""
+        for _, state in self.states():
+            inner = wrapper_of(state)
+            if isinstance(inner, IteratorWrapper):
+                inner.ask_to_go_on(not items.is_finished)
+
+    def _tell(self, text: str) -> None:
+        self.top.warn(text, '/'.join(self.below))
+
+    def begin_item(self) -> None:
+        """Note that an item begins."""
+        begun: Optional[Mapping[str, Any]] = None
+        for node in self.nodes():
+            record = node.records.by_label.get(node.site.label)
+            unfinished = None if record is None else node.tree.resumed.unfinished(record)
+            begun = None if unfinished is None else unfinished.snapshot
+        top = self.top
+        self.item_userdata.begin_item(begun, top.in_force.deep_copy_keys, top.warn_not_copied)
+
+    def leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
+        """Tell that the container has ended, and let its states execute by themselves again."""
+        self._ended_with = None if self._is_left else outcome
+        if self.tracked is not None and self.tracked.is_exhausted:
+            # the author has gone on behind it where an oracle has given up
+            for _, machine in machines_below(self.container):
+                node = node_of(machine)
+                if node is not None:
+                    node.execution.forget_unrecovered()
+        super().leave(outcome, error)
+
+    def __getstate__(self) -> Dict[str, Any]:
+        return dict(
+            super().__getstate__(), tracked=None, _ended_with=None, _is_asked_to_go_on=False
+        )
+
+    # -- userdata
+
+    def take_inputs(
+        self,
+        container: smach.Container,
+        copy: Callable[[], None],
+        parent_ud: Optional[smach.UserData],
+    ) -> None:
+        """Take the inputs, but keep what finished items have left, where it goes on."""
+        kept = self._keys_to_keep(parent_ud) if container is self.container else {}
+        super().take_inputs(container, copy, parent_ud)
+        for key, value in kept.items():
+            container.userdata[key] = value
+
+    def _keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
+        """Return the values of its keys that its inputs do not replace, as it begins or goes on.
+
+        `userdata`: what the inputs are copied from.
+        """
+        deep = self.top.in_force.deep_copy_keys
+        if not self.goes_on:
+            self.item_userdata.begin(userdata, deep, self.top.warn_not_copied)
+            return {}
+        if (
+            self.tracked is not None
+            and not self.tracked.is_finished
+            and self.top.settings.userdata == 'restore'
+        ):
+            self.item_userdata.take_back(deep)
+        return self.item_userdata.to_keep(userdata)

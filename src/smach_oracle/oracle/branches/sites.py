@@ -1,0 +1,181 @@
+"""The sites of branches: plain states of a Concurrence or an Iterator."""
+
+from dataclasses import replace
+from typing import Any, Optional, Tuple
+
+import smach
+
+from ..asking.question import OutcomeChoice
+from ..identity import attribute_of
+from ..machine.nesting import wrapper_of
+from ..machine.site import Route, Site, failure_kind, route_of
+from ..machine.tree_node import TreeNode
+from ..records.events import Event, EventKind, FailureKind
+from ..settings.settings import Settings, StateSettings
+from ..smach_private import (
+    break_outcomes_of,
+    final_outcomes_of,
+    loop_outcomes_of,
+    outcome_map_of,
+    states_of,
+)
+
+_LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
+
+
+class BranchSite(Site):
+    """The Concurrence or Iterator that holds a plain state, as the oracle of the state knows it."""
+
+    is_container = False
+    goes_on_with_any = True
+    begins_by = EventKind.STATE_START
+
+    def __init__(self, container: smach.Container, label: str) -> None:
+        self.container = container
+        self.label = label
+
+    def shown(self, node: TreeNode) -> smach.Container:
+        """Return the container that people see."""
+        return self.container
+
+    def settings_of_state(self, settings: StateSettings) -> StateSettings:
+        """Leave out preconditions by label: beside a branch is no state that could be run for it.
+
+        A path names one elsewhere.
+        """
+        if not any(spec.labels() for spec in settings.preconditions):
+            return settings
+        return replace(
+            settings,
+            preconditions=tuple(
+                spec
+                for spec in settings.preconditions
+                if all('/' in label for label in spec.labels())
+            ),
+        )
+
+    def foresees(
+        self,
+        node: TreeNode,
+        outcome: str,
+        route: Route,
+        kind: FailureKind,
+        settings: StateSettings,
+    ) -> bool:
+        """Whether the author has said what is to happen at this failing outcome."""
+        return settings.author_recoveries != 'override' and self._is_drawn(node, outcome)
+
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
+        raise NotImplementedError
+
+    def in_words(self, route: Route, outcome: str) -> Route:
+        """Say where an outcome leads, for people."""
+        return Route(self._leads_to(outcome), True)
+
+    def _leads_to(self, outcome: str) -> str:
+        raise NotImplementedError
+
+    def choices(self, node: TreeNode, label: str) -> Tuple[OutcomeChoice, ...]:
+        """Return the outcomes, and where they lead. Those that lead to the next item come first."""
+        last = [
+            (not self._goes_on_after(outcome), str(outcome), outcome)
+            for outcome in states_of(node.machine)[label].get_registered_outcomes()
+        ]
+        return tuple(
+            OutcomeChoice(outcome, self._leads_to(outcome)) for _, _, outcome in sorted(last)
+        )
+
+    def _goes_on_after(self, outcome: str) -> bool:
+        """Whether an outcome leads to the next item."""
+        return False
+
+    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
+        """Say nothing: the Concurrence or Iterator tells."""
+
+    def ended_by(self, node: TreeNode, event: Event) -> Optional[str]:
+        """Return the outcome with which the branch ends at an event, None for other events."""
+        outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
+        is_end = event.kind in _LEAVES and outcome and not node.is_oracle(outcome)
+        return outcome if is_end and outcome not in states_of(node.machine) else None
+
+    def is_line_over(self, node: TreeNode, event: Event) -> bool:
+        """Whether the branch is over by an event."""
+        return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
+
+
+class ConcurrenceSite(BranchSite):
+    """The site of one state of a Concurrence."""
+
+    def settings_here(self, settings: Settings) -> Settings:
+        """Keep the userdata at jumps: others write it at the same time."""
+        return replace(settings, userdata='keep', deep_copy_keys=())
+
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
+        """Whether the outcome map names it for the branch, and leads to what is no failure."""
+        return any(
+            not is_failure_above(node, name)
+            for name, conditions in _entries(outcome_map_of(self.container))
+            if dict(_entries(conditions)).get(self.label) == outcome
+        )
+
+    def _leads_to(self, outcome: str) -> str:
+        return 'the end of this branch'
+
+
+class IteratorSite(BranchSite):
+    """The site of the state of an Iterator."""
+
+    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
+        """Whether it leads to the next item, or is mapped to what is no failure."""
+        if loops(self.container, outcome):
+            return True
+        mapped = final_outcomes_of(self.container)
+        return outcome in mapped and not is_failure_above(node, mapped[outcome])
+
+    def _leads_to(self, outcome: str) -> str:
+        if loops(self.container, outcome):
+            return 'the next item'
+        return 'the end of the iteration, with {}'.format(
+            final_outcomes_of(self.container).get(outcome, outcome)
+        )
+
+    def _goes_on_after(self, outcome: str) -> bool:
+        return loops(self.container, outcome)
+
+    def tell_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
+        """Say which item is passed over where this failing outcome leads to the next one."""
+        wrapper = wrapper_of(self.container)
+        item = wrapper.in_words() if wrapper is not None else ''
+        if item and loops(self.container, outcome):
+            text = '{} is passed over with {}, as its author has drawn it'
+            node.warn(text.format(item, outcome), label)
+
+
+def loops(iterator: smach.Container, outcome: str) -> bool:
+    """Whether an outcome of its state leads an Iterator to the next item."""
+    looping, breaking = loop_outcomes_of(iterator), break_outcomes_of(iterator)
+    return outcome not in breaking and (not looping or outcome in looping)
+
+
+def is_failure_above(node: TreeNode, outcome: str) -> bool:
+    """Whether an outcome of the Concurrence or Iterator of a branch is a failure above it.
+
+    By its name alone where another Concurrence or Iterator is around it.
+    """
+    parent = node.parent
+    if parent is None or len(node.below) != 1:
+        return outcome in node.in_force.failing
+    (label,) = node.below
+    kind = failure_kind(
+        outcome,
+        route_of(parent.machine, label, outcome),
+        parent.settings_of(label).failure_outcomes,
+        parent.in_force.failing,
+    )
+    return kind is not FailureKind.NOT_A_FAILURE
+
+
+def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:
+    """Return the entries of an outcome map, or of the conditions in it. None of what is no map."""
+    items = attribute_of(given, 'items')
+    return tuple(items()) if callable(items) else ()
