@@ -22,7 +22,7 @@ from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, has_keys, names_that_engine_lacks, opened_container
+from .smach_private import Transitions, data_of, has_keys, names_that_engine_lacks, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -364,7 +364,7 @@ class OracleContainer(smach.StateMachine):
                 or not has_keys(state, view.input_keys, view.output_keys)
             ):
                 view = record.view = StateView(self, label, state)
-            record.snapshot = view.data.copy()
+            record.snapshot = data_of(view.userdata).copy()
             observed = node.events.observers
             constants = self._constants.get(label)
             outcome: Any  # a user's state may return anything

@@ -5,7 +5,7 @@ from typing import Collection, Iterable, Mapping, Optional, Tuple, cast
 import smach
 
 from ..identity import own_mark
-from ..smach_private import data_of, keys_of
+from ..smach_private import keys_of
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 
@@ -67,12 +67,11 @@ class StateView:
     each visit.
     """
 
-    __slots__ = ('remapper', 'state', 'userdata', 'data', 'remapping', 'input_keys', 'output_keys')
+    __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
 
     def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
-        self.data = data_of(machine.userdata)
         self.state: Optional[smach.State] = None  # made for one visit
         if (
             _KEEPS_KEY_SETS

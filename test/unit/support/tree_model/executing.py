@@ -121,7 +121,7 @@ class _InTurn(OracleState):
 
     def execute(self, ud: Any) -> str:
         """Recover, as its class does."""
-        recovery: Any = self._recovering
+        recovery: Any = self._recovery
         if recovery.failure.is_held_back:
             self._world.turns.wait('{}/{}'.format(self._node.path, recovery.failure.state))
             self._await_preempt(recovery)
