@@ -94,6 +94,10 @@ def check_answer(answer: Answer, choices: AnswerChoices) -> None:
     check_output_keys(choices.failed_state, answer.outputs or (), choices.output_keys)
 
 
+def _refuse(what: str, allowed: Iterable[object], more: str = '') -> None:
+    raise AnswerError('{}; allowed: {}{}'.format(what, names(allowed), more))
+
+
 def check_output_keys(state: str, keys: Iterable[str], allowed: Sequence[str]) -> None:
     """Check that outputs go to output keys of a state, to each once at most.
 
@@ -102,9 +106,7 @@ def check_output_keys(state: str, keys: Iterable[str], allowed: Sequence[str]) -
     given: List[str] = list(keys)
     unknown = [key for key in given if key not in allowed]
     if unknown:
-        raise AnswerError(
-            '{} has no output keys {}; allowed: {}'.format(state, names(unknown), names(allowed))
-        )
+        _refuse('{} has no output keys {}'.format(state, names(unknown)), allowed)
     if len(set(given)) < len(given):
         raise AnswerError(
             'output keys come twice: {}'.format(
@@ -119,11 +121,7 @@ def check_outcome(state: str, outcome: str, allowed: Sequence[str]) -> None:
     :raises AnswerError: where it may not.
     """
     if outcome not in allowed:
-        raise AnswerError(
-            '{} has no outcome {!r} to supersede it with; allowed: {}'.format(
-                state, outcome, names(allowed)
-            )
-        )
+        _refuse('{} has no outcome {!r} to supersede it with'.format(state, outcome), allowed)
 
 
 def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
@@ -136,20 +134,13 @@ def _check_goto(answer: Answer, choices: AnswerChoices) -> None:
     ]
     if target not in choices.states:
         elsewhere = [path for path, label in choices.states if label == answer.state]
-        raise AnswerError(
-            '{} has no state {!r} to go to; allowed: {}{}'.format(
-                container or choices.container,
-                answer.state,
-                names(free),
-                '; it is in {}: name the container'.format(names(elsewhere)) if elsewhere else '',
-            )
+        _refuse(
+            '{} has no state {!r} to go to'.format(container or choices.container, answer.state),
+            free,
+            '; it is in {}: name the container'.format(names(elsewhere)) if elsewhere else '',
         )
     if choices.states[target]:
-        raise AnswerError(
-            '{} cannot be entered now: {}; allowed: {}'.format(
-                answer.state, choices.states[target], names(free)
-            )
-        )
+        _refuse('{} cannot be entered now: {}'.format(answer.state, choices.states[target]), free)
 
 
 def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
@@ -157,29 +148,24 @@ def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
 
 
 def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:
-    container = answer.container
-    if container:
+    container = answer.container or choices.container
+    allowed, more = choices.give_up_outcomes, ', or none at all'
+    if answer.container:
         allowed = [outcome for path, outcome in choices.give_up_above if path == container]
-        if answer.outcome not in allowed:
-            raise AnswerError(
-                '{} has no outcome {!r} to give up with; allowed: {}'.format(
-                    container, answer.outcome, names(allowed)
-                )
-            )
-    elif answer.outcome and answer.outcome not in choices.give_up_outcomes:
-        raise AnswerError(
-            '{} has no outcome {!r} to give up with; allowed: {}, or none at all'.format(
-                choices.container, answer.outcome, names(choices.give_up_outcomes)
-            )
+        more = ''
+    if answer.outcome not in allowed and (answer.outcome or answer.container):
+        _refuse(
+            '{} has no outcome {!r} to give up with'.format(container, answer.outcome),
+            allowed,
+            more,
         )
 
 
 def _check_interface(answer: Answer, choices: AnswerChoices) -> None:
     if answer.interface not in choices.interfaces:
-        raise AnswerError(
-            'no interface {!r} is on offer for {}; allowed: {}'.format(
-                answer.interface, choices.failed_state, names(choices.interfaces)
-            )
+        _refuse(
+            'no interface {!r} is on offer for {}'.format(answer.interface, choices.failed_state),
+            choices.interfaces,
         )
 
 

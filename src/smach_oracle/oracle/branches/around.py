@@ -2,6 +2,8 @@
 
 from typing import List, Tuple
 
+import smach
+
 from ..machine.nesting import branching_below
 from ..machine.tree_node import TreeNode
 from ..smach_private import states_of
@@ -39,6 +41,6 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
     Any other Iterator of the container begins again when it is entered.
     """
     for label, state in list(states_of(node.machine).items()):
-        wrapper = wrapper_of(state)
+        wrapper = wrapper_of(state) if isinstance(state, smach.Container) else None
         if isinstance(wrapper, IteratorWrapper):
             wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

@@ -68,7 +68,7 @@ def execute_watched(
         outcome: object = None
         try:
             if record.settings.time_limit_s is not None and node.tree.recover:
-                outcome = _execute_limited(node, record, state, record.settings.time_limit_s)
+                outcome = _execute_limited(node, record, state)
             elif entered_by_oracle:
                 outcome = WatchedVisit(node, record).execute(userdata)
             else:
@@ -85,9 +85,7 @@ def execute_watched(
             node.execution.start_below(())
 
 
-def _execute_limited(
-    node: TreeNode, record: StateRecord, state: smach.State, limit_s: float
-) -> object:
+def _execute_limited(node: TreeNode, record: StateRecord, state: smach.State) -> object:
     """Execute a state in a worker, as `execute_watched` does."""
     machine, label = node.machine, record.label
 
@@ -104,8 +102,7 @@ def _execute_limited(
         view_behind(gate, machine, label, state),
         gate,
         label,
-        limit_s,
-        record.settings.grace_period_s,
+        record.settings,
     )
     if result.error is not None:
         raise result.error

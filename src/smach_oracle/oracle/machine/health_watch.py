@@ -2,7 +2,7 @@
 
 import random
 import threading
-from typing import Any, Callable, List, Optional, Protocol, Sequence, Set, Tuple
+from typing import TYPE_CHECKING, Callable, List, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -18,6 +18,9 @@ from ..settings.health import (
 )
 from .health_ports import HealthFunctionPort, HealthPort
 
+if TYPE_CHECKING:
+    from .tree_node import TreeNode
+
 LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
 # A function knows only how the robot is at this moment. It is asked so often in the settle time,
 # at irregular moments, so that a robot that is well at every other moment is not taken as well.
@@ -29,21 +32,10 @@ FAILED = 'failed'  # what has happened to a state that waits
 ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
 
 
-class Teller(Protocol):
-    """A container that tells the observers of what goes on in it (`TreeNode`)."""
-
-    @property
-    def path(self) -> str:
-        """Its path."""
-
-    def emit(self, kind: EventKind, **fields: Any) -> None:
-        """Tell the observers."""
-
-
 class _UnwellPhase:
     """The time from the first container that waits to the last. `teller` is the first's."""
 
-    def __init__(self, teller: Teller, state: str, why: str, clock: Clock) -> None:
+    def __init__(self, teller: 'TreeNode', state: str, why: str, clock: Clock) -> None:
         self.teller = teller
         self.state = state
         self.why = why
@@ -145,7 +137,7 @@ class HealthWatch:
             scope.wait(max(0.0, min(self._until_next_look_s(), until_s - now())))
 
     def wait_until_well(
-        self, teller: Teller, state: str, what: str, why: str, scope: Scope
+        self, teller: 'TreeNode', state: str, what: str, why: str, scope: Scope
     ) -> bool:
         """Wait until the robot has been well for the settle time.
 
@@ -176,7 +168,9 @@ class HealthWatch:
         mean_s = max(SHORTEST_LOOK_S, self._settle_s / LOOKS_IN_SETTLE_TIME)
         return min(LOOK_PERIOD_S, mean_s) * random.uniform(0.2, 1.8)
 
-    def _join(self, teller: Teller, state: str, what: str, why: str, clock: Clock) -> _UnwellPhase:
+    def _join(
+        self, teller: 'TreeNode', state: str, what: str, why: str, clock: Clock
+    ) -> _UnwellPhase:
         place = '{}/{}'.format(teller.path, state)
         with self._lock:
             phase = self._phase

@@ -16,6 +16,7 @@ from ..identity import attribute_of, own_mark
 from ..scope.background_call import BackgroundCall, KeptThread
 from ..scope.clock import Clock
 from ..scope.scope import CallEnd, Reason, Scope, inside
+from ..settings.settings import StateSettings
 from .snapshots import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
@@ -70,26 +71,30 @@ class Workers:
         userdata: smach.Remapper,
         gate: UserdataGate,
         label: str,
-        limit_s: float,
-        grace_s: float,
+        settings: StateSettings,
     ) -> LimitedResult:
-        """Execute `state` with a time limit and a grace period, in seconds of monotonic time.
+        """Execute `state` with the time limit and the grace period of some settings.
 
         The limit stands still while a person is asked about something inside the state.
         `gate` is what `userdata` writes through. What the state raises is told in the result, not
         raised.
         """
+        limit_s, grace_s = settings.time_limit_s or 0.0, settings.grace_period_s
         run = Scope(clock=self._clock, limit_s=limit_s)
-        call = BackgroundCall(
-            functools.partial(_execute_inside, run, state, userdata),
-            'smach_oracle worker of {}'.format(label),
-            functools.partial(self._ended_late, state),
-        )
+
+        def execute() -> object:
+            with inside(run):
+                return state.execute(userdata)
 
         def stop() -> None:
             gate.shut()
             request_preempt(state)
 
+        def end_late() -> None:
+            self.under_way.pop(id(state), None)
+            recall_preempts(state)
+
+        call = BackgroundCall(execute, 'smach_oracle worker of {}'.format(label), end_late)
         self.under_way[id(state)] = run
         end = None
         try:
@@ -99,45 +104,39 @@ class Workers:
                 self._block(state, call, _LATE)
                 run.cancel(Reason.LEFT_BEHIND)
                 _stop_bare_machines(state)
-            else:
+            elif end is CallEnd.BY_ITSELF:
                 self.under_way.pop(id(state), None)
-                if end is not CallEnd.BY_ITSELF:
-                    recall_preempts(state)
+            else:
+                end_late()
         if end is CallEnd.BY_ITSELF:
             return LimitedResult(call.result, call.error)
+        ended = 'ended when it was preempted'
+        if call.left:
+            ended = 'was abandoned {:g} s after it was preempted'.format(grace_s)
         return LimitedResult(
-            overrun='overran its time limit of {:g} s and '.format(limit_s)
-            + (
-                'was abandoned {:g} s after it was preempted'.format(grace_s)
-                if call.left
-                else 'ended when it was preempted'
-            )
+            overrun='overran its time limit of {:g} s and {}'.format(limit_s, ended)
         )
-
-    def _ended_late(self, state: smach.State) -> None:
-        self.under_way.pop(id(state), None)
-        recall_preempts(state)
 
     def call(
         self,
         function: Callable[[smach.UserData], object],
         userdata: smach.UserData,
         gate: UserdataGate,
-        limit_s: Optional[float],
-        grace_s: float,
+        settings: StateSettings,
         scope: Scope,
     ) -> LimitedResult:
-        """Call `function` until its time limit (s, None: no limit), or until `scope` is cancelled.
+        """Call `function` until its time limit, if any, or until `scope` is cancelled.
 
-        It has `grace_s` more to end by itself, in which it writes nothing any more, and is left
-        behind then. `gate` is what `userdata` writes through. What the function raises is told in
-        the result, not raised.
+        It has the grace period more to end by itself, in which it writes nothing any more, and is
+        left behind then. `gate` is what `userdata` writes through. What the function raises is told
+        in the result, not raised.
         """
-        thread = self._take_thread()
+        thread, limit_s = self._take_thread(), settings.time_limit_s
         call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
+        within = scope if limit_s is None else Scope(scope, limit_s=limit_s)
         end = None
         try:
-            end = Scope(scope, limit_s=limit_s).run(call, grace_s, gate.shut)
+            end = within.run(call, settings.grace_period_s, gate.shut)
         finally:
             if call.left:
                 is_late = end is CallEnd.OVERRUN and scope.reason is None
@@ -148,11 +147,9 @@ class Workers:
                 thread.end()
         if end is CallEnd.BY_ITSELF:
             return LimitedResult(call.result, call.error)
-        why = (
-            'overran its time limit of {:g} s'.format(limit_s or 0.0)
-            if end is CallEnd.OVERRUN
-            else 'was stopped by a preempt or a shutdown'
-        )
+        why = 'was stopped by a preempt or a shutdown'
+        if end is CallEnd.OVERRUN:
+            why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
         return LimitedResult(overrun=why + (' and was left behind' if call.left else ''))
 
     def _take_thread(self) -> KeptThread:
@@ -160,7 +157,7 @@ class Workers:
         with self._lock:
             while self._idle:
                 thread = self._idle.pop()
-                if thread.thread.is_alive():  # it is not where the process was forked
+                if thread.is_usable():
                     return thread
         return KeptThread(_FUNCTION)
 
@@ -173,11 +170,6 @@ class Workers:
     def _block(self, target: object, call: BackgroundCall, why: str) -> None:
         with self._lock:
             self.abandoned[id(target)] = _Left(target, call, why)
-
-
-def _execute_inside(run: Scope, state: smach.State, userdata: smach.Remapper) -> object:
-    with inside(run):
-        return state.execute(userdata)
 
 
 def request_preempt(state: smach.State) -> None:

@@ -149,15 +149,16 @@ def _run_preconditions(recovery: Recovery) -> Preconditions:
 
 
 def _run_precondition(recovery: Recovery, spec: PreconditionSpec) -> bool:
-    name, waits = spec.name, 'did not get its precondition ' + spec.name
+    name = spec.name
     recovery.tell(EventKind.PRECONDITION_START, target=name)
     why_not = why_not_met(recovery, spec)
     for _ in range(recovery.record.most_repeats if why_not else 0):
-        if not why_not or not recovery.origin.has_waited_after(waits):
+        waits = recovery.origin.has_waited_after
+        if not why_not or not waits('did not get its precondition ' + name):
             break
         why_not = why_not_met(recovery, spec)
     outcome = 'not met' if why_not else 'met'
-    recovery.tell(EventKind.PRECONDITION_END, outcome, name, why_not)
+    recovery.tell(EventKind.PRECONDITION_END, outcome=outcome, target=name, text=why_not)
     if why_not:
         recovery.not_met = name
     else:

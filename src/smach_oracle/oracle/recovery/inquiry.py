@@ -95,8 +95,13 @@ class Inquiry:
             answer = addressed(checked_type(given), choices_of(question))
             self._check(answer, question)
             if recovery.takes(answer):
-                kind, why = answer.kind.name.lower(), answer.why
-                self._tell(EventKind.QUERY_ANSWERED, kind, answer.named(), why, answer.by)
+                self._tell(
+                    EventKind.QUERY_ANSWERED,
+                    outcome=answer.kind.name.lower(),
+                    target=answer.named(),
+                    by=answer.by,
+                    text=answer.why,
+                )
             if answer.kind is AnswerKind.INTERFACE:
                 return self._try_interface(answer, question)
             return answer
@@ -168,7 +173,7 @@ class Inquiry:
                 self._check_done(done, question)
                 outcome = done.outcome
         finally:
-            self._tell(EventKind.INTERFACE_END, outcome, offer.name, by=by)
+            self._tell(EventKind.INTERFACE_END, target=offer.name, by=by, outcome=outcome)
         self._recovery.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
         return done if done is None or done.by else done._replace(by=by)
 
@@ -177,10 +182,8 @@ class Inquiry:
             raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
         self._check(done, question)
 
-    def _tell(
-        self, kind: EventKind, outcome: str = '', target: str = '', text: str = '', by: str = ''
-    ) -> None:
-        self._recovery.tell(kind, outcome, target, text, self._recovery.question_id, by)
+    def _tell(self, kind: EventKind, **fields: str) -> None:
+        self._recovery.tell(kind, query_id=self._recovery.question_id, **fields)
 
 
 def _say_that_it_waits(recovery: Recovery, question: Question) -> None:

@@ -83,8 +83,7 @@ def _call(recovery: Recovery, spec: PreconditionSpec) -> None:
         spec.target,
         behind(gate),
         gate,
-        settings.time_limit_s,
-        settings.grace_period_s,
+        settings,
         recovery.scope,
     )
     if isinstance(ended.error, Exception):
@@ -197,8 +196,7 @@ def _with_limit(recovery: Recovery, site: _RunIn, state: smach.State, label: str
         view_behind(gate, node.machine, label, state),
         gate,
         label,
-        settings.time_limit_s,
-        settings.grace_period_s,
+        settings,
     )
     if result.error is not None:
         raise result.error

@@ -123,19 +123,9 @@ class Recovery:
         """Log what the operator should know of this failure, and tell the observers."""
         self.node.warn(text, self.record.label)
 
-    def tell(
-        self,
-        kind: EventKind,
-        outcome: str = '',
-        target: str = '',
-        text: str = '',
-        query_id: str = '',
-        by: str = '',
-    ) -> None:
+    def tell(self, kind: EventKind, **fields: str) -> None:
         """Tell the observers of a step that is about the failed state."""
-        self.node.emit(
-            kind, self.record.label, outcome, target, text=text, query_id=query_id, by=by
-        )
+        self.node.emit(kind, self.record.label, **fields)
 
     def facts(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""
@@ -251,4 +241,4 @@ def _takes_any(answer: Answer) -> bool:
 
 
 def _as_it_stands(recovery: Recovery) -> None:
-    """A failure is over, and the next question tells of it what the first one has told."""
+    """A failure is over, and its next question says the same of it."""

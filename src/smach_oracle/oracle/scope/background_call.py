@@ -1,7 +1,6 @@
 """Calls a function in a thread of its own, so that nobody has to wait for its end."""
 
 import contextvars
-import functools
 import os
 import queue
 import threading
@@ -19,12 +18,16 @@ class KeptThread:
     def __init__(self, name: str) -> None:
         self._pid = os.getpid()
         self._calls: 'queue.SimpleQueue[Optional[Callable[[], None]]]' = queue.SimpleQueue()
-        self.thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self.thread = _thread(self._work, name)
         self.thread.start()
 
     def begin(self, call: Callable[[], None]) -> None:
         """Begin a call in the thread."""
         self._calls.put(call)
+
+    def is_usable(self) -> bool:
+        """Whether the thread is here: it is not in a child that the process has forked."""
+        return self._pid == os.getpid()
 
     def end(self) -> None:
         """Let the thread end after the call that it makes now, if any."""
@@ -34,7 +37,7 @@ class KeptThread:
         for call in iter(self._calls.get, None):
             call()
             del call  # with what it holds: its result may be large
-            if os.getpid() != self._pid:
+            if not self.is_usable():
                 return  # the call has forked, and nobody in the child has another
 
 
@@ -60,18 +63,19 @@ class BackgroundCall:
         self._function = function
         self._on_late_end = on_late_end
         self._lock = threading.Lock()
-        in_context = functools.partial(contextvars.copy_context().run, self._work)
-        self._start: Callable[[], object]
-        if kept is None:
-            self._thread = threading.Thread(target=in_context, name=name, daemon=True)
-            self._start = self._thread.start
-        else:
-            self._thread = kept.thread
-            self._start = functools.partial(kept.begin, in_context)
+        self._context = contextvars.copy_context()
+        self._kept = kept
+        self._thread = kept.thread if kept is not None else _thread(self._run, name)
 
     def start(self) -> None:
         """Begin the call in its thread."""
-        self._start()
+        if self._kept is None:
+            self._thread.start()
+        else:
+            self._kept.begin(self._run)
+
+    def _run(self) -> None:
+        self._context.run(self._work)
 
     def leave(self) -> bool:
         """Leave the thread to itself. Return False where it has ended after all."""
@@ -94,3 +98,7 @@ class BackgroundCall:
             late = self.left
         if late and self._on_late_end is not None:
             self._on_late_end()
+
+
+def _thread(run: Callable[[], None], name: str) -> threading.Thread:
+    return threading.Thread(target=run, name=name, daemon=True)
