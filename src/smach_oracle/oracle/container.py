@@ -22,7 +22,7 @@ from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, data_of, has_keys, names_that_engine_lacks, opened_container
+from .smach_private import Transitions, data_of, names_that_engine_lacks, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -356,15 +356,13 @@ class OracleContainer(smach.StateMachine):
                 if stop is not None:
                     return stop.outcome
             view = record.view
-            if (
-                view is None
-                or view.state is not state
-                or view.userdata is not self.userdata
-                or view.remapping is not remappings[label]
-                or not has_keys(state, view.input_keys, view.output_keys)
-            ):
+            snapshot = (
+                None if view is None else view.snapshot(state, self.userdata, remappings[label])
+            )
+            if view is None or snapshot is None:
                 view = record.view = StateView(self, label, state)
-            record.snapshot = data_of(view.userdata).copy()
+                snapshot = data_of(view.userdata).copy()
+            record.snapshot = snapshot
             observed = node.events.observers
             constants = self._constants.get(label)
             outcome: Any  # a user's state may return anything

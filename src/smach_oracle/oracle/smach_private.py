@@ -105,9 +105,32 @@ def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
     return state._input_keys, state._output_keys
 
 
-def has_keys(state: smach.State, input_keys: Set[str], output_keys: Set[str]) -> bool:
-    """Whether these are still the very sets of a state. The short way calls that in each step."""
-    return state._input_keys is input_keys and state._output_keys is output_keys
+class KeptParts:
+    """What a state's view of the userdata was made of, to be compared at its next visit."""
+
+    __slots__ = ('state', 'userdata', 'remapping', 'input_keys', 'output_keys')
+    state: Optional[smach.State]  # None: made for one visit
+    userdata: smach.UserData
+    remapping: Mapping[str, str]
+    input_keys: Set[str]
+    output_keys: Set[str]
+
+    def snapshot(
+        self, state: smach.State, userdata: smach.UserData, remapping: Mapping[str, str]
+    ) -> Optional[Dict[str, object]]:
+        """Return the values of the userdata now, None where a part was exchanged.
+
+        The short way of a plain success makes this one call in each step.
+        """
+        if (
+            self.state is state
+            and self.userdata is userdata
+            and self.remapping is remapping
+            and self.input_keys is state._input_keys
+            and self.output_keys is state._output_keys
+        ):
+            return userdata._data.copy()
+        return None
 
 
 def data_of(userdata: smach.UserData) -> Dict[str, Any]:

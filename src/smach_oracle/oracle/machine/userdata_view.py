@@ -1,11 +1,11 @@
 """The userdata of a state: the container's userdata by the state's own key names."""
 
-from typing import Collection, Iterable, Mapping, Optional, Tuple, cast
+from typing import Collection, Iterable, Mapping, Tuple, cast
 
 import smach
 
 from ..identity import own_mark
-from ..smach_private import keys_of
+from ..smach_private import KeptParts, keys_of
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
 
@@ -58,7 +58,7 @@ def _keeps_key_sets() -> bool:
 _KEEPS_KEY_SETS = _keeps_key_sets()
 
 
-class StateView:
+class StateView(KeptParts):
     """A state's view of the userdata, kept for its next visit where that is safe.
 
     This engine and the state's class decide that.
@@ -67,12 +67,12 @@ class StateView:
     each visit.
     """
 
-    __slots__ = ('remapper', 'state', 'userdata', 'remapping', 'input_keys', 'output_keys')
+    __slots__ = ('remapper',)
 
     def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
         self.remapping = machine._remappings[label]
         self.userdata = machine.userdata
-        self.state: Optional[smach.State] = None  # made for one visit
+        self.state = None
         if (
             _KEEPS_KEY_SETS
             and _has_plain_keys(state)
