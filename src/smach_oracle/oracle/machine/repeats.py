@@ -9,6 +9,7 @@ from typing import Iterable, Iterator, NamedTuple, Set, Tuple
 
 from ..records.visits import VisitMark
 from ..settings.settings import ALLOW, NEVER
+from ..smach_private import states_of, transitions_of
 from .nesting import nodes_of
 from .state_record import StateRecord
 from .tree_node import TreeNode
@@ -89,13 +90,13 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
     while waiting:
         label = waiting.pop()
         reached.add(label)
-        following = (node.machine._transitions.get(label) or {}).values()
+        following = transitions_of(node.machine).get(label, {}).values()
         waiting.update(
             each
             for each in following
             if each is not None
             and each not in reached
-            and each in node.machine._states
+            and each in states_of(node.machine)
             and not node.is_oracle(each)
         )
     return reached
@@ -151,7 +152,7 @@ def note_superseded(node: TreeNode, label: str) -> None:
 
 def why_closed(node: TreeNode, label: str) -> str:
     """Return why a state cannot be entered now, whoever wants it, or '' where it can."""
-    blocked = node.tree.workers.blocked(node.machine._states[label])
+    blocked = node.tree.workers.blocked(states_of(node.machine)[label])
     if blocked or not node.tree.numbers_visits:
         return blocked
     if node.records.marks.of(label).done and node.settings_of(label).on_retry == NEVER:

@@ -8,6 +8,7 @@ from ..asking.question import OutcomeChoice
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.failing_outcomes import FailingNames
 from ..settings.settings import Settings, StateSettings
+from ..smach_private import states_of, transitions_of
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -25,11 +26,11 @@ def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
 
     It leads to a state, to a container outcome by its target's or its own name, or nowhere.
     """
-    transitions = machine._transitions.get(label) or {}
+    transitions = transitions_of(machine).get(label) or {}
     if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
         return Route('', False)
     target = transitions[outcome]
-    if target is not None and target in machine._states:
+    if target is not None and target in states_of(machine):
         return Route(target, True)
     container_outcomes = machine.get_registered_outcomes()
     for name in (target, outcome):
@@ -149,4 +150,4 @@ class Site:
 
 
 def _outcomes_of(node: 'TreeNode', label: str) -> Tuple[str, ...]:
-    return tuple(sorted(node.machine._states[label].get_registered_outcomes(), key=str))
+    return tuple(sorted(states_of(node.machine)[label].get_registered_outcomes(), key=str))

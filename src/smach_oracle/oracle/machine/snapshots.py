@@ -15,6 +15,7 @@ import smach
 from smach_common.foreign import ends_program, error_text
 
 from ..identity import own_mark
+from ..smach_private import data_of, hold_data
 
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
@@ -110,13 +111,13 @@ class UserdataGate(MutableMapping):
             self._open = False
 
     def __getitem__(self, key: str) -> object:
-        return self._machine.userdata._data[key]
+        return data_of(self._machine.userdata)[key]
 
     def __setitem__(self, key: str, value: object) -> None:
         with self._lock:
             if self._open:
                 self.written.add(key)
-                self._machine.userdata._data[key] = value
+                data_of(self._machine.userdata)[key] = value
                 return
         self._late(key)
 
@@ -124,15 +125,15 @@ class UserdataGate(MutableMapping):
         with self._lock:
             if self._open:
                 self.written.add(key)
-                del self._machine.userdata._data[key]
+                del data_of(self._machine.userdata)[key]
                 return
         self._late(key)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(list(self._machine.userdata._data))
+        return iter(list(data_of(self._machine.userdata)))
 
     def __len__(self) -> int:
-        return len(self._machine.userdata._data)
+        return len(data_of(self._machine.userdata))
 
     def _late(self, key: str) -> None:
         if self._on_late_write is not None:
@@ -142,7 +143,7 @@ class UserdataGate(MutableMapping):
 def behind(gate: UserdataGate) -> smach.UserData:
     """Return a `smach.UserData` whose reads and writes pass `gate`."""
     userdata: Any = smach.UserData()
-    userdata._data = gate
+    hold_data(userdata, gate)
     return userdata
 
 
@@ -172,14 +173,14 @@ class WriteWatch:
         self._deep = tuple(deep_copy_keys)
         self.gate = UserdataGate(machine)
         self._kept: Set[str] = set()  # written through the gate before `begin`
-        self._before = dict(machine.userdata._data)
+        self._before = dict(data_of(machine.userdata))
         self._prints = {
             key: fingerprint(self._before[key]) for key in self._deep if key in self._before
         }
 
     def begin(self) -> UserdataMark:
         """Begin with what may be taken back."""
-        data = dict(self._machine.userdata._data)
+        data = dict(data_of(self._machine.userdata))
         self._kept.update(self.gate.written)
         self.gate.written.clear()  # the set itself: branches of the gate have it, too
         if not self._deep:
@@ -192,7 +193,7 @@ class WriteWatch:
 
         Objects that were changed inside stay changed, except the deep-copied keys.
         """
-        data = self._machine.userdata._data
+        data = data_of(self._machine.userdata)
         if own_mark(self._machine, 'shares_userdata'):
             self.take_back_own(begun)
             return
@@ -208,7 +209,7 @@ class WriteWatch:
 
     def take_back_own(self, begun: UserdataMark) -> None:
         """Take back what passed the gate alone: others write the userdata at the same time."""
-        data = self._machine.userdata._data
+        data = data_of(self._machine.userdata)
         for key in self.gate.written:
             if key in begun.data:
                 data[key] = begun.data[key]
@@ -222,7 +223,7 @@ class WriteWatch:
 
     def written(self) -> Set[str]:
         """Return the keys set, deleted or changed so far."""
-        now = dict(self._machine.userdata._data)
+        now = dict(data_of(self._machine.userdata))
         keys = self._kept.union(self.gate.written)
         keys.update(
             key for key in now if key not in self._before or now[key] is not self._before[key]

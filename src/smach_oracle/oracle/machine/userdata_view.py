@@ -5,17 +5,17 @@ from typing import Collection, Iterable, Mapping, Tuple, cast
 import smach
 
 from ..identity import own_mark
-from ..smach_private import KeptParts, keys_of
+from ..smach_private import (
+    KeptParts,
+    constants_of,
+    data_of,
+    keys_of,
+    remapping_of,
+    remappings_of,
+    states_of,
+)
 from .snapshots import UserdataGate, behind
 from .tree_node import TreeNode
-
-
-def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, object]:
-    """Return the constants given with a state, by keys of the container.
-
-    Engines without constants have none.
-    """
-    return machine._constants.get(label) or {}
 
 
 def write_constants(userdata: smach.UserData, constants: Mapping[str, object]) -> None:
@@ -33,7 +33,7 @@ def view_of(
     """
     if label and own_mark(machine, 'hands_on_userdata'):
         return cast(smach.Remapper, userdata)  # as an Iterator does
-    remapping = machine._remappings.get(label) or {} if label else {}
+    remapping = remapping_of(machine, label) if label else {}
     return smach.Remapper(
         userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping
     )
@@ -49,7 +49,7 @@ def view_behind(
 def _keeps_key_sets() -> bool:
     """Whether a Remapper of this engine sees keys that a state declares later."""
     userdata, keys = smach.UserData(), {'before'}
-    userdata._data['after'] = None
+    data_of(userdata)['after'] = None
     remapper = smach.Remapper(userdata, keys, keys, {})
     keys.add('after')
     return 'after' in remapper
@@ -70,7 +70,7 @@ class StateView(KeptParts):
     __slots__ = ('remapper',)
 
     def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
-        self.remapping = machine._remappings[label]
+        self.remapping = remappings_of(machine)[label]
         self.userdata = machine.userdata
         self.state = None
         if (
@@ -104,14 +104,14 @@ def missing_keys(
     They are named as the state names them. `available` are keys of the container.
     """
     present = set(available).union(constants_of(machine, label))
-    remapping = machine._remappings.get(label) or {}
-    inputs = machine._states[label].get_registered_input_keys()
+    remapping = remapping_of(machine, label)
+    inputs = states_of(machine)[label].get_registered_input_keys()
     return tuple(sorted(key for key in inputs if remapping.get(key, key) not in present))
 
 
 def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:
     """Return the container's userdata keys as they would be after a jump to a state."""
-    now = node.machine.userdata._data
+    now = data_of(node.machine.userdata)
     snapshot = node.record(label).snapshot
     if node.settings.userdata == 'keep' or snapshot is None:
         return tuple(now)

@@ -17,6 +17,7 @@ from ..scope.background_call import BackgroundCall, KeptThread
 from ..scope.clock import Clock
 from ..scope.scope import CallEnd, Reason, Scope, inside
 from ..settings.settings import StateSettings
+from ..smach_private import set_executing
 from .snapshots import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
@@ -184,7 +185,7 @@ def _stop_bare_machines(state: smach.State) -> None:
     """Let machines without an oracle end at their next state boundary, as both engines do then."""
     try:
         if isinstance(state, smach.StateMachine) and own_mark(state, '_oracle') is None:
-            state._is_running = False
+            set_executing(state, False)
         for child in _children(state):
             _stop_bare_machines(child)
     except Exception as err:  # a user's container may be of any make

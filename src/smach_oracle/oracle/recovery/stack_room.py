@@ -5,6 +5,7 @@ RecursionError in the innermost one. That is no failure of any state: no oracle 
 better, and each of them would try.
 """
 
+import inspect
 import sys
 from typing import Iterator, Optional
 
@@ -45,7 +46,7 @@ def _chain(error: BaseException) -> Iterator[BaseException]:
 
 
 def _frames_in_use() -> int:
-    count, frame = 0, sys._getframe().f_back
+    count, frame = -1, inspect.currentframe()
     while frame is not None:
         count, frame = count + 1, frame.f_back
     return count

@@ -85,7 +85,7 @@ class Scope:
     :param time: has passed in it, except where others have paused it. It has one with a limit.
     """
 
-    __slots__ = ('clock', 'time', 'limit_s', '_line', '_looks', '_cancelled', '_bells')
+    __slots__ = ('clock', 'time', 'limit_s', 'line', 'looks', 'cancelled', 'bells')
 
     def __init__(
         self,
@@ -101,32 +101,32 @@ class Scope:
         line: Tuple['Scope', ...] = (self,)  # it and all around it
         looks: Tuple[Look, ...] = () if look is None else (look,)
         for each in around:
-            line += each._line
-            looks += each._looks
-        self._line: Tuple['Scope', ...] = line
-        self._looks: Tuple[Look, ...] = looks
-        self._cancelled: Optional[Reason] = None
+            line += each.line
+            looks += each.looks
+        self.line: Tuple['Scope', ...] = line
+        self.looks: Tuple[Look, ...] = looks
+        self.cancelled: Optional[Reason] = None
         # of all who wait. To add one, to remove one and to copy them are one step each: no lock is
         # held, in which the handler of a signal could meet its own thread
-        self._bells: Set[Ringable] = set()
+        self.bells: Set[Ringable] = set()
 
     def cancel(self, reason: Reason) -> None:
         """End it early, and wake all that wait in it. A reason that counts more stays."""
-        self._cancelled = min(reason, self._cancelled or reason)
+        self.cancelled = min(reason, self.cancelled or reason)
         self.wake()
 
     def renew(self) -> None:
         """Have it go on, as if it had not been cancelled."""
-        self._cancelled = None
+        self.cancelled = None
 
     def wake(self) -> None:
         """Have all that wait in it look at its reason now."""
-        for bell in tuple(self._bells):
+        for bell in tuple(self.bells):
             bell.ring()
 
     def tell(self, bell: Ringable) -> None:
         """Ring this, too, when it is cancelled, or now where it was."""
-        self._bells.add(bell)
+        self.bells.add(bell)
         if self.told is not None:
             bell.ring()
 
@@ -134,8 +134,8 @@ class Scope:
     def told(self) -> Optional[Reason]:
         """Return why it was cancelled, or one around it, None where it was not."""
         told = None
-        for each in self._line:
-            reason = each._cancelled
+        for each in self.line:
+            reason = each.cancelled
             if reason is not None and (told is None or reason < told):
                 told = reason
         return told
@@ -146,7 +146,7 @@ class Scope:
         reason = self.told
         # a look may be the code of a user: nobody takes it where it cannot count
         if reason is None or reason > Reason.LEFT_BEHIND:
-            for look in self._looks:
+            for look in self.looks:
                 seen = look()
                 if seen is not None and (reason is None or seen < reason):
                     reason = seen
@@ -155,7 +155,7 @@ class Scope:
     @property
     def reasons(self) -> Set[Reason]:
         """Return all reasons for which it is to end."""
-        found = [each._cancelled for each in self._line] + [look() for look in self._looks]
+        found = [each.cancelled for each in self.line] + [look() for look in self.looks]
         return {each for each in found if each is not None}
 
     def wait(self, seconds: Optional[float] = None, until: Optional[Flag] = None) -> bool:
@@ -166,9 +166,9 @@ class Scope:
         """
         bell, now = Bell(), self.clock.now
         ends_s = float('inf') if seconds is None else now() + seconds
-        longest_s = LOOK_S if self._looks else threading.TIMEOUT_MAX
-        for each in self._line:
-            each._bells.add(bell)
+        longest_s = LOOK_S if self.looks else threading.TIMEOUT_MAX
+        for each in self.line:
+            each.bells.add(bell)
         if until is not None:
             until.bells.add(bell)
         try:
@@ -183,8 +183,8 @@ class Scope:
                     return until is None
                 self.clock.wait(bell, left_s, longest_s, until is None)
         finally:
-            for each in self._line:
-                each._bells.discard(bell)
+            for each in self.line:
+                each.bells.discard(bell)
             if until is not None:
                 until.bells.discard(bell)
 
