@@ -19,6 +19,8 @@ def inconsistencies(
         errors.append("Its initial state '%s' is not among its states." % initial)
     known = set(states).union(outcomes)
     for label, drawn in transitions.items():
+        if known.issuperset(drawn.values()):
+            continue
         unknown = [to for to in drawn.values() if to and to not in known]
         if unknown:
             errors.append(

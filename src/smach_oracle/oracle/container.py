@@ -292,7 +292,7 @@ class OracleContainer(smach.StateMachine):
         """
         if self._oracle.tree.is_parents and not self.is_running():
             return execute_bare(self, *args, **kwargs)
-        with ContainerRun(self, self.new_trial_id) as run:
+        with ContainerRun(self._oracle, self.new_trial_id) as run:
             if run.begins():
                 run.outcome = super().execute(*args, **kwargs)
         return run.outcome

@@ -13,7 +13,6 @@ from ..machine.workers import request_preempt
 from ..records.early_end import EarlyEnd
 from ..recovery.verdict import outcome_of_early_end
 from ..smach_private import Transitions, data_of, remapping_in, state_ended, step_once
-from .item_userdata import ItemUserdata
 
 COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
 End = Tuple[object, Optional[Exception]]  # of a state: its outcome, and what it has raised
@@ -34,7 +33,7 @@ _OF_EXECUTION = (
 class ItemPort(Protocol):
     """The Iterator around a branch."""
 
-    item_userdata: ItemUserdata
+    at_item: Optional[Dict[str, Any]]  # the userdata as the item under way began
 
     def begin_item(self) -> None:
         """Note that an item begins."""
@@ -144,7 +143,7 @@ class Branch(smach.Container):
                 return self._run(None)
             record.snapshot = snapshot = data_of(self.userdata).copy()
             if self._item is not None:
-                self._item.item_userdata.at_item = snapshot
+                self._item.at_item = snapshot
             if self._current_state is not state or not self._is_running:
                 # a request reaches it from now on
                 self._set_current_state(record.label)

@@ -5,11 +5,11 @@ from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 import smach
 
 from ..machine.nesting import children_of, machines_below
+from ..machine.snapshots import restore, take_snapshot
 from ..machine.tree_node import TreeNode, node_of
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
-from ..smach_private import Labels, items_of
-from .item_userdata import ItemUserdata
+from ..smach_private import Labels, data_of, items_of
 from .items import TrackedItems
 from .wrapper import ContainerWrapper, wrapper_of
 
@@ -22,7 +22,8 @@ class IteratorWrapper(ContainerWrapper):
         self._trial_id = ''  # that of `tracked`
         self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
-        self.item_userdata = ItemUserdata(container)
+        self._given: Dict[str, Any] = {}  # its io keys when it began
+        self.at_item: Optional[Dict[str, Any]] = None  # its userdata as the item under way began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_left = False
         self._is_asked_to_go_on = False
@@ -106,13 +107,17 @@ class IteratorWrapper(ContainerWrapper):
 
     def begin_item(self) -> None:
         """Note that an item begins."""
-        begun: Optional[Mapping[str, Any]] = None
+        data: Mapping[str, Any] = data_of(self.container.userdata)
         for node in self.nodes():
             record = node.records.by_label.get(node.site.label)
             unfinished = None if record is None else node.tree.resumed.unfinished(record)
-            begun = None if unfinished is None else unfinished.snapshot
+            if unfinished is not None and unfinished.snapshot is not None:
+                data = unfinished.snapshot  # before the program was stopped: it has written since
+        self.at_item = self._snapshot(data)
+
+    def _snapshot(self, data: Mapping[str, Any]) -> Dict[str, Any]:
         top = self.top
-        self.item_userdata.begin_item(begun, top.in_force.deep_copy_keys, top.warn_not_copied)
+        return take_snapshot(data, top.in_force.deep_copy_keys, top.warn_not_copied)
 
     def leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
@@ -127,7 +132,12 @@ class IteratorWrapper(ContainerWrapper):
 
     def __getstate__(self) -> Dict[str, Any]:
         return dict(
-            super().__getstate__(), tracked=None, _ended_with=None, _is_asked_to_go_on=False
+            super().__getstate__(),
+            tracked=None,
+            _ended_with=None,
+            _is_asked_to_go_on=False,
+            _given={},
+            at_item=None,
         )
 
     # -- userdata
@@ -147,16 +157,38 @@ class IteratorWrapper(ContainerWrapper):
     def _keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
         """Return the values of its keys that its inputs do not replace, as it begins or goes on.
 
+        What finished items have left under keys that are inputs and outputs stays where the
+        container above has the value again with which the Iterator began. What the unfinished item
+        wrote is taken back.
+
         `userdata`: what the inputs are copied from.
         """
-        deep = self.top.in_force.deep_copy_keys
+        iterator, own, top = self.container, data_of(self.container.userdata), self.top
+        both = set(iterator.get_registered_input_keys()).intersection(
+            iterator.get_registered_output_keys()
+        )
+        given = {} if userdata is None else {key: userdata[key] for key in both if key in userdata}
         if not self.goes_on:
-            self.item_userdata.begin(userdata, deep, self.top.warn_not_copied)
+            self._given = self._snapshot(given)
             return {}
         if (
             self.tracked is not None
             and not self.tracked.is_finished
-            and self.top.settings.userdata == 'restore'
+            and self.at_item is not None
+            and top.settings.userdata == 'restore'
         ):
-            self.item_userdata.take_back(deep)
-        return self.item_userdata.to_keep(userdata)
+            restore(own, self.at_item, (), top.in_force.deep_copy_keys)
+        return {
+            key: own[key]
+            for key, value in given.items()
+            if key in own and key in self._given and _same(self._given[key], value)
+        }
+
+
+def _same(one: object, other: object) -> bool:
+    if one is other:
+        return True
+    try:
+        return type(one) is type(other) and bool(one == other)
+    except Exception:  # whatever a user's object raises, or an array that is no truth
+        return False

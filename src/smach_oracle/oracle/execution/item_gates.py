@@ -4,15 +4,16 @@ An Iterator is under no oracle. It calls its transition callbacks between items,
 machine that it contains is held at its own boundaries.
 """
 
-from typing import Any, Iterator, Optional, Tuple
+from typing import Any, Iterator, Optional
 
 import smach
 
 from ..branches.wrapper import wrapper_of
+from ..machine.nesting import branching_below
 from ..machine.tree_node import TreeNode
 from ..recovery.operator_wait import wait_for_operator
 from ..scope.scope import Reason, Scope
-from ..smach_private import Labels, states_of, transition_callbacks
+from ..smach_private import Labels, transition_callbacks
 
 
 class ItemGate:
@@ -44,7 +45,7 @@ def place_gates(node: TreeNode) -> None:
 
     Machines have one, and states under an oracle of their own.
     """
-    for below, container in _bare_containers(node.machine, ()):
+    for below, container in branching_below(node.machine):
         children = container.get_children().values()
         wrapper = wrapper_of(container)
         if wrapper is not None and wrapper.branches:
@@ -61,7 +62,7 @@ def place_gates(node: TreeNode) -> None:
 
 def remove_gates(machine: smach.StateMachine) -> None:
     """Take the gates away from the Iterators of a container."""
-    for _, container in _bare_containers(machine, ()):
+    for _, container in branching_below(machine):
         _remove(container)
 
 
@@ -77,17 +78,3 @@ def _remove(container: Any) -> None:
     transition_callbacks(container)[:] = [
         each for each in transition_callbacks(container) if not isinstance(each[0], ItemGate)
     ]
-
-
-def _bare_containers(container: Any, below: Labels) -> Iterator[Tuple[Labels, Any]]:
-    """Yield the containers within that are no machines, each with the labels that lead to it."""
-    children = (
-        states_of(container)
-        if isinstance(container, smach.StateMachine)
-        else container.get_children()
-    )
-    for label, state in list(children.items()):
-        if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
-            path = below + (label,)
-            yield path, state
-            yield from _bare_containers(state, path)

@@ -4,7 +4,7 @@ An Iterator that has failed or was left goes on there with the item that was not
 that is started over has its userdata as it was at first, in all containers of the tree.
 """
 
-from typing import Collection, NamedTuple, Tuple
+from typing import Collection, Iterable, NamedTuple, Tuple
 
 from ..branches.around import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
@@ -12,6 +12,7 @@ from ..machine.jump_path import JumpPath, missing_on
 from ..machine.nesting import nodes_of
 from ..machine.repeats import leave_for
 from ..machine.snapshots import restore
+from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode
 from ..smach_private import data_of, remapping_of
 
@@ -65,11 +66,9 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
 # -- a script that is started over
 
 
-def may_start_over(node: TreeNode) -> bool:
+def may_start_over(tree: Tree, nodes: Iterable[TreeNode]) -> bool:
     """Whether a policy of the tree may start its top machine over."""
-    return node.tree.recover and any(
-        each.in_force.policy.restarts for each in nodes_of(node.machine)
-    )
+    return tree.recover and any(each.in_force.policy.restarts for each in nodes)
 
 
 def keep_start(node: TreeNode) -> None:

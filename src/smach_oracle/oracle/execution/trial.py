@@ -16,7 +16,7 @@ from ..machine.execution import Execution, ends_program, why_no_outcome
 from ..machine.nesting import nodes_of
 from ..machine.oracle import save_rates
 from ..machine.repeats import begin_watching
-from ..machine.tree_node import TreeNode, marked_node
+from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..records.facts import ENDED_BY, TrialEnd
@@ -30,7 +30,7 @@ from .wrapping import adopt, bring_up_to_date
 _running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
-class ContainerRun:
+class ContainerRun(Execution):
     """One execution of a container by its engine, within this context.
 
     Where no container above it runs, it is a trial. It is a context, and no function around the
@@ -39,11 +39,11 @@ class ContainerRun:
     `outcome`: with which it ends.
     """
 
-    def __init__(self, machine: smach.StateMachine, new_trial_id: Callable[[], str]) -> None:
-        self._machine = machine
+    __slots__ = ('outcome', '_new_trial_id', '_is_executed', '_is_trial', '_store')
+
+    def __init__(self, node: TreeNode, new_trial_id: Callable[[], str]) -> None:
+        super().__init__(node)
         self._new_trial_id = new_trial_id
-        self._node = marked_node(machine)
-        self._execution = Execution(self._node)
         self._is_executed = self._is_trial = False
         self._store: Optional[TrialStore] = None
         self.outcome: Optional[str] = None
@@ -57,7 +57,7 @@ class ContainerRun:
         is_top = not node.has_running_ancestor()
         if is_top:
             node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
-        if not self._execution.look_around():
+        if not self.look_around():
             smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
             return False
         if is_top:
@@ -67,13 +67,14 @@ class ContainerRun:
             if self.outcome is not None:
                 return False
         self._is_executed = True
-        self._execution.begin()
+        self.begin()
         return True
 
     def _begin_trial(self) -> None:
         node = self._node
-        adopt(self._machine)
-        for each in nodes_of(self._machine):
+        adopt(node.machine)
+        nodes = list(nodes_of(node.machine))
+        for each in nodes:
             bring_up_to_date(each)
         if node.tree.recover:
             node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
@@ -81,12 +82,12 @@ class ContainerRun:
         resumed = None if store is None else store.to_resume()
         node.tree.early_end.begin_trial(is_stored=store is not None)
         node.tree.begin_trial(self._new_trial_id() if resumed is None else resumed.trial.trial_id)
-        for each in nodes_of(self._machine):
+        for each in nodes:
             # one that still runs was abandoned in an earlier trial, and is left there
             if not each.machine.is_running():
                 each.begin_trial(node.tree.trial_id)
-        begin_watching(node)
-        node.tree.restarts.begin_trial(may_start_over(node))
+        begin_watching(node.tree, nodes)
+        node.tree.restarts.begin_trial(may_start_over(node.tree, nodes))
         node.tree.budget.begin(node.settings.budget)
         if store is not None:
             store.begin_trial(resumed)
@@ -114,12 +115,13 @@ class ContainerRun:
         node = self._node
         try:
             if self._is_executed:
-                self._execution.end(self.outcome, error)
+                self.end(self.outcome, error)
         finally:
             if self._is_trial:
                 _running.remove(node)
                 if not node.tree.is_parents:
                     _end_trial(node, self.outcome, error, self._store)
+                self._store = None
             else:
                 self.outcome = outcome_of_early_end(node, self.outcome)
 

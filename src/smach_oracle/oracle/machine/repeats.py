@@ -5,13 +5,14 @@ at once or by the author's transitions from where it has jumped to. The author's
 are not repeats.
 """
 
-from typing import Iterable, Iterator, NamedTuple, Set, Tuple
+from typing import Iterable, Iterator, NamedTuple, Sequence, Set, Tuple
 
 from ..records.visits import VisitMark
 from ..settings.settings import ALLOW, NEVER
 from ..smach_private import states_of, transitions_of
 from .nesting import nodes_of
 from .state_record import StateRecord
+from .tree import Tree
 from .tree_node import TreeNode
 
 
@@ -22,12 +23,9 @@ class _Done(NamedTuple):
     mark: VisitMark
 
 
-def begin_watching(node: TreeNode) -> None:
+def begin_watching(tree: Tree, nodes: Sequence[TreeNode]) -> None:
     """Begin a trial: number the visits where a state of the tree is guarded."""
-    nodes = list(nodes_of(node.machine))
-    node.tree.numbers_visits = node.tree.recover and any(
-        each.in_force.guards_states() for each in nodes
-    )
+    tree.numbers_visits = tree.recover and any(each.in_force.guards_states() for each in nodes)
     for each in nodes:
         for record in each.records.by_label.values():
             record.be_special(each.is_special())

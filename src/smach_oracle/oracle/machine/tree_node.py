@@ -153,8 +153,13 @@ class TreeNode:
 
         `take`: it does so once.
         """
-        starts = (each.execution.start_of(self, take) for each in self.running_around())
-        return next(filter(None, starts), '')
+        above = self.parent
+        while above is not None:
+            start = is_executing(above.machine) and above.execution.start_of(self, take)
+            if start:
+                return start
+            above = above.parent
+        return ''
 
     def is_left_behind(self) -> bool:
         """Whether this container is to stop without an outcome, as nobody waits for one.
