@@ -50,7 +50,7 @@ class ExecutionHook(object):
     def runner_of(self, container: Any, label: str, state: Any) -> Any:
         """Return what executes a state of the container, the state itself where nothing does.
 
-        It is asked before each execution, as the state at a label may be another by then.
+        It is asked as the container begins, and again if the state at a label is another by then.
         """
         return self.runners.get(label, state)
 

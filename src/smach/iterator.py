@@ -126,6 +126,7 @@ class Iterator(Container):
         exhaustion.
         """
         outcome = self._exhausted_outcome
+        state = runner = None
         while not smach.is_shutdown():
             self._wait_while_paused()
             try:
@@ -139,7 +140,10 @@ class Iterator(Container):
                 ) from err
             smach.loginfo('Iterating %s of %s' % (item, self._items))
             self.userdata[self._items_label] = item
-            outcome = self._execute_state()
+            if runner is None or self._state is not state:
+                state = self._state
+                runner = self._runner_of_state()
+            outcome = self._execute_state(runner)
             if self._stops_at(outcome) or self.preempt_requested():
                 return outcome
             self.call_transition_cbs()
@@ -160,15 +164,15 @@ class Iterator(Container):
         )
         return bool(self._loop_outcomes)
 
-    def _execute_state(self) -> str:
-        state = self._state
-        if state is None:
+    def _runner_of_state(self) -> Any:
+        if self._state is None:
             raise smach.InvalidStateError(
                 'This iterator has no state to repeat; give it one with '
                 'Iterator.set_contained_state().'
             )
-        hook = self.execution_hook
-        runner = state if hook is None else hook.runner_of(self, self._state_label, state)
+        return self._runner(self._state_label, self._state)
+
+    def _execute_state(self, runner: Any) -> str:
         # before the first item: later ones are not reached with a preempt pending
         if self.preempt_requested():
             runner.request_preempt()
@@ -180,7 +184,7 @@ class Iterator(Container):
         except Exception as err:
             raise smach.InvalidUserCodeError(
                 "Could not execute iterator state '%s' of type '%s': %s"
-                % (self._state_label, state, traceback.format_exc())
+                % (self._state_label, self._state, traceback.format_exc())
             ) from err
         return outcome
 

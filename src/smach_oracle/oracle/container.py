@@ -306,7 +306,7 @@ class OracleContainer(smach.StateMachine):
         """Forget the execution before: the machine has its initial state now."""
         node = self._oracle
         if node.engine.stepped:
-            node.begin_execution()
+            node.begin_once_more()
         how = ''
         if node.execution.starts_in in self._states:
             self._set_current_state(node.execution.starts_in)

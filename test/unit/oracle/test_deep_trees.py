@@ -84,7 +84,7 @@ def test_150_containers_in_each_other_run_under_an_oracle(around):
     assert executed(machine) == 'ok'
 
 
-@pytest.mark.parametrize('around, count', [(machine_around, 280), (iterator_around, 400)])
+@pytest.mark.parametrize('around, count', [(machine_around, 280), (iterator_around, 550)])
 def test_a_tree_that_is_too_deep_ends_with_one_error_that_says_what_to_do(around, count):
     machine, expert = nested(around, count), FakeExpert()
     seen = watched(machine, expert)

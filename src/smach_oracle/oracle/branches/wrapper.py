@@ -109,7 +109,7 @@ class ContainerWrapper:
             branch.take(self.container, states[label])
         nodes = self.nodes()
         for node in nodes:
-            node.begin_execution()
+            node.begin_once_more()
         if nodes:
             nodes[0].emit(
                 EventKind.CONTAINER_START,

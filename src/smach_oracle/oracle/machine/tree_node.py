@@ -315,12 +315,16 @@ class TreeNode:
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
-        self.execution.renew()
         self.engine.begin_execution()
-        self.records.drop_snapshots()
         entry = self.tree.resumed.entry_of(self)
         if entry is not None:
             entry.take_over_records(self)
+
+    def begin_once_more(self) -> None:
+        """Begin an execution as the one that is there already."""
+        self.execution.renew()
+        self.records.drop_snapshots()
+        self.begin_execution()
 
     def begin_stepping(self) -> None:
         """Find out at the first state of an execution what the engine is like."""
