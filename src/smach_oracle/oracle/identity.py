@@ -7,7 +7,7 @@ raise there. A machine, a state, a function or a message is itself, and equal to
 import inspect
 import types
 import weakref
-from typing import Any, Dict, Generic, Iterator, List, Optional, Tuple, TypeVar
+from typing import Dict, Generic, Iterator, List, Optional, Tuple, TypeVar
 
 Key = TypeVar('Key')
 Value = TypeVar('Value')
@@ -60,7 +60,7 @@ class WeakIdentityMap(Generic[Key, Value]):
                 yield key
 
 
-def remove_identical(items: List[Any], item: object) -> bool:
+def remove_identical(items: List[Value], item: object) -> bool:
     """Take an object out of a list, once. Return whether it was there."""
     for index, each in enumerate(items):
         if each is item:
@@ -99,19 +99,19 @@ def truth_of(value: object) -> Optional[bool]:
         return None
 
 
-def own_attributes(thing: object) -> Dict[str, Any]:
+def own_attributes(thing: object) -> Dict[str, object]:
     """Return the attributes that were set on an object itself, empty for one that has slots.
 
     Neither its class nor its `__getattr__` is asked.
     """
     try:
-        attributes: Dict[str, Any] = object.__getattribute__(thing, '__dict__')
+        attributes: Dict[str, object] = object.__getattribute__(thing, '__dict__')
     except AttributeError:
         return {}
     return attributes
 
 
-def own_mark(thing: object, name: str) -> Any:
+def own_mark(thing: object, name: str) -> object:
     """Return an attribute that was set on an object itself, None where none was."""
     return own_attributes(thing).get(name)
 
@@ -129,7 +129,7 @@ def has_attribute(thing: object, name: str) -> bool:
     return inspect.getattr_static(thing, name, _MISSING) is not _MISSING
 
 
-def attribute_of(thing: Any, name: str, default: Any = None) -> Any:
+def attribute_of(thing: object, name: str, default: object = None) -> object:
     """Return an attribute that an object or its class has.
 
     :param default: returned where there is none, and where the attribute is a property that raises.
@@ -142,10 +142,10 @@ def attribute_of(thing: Any, name: str, default: Any = None) -> Any:
         return default
 
 
-def name_of(function: Any) -> str:
+def name_of(function: object) -> str:
     """Return the name of a function, or that of its class where it has none."""
     try:
-        name = function.__name__
+        name = getattr(function, '__name__', None)
     except Exception:  # of an object that can be called
         name = None
     return name if isinstance(name, str) and name else str(type(function).__name__)

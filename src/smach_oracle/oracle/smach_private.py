@@ -16,6 +16,7 @@ from typing import (
     Optional,
     Set,
     Tuple,
+    cast,
 )
 
 import smach
@@ -311,8 +312,8 @@ def iterated_state_of(iterator: Any) -> Optional[smach.State]:
 
 def items_label_of(container: object) -> Optional[str]:
     """Return the key of an Iterator's userdata that has the item, None for other containers."""
-    label: Optional[str] = own_mark(container, '_items_label')
-    return label
+    label = own_mark(container, '_items_label')
+    return None if label is None else str(label)
 
 
 def initial_label_in(container: object) -> str:
@@ -322,12 +323,14 @@ def initial_label_in(container: object) -> str:
 
 def transitions_in(container: object, label: str) -> Transitions:
     """Return where the outcomes of a state lead."""
-    return (own_mark(container, '_transitions') or {}).get(label) or {}
+    tables = cast(Dict[str, Optional[Transitions]], own_mark(container, '_transitions') or {})
+    return tables.get(label) or {}
 
 
 def remapping_in(container: object, label: str) -> Mapping[str, str]:
     """Return the container's names of a state's keys."""
-    return (own_mark(container, '_remappings') or {}).get(label) or {}
+    tables = cast(Dict[str, Mapping[str, str]], own_mark(container, '_remappings') or {})
+    return tables.get(label) or {}
 
 
 _STEP_AS_DRAWN: WeakIdentityMap[type, bool] = WeakIdentityMap()

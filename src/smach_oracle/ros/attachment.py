@@ -22,6 +22,7 @@ from typing import (
     NamedTuple,
     Optional,
     Tuple,
+    cast,
 )
 
 import rospy
@@ -372,7 +373,11 @@ def has_introspection(machine: OracleContainer) -> bool:
 
     Told by its callbacks: the server of a script that was made before the machine first ran.
     """
-    callbacks = [each[0] for name in CALLBACK_LISTS for each in own_mark(machine, name) or ()]
+    callbacks = [
+        each[0]
+        for name in CALLBACK_LISTS
+        for each in cast(List[Tuple[object, ...]], own_mark(machine, name) or [])
+    ]
     return is_watched(machine) or any(_is_running_proxy(callback) for callback in callbacks)
 
 

@@ -8,7 +8,7 @@ recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves 
 """
 
 import functools
-from typing import Any, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Any, Mapping, NamedTuple, Optional, Sequence
 
 import rospy
 
@@ -21,7 +21,7 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.names import Nested, Strictness
-from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.settings import PreconditionLists, Settings
 
 from .attachment import attachments
 from .expert.failure_text import describe_failure
@@ -36,8 +36,6 @@ from .log.said_once import SaidOnce
 from .machine_names import machine_names
 from .main_thread import outside_main_thread
 from .reading.known_names import Complaint
-
-PreconditionLists = Optional[Mapping[str, List[Any]]]
 
 
 class _GivenSettings(NamedTuple):

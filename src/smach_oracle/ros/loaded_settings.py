@@ -6,7 +6,7 @@ learns where the key came from.
 """
 
 import importlib
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, cast
 
 import rospy
 
@@ -53,7 +53,9 @@ class LoadedSettings(Dict[str, Any]):
 
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
-        mine, theirs = dict(_leaves(plain(self))), dict(_leaves(plain(values)))
+        mine, theirs = (
+            dict(_leaves(cast(Mapping[str, object], plain(each)))) for each in (self, values)
+        )
         return [
             '{}: {!r}, now {!r}'.format(key, mine[key], value)
             for key, value in theirs.items()

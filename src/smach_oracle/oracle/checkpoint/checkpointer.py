@@ -1,7 +1,7 @@
 """Stores where every container of a tree stands, before each state begins."""
 
 import time
-from typing import Any, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
 
 import smach
 from smach_oracle.store.codecs import Codecs
@@ -18,6 +18,7 @@ from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_TO
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
+from ..smach_private import data_of, states_of
 from .container_facts import ContainerFacts, KeptOut, UserdataFacts, WeakIds, fact_of, keys_of
 from .stored_tree import StoredTree
 
@@ -84,7 +85,7 @@ class Checkpointer:
         # by key of a container: its node, and what stands around it
         self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, ContainerWrapper]]]] = {}
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
-        self._spent_stored: Dict[str, Any] = {}
+        self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
         # paths and keys of what is named. Of a trial that goes on its first part has done so
         self._told = (
@@ -227,7 +228,7 @@ class Checkpointer:
         kind, label = event.kind, event.state
         if kind is EventKind.STATE_START:
             path = '{}/{}'.format(node.key, label)
-            is_container = isinstance(node.machine._states.get(label), smach.Container)
+            is_container = isinstance(states_of(node.machine).get(label), smach.Container)
             below = self._below(path) if is_container else []
             sent_to = [
                 TreePlace(each, start).path
@@ -244,9 +245,7 @@ class Checkpointer:
             kind is EventKind.CONTAINER_START and node is self._top and not self._enters_again(node)
         ):
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
-        elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (
-            event.target in node.machine._states and not node.is_oracle(event.target)
-        ):
+        elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (node.has(event.target)):
             yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
         elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
             yield fact_of(
@@ -292,7 +291,7 @@ class Checkpointer:
                 yield fact_of(path, ITEMS, number)
                 yield from self._not_begun_below(path)
                 if event.kind is not node.site.begins_by:  # else the commit has them
-                    yield from self._keys(path, wrapper.container.userdata._data, None)
+                    yield from self._keys(path, data_of(wrapper.container.userdata), None)
 
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
@@ -339,10 +338,10 @@ class Checkpointer:
             if labels
             else frozenset()
         )
-        yield from self._keys(node.path, node.machine.userdata._data, reached)
+        yield from self._keys(node.path, data_of(node.machine.userdata), reached)
 
     def _keys(
-        self, path: str, data: Dict[str, Any], reached: Optional[FrozenSet[str]]
+        self, path: str, data: Dict[str, object], reached: Optional[FrozenSet[str]]
     ) -> Iterator[Fact]:
         userdata = self._userdata.get(path)
         if userdata is None:
@@ -358,12 +357,12 @@ class Checkpointer:
         yield from self._keys_around(node)
         if node.parent is not None and len(node.below) == 1:
             self._wrote[node.parent.key] = node.key
-            yield from self._keys(node.parent.key, node.parent.machine.userdata._data, None)
+            yield from self._keys(node.parent.key, data_of(node.parent.machine.userdata), None)
 
     def _keys_around(self, node: TreeNode) -> Iterator[Fact]:
         """Yield what is new of the userdata of the Concurrences and Iterators around a node."""
         for path, wrapper in self._wrappers_around(node):
-            yield from self._keys(path, wrapper.container.userdata._data, None)
+            yield from self._keys(path, data_of(wrapper.container.userdata), None)
 
     def _tell(self, path: str, out: KeptOut) -> None:
         told = (

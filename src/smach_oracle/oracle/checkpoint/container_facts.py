@@ -4,7 +4,6 @@ import json
 import marshal
 import weakref
 from typing import (
-    Any,
     Callable,
     Dict,
     FrozenSet,
@@ -23,17 +22,16 @@ from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
 from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, VISIT
 from smach_oracle.store.rows import Fact
 
-from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.visits import Visit
+from ..smach_private import remapping_of, states_of
 from .stored_tree import StoredContainer
 
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
-Plain = Union[Dict[str, Any], List[Any], str, int]
 
 
-def fact_of(path: str, name: str, plain: Plain) -> Fact:
+def fact_of(path: str, name: str, plain: object) -> Fact:
     """Return a fact of plain data."""
     return Fact(path, name, Encoded(_as_json(plain), None, {}))
 
@@ -67,26 +65,25 @@ class ContainerFacts:
         for label in labels:
             record = self._node.records.by_label.get(label)
             if record is not None:
-                yield from self._if_new(STATE + label, self._of_state(record))
+                counts = (record.visits, record.recoveries, record.fallbacks, record.unwell_repeats)
+                told = {
+                    'learned': record.learned(),
+                    'counts': counts,
+                    'longest_s': record.longest_s,
+                    'shared': record.shared,
+                }
+                yield from self._if_new(STATE + label, told)
 
     def all_states(self) -> Iterator[Fact]:
         """Yield what is new of every state."""
         yield from self.changed(list(self._node.records.by_label))
-
-    def _of_state(self, record: StateRecord) -> Dict[str, Any]:
-        return {
-            'learned': record.learned(),
-            'counts': [record.visits, record.recoveries, record.fallbacks, record.unwell_repeats],
-            'longest_s': record.longest_s,
-            'shared': record.shared,
-        }
 
     def marks(self) -> Iterator[Fact]:
         """Yield what is new of the states that have begun: a jump changes marks of many at once."""
         for label, mark in self._node.records.marks.told():
             if self._marks.get(label) != mark:
                 self._marks[label] = mark
-                if label in self._node.machine._states:
+                if label in states_of(self._node.machine):
                     yield fact_of(
                         self._path, MARK + label, [*mark, self._node.settings_of(label).on_retry]
                     )
@@ -107,7 +104,7 @@ class ContainerFacts:
         self._visits = total
         self._latest = visits[-1] if visits else None
 
-    def _if_new(self, name: str, plain: Plain) -> Iterator[Fact]:
+    def _if_new(self, name: str, plain: object) -> Iterator[Fact]:
         text = _as_json(plain)
         if self._stored.get(name) != text:
             self._stored[name] = text
@@ -143,7 +140,7 @@ class WeakIds:
         if seen is not None and seen() is value:
             return False
         try:
-            self._seen[id(value)] = weakref.ref(cast(Any, value))
+            self._seen[id(value)] = weakref.ref(value)
         except TypeError:
             self._seen[id(value)] = lambda: value
         return True
@@ -168,7 +165,7 @@ class UserdataFacts:
         self._codecs, self._path, self._tell = codecs, path, tell
         self._known: Dict[str, _Known] = {}
 
-    def changed(self, data: Dict[str, Any], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
+    def changed(self, data: Dict[str, object], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
         """Yield the facts that are new.
 
         `data`: the userdata. `reached`: keys whose values may have changed inside. None means all.
@@ -237,7 +234,8 @@ def _told(key: object) -> str:
 def _print_of(value: object) -> Optional[bytes]:
     """Return bytes that differ where plain data differ, or None for anything else."""
     try:
-        return marshal.dumps(cast(Any, value), _WITH_REFERENCES)  # to compare, never loaded
+        # to compare, never loaded. It raises for a value of another type than plain ones
+        return marshal.dumps(cast(bytes, value), _WITH_REFERENCES)
     except BaseException as err:  # a value that lends its memory may raise anything
         if ends_program(err):
             raise
@@ -253,10 +251,10 @@ def _is_plain(encoded: Encoded) -> bool:
 
 def keys_of(machine: smach.StateMachine, label: str) -> FrozenSet[str]:
     """Return the keys of a container that one of its states can read or write."""
-    state = machine._states.get(label)
+    state = states_of(machine).get(label)
     if state is None:
         return frozenset()
-    remapping = machine._remappings.get(label) or {}
+    remapping = remapping_of(machine, label)
     return frozenset(
         remapping.get(key, key)
         for key in set(state.get_registered_input_keys()).union(state.get_registered_output_keys())

@@ -1,7 +1,7 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 
 import time
-from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, cast
 
 import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
@@ -21,6 +21,7 @@ from ..machine.tree_node import TreeNode, node_of
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
+from ..smach_private import data_of, initial_label_of, set_current_label, states_of, transitions_of
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_marks import Marks, let_repeat, take_over_marks
 from .stored_tree import StoredContainer, StoredTree
@@ -112,13 +113,13 @@ class EntryPoint:
         stored = self._stored
         if stored.history:
             node.records.history.take_over(
-                stored.visits, stored.visits_of_execution, _of_states(node, stored.history)
+                stored.visits, stored.visits_of_execution, stored.history, node.has
             )
 
     def enter(self, node: TreeNode) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
         stored, machine = self._stored, node.machine
-        data = machine.userdata._data
+        data = data_of(machine.userdata)
         for key in stored.gone:
             data.pop(key, None)
         data.update(stored.keys)
@@ -133,23 +134,11 @@ class EntryPoint:
             )
         stored.complete_snapshots(data)
         for label, snapshot in stored.snapshots.items():
-            if label in machine._states and not node.is_oracle(label):
+            if node.has(label):
                 node.record(label).snapshot = snapshot
-        machine._set_current_state(stored.label)
+        set_current_label(machine, stored.label)
         if self._down:
             node.record(stored.label).go_down(self._down)
-
-
-def _of_states(node: TreeNode, told: List[Any]) -> List[Any]:
-    """Return what a history told, without the states that are gone."""
-
-    def there(label: Any) -> Any:
-        return label if label in node.machine._states else None
-
-    return [there(each) for each in told[:3]] + [
-        [there(state), successes, there(anchor), is_anchored]
-        for state, successes, anchor, is_anchored in told[3:]
-    ]
 
 
 def _down_to(node: TreeNode, path: str) -> Sequence[TreePlace]:
@@ -190,13 +179,13 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     for node in nodes:
         stored = resumption.tree.container(node.key)
         for label, told in stored.states.items():
-            if label in node.machine._states and not node.is_oracle(label):
+            if node.has(label):
                 record = node.record(label)
                 record.restore(told['learned'])
                 record.shared = told.get('shared', record.shared)
                 record.go_on(told['counts'], told['longest_s'])
         if stored.history:
-            node.records.history.take_over([], 0, _of_states(node, stored.history))
+            node.records.history.take_over((), 0, stored.history, node.has)
     latest = take_over_marks(nodes, resumption.marks, resumption.is_in_doubt)
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
@@ -204,7 +193,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     way = _jump_path_named(top, resumption.begins_at) if resumption.begins_at else None
     if way is not None:
         stood.at = [way.first, BEFORE]
-    elif stood.label in top.machine._states and stood.sent is not None:
+    elif top.has(stood.label) and stood.sent is not None:
         way = _jump_path_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
     if way is not None:
         leave_unconfirmed(top, way.first)
@@ -249,7 +238,7 @@ class _Setting:
         if moved is not None:
             self._go_on_elsewhere(node, moved)
             return True
-        if stored.label not in node.machine._states:
+        if not node.has(stored.label):
             self._ask_at_beginning(node, stored, stored.label)
             return True
         if node.site.is_container:
@@ -321,7 +310,7 @@ class _Setting:
         elif stored.phase:
             return self.activate(node)
         else:
-            self._ask_before(node, node.machine._initial_state_label or '')
+            self._ask_before(node, initial_label_of(node.machine))
         return True
 
     def _left_below(self, node: TreeNode, stored: StoredContainer) -> Optional[StoredContainer]:
@@ -341,7 +330,7 @@ class _Setting:
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
-        stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at[3]
+        stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at_there
         self._resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
         there = StoredContainer()
         there.at = at
@@ -355,11 +344,10 @@ class _Setting:
 
     def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
         """Have a person asked before a container begins that stood where it cannot go on."""
-        label = node.machine._initial_state_label
-        if label not in node.machine._states:
-            label = next(iter(node.labels()), '')
-        if not label:
+        labels, initial = list(node.labels()), initial_label_of(node.machine)
+        if not labels:
             return
+        label = initial if initial in labels else labels[0]
         stored.at, stored.asked = [label, BEFORE], []
         if node.site.is_container:
             self._resumed.enter_at(node, EntryPoint(stored))
@@ -377,7 +365,7 @@ class _Setting:
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
-        if self._resumption.asks and label in node.machine._states:
+        if self._resumption.asks and node.has(label):
             self._interrupt(node, label, NOT_BEGUN)
 
     def _interrupt(self, node: TreeNode, label: str, text: str) -> None:
@@ -393,8 +381,8 @@ class _Setting:
         # a branch has the userdata of the Concurrence or Iterator that holds it
         snapshots = self._resumption.tree.container(node.path).snapshots
         if stored.phase == FAILED:
-            kind, outcome, text = stored.at[2:5]
-            if outcome and outcome not in node.machine._transitions.get(stored.label, ()):
+            kind, outcome, text = cast(Tuple[int, str, str], stored.at[2:5])
+            if outcome and outcome not in transitions_of(node.machine).get(stored.label, ()):
                 kind, text = FailureKind.INTERRUPTED, GONE.format('outcome ' + outcome)
                 outcome = ''
             return Unfinished(
@@ -418,7 +406,7 @@ class _Setting:
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
         """Return the containers directly in a state, or None where it can only go on as a whole."""
         inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
-        state = node.machine._states.get(label)
+        state = states_of(node.machine).get(label)
         return inside if inside and _is_wrapped_through(state) else None
 
 

@@ -60,10 +60,9 @@ def marks_now(
 def _mark_of(container: StoredContainer, label: str) -> VisitMark:
     """Return a mark. Where no state was guarded, visits were counted, and not numbered."""
     mark = VisitMark()
-    mark.reached, mark.executed, mark.done, mark.spent = container.marks.get(
-        label, (0, 0, False, False)
-    )[:4]
-    mark.done = bool(mark.done or container.visits_of(label) or label in container.begun)
+    told = container.marks.get(label, [0, 0, 0, 0])
+    mark.reached, mark.executed, mark.spent = told[0], told[1], bool(told[3])
+    mark.done = bool(told[2] or container.visits_of(label) or label in container.begun)
     return mark
 
 

@@ -1,37 +1,48 @@
 """The containers of a tree at one moment, as a store has them."""
 
 import json
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Set, Tuple
+from dataclasses import dataclass, field
+from typing import (
+    Dict,
+    Iterable,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Set,
+    Tuple,
+    TypedDict,
+    TypeVar,
+    Union,
+    cast,
+)
 
+from smach_oracle.store import names
 from smach_oracle.store.codecs import Codecs, NotReadable
 from smach_oracle.store.errors import StoreDamaged
-from smach_oracle.store.names import (
-    ASKED,
-    AT,
-    BEFORE,
-    EDIT,
-    ENDED,
-    EXECUTION,
-    FAILED,
-    GOAL,
-    HISTORY,
-    IN,
-    ITEMS,
-    KEPT_OUT,
-    KEY,
-    MARK,
-    MOVED,
-    STATE,
-    VISIT,
-)
 from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
 from smach_oracle.store.store_file import StoreFile
 
 from ..records.events import EventKind
+from ..records.history import Told
 from ..records.visits import Visit, VisitResult
 
+_Plain = TypeVar('_Plain')
+_Values = Dict[str, StoredValue]  # by key
 
+
+class StoredState(TypedDict, total=False):
+    """What a state has learned and counted. `mark`: of an earlier version."""
+
+    learned: Dict[str, object]
+    counts: List[int]
+    longest_s: Optional[float]
+    shared: Dict[str, object]
+    mark: List[int]
+
+
+@dataclass
 class StoredContainer:
     """One container as it was.
 
@@ -43,25 +54,24 @@ class StoredContainer:
     way.
     """
 
-    def __init__(self) -> None:
-        self.at: List[Any] = []
-        self.execution = 0
-        self.history: List[Any] = []
-        self.visits: List[Visit] = []
-        self.visits_of_execution = 0
-        self.states: Dict[str, Mapping[str, Any]] = {}
-        self.marks: Dict[str, List[Any]] = {}
-        self.begun: Set[str] = set()  # states at which it has stood, and which had begun
-        # sent elsewhere by oracle_state: the states that may be repeated. None: it was not
-        self.sent: Optional[List[str]] = None
-        self.keys: Dict[str, Any] = {}
-        self.missing: Dict[str, str] = {}
-        self.snapshots: Dict[str, Dict[str, Any]] = {}
-        self.asked: List[str] = []
-        self.item = 0
-        self.gone: List[str] = []
+    at: List[object] = field(default_factory=list)
+    execution: int = 0
+    history: Optional[Told] = None
+    visits: List[Visit] = field(default_factory=list)
+    visits_of_execution: int = 0
+    states: Dict[str, StoredState] = field(default_factory=dict)
+    marks: Dict[str, List[int]] = field(default_factory=dict)
+    begun: Set[str] = field(default_factory=set)  # at which it has stood, and which had begun
+    # sent elsewhere by oracle_state: the states that may be repeated. None: it was not
+    sent: Optional[List[str]] = None
+    keys: Dict[str, object] = field(default_factory=dict)
+    missing: Dict[str, str] = field(default_factory=dict)
+    snapshots: Dict[str, Dict[str, object]] = field(default_factory=dict)
+    asked: List[str] = field(default_factory=list)
+    item: int = 0
+    gone: List[str] = field(default_factory=list)
 
-    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+    def complete_snapshots(self, data: Mapping[str, object]) -> None:
         """Have in the snapshots what could not be stored, as the userdata have it now."""
         for key in self.missing:
             if key in data:
@@ -70,12 +80,12 @@ class StoredContainer:
 
     def labels(self) -> Set[str]:
         """Return the states of which anything is told."""
-        here = {self.label} if self.at and self.phase not in (ENDED, MOVED) else set()
+        here = {self.label} if self.at and self.phase not in (names.ENDED, names.MOVED) else set()
         return {*self.states, *self.marks, *self.begun, *here}
 
     def visits_of(self, label: str) -> int:
         """Return how many visits of a state have ended in the trial."""
-        return int(self.states.get(label, {}).get('counts', [0])[0])
+        return self.states[label]['counts'][0] if label in self.states else 0
 
     @property
     def phase(self) -> str:
@@ -85,7 +95,12 @@ class StoredContainer:
     @property
     def moved_to(self) -> str:
         """Path of the state at which it stood, where that is in another container now, else ''."""
-        return str(self.at[2]) if self.phase == MOVED else ''
+        return str(self.at[2]) if self.phase == names.MOVED else ''
+
+    @property
+    def at_there(self) -> List[object]:
+        """Return how it stands there."""
+        return cast(List[object], self.at[3])
 
     @property
     def jumped_to(self) -> str:
@@ -93,7 +108,7 @@ class StoredContainer:
 
         Once a container below has begun, it knows better.
         """
-        has_it = self.phase in (BEFORE, IN) and len(self.at) > 2
+        has_it = self.phase in (names.BEFORE, names.IN) and len(self.at) > 2
         return str(self.at[2] or '') if has_it else ''
 
     @property
@@ -102,22 +117,19 @@ class StoredContainer:
         return str(self.at[0]) if self.at else ''
 
 
-_Values = Dict[str, StoredValue]  # by key
-
-
 class StoredTree(NamedTuple):
     """The containers by their keys, and what belongs to the whole tree, by name."""
 
     containers: Dict[str, StoredContainer]
-    whole: Dict[str, Any]
+    whole: Dict[str, object]
 
     @property
     def goals(self) -> Dict[str, str]:
         """Return the servers of the goals that ran, by goal id."""
         return {
-            name[len(GOAL) :]: str(server)
+            name[len(names.GOAL) :]: str(server)
             for name, server in self.whole.items()
-            if name.startswith(GOAL) and server
+            if name.startswith(names.GOAL) and server
         }
 
     def container(self, key: str) -> StoredContainer:
@@ -157,7 +169,7 @@ class _Reading:
         self._keys: Dict[str, _Values] = {}  # by path
         self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
         self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
-        self._decoded: Dict[Tuple[str, StoredValue], Any] = {}  # by userdata key
+        self._decoded: Dict[Tuple[str, StoredValue], object] = {}  # by userdata key
 
     def read(self, facts: Iterable[StoredFact]) -> StoredTree:
         before: Optional[StoredFact] = None
@@ -182,59 +194,60 @@ class _Reading:
     def _take(self, fact: StoredFact) -> None:
         path, name, value = fact.path, fact.name, fact.value
         if not path:
-            self._tree.whole[name] = _plain(value)
+            self._tree.whole[name] = _plain(value, None)
             return
         container = self._tree.containers.setdefault(path, StoredContainer())
-        if name.startswith(KEY):
-            self._keys.setdefault(path, {})[name[len(KEY) :]] = value
-            # what somebody has set outlives a restore, and what a precondition has written
-            if fact.kind == EDIT:
-                for values in self._at_entry.get(path, {}).values():
-                    values[name[len(KEY) :]] = value
-            elif fact.kind in _AFTER_FAILURE and path == fact.moment_path:
-                self._at_entry.get(path, {}).get(fact.label, {})[name[len(KEY) :]] = value
-        elif name.startswith(KEPT_OUT):
-            container.missing.pop(name[len(KEPT_OUT) :], None)
+        word = name[: name.find(':') + 1] or name
+        of = name[len(word) :]  # a userdata key, or a label
+        if word == names.KEY:
+            self._take_key(fact, of)
+        elif word == names.KEPT_OUT:
+            container.missing.pop(of, None)
             if value.is_there:
-                kind, why = _plain(value)
-                container.missing[name[len(KEPT_OUT) :]] = '{} was not stored: {}'.format(kind, why)
-        elif name.startswith(VISIT):
-            state, outcome, result, *when = _plain(value)
+                container.missing[of] = '{} was not stored: {}'.format(*_plain(value, ['', '']))
+        elif word == names.VISIT:
+            visit: List[Union[str, int]] = _plain(value, [])
+            state, outcome, result, *when = visit
             # of an earlier version the name says when
-            execution, number = when or map(int, name[len(VISIT) :].split(':'))
+            execution, number = map(int, when or of.split(':'))
             self._visits.setdefault(path, {})[execution, number] = Visit(
-                state, outcome, VisitResult(result)
+                str(state), str(outcome), VisitResult(int(result))
             )
-        elif name.startswith(STATE):
-            told = container.states[name[len(STATE) :]] = _plain(value)
+        elif word == names.STATE:
+            told = container.states[of] = _plain(value, cast(StoredState, {}))
             if 'mark' in told:  # of an earlier version
-                container.marks[name[len(STATE) :]] = told['mark']
-        elif name.startswith(MARK):
-            container.marks[name[len(MARK) :]] = _plain(value)
-        elif name == AT:
-            container.at = _plain(value) or []
-            container.sent = [*container.at[3:4], []][0] if fact.kind == EDIT else None
-            self._note_begun(path, container.at)
-        else:
-            self._take_named(container, path, name, _plain(value))
-
-    def _note_begun(self, path: str, at: List[Any]) -> None:
-        """Keep which states have begun, also where the machine is sent elsewhere later."""
-        if at and at[1] == MOVED:
-            path, at = at[2].rpartition('/')[0], at[3]
-        if at and at[1] in (IN, FAILED):
-            self._tree.containers.setdefault(path, StoredContainer()).begun.add(at[0])
-
-    def _take_named(self, container: StoredContainer, path: str, name: str, plain: Any) -> None:
-        if name == HISTORY:
-            container.history = plain
-        elif name == ASKED:
-            container.asked = plain or []
-        elif name == ITEMS:
-            container.item = plain or 0
-        elif name == EXECUTION:
-            container.execution = plain
+                container.marks[of] = told['mark']
+        elif word == names.MARK:
+            container.marks[of] = _plain(value, [0, 0, 0, 0])[:4]
+        elif word == names.AT:
+            at = container.at = _plain(value, [])
+            is_sent = fact.kind == names.EDIT
+            container.sent = (cast(List[str], at[3]) if at[3:] else []) if is_sent else None
+            if container.phase == names.MOVED:
+                path, at = container.moved_to.rpartition('/')[0], container.at_there
+            # it has begun, also where the machine is sent elsewhere later
+            if at and at[1] in (names.IN, names.FAILED):
+                there = self._tree.containers.setdefault(path, StoredContainer())
+                there.begun.add(str(at[0]))
+        elif word == names.HISTORY:
+            container.history = _plain(value, container.history)
+        elif word == names.ASKED:
+            container.asked = _plain(value, [])
+        elif word == names.ITEMS:
+            container.item = _plain(value, 0)
+        elif word == names.EXECUTION:
+            container.execution = _plain(value, 0)
             self._at_entry.pop(path, None)
+
+    def _take_key(self, fact: StoredFact, key: str) -> None:
+        path, entries = fact.path, self._at_entry.get(fact.path, {})
+        self._keys.setdefault(path, {})[key] = fact.value
+        # what somebody has set outlives a restore, and what a precondition has written
+        if fact.kind == names.EDIT:
+            for values in entries.values():
+                values[key] = fact.value
+        elif fact.kind in _AFTER_FAILURE and path == fact.moment_path:
+            entries.get(fact.label, {})[key] = fact.value
 
     def _put_together(self, path: str, container: StoredContainer) -> None:
         visits = self._visits.get(path, {})
@@ -245,28 +258,25 @@ class _Reading:
         while (container.execution, latest) in visits:
             container.visits.insert(0, visits[container.execution, latest])
             latest -= 1
-        for key, value in self._keys.get(path, {}).items():
-            if not value.is_there:
-                container.gone.append(key)
-                continue
-            try:
-                container.keys[key] = self._value(key, value)
-            except NotReadable as err:
-                container.missing[key] = str(err)
+        values = self._keys.get(path, {})
+        container.gone += (key for key, value in values.items() if not value.is_there)
+        container.keys = self._readable(values, container.missing)
         for label, values in self._at_entry.get(path, {}).items():
-            container.snapshots[label] = self._readable(values)
+            # what cannot be read is said of the present value, or not needed any more
+            container.snapshots[label] = self._readable(values, {})
 
-    def _readable(self, values: _Values) -> Dict[str, Any]:
+    def _readable(self, values: _Values, missing: Dict[str, str]) -> Dict[str, object]:
+        """Return the values that can be read. `missing`: gets why others cannot."""
         found = {}
         for key, value in values.items():
             try:
                 if value.is_there:
                     found[key] = self._value(key, value)
-            except NotReadable:
-                pass  # said of the present value, or not needed any more
+            except NotReadable as err:
+                missing[key] = str(err)
         return found
 
-    def _value(self, key: str, value: StoredValue) -> Any:
+    def _value(self, key: str, value: StoredValue) -> object:
         """Return a value, the same object where a container hands it to those below."""
         known = self._decoded
         if (key, value) not in known:
@@ -274,8 +284,10 @@ class _Reading:
         return known[key, value]
 
 
-def _plain(value: StoredValue) -> Any:
+def _plain(value: StoredValue, otherwise: _Plain) -> _Plain:
+    """Return the plain data of a fact, `otherwise` where it is gone."""
     try:
-        return json.loads(value.text or 'null')
+        plain: Optional[_Plain] = json.loads(value.text or 'null')
     except ValueError as err:
         raise StoreDamaged('a stored fact cannot be read: {}'.format(err)) from err
+    return otherwise if plain is None else plain

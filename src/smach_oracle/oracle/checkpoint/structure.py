@@ -2,20 +2,41 @@
 
 import hashlib
 import json
-from typing import Any, Collection, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple
+from typing import (
+    Collection,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Tuple,
+    cast,
+)
 
 import smach
+from smach_oracle.store import renaming
 from smach_oracle.store.names import STRUCTURE
-from smach_oracle.store.renaming import Renaming, containers_of, states_of
+from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import StoreFile
 
 from ..errors import SettingsError
-from ..identity import own_mark
 from ..machine.tree_node import TreeNode
+from ..smach_private import (
+    final_outcomes_of,
+    initial_label_in,
+    loop_outcomes_of,
+    outcome_map_of,
+    remapping_in,
+    states_of,
+    transitions_in,
+)
 from .stored_tree import StoredTree
 
 DIGITS = 16  # of the id
+Plain = Mapping[str, object]
 
 
 class Structure(NamedTuple):
@@ -50,28 +71,31 @@ def differences(stored: str, now: str) -> List[str]:
     except ValueError:
         return ['the stored machine cannot be read']
     found: List[str] = []
-    for path in sorted(set(before).union(after)):
+    for path, was, now_is in _pairs(before, after):
         name = path or 'the top machine'
-        if path not in after:
-            found.append('container {} is gone'.format(name))
-        elif path not in before:
-            found.append('container {} is new'.format(name))
+        if was is None or now_is is None:
+            found.append('container {} is {}'.format(name, 'gone' if now_is is None else 'new'))
         else:
-            found += ('{}: {}'.format(name, text) for text in _between(before[path], after[path]))
+            found += ('{}: {}'.format(name, text) for text in _between(was, now_is))
     return found
 
 
-def _between(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[str]:
+def _pairs(before: object, after: object) -> Iterator[Tuple[str, Optional[Plain], Optional[Plain]]]:
+    """Yield what two mappings have under each name, None where one of them has it not."""
+    one, other = cast(Mapping[str, Plain], before), cast(Mapping[str, Plain], after)
+    for name in sorted({*one, *other}):
+        yield name, one.get(name), other.get(name)
+
+
+def _between(before: Plain, after: Plain) -> Iterator[str]:
     if before['kind'] != after['kind']:
         yield 'it was a {}, and is a {}'.format(before['kind'], after['kind'])
-    states, states_now = before['states'], after['states']
-    for label in sorted(set(states).union(states_now)):
-        if label not in states_now:
-            yield 'state {} is gone'.format(label)
-        elif label not in states:
-            yield 'state {} is new'.format(label)
+    for label, was, now in _pairs(before['states'], after['states']):
+        if was is None or now is None:
+            yield 'state {} is {}'.format(label, 'gone' if now is None else 'new')
         else:
-            yield from _state_differences(label, states[label], states_now[label])
+            for text in _state_differences(was, now):
+                yield 'state {}: {}'.format(label, text)
     for what in ('outcomes', 'initial', 'input_keys', 'output_keys', 'rules'):
         if before.get(what) != after.get(what):
             yield '{} were {}, and are {}'.format(
@@ -79,47 +103,43 @@ def _between(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[st
             )
 
 
-def _state_differences(
-    label: str, before: Mapping[str, Any], after: Mapping[str, Any]
-) -> Iterator[str]:
-    for outcome in sorted(set(before['transitions']).union(after['transitions'])):
-        was, now = before['transitions'].get(outcome), after['transitions'].get(outcome)
+def _state_differences(before: Plain, after: Plain) -> Iterator[str]:
+    for outcome, was, now in _pairs(before['transitions'], after['transitions']):
         if was != now:
-            yield 'state {}: {} led to {}, and leads to {}'.format(
-                label, outcome, was or 'nothing', now or 'nothing'
+            yield '{} led to {}, and leads to {}'.format(
+                outcome, was or 'nothing', now or 'nothing'
             )
     for what in ('class', 'keys', 'remapping'):
         if before[what] != after[what]:
-            yield 'state {}: {} was {}, and is {}'.format(
-                label, what, _shown(before[what]), _shown(after[what])
-            )
+            yield '{} was {}, and is {}'.format(what, _shown(before[what]), _shown(after[what]))
 
 
 def _shown(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _containers(container: Any, path: str, meta: str) -> Iterator[Tuple[str, Any, str]]:
+def _containers(
+    container: smach.Container, path: str, meta: str
+) -> Iterator[Tuple[str, smach.Container, str]]:
     yield path, container, meta
     for label, state in sorted(_states(container, meta).items()):
         if isinstance(state, smach.Container):
             yield from _containers(state, '{}/{}'.format(path, label) if path else label, meta)
 
 
-def _states(container: Any, meta: str) -> Dict[str, Any]:
-    children = (
-        container._states if isinstance(container, smach.StateMachine) else container.get_children()
-    )
-    return {str(label): state for label, state in dict(children).items() if label != meta}
+def _states(container: smach.Container, meta: str) -> Dict[str, smach.State]:
+    is_machine = isinstance(container, smach.StateMachine)
+    states = states_of(container) if is_machine else container.get_children()
+    return {str(label): state for label, state in dict(states).items() if label != meta}
 
 
-def _container(container: Any, meta: str) -> Dict[str, Any]:
+def _container(container: smach.Container, meta: str) -> Plain:
     return {
         'kind': _kind(container),
-        'outcomes': sorted(map(str, container.get_registered_outcomes())),
-        'input_keys': sorted(map(str, container.get_registered_input_keys())),
-        'output_keys': sorted(map(str, container.get_registered_output_keys())),
-        'initial': str(own_mark(container, '_initial_state_label') or ''),
+        'outcomes': _sorted(container.get_registered_outcomes()),
+        'input_keys': _sorted(container.get_registered_input_keys()),
+        'output_keys': _sorted(container.get_registered_output_keys()),
+        'initial': initial_label_in(container),
         'states': {
             label: _state(container, label, state)
             for label, state in _states(container, meta).items()
@@ -128,48 +148,41 @@ def _container(container: Any, meta: str) -> Dict[str, Any]:
     }
 
 
-def _kind(container: Any) -> str:
-    for kind in (smach.Concurrence, smach.Iterator, smach.Sequence, smach.StateMachine):
-        if isinstance(container, kind):
-            return str(kind.__name__)
-    return type(container).__name__
+def _sorted(names: Iterable[object]) -> List[str]:
+    return sorted(map(str, names))
 
 
-def _rules(container: Any) -> List[str]:
+def _kind(state: object) -> str:
+    """Return the name of a state's class, the same whether it is wrapped or not."""
+    kinds = (smach.Concurrence, smach.Iterator, smach.Sequence, smach.StateMachine)
+    return str(next((kind for kind in kinds if isinstance(state, kind)), type(state)).__name__)
+
+
+def _rules(container: smach.Container) -> List[str]:
     """Return what a Concurrence or an Iterator goes by, as far as it can be told in words."""
     if isinstance(container, smach.Iterator):
-        return (
-            sorted(map(str, container._loop_outcomes))
-            + ['->']
-            + sorted('{}:{}'.format(*item) for item in dict(container._final_outcome_map).items())
-        )
-    if isinstance(container, smach.Concurrence):
-        return sorted(map(str, container._outcome_map))
-    return []
-
-
-def _state(container: Any, label: str, state: Any) -> Dict[str, Any]:
-    transitions = (own_mark(container, '_transitions') or {}).get(label) or {}
-    remapping = (own_mark(container, '_remappings') or {}).get(label) or {}
-    is_state = isinstance(state, smach.State)
-    return {
-        'class': _class_of(state),
-        'transitions': {str(outcome): str(target) for outcome, target in dict(transitions).items()},
-        'keys': [
-            sorted(map(str, state.get_registered_input_keys())),
-            sorted(map(str, state.get_registered_output_keys())),
+        final = dict(final_outcomes_of(container))
+        return [
+            *_sorted(loop_outcomes_of(container)),
+            '->',
+            *sorted('{}:{}'.format(*item) for item in final.items()),
         ]
-        if is_state
-        else [],
-        'remapping': {str(one): str(other) for one, other in dict(remapping).items()},
+    return _sorted(outcome_map_of(container)) if isinstance(container, smach.Concurrence) else []
+
+
+def _state(container: smach.Container, label: str, state: smach.State) -> Plain:
+    keys = (
+        [state.get_registered_input_keys(), state.get_registered_output_keys()]
+        if isinstance(state, smach.State)
+        else []
+    )
+    transitions, remapping = transitions_in(container, label), remapping_in(container, label)
+    return {
+        'class': _kind(state),
+        'transitions': {str(outcome): str(target) for outcome, target in transitions.items()},
+        'keys': list(map(_sorted, keys)),
+        'remapping': {str(one): str(other) for one, other in remapping.items()},
     }
-
-
-def _class_of(state: Any) -> str:
-    """Return the name of a state's class, the same whether it is wrapped or not."""
-    if isinstance(state, smach.Container):
-        return _kind(state)
-    return type(state).__name__
 
 
 class ChangedScript(NamedTuple):
@@ -191,7 +204,7 @@ def changed_script(
 
     :raises SettingsError: where `resume_map` names a state that was not there, or is not.
     """
-    before = tree.whole.get(STRUCTURE) or trial.structure
+    before = str(tree.whole.get(STRUCTURE) or trial.structure)
     names = top.settings.resume_map
     if before == now.id:
         _name_unknown(top, names, store, now)
@@ -200,12 +213,12 @@ def changed_script(
     changes = differences(described, now.description)
     if not names:
         return ChangedScript(before, changes, {}, None)
-    known, present = states_of(described), states_of(now.description)
+    known, present = renaming.states_of(described), renaming.states_of(now.description)
     for old, new in names.items():
         _check(old, old, known, 'a state of the machine that was stopped')
         _check(old, new, present, 'a state of the machine')
     return ChangedScript(
-        before, changes, names, Renaming(top.name, names, containers_of(described))
+        before, changes, names, Renaming(top.name, names, renaming.containers_of(described))
     )
 
 
@@ -215,9 +228,9 @@ def _name_unknown(
     """Warn of states of a map of no effect that neither this script has, nor one of before."""
     if not names:
         return
-    known = set(states_of(now.description)).union(
+    known = set(renaming.states_of(now.description)).union(
         *(
-            states_of(store.description(each))
+            renaming.states_of(store.description(each))
             for each in {trial.structure for trial in store.trials(top.name)}
         )
     )
@@ -225,7 +238,7 @@ def _name_unknown(
         smach.logwarn(
             '{}: resume_map names {!r}, which is not a state of the machine, and was '
             'not one before; there are {}'.format(
-                top.path, path, ', '.join(sorted(states_of(now.description)))
+                top.path, path, ', '.join(sorted(renaming.states_of(now.description)))
             )
         )
 

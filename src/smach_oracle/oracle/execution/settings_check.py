@@ -1,6 +1,6 @@
 """Checks that the settings of a wrapped machine fit its states."""
 
-from typing import Any, Iterator, List, Set, Tuple
+from typing import Any, Iterator, List, Set, Tuple, cast
 
 import smach
 
@@ -130,7 +130,7 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     named += [
         ('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
         for name, given in settings.states.items()
-        for each in given.get('failure_outcomes', ())
+        for each in cast(Tuple[str, ...], given.get('failure_outcomes', ()))
     ]
     for key, name, outcome, kind in named:
         known = _outcomes_of(top, name)
@@ -183,7 +183,7 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
     # labels given for all states of this label are meant for others: none is beside a branch
     path = '{}/{}'.format(node.relative_path, label)
     given = node.settings.states.get(path, {}).get('preconditions')
-    return tuple(given or ())
+    return cast(Tuple[PreconditionSpec, ...], given or ())
 
 
 def _complain(node: TreeNode, unfit: UnfitName) -> None:

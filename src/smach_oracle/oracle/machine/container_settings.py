@@ -72,7 +72,5 @@ class ContainerSettings:
         own = self.given_with_add.get(label)
         settings = self.of_machine
         if own:
-            settings = settings.with_states(
-                {label: {**own, **dict(settings.states.get(label, {}))}}
-            )
+            settings = settings.with_states({label: {**own, **(settings.states.get(label) or {})}})
         return settings.for_state(path, label)

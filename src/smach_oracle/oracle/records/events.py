@@ -215,11 +215,11 @@ class EventSource:
             )
         )
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         """Leave out the lock and the observers: neither can travel with a pickled machine."""
         return {'trial_id': self.trial_id, '_seq': self._seq, '_log_error': self._log_error}
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
         self._over = False
         self._lock = threading.RLock()
@@ -229,8 +229,8 @@ class EventSource:
 
 def _in_words(observer: Observer) -> Tuple[str, str]:
     """Return what the log calls an observer, and what its failure means for the user."""
-    given: Any = observer
-    owner = given.__self__ if type(given) is MethodType else given
-    if issubclass(type(owner), OwnObserver):
+    is_method = type(observer) is MethodType
+    owner: object = getattr(observer, '__self__', None) if is_method else observer
+    if isinstance(owner, OwnObserver) and issubclass(type(owner), OwnObserver):
         return owner.observer_name, owner.without_it
     return 'the observer {}'.format(repr_of(observer)), 'it has missed this event'

@@ -5,7 +5,7 @@ are known here and nowhere else. Pure, and without smach.
 """
 
 from enum import Enum
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Dict, Mapping, Tuple
 
 from ..number_checks import is_whole
 from .events import NO_OUTCOME, Event
@@ -67,7 +67,7 @@ def decided_by(event: Event) -> Decider:
     return Decider.MAX_RECOVERIES if old else Decider.POLICY
 
 
-def told_in_words(data: Any) -> Dict[str, str]:
+def told_in_words(data: object) -> Dict[str, str]:
     """Return the facts in the data of an event that its sentence tells, too."""
     if not isinstance(data, Mapping):
         return {}
@@ -97,8 +97,8 @@ def branches_of(event: Event) -> Tuple[str, ...]:
 
 def last_stored(event: Event) -> int:
     """Return the number of the last event that was stored before a RESUMED one, -1 for none."""
-    stated: Any = _stated(event, LAST_SEQ)
-    return int(stated) if is_whole(stated, -1) else -1
+    stated = _stated(event, LAST_SEQ)
+    return stated if isinstance(stated, int) and is_whole(stated, -1) else -1
 
 
 def is_counted(event: Event) -> bool:
@@ -106,5 +106,5 @@ def is_counted(event: Event) -> bool:
     return not _stated(event, NOT_COUNTED)
 
 
-def _stated(event: Event, key: str) -> Optional[Any]:
+def _stated(event: Event, key: str) -> object:
     return event.data.get(key) if isinstance(event.data, Mapping) else None

@@ -9,7 +9,7 @@ come in, so no walk over the chain is ever needed.
 """
 
 from collections import deque
-from typing import Any, Deque, List, NamedTuple, Optional, Tuple
+from typing import Callable, Deque, Iterable, NamedTuple, Optional, Tuple
 
 from ..decision.policy import FailureContext
 from .visits import Visit, VisitResult
@@ -38,6 +38,8 @@ class _CountedVisits(Deque[Visit]):
         self.added += 1
 
 
+# state of the latest visit without preconditions, those of the latest successes, two streaks
+Told = Tuple[Optional[str], Optional[str], Optional[str], _Streak, _Streak]
 _NO_STREAK = _Streak(None, 0, None, False)
 
 
@@ -169,31 +171,40 @@ class History:
     def _latest_other(self, state: str) -> Optional[str]:
         return self.succeeded if self.succeeded != state else self.succeeded_other
 
-    def told(self) -> List[Any]:
+    def told(self) -> Told:
         """Return all but the visits as plain data, for `take_over`."""
-        return [
+        return (
             self.unconditioned,
             self.succeeded,
             self.succeeded_other,
-            list(self._streak),
-            list(self._before),
-        ]
+            self._streak,
+            self._before,
+        )
 
-    def take_over(self, visits: List[Visit], number: int, told: List[Any]) -> None:
+    def take_over(
+        self, visits: Iterable[Visit], number: int, told: Told, has: Callable[[str], bool]
+    ) -> None:
         """Go on from another history: its latest visits, their number in all, and what it told.
+
+        `has`: whether a state is still there. Others are forgotten.
 
         :raises ValueError: where `told` is none of a history.
         """
+
+        def there(label: Optional[str]) -> Optional[str]:
+            return label if label is not None and has(label) else None
+
         try:
-            unconditioned, succeeded, succeeded_other, streak, before = told
-            streaks = _Streak(*streak), _Streak(*before)
+            *labels, streak, before = told
+            self.unconditioned, self.succeeded, self.succeeded_other = map(there, labels)
+            streaks = [_Streak(*each) for each in (streak, before)]
         except TypeError as err:
             raise ValueError('that is no history: {}'.format(err)) from err
         self.visits = _CountedVisits(visits, maxlen=self.visits.maxlen)
         self.visits.added = number
-        self.unconditioned, self.succeeded = unconditioned, succeeded
-        self.succeeded_other = succeeded_other
-        self._streak, self._before = streaks
+        self._streak, self._before = (
+            each._replace(state=there(each.state), anchor=there(each.anchor)) for each in streaks
+        )
 
     def latest(self) -> Tuple[Visit, ...]:
         """Return the latest visits, oldest first."""

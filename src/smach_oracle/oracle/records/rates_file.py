@@ -12,17 +12,20 @@ machines then, for programs that do not know "machines". A machine without a nam
 {NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
 """
 
+import contextlib
 import gc
 import json
 import os
 import tempfile
+from functools import partial
 from typing import (
     Any,
+    Callable,
     Dict,
     Iterable,
+    Iterator,
     List,
     Mapping,
-    NamedTuple,
     Optional,
     Protocol,
     Sequence,
@@ -44,7 +47,7 @@ FROM_NAMELESS = (
     'Rates file {}: {!r} is new there, and begins with what machines without a name '
     'have learned of its states'
 )
-States = Dict[str, Any]  # what was learned, by label
+States = Dict[str, Mapping[str, object]]  # what was learned, by label
 Containers = Dict[str, States]  # by path below the top machine
 Labels = Dict[str, List[str]]  # by path, too
 
@@ -53,7 +56,7 @@ class Machines(Dict[str, Containers]):
     """What a file has, by the names of machines, '' for one that has none."""
 
     def __init__(
-        self, content: Mapping[str, Containers], states: Any = None, renamed: Any = None
+        self, content: Mapping[str, Containers], states: object = None, renamed: object = None
     ) -> None:
         """`states`: of each. `renamed`: new names, by those whose rates have gone there, too."""
         super().__init__(content)
@@ -77,19 +80,11 @@ class Learner(Protocol):
     def labels(self) -> Iterable[str]:
         """Return the labels of its states."""
 
-    def learn(self, label: str, learned: Mapping[str, Any], is_shared: bool) -> None:
+    def learn(self, label: str, learned: Mapping[str, object], is_shared: bool) -> None:
         """Take over what was learned of a state.
 
         :raises ValueError: where it cannot be read.
         """
-
-
-class _Written(NamedTuple):
-    """What was learned of one state, here and in all."""
-
-    record: Any  # StateRecord
-    before: Dict[str, Any]
-    written: Dict[str, Any]
 
 
 def learned_by(containers: Iterable[Learner]) -> Containers:
@@ -112,36 +107,42 @@ def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
     :raises OSError: where it cannot be written, or another program keeps the file locked. The old
         file is then untouched, and the next call adds what this one did not.
     """
-    learners = list(learners)
-    path = os.path.realpath(path)
-    with folder_lock(os.path.dirname(path)):
-        machines = _machines_or_none(path)
+    learners, path = list(learners), os.path.realpath(path)
+    with _rewritten(path, name, learners) as machines:
         done = _merge(path, machines.setdefault(name, {}), learners)
+    for share in done:
+        share()
+
+
+@contextlib.contextmanager
+def _rewritten(path: str, name: str, learners: Sequence[Learner]) -> Iterator[Machines]:
+    """Have what the file has changed by the body, and written."""
+    with folder_lock(os.path.dirname(path)):
+        machines = _to_change(path)
+        yield machines
         machines.states[name] = _labels(learners)
         _write(path, machines, name)
-    for each in done:
-        each.record.share(each.before, each.written)
 
 
-def _merge(path: str, containers: Containers, learners: Sequence[Learner]) -> List[_Written]:
-    """Put what is new of a machine into what its file has."""
-    done = []
+def _merge(
+    path: str, containers: Containers, learners: Sequence[Learner]
+) -> List[Callable[[], None]]:
+    """Put what is new of a machine into what its file has. Return what is done once it has it."""
+    done: List[Callable[[], None]] = []
     for learner in learners:
         states = containers.setdefault(learner.relative_path, {})
         for label, record in list(learner.records.by_label.items()):
-            before = record.learned()
-            written = before
+            before = written = record.learned()
             if label in states:
                 try:
                     written = record.merged_with(states[label])
                 except ValueError as err:
                     _tell_unusable(path, label, learner, err)
-            done.append(_Written(record, before, written))
+            done.append(partial(record.share, before, written))
             states[label] = written
     for learner in learners:
-        states = containers[learner.relative_path]
         for label, learned in learner.records.to_come.items():
-            states.setdefault(label, learned)
+            containers[learner.relative_path].setdefault(label, learned)
     return done
 
 
@@ -153,15 +154,11 @@ def write_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
     :raises OSError: where it cannot be written. The old file is then untouched.
     """
     learners = list(learners)
-    path = os.path.realpath(path)
-    with folder_lock(os.path.dirname(path)):
-        machines = _machines_or_none(path)
+    with _rewritten(os.path.realpath(path), name, learners) as machines:
         machines[name] = learned_by(learners)
-        machines.states[name] = _labels(learners)
-        _write(path, machines, name)
 
 
-def write_learned(path: str, containers: Mapping[str, Any]) -> None:
+def write_learned(path: str, containers: Mapping[str, States]) -> None:
     """Write what `learned_by` returned, in place of all that the file had.
 
     :raises OSError: where it cannot be written. The old file is then untouched.
@@ -174,10 +171,11 @@ def write_learned(path: str, containers: Mapping[str, Any]) -> None:
 def _write(path: str, machines: Machines, name: str) -> None:
     """Write all. In "containers" the machine of this name wins, as the latest."""
     machines.renamed.pop(name, None)  # it is there again
-    content: Dict[str, Any] = {'format': FORMAT, 'version': VERSION, 'containers': {}}
+    containers: Containers = {}
     for each in [each for each in machines if each != name] + [name]:
         for place, states in machines[each].items():
-            content['containers'].setdefault(place, {}).update(states)
+            containers.setdefault(place, {}).update(states)
+    content = {'format': FORMAT, 'version': VERSION, 'containers': containers}
     if set(machines) != {''}:
         content['machines'], content['states'] = machines, machines.states
     if machines.renamed:
@@ -195,30 +193,15 @@ def _write(path: str, machines: Machines, name: str) -> None:
         os.chmod(temporary, 0o644)
         os.replace(temporary, path)
     except BaseException:
-        _remove(temporary)
+        with contextlib.suppress(OSError):
+            os.remove(temporary)
         raise
-    _sync_folder(folder)
-
-
-def _remove(path: str) -> None:
-    try:
-        os.remove(path)
-    except OSError:
-        pass
-
-
-def _sync_folder(folder: str) -> None:
-    """Make the renaming durable, where the file system lets folders be synced."""
-    try:
+    with contextlib.suppress(OSError):  # not every file system lets folders be synced
         descriptor = os.open(folder, os.O_RDONLY)
-    except OSError:
-        return
-    try:
-        os.fsync(descriptor)
-    except OSError:
-        pass
-    finally:
-        os.close(descriptor)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: bool) -> None:
@@ -233,7 +216,13 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
     if is_shared:
         for learner in learners:
             learner.records.forget_shared()
-    machines = _machines(path)
+    try:
+        machines = _read(path, 'starting from the priors')
+    except OSError as err:
+        smach.logwarn(
+            'Rates file {} cannot be read, starting from the priors: {}'.format(path, err)
+        )
+        return
     if machines is None:
         return
     containers = (
@@ -259,7 +248,7 @@ def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: boo
     containers: Containers = {}
     try:
         with folder_lock(os.path.dirname(path)):
-            machines = _machines_or_none(path)
+            machines = _to_change(path)
             if name in machines:  # by now
                 return machines[name]
             before = _name_before(path, machines, learners)
@@ -318,59 +307,46 @@ def _tell_unusable(path: str, label: str, learner: Learner, err: Exception) -> N
     )
 
 
-def _machines_or_none(path: str) -> Machines:
+def _to_change(path: str) -> Machines:
     """Return what the file has, nothing where it has nothing that can be read.
 
     :raises OSError: where it is there and cannot be read: it is not to be written then.
     """
+    machines = _read(path, 'a new one is written')
+    return Machines({}) if machines is None else machines
+
+
+def _read(path: str, then: str) -> Optional[Machines]:
+    """Return what the file has by machine, None where it has nothing that can be read.
+
+    `then`: what a warning says of a damaged one.
+
+    :raises OSError: where it is there and cannot be read.
+    """
     try:
         with open(path, encoding='utf-8') as stream:
-            return _checked(json.load(stream))
-    except FileNotFoundError:
-        return Machines({})
-    except (ValueError, RecursionError) as err:
-        smach.logwarn(
-            'Rates file {} is damaged ({}), {}; a new one is written'.format(
-                path, err, _set_aside(path)
+            content = json.load(stream)
+        if not isinstance(content, dict) or content.get('format') != FORMAT:
+            raise ValueError('it is no file of {}'.format(FORMAT))
+        if content.get('version') != VERSION:
+            raise ValueError(
+                'it has version {!r}, known is {}'.format(content.get('version'), VERSION)
             )
-        )
-        return Machines({})
-
-
-def _machines(path: str) -> Any:
-    """Return what the file has by machine, None where that cannot be read."""
-    try:
-        with open(path, encoding='utf-8') as stream:
-            return _checked(json.load(stream))
+        machines = content.get('machines', {'': content.get('containers')})
+        if not isinstance(machines, dict) or not all(
+            isinstance(containers, dict)
+            and all(isinstance(states, dict) for states in containers.values())
+            for containers in machines.values()
+        ):
+            raise ValueError('it has no states')
+        return Machines(machines, content.get('states'), content.get('renamed'))
     except FileNotFoundError:
-        return None
-    except OSError as err:
-        smach.logwarn(
-            'Rates file {} cannot be read, starting from the priors: {}'.format(path, err)
-        )
         return None
     except (ValueError, RecursionError) as err:
         smach.logwarn(
-            'Rates file {} is damaged ({}), {}; starting from the priors'.format(
-                path, err, _set_aside(path)
-            )
+            'Rates file {} is damaged ({}), {}; {}'.format(path, err, _set_aside(path), then)
         )
         return None
-
-
-def _checked(content: Any) -> Machines:
-    if not isinstance(content, dict) or content.get('format') != FORMAT:
-        raise ValueError('it is no file of {}'.format(FORMAT))
-    if content.get('version') != VERSION:
-        raise ValueError('it has version {!r}, known is {}'.format(content.get('version'), VERSION))
-    machines = content.get('machines', {'': content.get('containers')})
-    if not isinstance(machines, dict) or not all(
-        isinstance(containers, dict)
-        and all(isinstance(states, dict) for states in containers.values())
-        for containers in machines.values()
-    ):
-        raise ValueError('it has no states')
-    return Machines(machines, content.get('states'), content.get('renamed'))
 
 
 def _set_aside(path: str) -> str:

@@ -14,6 +14,7 @@ launch/oracle.yaml and doc/settings.md of those of the executive.
 """
 
 import math
+from copy import copy
 from dataclasses import dataclass, field, fields
 from typing import (
     Any,
@@ -27,6 +28,7 @@ from typing import (
     Sequence,
     Tuple,
     TypeVar,
+    cast,
 )
 
 from smach_common.foreign import error_text
@@ -38,7 +40,8 @@ from ..number_checks import is_number, is_whole
 from .paths import path_of
 from .written import as_text, as_value, read_otherwise
 
-Check = Callable[[str, object], Any]
+T = TypeVar('T')
+Check = Callable[[str, object], T]
 
 
 def is_state(value: object) -> bool:
@@ -54,24 +57,24 @@ def is_state(value: object) -> bool:
         return False
 
 
-def number(low: float, high: float, allowed: str) -> Check:
+def number(low: float, high: float, allowed: str) -> Check[float]:
     """Check for a number from `low` to `high`. Its SettingsError says `allowed`."""
 
-    def check(key: str, value: Any) -> float:
+    def check(key: str, value: object) -> float:
         if not is_number(value, low, high):
             raise SettingsError(key, value, allowed)
-        return float(value)
+        return float(cast(float, value))
 
     return check
 
 
-def whole(low: int, allowed: str, high: float = math.inf) -> Check:
+def whole(low: int, allowed: str, high: float = math.inf) -> Check[int]:
     """Check for a whole number from `low` to `high`. Its SettingsError says `allowed`."""
 
-    def check(key: str, value: Any) -> int:
+    def check(key: str, value: object) -> int:
         if not is_whole(value, low, high):
             raise SettingsError(key, value, allowed)
-        return int(value)
+        return int(cast(int, value))
 
     return check
 
@@ -92,43 +95,28 @@ def no_name(key: str, value: object, allowed: str) -> SettingsError:
     return SettingsError(key, value, allowed, problem='is not allowed' + read_otherwise(value))
 
 
-def choice(options: Sequence[str]) -> Check:
-    """Check for one of some words. Its SettingsError names them all."""
-
+def _text_that(allowed: str, fits: Callable[[str], bool]) -> Check[str]:
     def check(key: str, value: object) -> str:
         word = as_text(value)
-        if not isinstance(word, str) or word not in options:
-            raise no_name(key, value, ', '.join(options))
+        if not isinstance(word, str) or not fits(word):
+            raise no_name(key, value, allowed)
         return word
 
     return check
 
 
-def text(key: str, value: object) -> str:
-    """Check for a string, empty or not.
+def choice(options: Sequence[str]) -> Check[str]:
+    """Check for one of some words. Its SettingsError names them all."""
+    return _text_that(', '.join(options), lambda word: word in options)
 
-    :raises SettingsError: for anything else.
-    """
-    found = as_text(value)
-    if not isinstance(found, str):
-        raise no_name(key, value, 'a string')
-    return found
+
+text = _text_that('a string', lambda word: True)  # empty or not
+label = _text_that('a string that is not empty', bool)
 
 
 def file(key: str, value: object) -> str:
     """Check for a path, empty or not, and return it with `~` filled in."""
     return path_of(text(key, value))
-
-
-def label(key: str, value: object) -> str:
-    """Check for a string that is not empty.
-
-    :raises SettingsError: for anything else.
-    """
-    found = as_text(value)
-    if not isinstance(found, str) or not found:
-        raise no_name(key, value, 'a string that is not empty')
-    return found
 
 
 def words(key: str, value: object) -> Tuple[str, ...]:
@@ -147,16 +135,16 @@ def words(key: str, value: object) -> Tuple[str, ...]:
     return tuple(sorted(found)) if isinstance(value, (set, frozenset)) else tuple(found)
 
 
-def optional(check: Check) -> Check:
+def optional(check: Check[T]) -> Check[Optional[T]]:
     """Check that admits None (nothing set) beside what `check` admits."""
 
-    def checked(key: str, value: object) -> object:
+    def checked(key: str, value: object) -> Optional[T]:
         return None if as_value(value) is None else check(key, value)
 
     return checked
 
 
-def mapping(key: str, value: object) -> Mapping[str, Any]:
+def mapping(key: str, value: object) -> Mapping[str, object]:
     """Check for a mapping whose keys are strings.
 
     None, an empty section of a YAML file, counts as an empty one.
@@ -173,7 +161,7 @@ def mapping(key: str, value: object) -> Mapping[str, Any]:
     return value
 
 
-def section(key: str, value: object, allowed: Collection[str]) -> Mapping[str, Any]:
+def section(key: str, value: object, allowed: Collection[str]) -> Mapping[str, object]:
     """Check for a mapping that has none but these keys.
 
     :raises SettingsError: as `mapping`, or naming the first other key.
@@ -229,17 +217,14 @@ def time_limit(key: str, value: object) -> Optional[float]:
     return _limit(key, value) or None
 
 
-T = TypeVar('T')
-
-
 def setting(
-    default: T, check: Callable[..., Any], text: str = '', names_objects: bool = False
+    default: T, check: Callable[..., object], text: str = '', names_objects: bool = False
 ) -> T:
     """Return the field of a setting. `names_objects`: the check also takes what imports these."""
     facts = {'check': check, 'text': text, 'names_objects': names_objects}
-    value: Any = {'default_factory': dict} if isinstance(default, dict) else {'default': default}
-    made: T = field(metadata=facts, **value)
-    return made
+    if isinstance(default, dict):
+        return field(default_factory=lambda: copy(default), metadata=facts)
+    return field(default=default, metadata=facts)
 
 
 def settings_of(group: type) -> Dict[str, Mapping[str, Any]]:
@@ -248,7 +233,7 @@ def settings_of(group: type) -> Dict[str, Mapping[str, Any]]:
 
 
 def checked(
-    group: type, prefix: str, given: Mapping[str, Any], resolver: Any = None
+    group: type, prefix: str, given: Mapping[str, object], resolver: 'Optional[Resolver]' = None
 ) -> Dict[str, Any]:
     """Return those of the settings of a dataclass that are given, checked.
 
@@ -264,11 +249,11 @@ def checked(
 
 
 PYTHON = 'python:'
-Resolver = Callable[[str], Any]
+Resolver = Callable[[str], object]
 _PYTHON_NAME = "'python:module:attribute', which names a {} of a module that can be imported"
 
 
-def named_object(key: str, given: str, wanted: str, resolver: Resolver) -> Any:
+def named_object(key: str, given: str, wanted: str, resolver: Resolver) -> object:
     """Return the object that `given` names.
 
     `wanted`: what it should be, in a word or two. `resolver`: imports it. It raises ImportError or
@@ -349,7 +334,7 @@ class PolicyChoice(NamedTuple):
 
 
 _TIMES = whole(0, 'a whole number from 0 to {}'.format(_MOST), _MOST)
-_CHECKS: Dict[str, Check] = {
+_CHECKS: Dict[str, Check[float]] = {
     'times': _TIMES,
     'tries': _TIMES,
     'steps_back': _TIMES,
@@ -370,7 +355,7 @@ def checked_policy(key: str, given: object) -> PolicyChoice:
         raise SettingsError(key, given, 'the name of a policy, or a mapping with its name')
     name = _NAMED(key + '.name', given['name'])
     allowed = POLICIES[name].parameters
-    parameters: Dict[str, Any] = {}
+    parameters: Dict[str, float] = {}
     for parameter, value in section(key, given, ['name', *allowed]).items():
         if parameter != 'name':
             checked = _CHECKS[parameter]('{}.{}'.format(key, parameter), value)
@@ -384,7 +369,7 @@ _COUNT = optional(whole(0, 'a whole number from 0'))
 
 def _minutes(key: str, value: object) -> float:
     allowed = 'a number of minutes above 0'
-    minutes = float(number(0, math.inf, allowed)(key, value))
+    minutes = number(0, math.inf, allowed)(key, value)
     if not minutes:
         raise SettingsError(key, value, allowed)
     return minutes

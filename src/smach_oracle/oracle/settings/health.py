@@ -7,7 +7,7 @@ A topic, a status of the diagnostics, or a function. In YAML a list of them, or 
 import math
 import re
 from enum import Enum
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, Union
+from typing import Callable, List, Mapping, NamedTuple, Optional, Tuple, Union
 
 from ..errors import SettingsError
 from ..identity import name_of
@@ -41,7 +41,7 @@ class HealthCondition(NamedTuple):
     name: str  # what people call it
     source: str = ''  # the topic, or the name of the status in the diagnostics
     field: str = 'data'  # of the topic's messages, dotted
-    equals: Any = None  # bool, number or text. None means the limits count
+    equals: object = None  # bool, number or text. None means the limits count
     at_least: float = -math.inf
     at_most: float = math.inf
     max_age_s: Optional[float] = None  # what is older, or was never received, is unwell
@@ -96,7 +96,7 @@ def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthC
     return made
 
 
-def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
+def _topic(prefix: str, entry: Mapping[str, object]) -> HealthCondition:
     topic = values.label(prefix + 'topic', entry['topic'])
     if not _GRAPH_NAME.fullmatch(topic):
         raise SettingsError(prefix + 'topic', topic, 'the name of a topic, such as /motors_on')
@@ -105,28 +105,27 @@ def _topic(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
         raise SettingsError(
             prefix + 'field', field, 'a field of the message, such as data or status.level'
         )
-    return HealthCondition(
-        HealthKind.TOPIC, topic.strip('/') or topic, topic, field, **_wanted(prefix, entry)
-    )
+    made = HealthCondition(HealthKind.TOPIC, topic.strip('/') or topic, topic, field)
+    return _wanted(prefix, entry, made)
 
 
-def _wanted(prefix: str, entry: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return what the field must be: `equals`, or limits. True where nothing is said."""
-    limits = [name for name in ('at_least', 'at_most') if name in entry]
-    if not limits:
-        return {'equals': _plain(prefix + 'equals', entry.get('equals', True))}
+def _wanted(prefix: str, entry: Mapping[str, object], made: HealthCondition) -> HealthCondition:
+    """Add what the field must be: `equals`, or limits. True where nothing is said."""
+    if not any(name in entry for name in ('at_least', 'at_most')):
+        return made._replace(equals=_plain(prefix + 'equals', entry.get('equals', True)))
     if 'equals' in entry:
         raise SettingsError(
             prefix + 'equals', entry['equals'], 'equals, or at_least and at_most, not both'
         )
-    wanted = {name: _NUMBER(prefix + name, entry[name]) for name in limits}
-    if wanted.get('at_least', -math.inf) > wanted.get('at_most', math.inf):
+    at_least, at_most = (
+        _NUMBER(prefix + name, entry[name]) if name in entry else none
+        for name, none in (('at_least', -math.inf), ('at_most', math.inf))
+    )
+    if at_least > at_most:
         raise SettingsError(
-            prefix + 'at_least',
-            wanted['at_least'],
-            'at most at_most, which is {:g}'.format(wanted['at_most']),
+            prefix + 'at_least', at_least, 'at most at_most, which is {:g}'.format(at_most)
         )
-    return wanted
+    return made._replace(at_least=at_least, at_most=at_most)
 
 
 def _plain(key: str, value: object) -> object:
@@ -139,14 +138,14 @@ def _plain(key: str, value: object) -> object:
 _plain_number = values.number(-math.inf, math.inf, 'true, false, a number or a text')
 
 
-def _diagnostics(prefix: str, entry: Mapping[str, Any]) -> HealthCondition:
+def _diagnostics(prefix: str, entry: Mapping[str, object]) -> HealthCondition:
     source = values.label(prefix + 'diagnostics', entry['diagnostics'])
     worst = values.choice(WORST)(prefix + 'worst', entry.get('worst', 'warn'))
     return HealthCondition(HealthKind.DIAGNOSTICS, source.strip('/') or source, source, worst=worst)
 
 
 def _function(
-    prefix: str, entry: Mapping[str, Any], resolver: Optional[Resolver]
+    prefix: str, entry: Mapping[str, object], resolver: Optional[Resolver]
 ) -> HealthCondition:
     given = entry['function']
     name, found = '', given

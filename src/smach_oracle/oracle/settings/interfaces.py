@@ -4,7 +4,7 @@ They say what is offered, for which states, and how it is started.
 """
 
 import re
-from typing import Any, List, Mapping, NamedTuple, Optional, Tuple
+from typing import List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from . import checks as values
@@ -62,7 +62,7 @@ def checked_interfaces(key: str, given: object) -> Offers:
     return tuple(offers)
 
 
-def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
+def _start(prefix: str, entry: Mapping[str, object]) -> Optional[InterfaceStart]:
     """Return how it is started, or None where it is somebody else's to start it."""
     kinds = [key for key in ('launch', 'node') if key in entry]
     if not kinds:
@@ -78,7 +78,7 @@ def _start(prefix: str, entry: Mapping[str, Any]) -> Optional[InterfaceStart]:
         'node': (_NODE, 'PACKAGE TYPE'),
     }[kind]
     found = pattern.fullmatch(values.text(prefix + kind, entry[kind]))
-    if found is None or '..' in entry[kind]:
+    if found is None or '..' in found.string:
         raise SettingsError(prefix + kind, entry[kind], allowed)
     args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
     return InterfaceStart(

@@ -41,7 +41,7 @@ class PreconditionSpec(NamedTuple):
             return tuple(label for half in self.target for label in half.labels())
         return ()
 
-    def functions(self) -> Tuple[Tuple[str, Callable[..., Any]], ...]:
+    def functions(self) -> Tuple[Tuple[str, Callable[..., object]], ...]:
         """Return the names of the functions that it calls, each with the function."""
         if self.kind is PreconditionKind.CALLABLE:
             return ((self.name, self.target),)
@@ -115,13 +115,13 @@ def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> Precondit
     return parse_precondition(key, found)._replace(name=given[len(PYTHON) :].rpartition(':')[2])
 
 
-def _halves(key: str, given: Mapping[str, Any]) -> List[Any]:
+def _halves(key: str, given: Mapping[str, object]) -> List[object]:
     if set(given) != {'check', 'achieve'}:
         raise SettingsError(key, dict(given), 'exactly the keys check and achieve')
     return [given['check'], given['achieve']]
 
 
-def _parse_pair(key: str, halves: List[Any], resolver: Optional[Resolver]) -> PreconditionSpec:
+def _parse_pair(key: str, halves: List[object], resolver: Optional[Resolver]) -> PreconditionSpec:
     check = parse_precondition(key + '.check', halves[0], resolver)
     achieve = parse_precondition(key + '.achieve', halves[1], resolver)
     if PreconditionKind.PAIR in (check.kind, achieve.kind):

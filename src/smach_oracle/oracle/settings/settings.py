@@ -6,7 +6,7 @@ a SettingsError that names the dotted key, the value and what is allowed.
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
 from ..decision.policy import POLICIES
@@ -181,7 +181,7 @@ class Settings:
         '`states`; to have it started `launch` or `node`, with `args` and `start_limit_s` ({:g}) '
         '([shared_autonomy.md](shared_autonomy.md))'.format(START_LIMIT_S),
     )
-    states: Mapping[str, Mapping[str, Any]] = setting(
+    states: Mapping[str, Mapping[str, object]] = setting(
         {},
         values.mapping,
         'the settings with a * and `preconditions`, by LABEL (everywhere), PATH/LABEL (relative '
@@ -275,7 +275,7 @@ class Settings:
 
     @classmethod
     def from_dict(
-        cls, given: Optional[Mapping[str, Any]], resolver: Optional[Resolver] = None
+        cls, given: Optional[Mapping[str, object]], resolver: Optional[Resolver] = None
     ) -> 'Settings':
         """Check a dictionary of settings.
 
@@ -287,7 +287,7 @@ class Settings:
         given = values.mapping('settings', given)
         names = sorted({*settings_of(StateSettings), *settings_of(cls)} - {'preconditions'})
         _refuse_unknown('', given, names)
-        defaults = StateSettings(**_checked_state('', given, StateSettings(), resolver))
+        defaults = replace(StateSettings(), **_checked_state('', given, StateSettings(), resolver))
         found = checked(cls, '', given, resolver)
         if 'policy' in found:
             found['policy'], found['policy_parameters'] = found['policy']
@@ -301,13 +301,13 @@ class Settings:
         names of `states` stand for it, the most exact one wins.
         """
         full = '{}/{}'.format(path, label) if path else label
-        merged: Dict[str, Any] = {}
+        merged: Dict[str, object] = {}
         for name in sorted((name for name in self.states if matches(name, full)), key=exactness):
             merged.update(self.states[name])
         return replace(self.defaults, **merged) if merged else self.defaults
 
     def with_states(
-        self, states: Mapping[str, Mapping[str, Any]], resolver: Optional[Resolver] = None
+        self, states: Mapping[str, object], resolver: Optional[Resolver] = None
     ) -> 'Settings':
         """Return these settings with further settings of single states, which win.
 
@@ -333,7 +333,7 @@ class Settings:
         )
 
 
-def _refuse_unknown(prefix: str, given: Mapping[str, Any], allowed: List[str]) -> None:
+def _refuse_unknown(prefix: str, given: Mapping[str, object], allowed: List[str]) -> None:
     for key in given:
         if key not in allowed:
             keys = 'one of the keys ' + ', '.join(allowed)
@@ -357,8 +357,8 @@ def _hint(prefix: str, key: str, allowed: List[str]) -> str:
 
 
 def _checked_state(
-    prefix: str, given: Mapping[str, Any], defaults: StateSettings, resolver: Optional[Resolver]
-) -> Dict[str, Any]:
+    prefix: str, given: Mapping[str, object], defaults: StateSettings, resolver: Optional[Resolver]
+) -> Dict[str, object]:
     found = checked(StateSettings, prefix, given, resolver)
     settings = replace(defaults, **found)
     if settings.moderate_from > settings.high_from:
@@ -377,8 +377,8 @@ def _checked_state(
     return found
 
 
-SettingsLike = Union[Settings, Mapping[str, Any], None]
-PreconditionLists = Optional[Mapping[str, List[Any]]]
+SettingsLike = Union[Settings, Mapping[str, object], None]
+PreconditionLists = Optional[Mapping[str, Sequence[object]]]
 
 
 def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Settings:

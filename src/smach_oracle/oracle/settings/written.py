@@ -5,7 +5,7 @@ on the setting. So a value from a file keeps its text: `as_text` gives what stan
 `as_value` what YAML reads.
 """
 
-from typing import Any, Mapping, Optional
+from typing import Mapping, Optional, Tuple
 
 
 class WrittenWord(str):
@@ -19,7 +19,7 @@ class WrittenWord(str):
         word.value = value
         return word
 
-    def __getnewargs__(self) -> Any:
+    def __getnewargs__(self) -> Tuple[str, Optional[bool]]:  # type: ignore[override]
         return str(self), self.value
 
 
@@ -47,7 +47,7 @@ def as_value(value: object) -> object:
     return value.value if isinstance(value, WrittenWord) else value
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> object:
     """Return plain data, as YAML reads them, of what a file holds."""
     if isinstance(value, Mapping):
         return {name: plain(each) for name, each in value.items()}

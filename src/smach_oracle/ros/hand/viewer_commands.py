@@ -8,7 +8,7 @@ import threading
 import time
 import types
 import weakref
-from typing import Any, Collection, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Collection, Dict, Iterator, List, Optional, Tuple, cast
 
 import rospy
 
@@ -105,7 +105,8 @@ def _containers_in(container: Any, above: List[object]) -> Iterator[smach.Contai
 
 def _shown_by_upstream(container: smach.Container) -> Iterator[_Shown]:
     """Topics and paths by which upstream's introspection listens for a container."""
-    for callback in own_mark(container, '_transition_cbs') or ():
+    callbacks = cast(List[Tuple[object, ...]], own_mark(container, '_transition_cbs') or [])
+    for callback in callbacks:
         if not isinstance(callback[0], types.MethodType):
             continue
         proxy: Any = callback[0].__self__
