@@ -12,6 +12,8 @@ from typing import Any, Callable, Deque, Dict, List, Mapping, Tuple, Union
 from ..errors import SettingsError
 from ..number_checks import is_number, is_whole
 
+Snapshot = Dict[str, Any]  # what an estimator has learned, as plain data
+Learned = Mapping[str, Any]  # a snapshot that somebody else has made
 _ROUNDING = 1e-9  # a rate that equals a threshold except for binary rounding has reached it
 
 
@@ -121,7 +123,7 @@ class FailureRate(_Totals):
             failures -= 1
         return failures, min(self.memory, self._results)
 
-    def snapshot(self) -> Dict[str, Any]:
+    def snapshot(self) -> Snapshot:
         """Return what was learned as plain data, for `restore` and the rates file.
 
         The newest result is the last one.
@@ -138,7 +140,7 @@ class FailureRate(_Totals):
             'window': window,
         }
 
-    def restore(self, learned: Mapping[str, Any]) -> None:
+    def restore(self, learned: Learned) -> None:
         """Take over a `snapshot`, also one made with another memory: its newest results count.
 
         A snapshot of the other estimator gives the totals alone.
@@ -205,7 +207,7 @@ class ExponentialFailureRate(_Totals):
         """Return 0, 0: it does not know single results."""
         return 0, 0
 
-    def snapshot(self) -> Dict[str, Any]:
+    def snapshot(self) -> Snapshot:
         """Return what was learned as plain data, for `restore` and the rates file."""
         return {
             'estimator': self.kind,
@@ -214,7 +216,7 @@ class ExponentialFailureRate(_Totals):
             'rate': self._rate,
         }
 
-    def restore(self, learned: Mapping[str, Any]) -> None:
+    def restore(self, learned: Learned) -> None:
         """Take over a `snapshot`. One of the other estimator gives the totals alone.
 
         :raises ValueError: where it is no snapshot.
@@ -228,7 +230,7 @@ class ExponentialFailureRate(_Totals):
         self.successes, self.failures, self._rate = successes, failures, float(rate)
 
 
-def _totals(learned: Mapping[str, Any]) -> Tuple[int, int]:
+def _totals(learned: Learned) -> Tuple[int, int]:
     totals = (learned.get('successes', 0), learned.get('failures', 0))
     if not all(is_whole(total, 0) for total in totals):
         raise ValueError('successes, failures: {!r} are not counts'.format(totals))
@@ -254,10 +256,8 @@ def make_estimator(kind: str, memory: int, prior: float) -> Estimator:
 
 # -- what two machines have learned of one state, merged
 
-Learned = Mapping[str, Any]  # the snapshot of an estimator
 
-
-def base_of(learned: Learned) -> Dict[str, Any]:
+def base_of(learned: Learned) -> Snapshot:
     """Return what `merged` has to know of a snapshot, to tell later what is new since then."""
     return {
         key: learned[key]
@@ -266,7 +266,7 @@ def base_of(learned: Learned) -> Dict[str, Any]:
     }
 
 
-def merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Dict[str, Any]:
+def merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapshot:
     """Return what others have learned, and behind it what is new of our own since `base`.
 
     A failure that was taken back since then is taken out.
@@ -279,7 +279,7 @@ def merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Dict[st
         raise ValueError('{!r} is not what was learned of a state'.format(theirs)) from err
 
 
-def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Dict[str, Any]:
+def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapshot:
     successes = own['successes'] - base.get('successes', 0)
     failures = own['failures'] - base.get('failures', 0)
     if base and base == base_of(theirs):

@@ -9,7 +9,7 @@ import copy
 import pickle
 import threading
 from collections.abc import MutableMapping
-from typing import Any, Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Set
+from typing import Callable, Dict, Iterable, Iterator, Mapping, NamedTuple, Optional, Set
 
 import smach
 from smach_common.foreign import ends_program, error_text
@@ -142,7 +142,7 @@ class UserdataGate(MutableMapping):
 
 def behind(gate: UserdataGate) -> smach.UserData:
     """Return a `smach.UserData` whose reads and writes pass `gate`."""
-    userdata: Any = smach.UserData()
+    userdata = smach.UserData()
     hold_data(userdata, gate)
     return userdata
 
@@ -223,15 +223,15 @@ class WriteWatch:
 
     def written(self) -> Set[str]:
         """Return the keys set, deleted or changed so far."""
-        now = dict(data_of(self._machine.userdata))
+        now, before = dict(data_of(self._machine.userdata)), self._before
         keys = self._kept.union(self.gate.written)
-        keys.update(
-            key for key in now if key not in self._before or now[key] is not self._before[key]
-        )
-        keys.update(key for key in self._before if key not in now)
-        keys.update(
-            key
-            for key, seen in self._prints.items()
-            if key in now and fingerprint(now[key]) != seen
-        )
+        for key, value in now.items():
+            if key not in before or before[key] is not value:
+                keys.add(key)
+        for key in before:
+            if key not in now:
+                keys.add(key)
+        for key, seen in self._prints.items():
+            if key in now and fingerprint(now[key]) != seen:
+                keys.add(key)
         return keys

@@ -155,18 +155,18 @@ class Workers:
 
     def _take_thread(self) -> KeptThread:
         """Return a thread for a function: an idle one, or a new one."""
-        with self._lock:
-            while self._idle:
+        try:
+            while True:
                 thread = self._idle.pop()
                 if thread.is_usable():
                     return thread
-        return KeptThread(_FUNCTION)
+        except IndexError:
+            return KeptThread(_FUNCTION)
 
     def end_idle_threads(self) -> None:
         """Let the threads end that were kept for further functions."""
-        with self._lock:
-            while self._idle:
-                self._idle.pop().end()
+        while self._idle:
+            self._idle.pop().end()
 
     def _block(self, target: object, call: BackgroundCall, why: str) -> None:
         with self._lock:

@@ -6,7 +6,7 @@ Without an oracle an unsuccessful outcome leads to a state of the author's or en
 
 import traceback
 from functools import lru_cache, partial
-from typing import Any, Callable, NamedTuple, Optional, Tuple, Union
+from typing import Callable, NamedTuple, Optional, Tuple, Union, cast
 
 import smach
 from smach_common.foreign import error_text, repr_of
@@ -97,7 +97,7 @@ def traceback_of(err: Exception) -> str:
     return ''.join(traceback.format_exception(type(err), err, err.__traceback__))
 
 
-def unregistered_text(label: str, state: smach.State, outcome: Any) -> str:
+def unregistered_text(label: str, state: smach.State, outcome: object) -> str:
     """Say that the state has not registered the outcome."""
     return 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
         label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes())
@@ -128,7 +128,7 @@ class HeldBack(NamedTuple):
 
 
 def judge(
-    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+    node: TreeNode, record: StateRecord, outcome: object, error: Optional[Exception]
 ) -> Union[Route, Failure]:
     """Return where the outcome leads, or what kind of failure it is."""
     judged = _judge(node, record, outcome, error)
@@ -139,7 +139,7 @@ def judge(
 
 
 def _judge(
-    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
+    node: TreeNode, record: StateRecord, outcome: object, error: Optional[Exception]
 ) -> Union[Route, Failure]:
     machine = node.machine
     label, state = record.label, states_of(machine)[record.label]
@@ -173,6 +173,7 @@ def _judge(
             None,
             _once(partial(smach.InvalidTransitionError, text)),
         )
+    outcome = cast(str, outcome)
     route = route_of(machine, label, outcome)
     kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:

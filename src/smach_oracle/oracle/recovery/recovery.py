@@ -125,7 +125,8 @@ class Recovery:
 
     def tell(self, kind: EventKind, **fields: str) -> None:
         """Tell the observers of a step that is about the failed state."""
-        self.node.emit(kind, self.record.label, **fields)
+        if self.node.events.observers:
+            self.node.emit(kind, self.record.label, **fields)
 
     def facts(self, action: Action, **fields: Any) -> DecisionFacts:
         """Return what has led to a decision."""

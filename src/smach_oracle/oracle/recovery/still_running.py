@@ -5,7 +5,7 @@ limit is never abandoned, so a person is asked, while it runs, whether to wait o
 """
 
 import threading
-from typing import Any, NamedTuple, Optional
+from typing import NamedTuple, Optional
 
 import smach
 
@@ -29,7 +29,7 @@ class EndedByAnswer(NamedTuple):
 
     answer: Answer
     failure: Failure  # as if it had failed, for giving up as the failure would
-    outcome: Any
+    outcome: object
     error: Optional[Exception]
 
 

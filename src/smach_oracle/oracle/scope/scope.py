@@ -98,13 +98,11 @@ class Scope:
         self.clock: Clock = clock or (around[0].clock if around else Clock())
         self.limit_s = limit_s
         self.time = PausableClock(self.clock) if time is None and limit_s is not None else time
-        line: Tuple['Scope', ...] = (self,)  # it and all around it
-        looks: Tuple[Look, ...] = () if look is None else (look,)
+        self.line: Tuple['Scope', ...] = (self,)  # it and all around it
+        self.looks: Tuple[Look, ...] = () if look is None else (look,)
         for each in around:
-            line += each.line
-            looks += each.looks
-        self.line: Tuple['Scope', ...] = line
-        self.looks: Tuple[Look, ...] = looks
+            self.line += each.line
+            self.looks += each.looks
         self.cancelled: Optional[Reason] = None
         # of all who wait. To add one, to remove one and to copy them are one step each: no lock is
         # held, in which the handler of a signal could meet its own thread
