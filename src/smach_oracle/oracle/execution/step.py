@@ -112,7 +112,7 @@ class Step:
                 node, record.label, outcome if isinstance(judged, Route) else None
             )
         if isinstance(judged, Route):
-            result = visit_result(outcome, FailureKind.NOT_A_FAILURE, stopping)
+            result = visit_result(outcome, stopping)
             node.records.visit_ended(record, outcome, result)
             return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)
         stopping = stopping or winds_down(node)

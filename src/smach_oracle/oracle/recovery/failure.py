@@ -6,7 +6,7 @@ Without an oracle an unsuccessful outcome leads to a state of the author's or en
 
 import traceback
 from functools import lru_cache, partial
-from typing import Callable, NamedTuple, Optional, Tuple, Union, cast
+from typing import Callable, NamedTuple, Optional, Union, cast
 
 import smach
 from smach_common.foreign import error_text, repr_of
@@ -28,9 +28,9 @@ class Failure(NamedTuple):
 
     state: str
     kind: FailureKind
-    outcome: str  # '' where there is none
-    text: str  # exception text, reasons
-    route: Optional[Route]  # where the outcome would have led, or None where it raises
+    outcome: str = ''
+    text: str = ''  # exception text, reasons
+    route: Optional[Route] = None  # where the outcome would have led, or None where it raises
     # makes what the machine raises if the oracle gives up
     error: Optional[Callable[[], Exception]] = None
     details: str = ''  # the traceback
@@ -66,14 +66,14 @@ def is_registered(state: smach.State, outcome: object) -> bool:
         return False
 
 
-def visit_result(outcome: str, kind: FailureKind, stopping: bool) -> VisitResult:
-    """Return how a visit counts that ended with `outcome`.
+def visit_result(outcome: str, stopping: bool) -> VisitResult:
+    """Return how a visit counts that did not fail.
 
     `stopping`: a preempt or a shutdown is under way.
     """
-    if stopping or (is_preempted(outcome) and kind is FailureKind.NOT_A_FAILURE):
+    if stopping or is_preempted(outcome):
         return VisitResult.PREEMPTED
-    return VisitResult.SUCCESS if kind is FailureKind.NOT_A_FAILURE else VisitResult.FAILURE
+    return VisitResult.SUCCESS
 
 
 def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
@@ -95,21 +95,6 @@ def raised_error(label: str, state: smach.State, err: Exception) -> Exception:
 def traceback_of(err: Exception) -> str:
     """Return the traceback as Python prints it."""
     return ''.join(traceback.format_exception(type(err), err, err.__traceback__))
-
-
-def unregistered_text(label: str, state: smach.State, outcome: object) -> str:
-    """Say that the state has not registered the outcome."""
-    return 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
-        label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes())
-    )
-
-
-def unbound_text(label: str, outcome: str, container_outcomes: Tuple[str, ...]) -> str:
-    """Say that the outcome leads nowhere."""
-    return (
-        'Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
-        'the container has {}'.format(outcome, label, names(container_outcomes))
-    )
 
 
 # -- judging
@@ -147,32 +132,25 @@ def _judge(
         return Failure(
             label,
             FailureKind.EXCEPTION,
-            '',
-            error_text(error),
-            None,
-            _once(partial(raised_error, label, state, error)),
-            traceback_of(error),
+            text=error_text(error),
+            error=_once(partial(raised_error, label, state, error)),
+            details=traceback_of(error),
         )
     if isinstance(outcome, Overrun):
-        return Failure(label, FailureKind.TIME_LIMIT, '', outcome.text, None)
+        return Failure(label, FailureKind.TIME_LIMIT, text=outcome.text)
     if isinstance(outcome, Unfinished):
         return _failure_before(node, label, outcome)
     if isinstance(outcome, HeldBack):
-        return Failure(label, FailureKind.HELD_BACK, '', outcome.text, None)
+        return Failure(label, FailureKind.HELD_BACK, text=outcome.text)
     if not is_registered(state, outcome):
-        text = unregistered_text(label, state, outcome)
-        if node.site.goes_on_with_any and isinstance(outcome, str):
-            return Failure(
-                label, FailureKind.UNREGISTERED_OUTCOME, outcome, text, Route(outcome, False)
-            )
-        return Failure(
-            label,
-            FailureKind.UNREGISTERED_OUTCOME,
-            outcome if isinstance(outcome, str) else '',
-            text,
-            None,
-            _once(partial(smach.InvalidTransitionError, text)),
+        text = 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
+            label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes())
         )
+        told = outcome if isinstance(outcome, str) else None
+        failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told or '', text)
+        if node.site.goes_on_with_any and told is not None:
+            return failure._replace(route=Route(told, False))
+        return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast(str, outcome)
     route = route_of(machine, label, outcome)
     kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
@@ -180,10 +158,12 @@ def _judge(
         return route
     if route.target:
         return Failure(label, kind, outcome, _description(node, label, state), route)
-    text = unbound_text(label, outcome, machine.get_registered_outcomes())
-    return Failure(
-        label, kind, outcome, text, route, _once(partial(smach.InvalidTransitionError, text))
+    text = (
+        'Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
+        'the container has {}'.format(outcome, label, names(machine.get_registered_outcomes()))
     )
+    unbound = _once(partial(smach.InvalidTransitionError, text))
+    return Failure(label, kind, outcome, text, route, unbound)
 
 
 def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
@@ -193,17 +173,15 @@ def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
 
 def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     """Return the failure of a visit that was begun before the program was stopped."""
-    route = route_of(node.machine, label, before.outcome) if before.outcome else None
-    error = None
-    if route is None or not route.target:
-        route = None
-        if before.kind not in (
-            FailureKind.INTERRUPTED,
-            FailureKind.TIME_LIMIT,
-            FailureKind.HELD_BACK,
-        ):
-            error = partial(smach.InvalidUserCodeError, '{}: {}'.format(label, before.text))
-    return Failure(label, before.kind, before.outcome, before.text, route, error)
+    failure = Failure(label, before.kind, before.outcome, before.text)
+    route = route_of(node.machine, label, before.outcome) if before.outcome else Route('', False)
+    if route.target:
+        return failure._replace(route=route)
+    raises_none = (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
+    if before.kind in raises_none:
+        return failure
+    text = '{}: {}'.format(label, before.text)
+    return failure._replace(error=partial(smach.InvalidUserCodeError, text))
 
 
 def _description(node: TreeNode, label: str, state: smach.State) -> str:

@@ -1,7 +1,7 @@
 """Asking the expert until an answer fits or the deadline is over (paper, section V)."""
 
 import threading
-from typing import Callable, NamedTuple, Optional
+from typing import Callable, Optional
 
 import smach
 from smach_common.foreign import repr_of
@@ -24,13 +24,6 @@ _MAX_PAUSE_S = 1.0  # between questions while the answers do not fit
 _TOLD = {'claimed': EventKind.QUERY_CLAIMED, 'released': EventKind.QUERY_RELEASED}
 
 
-class Reply(NamedTuple):
-    """The end of an inquiry: with an answer that fits, or without one."""
-
-    answer: Optional[Answer]
-    why_none: str = ''
-
-
 class _NoAnswer(Exception):
     """Nobody answers this question any more. It never leaves this module."""
 
@@ -50,8 +43,11 @@ class Inquiry:
             self._cancelled.set()  # it came before there was an event
         self._unfit = 0
 
-    def run(self) -> Reply:
-        """Ask, and ask again while the answer does not fit, until the deadline."""
+    def run(self) -> Optional[Answer]:
+        """Ask, and ask again while the answer does not fit, until the deadline.
+
+        Where nobody answers, `recovery.why_no_answer` says why.
+        """
         try:
             while True:
                 left_s = self._remaining_s()
@@ -62,10 +58,11 @@ class Inquiry:
                 _say_that_it_waits(self._recovery, question)
                 answer = self._answer_to(question)
                 if answer is not None:
-                    return Reply(answer)
+                    return answer
                 self._pause()
         except _NoAnswer as why:
-            return Reply(None, str(why))
+            self._recovery.why_no_answer = str(why)
+            return None
 
     def _remaining_s(self) -> float:
         if self._scope.reason is not None:

@@ -4,6 +4,7 @@ from typing import Any, List, NamedTuple, Optional, Tuple
 
 import smach
 
+from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.jump_path import jump_path_to
@@ -11,7 +12,7 @@ from ..machine.places import TreePlace, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, route_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
-from ..records.facts import DECIDED_BY
+from ..records.facts import DECIDED_BY, Decider
 from ..smach_private import (
     Labels,
     current_label_of,
@@ -130,11 +131,16 @@ def runs_as_precondition(node: TreeNode) -> bool:
     return False
 
 
-def levels_that_may_decide(node: TreeNode) -> List[TreeNode]:
-    """Return the levels above to which `escalate` hands a failure, innermost first."""
+def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNode]:
+    """Return the levels above to which `escalate` hands a failure, innermost first.
+
+    None where the failure is to be asked about at once.
+    """
     found: List[TreeNode] = []
-    child = node
-    for above in levels_above(node):
+    if decider is not Decider.POLICY or recovery.record.failure_class is FailureClass.HIGH:
+        return found
+    child = recovery.node
+    for above in levels_above(child):
         if not child.settings.escalate or not is_direct(child):
             break
         found.append(above)

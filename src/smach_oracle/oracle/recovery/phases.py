@@ -11,7 +11,6 @@ from typing import Dict, FrozenSet, List, Optional, Tuple
 import smach
 
 from ..asking.question import Answer, AnswerKind, Expert
-from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import DecisionFacts, cause_of
 from ..errors import TrialError
@@ -21,7 +20,6 @@ from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
-from ..records.facts import Decider
 from ..scope.scope import standing_still
 from ..smach_private import Labels, Transitions, remapping_of, states_of, transitions_of
 from .deciding import decide_on_level
@@ -165,7 +163,7 @@ def escalate(recovery: Recovery) -> Optional[Verdict]:
         return None
     decider, facts = recovery.decided
     nobody = _why_nobody_is_asked(recovery)
-    levels = [] if nobody else _levels_that_may_decide(recovery, decider)
+    levels = [] if nobody else levels_that_may_decide(recovery, decider)
     asked = (
         'the oracle above'
         if levels
@@ -209,13 +207,6 @@ def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
     return recovery.give_up('{}: {}'.format(recovery.cause, why.text))
 
 
-def _levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNode]:
-    """Return them, innermost first. None where the failure is to be asked about at once."""
-    if decider is not Decider.POLICY or (recovery.record.failure_class is FailureClass.HIGH):
-        return []
-    return levels_that_may_decide(recovery.node)
-
-
 def _decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
     """Return what the innermost level decides that does not ask, or None where all ask."""
     below, ending = recovery.node, recovery.natural_ending()
@@ -254,7 +245,7 @@ def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
     deadline_s, recovery.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
     with standing_still(node.execution.runs_around), early_end.asking():
-        reply = Inquiry(recovery, expert, deadline_s).run()
+        answer = Inquiry(recovery, expert, deadline_s).run()
     question_id = recovery.question_id
     if recovery.stopped():
         if early_end.end_at_shutdown():
@@ -263,9 +254,10 @@ def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
             why = recovery.why_taken_back()
             recovery.tell(EventKind.QUERY_CANCELLED, text=why, query_id=question_id)
         return recovery.preempted()
-    if reply.answer is not None:
-        return _obey(recovery, reply.answer)
-    why = recovery.why_no_answer = '; '.join(filter(None, (reply.why_none, budget.why_over())))
+    if answer is not None:
+        return _obey(recovery, answer)
+    why = '; '.join(filter(None, (recovery.why_no_answer, budget.why_over())))
+    recovery.why_no_answer = why
     text = '{}; fallback: {}'.format(why, fallback_in_words(recovery))
     recovery.tell(EventKind.QUERY_EXPIRED, text=text, query_id=question_id)
     return None

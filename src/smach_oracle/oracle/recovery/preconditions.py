@@ -8,7 +8,7 @@ through their output keys, and down through the input keys of the containers aro
 state.
 """
 
-from typing import Dict, List, NamedTuple, Tuple, Union, cast
+from typing import Dict, List, Tuple, Union, cast
 
 import smach
 from smach_common.foreign import repr_of
@@ -33,13 +33,6 @@ from .recovery import Recovery
 
 class NotMet(Exception):
     """A precondition is not met. The text says why. This error never leaves its module."""
-
-
-class _RunIn(NamedTuple):
-    """A container of which a state is run, and what its userdata is written through."""
-
-    node: TreeNode
-    gate: UserdataGate
 
 
 def why_not_met(recovery: Recovery, spec: PreconditionSpec) -> str:
@@ -69,7 +62,7 @@ def _achieve(recovery: Recovery, spec: PreconditionSpec, elsewhere: 'List[_Elsew
     elif spec.kind is PreconditionKind.CALLABLE:
         _call(recovery, spec)
     elif spec.kind is PreconditionKind.STATE:
-        _run(recovery, _RunIn(recovery.node, recovery.watch.gate), spec.target, '')
+        _run(recovery, recovery.node, recovery.watch.gate, spec.target, '')
     else:
         _run_place(recovery, spec.target, elsewhere)
 
@@ -119,31 +112,36 @@ def _run_place(recovery: Recovery, name: str, elsewhere: 'List[_Elsewhere]') -> 
         raise NotMet('{!r} cannot be run: {}'.format(name, why_not or 'there is no such state'))
     state, gate = states_of(place.node.machine)[place.label], recovery.watch.gate
     if place.node is node:
-        _run(recovery, _RunIn(node, gate), state, place.label)
+        _run(recovery, node, gate, state, place.label)
         return
     run = _Elsewhere(node, place, gate)
     elsewhere.append(run)
-    _run(recovery, _RunIn(place.node, run.gate), state, place.label)
+    _run(recovery, place.node, run.gate, state, place.label)
     run.hand_over()
 
 
-def _run(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> None:
-    """Execute a state, and note that. `label`: '' where it was given itself.
+def _run(
+    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
+) -> None:
+    """Execute a state of a container, and note that.
+
+    :param gate: what its userdata is written through.
+    :param label: '' where the state was given itself.
 
     :raises NotMet: where it, or a state within, would be repeated and is not to be.
     """
     noted = label or _label_of(recovery.node, state)
     if noted:
-        repeated = repeated_by_running(site.node, noted)
+        repeated = repeated_by_running(node, noted)
         if repeated:
             raise _not_repeated(', '.join(repeated))
-        _check_free(recovery, states_of(site.node.machine)[noted])
-        note_precondition(site.node, noted)
+        _check_free(recovery, states_of(node.machine)[noted])
+        note_precondition(node, noted)
     try:
-        _judge(recovery, site.node, state, label, _execute(recovery, site, state, label))
+        _judge(recovery, node, state, label, _execute(recovery, node, gate, state, label))
     finally:
         if noted:
-            note_precondition(site.node, noted)
+            note_precondition(node, noted)
 
 
 def _not_repeated(what: str) -> NotMet:
@@ -156,8 +154,10 @@ def _label_of(node: TreeNode, state: smach.State) -> str:
     return next((label for label in node.labels() if states[label] is state), '')
 
 
-def _execute(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> object:
-    node, scope, origin = site.node, recovery.scope, recovery.origin
+def _execute(
+    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
+) -> object:
+    scope, origin = recovery.scope, recovery.origin
     autonomy = node.settings_of(label).autonomy if label else RUN
     wait_for_operator(node, (), label or type(state).__name__, autonomy, scope)
     _check_free(recovery, state)
@@ -170,8 +170,8 @@ def _execute(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -
         raise NotMet('is being run as a precondition already')
     try:
         if label:
-            write_constants(behind(site.gate), constants_of(node.machine, label))
-        return _with_limit(recovery, site, state, label)
+            write_constants(behind(gate), constants_of(node.machine, label))
+        return _with_limit(recovery, node, gate, state, label)
     except NotMet:
         raise
     except Exception as err:
@@ -185,12 +185,13 @@ def _execute(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -
             state.recall_preempt()  # the meta state services the request in its place
 
 
-def _with_limit(recovery: Recovery, site: _RunIn, state: smach.State, label: str) -> object:
-    node = site.node
+def _with_limit(
+    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
+) -> object:
     settings = node.settings_of(label) if label else recovery.record.settings
     if settings.time_limit_s is None:
-        return state.execute(view_behind(site.gate, node.machine, label, state))
-    gate = site.gate.fork()
+        return state.execute(view_behind(gate, node.machine, label, state))
+    gate = gate.fork()
     result = node.tree.workers.run(
         state,
         view_behind(gate, node.machine, label, state),

@@ -19,7 +19,7 @@ from ..scope.clock import Flag, PausableClock
 from ..scope.scope import Reason, Scope, inside, standing_still
 from ..smach_private import states_of
 from .failure import Failure
-from .inquiry import Inquiry, Reply
+from .inquiry import Inquiry
 from .occasions import still_running
 from .recovery import Recovery
 
@@ -135,24 +135,24 @@ class WatchedVisit:
         if expert is None or spent:
             self._warn(failure.text + (' Nobody is asked: ' + spent if spent else ''))
             return False
-        reply = self._inquire(recovery, expert)
+        answer = self._inquire(recovery, expert)
         if recovery.stopped():
             if not self._ended.is_set():
                 node.tree.early_end.end_at_shutdown()
                 self._close(EventKind.QUERY_CANCELLED, recovery.why_taken_back())
             return False
-        if reply.answer is None:
+        if answer is None:
             why_over = budget.why_over()
-            why = '; '.join(filter(None, (reply.why_none, why_over)))
+            why = '; '.join(filter(None, (recovery.why_no_answer, why_over)))
             self._close(EventKind.QUERY_EXPIRED, why + '; it runs on')
             return not why_over
-        if self._is_wait_on(reply.answer):
-            smach.loginfo('{}: {} waits on'.format(self._place(), reply.answer.by or 'the expert'))
+        if self._is_wait_on(answer):
+            smach.loginfo('{}: {} waits on'.format(self._place(), answer.by or 'the expert'))
             return True
-        self._take_out(reply.answer)
+        self._take_out(answer)
         return False
 
-    def _inquire(self, recovery: Recovery, expert: Expert) -> Reply:
+    def _inquire(self, recovery: Recovery, expert: Expert) -> Optional[Answer]:
         # the state runs on, and so do the time limits around it. Whoever looks whether a state
         # around still runs has its answer in this question
         watched = [run for run in self._node.execution.runs_around if run.limit_s is None]
