@@ -11,7 +11,7 @@ from smach_common.foreign import repr_of
 
 from .control.control import HeldPlace, Hold, Jump
 from .errors import OperatorError, SettingsError, TrialError
-from .execution.sending import Prospect, jump_path_for, prospect_of
+from .execution.jump_entry import Prospect, jump_path_for, prospect_of
 from .machine.nesting import nodes_of
 from .machine.places import TreePlace
 from .machine.repeats import note_initial

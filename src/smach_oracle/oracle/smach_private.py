@@ -16,6 +16,8 @@ from typing import (
     Optional,
     Set,
     Tuple,
+    Type,
+    Union,
     cast,
 )
 
@@ -25,6 +27,7 @@ from .identity import WeakIdentityMap, own_attributes, own_mark
 
 Labels = Tuple[str, ...]
 Transitions = Dict[str, Optional[str]]
+HasStates = Union[smach.StateMachine, smach.Concurrence]
 
 
 # -- the mark of an oracle: all of ours that is set on a user's machine
@@ -53,10 +56,9 @@ def remove_mark(machine: object) -> None:
 # -- the states of a container, and what lies between them
 
 
-def states_of(container: Any) -> Dict[str, smach.State]:
+def states_of(container: HasStates) -> Dict[str, smach.State]:
     """Return the states of a StateMachine or a Concurrence by label, in the author's order."""
-    states: Dict[str, smach.State] = container._states
-    return states
+    return container._states
 
 
 def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
@@ -64,13 +66,12 @@ def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
     return machine._transitions
 
 
-def remappings_of(container: Any) -> Dict[str, Mapping[str, str]]:
+def remappings_of(container: HasStates) -> Dict[str, Mapping[str, str]]:
     """Return the container's names of its states' keys, by the label of the state."""
-    remappings: Dict[str, Mapping[str, str]] = container._remappings
-    return remappings
+    return container._remappings
 
 
-def remapping_of(container: Any, label: str) -> Mapping[str, str]:
+def remapping_of(container: HasStates, label: str) -> Mapping[str, str]:
     """Return the container's names of a state's keys.
 
     It is empty for an unknown label, and on upstream where the author gave None.
@@ -152,10 +153,9 @@ def opened_container() -> Optional[smach.Container]:
     return container
 
 
-def transition_callbacks(container: Any) -> List[Tuple[Any, Any]]:
+def transition_callbacks(container: smach.Container) -> List[Tuple[Any, Any]]:
     """Return the transition callbacks of a container, each with its arguments."""
-    callbacks: List[Tuple[Any, Any]] = container._transition_cbs
-    return callbacks
+    return container._transition_cbs
 
 
 # -- a machine that executes. Its thread alone writes
@@ -171,7 +171,7 @@ def is_executing(machine: smach.StateMachine) -> bool:
     return machine._is_running
 
 
-def set_executing(machine: Any, is_running: bool) -> None:
+def set_executing(machine: smach.StateMachine, is_running: bool) -> None:
     """Have the engine go on, or stop, at the next step."""
     machine._is_running = is_running
 
@@ -198,13 +198,12 @@ def set_current_state(
     machine._current_label, machine._current_state = label, state
 
 
-def step_once(cls: Any, machine: smach.StateMachine) -> Optional[str]:
+def step_once(cls: Type[smach.StateMachine], machine: smach.StateMachine) -> Optional[str]:
     """Execute the current state and go on, as a class of machines does. The lock is held.
 
     See `OracleContainer._update_once`.
     """
-    outcome: Optional[str] = cls._update_once(machine)
-    return outcome
+    return cls._update_once(machine)
 
 
 def state_ended(
@@ -221,10 +220,9 @@ def state_ended(
 # -- its preempt
 
 
-def has_preempt_flag(container: Any) -> bool:
+def has_preempt_flag(state: smach.State) -> bool:
     """Whether it has a request, whatever its class says of `preempt_requested`."""
-    requested: bool = container._preempt_requested
-    return requested
+    return state._preempt_requested
 
 
 def set_preempt_flag(machine: smach.StateMachine, is_requested: bool) -> None:
@@ -258,26 +256,22 @@ def note_passed_on(machine: smach.StateMachine) -> None:
 
 def outcome_map_of(concurrence: Any) -> Mapping[str, Mapping[str, str]]:
     """Return which outcomes of its states a Concurrence maps to which of its own."""
-    outcomes: Mapping[str, Mapping[str, str]] = concurrence._outcome_map
-    return outcomes
+    return concurrence._outcome_map
 
 
 def final_outcomes_of(iterator: Any) -> Mapping[str, str]:
     """Return which outcome of the last item an Iterator maps to which of its own."""
-    outcomes: Mapping[str, str] = iterator._final_outcome_map
-    return outcomes
+    return iterator._final_outcome_map
 
 
 def loop_outcomes_of(iterator: Any) -> Collection[str]:
     """Return the outcomes after which an Iterator goes on. If there are none, all not to break."""
-    outcomes: Collection[str] = iterator._loop_outcomes
-    return outcomes
+    return iterator._loop_outcomes
 
 
 def break_outcomes_of(iterator: Any) -> Collection[str]:
     """Return the outcomes after which an Iterator ends."""
-    outcomes: Collection[str] = iterator._break_outcomes
-    return outcomes
+    return iterator._break_outcomes
 
 
 def items_of(iterator: Any) -> Any:
@@ -285,10 +279,9 @@ def items_of(iterator: Any) -> Any:
     return iterator._items
 
 
-def iterated_label_of(iterator: Any) -> str:
+def iterated_label_of(iterator: smach.Iterator) -> str:
     """Return the label of the state that an Iterator executes, '' while it has none."""
-    label: str = iterator._state_label
-    return label
+    return iterator._state_label
 
 
 def set_items(iterator: Any, items: object, state: Optional[smach.State]) -> None:
@@ -301,10 +294,9 @@ def set_states(concurrence: Any, states: Mapping[str, smach.State]) -> None:
     concurrence._states = states
 
 
-def iterated_state_of(iterator: Any) -> Optional[smach.State]:
+def iterated_state_of(iterator: smach.Iterator) -> Optional[smach.State]:
     """Return the state that an Iterator executes."""
-    state: Optional[smach.State] = iterator._state
-    return state
+    return iterator._state
 
 
 # -- of any container, empty where it has none

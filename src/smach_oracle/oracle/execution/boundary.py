@@ -4,6 +4,9 @@ That is holds, announcements and jumps that were asked for. Where a preempt come
 that is held, the machine takes the author's way after `preempted`. Without an oracle the state
 would be executed under the request. One that does not look at it would do its work, which an
 operator has held. So none is executed: the machine goes on as if the state had obeyed at once.
+
+An Iterator is under no oracle. It calls its transition callbacks between items, on both engines.
+There an operator can hold it. A machine that it contains is held at its own boundaries.
 """
 
 import contextlib
@@ -11,21 +14,24 @@ from typing import Iterator, Optional, Tuple
 
 import smach
 
+from ..branches.wrapper import wrapper_of
 from ..checkpoint.resuming import forget_resumed
 from ..control.control import HeldPlace, Hold, LetGo
+from ..machine.nesting import branching_below
 from ..machine.places import TreePlace
 from ..machine.site import Route, route_of
 from ..machine.tree_node import TreeNode, marked_node
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
 from ..records.facts import PASSED_BY
-from ..recovery.operator_wait import wait_until_let_go
+from ..recovery.operator_wait import wait_for_operator, wait_until_let_go
 from ..recovery.stop import is_asked_around
 from ..recovery.verdict import ending_at_once, route_at_preempt
-from ..scope.scope import Reason
+from ..scope.scope import Reason, Scope
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
 from ..smach_private import (
+    Labels,
     current_label_of,
     current_state_of,
     initial_label_of,
@@ -35,9 +41,9 @@ from ..smach_private import (
     set_preempt_flag,
     set_preempted_state,
     states_of,
+    transition_callbacks,
 )
-from .jump_entry import keep_start
-from .sending import make_jump
+from .jump_entry import keep_start, make_jump
 from .transitions import Stop, go_to, message_of, obey_preempt, stop_left_behind, terminate
 
 Down = Tuple[TreePlace, ...]
@@ -245,3 +251,63 @@ def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
     inner = marked_node(state)
     goes_on = node.tree.resumed.entry_of(inner) is not None
     return inner if inner.parent is node and not goes_on else None
+
+
+# -- the boundary between two items of an Iterator
+
+
+class ItemGate:
+    """A transition callback of an Iterator that waits where an operator holds the tree."""
+
+    def __init__(self, node: TreeNode, below: Labels, container: smach.Container) -> None:
+        """`node`: of the wrapped container around it. `below`: the labels that lead to it."""
+        self.node = node
+        self._below = below
+        self._container = container
+
+    def __call__(self, userdata: object, active: object, *args: object) -> None:
+        """Wait before the next item."""
+        node = self.node
+        if not (node.tree.control.is_set or node.in_force.limits_autonomy()):
+            return
+        label = next(iter(self._container.get_children()), '')
+        relative = '/'.join(filter(None, (node.relative_path,) + self._below))
+        autonomy = node.in_force.of_state(relative, label).autonomy
+        scope = Scope(node.execution.scope_around, look=self._look_for_preempt)
+        wait_for_operator(node, self._below, label, autonomy, scope)
+
+    def _look_for_preempt(self) -> Optional[Reason]:
+        return Reason.PREEMPTED if self._container.preempt_requested() else None
+
+
+def place_gates(node: TreeNode) -> None:
+    """Place a gate in each Iterator of a container whose items have no boundary themselves; once.
+
+    Machines have one, and states under an oracle of their own.
+    """
+    for below, container in branching_below(node.machine):
+        wrapper = wrapper_of(container)
+        callbacks = transition_callbacks(container)
+        if (
+            not isinstance(container, smach.Iterator)
+            or (wrapper is not None and wrapper.branches)
+            or any(
+                isinstance(each, smach.StateMachine) for each in container.get_children().values()
+            )
+        ):
+            _remove(container)
+        elif not any(isinstance(each[0], ItemGate) and each[0].node is node for each in callbacks):
+            _remove(container)
+            container.register_transition_cb(ItemGate(node, below, container))
+
+
+def remove_gates(machine: smach.StateMachine) -> None:
+    """Take the gates away from the Iterators of a container."""
+    for _, container in branching_below(machine):
+        _remove(container)
+
+
+def _remove(container: smach.Container) -> None:
+    transition_callbacks(container)[:] = [
+        each for each in transition_callbacks(container) if not isinstance(each[0], ItemGate)
+    ]

@@ -1,20 +1,25 @@
-"""Prepares a place before a machine goes there, whoever sends it.
+"""Comes to a place, whoever sends the machine there: the oracle, or an operator at a boundary.
 
 An Iterator that has failed or was left goes on there with the item that was not finished. A script
 that is started over has its userdata as it was at first, in all containers of the tree.
 """
 
-from typing import Collection, Iterable, NamedTuple, Tuple
+from typing import Collection, Iterable, NamedTuple, Optional, Tuple
 
+from ..asking.question import names
 from ..branches.around import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
-from ..machine.jump_path import JumpPath, missing_on
+from ..control.control import Jump
+from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..machine.nesting import nodes_of
-from ..machine.repeats import leave_for
+from ..machine.places import TreePlace, place_at
+from ..machine.repeats import leave_for, why_closed
 from ..machine.snapshots import restore
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode
-from ..smach_private import data_of, remapping_of
+from ..records.events import EventKind
+from ..smach_private import current_label_of, data_of, is_executing, remapping_of
+from .transitions import go_to
 
 
 class JumpEntry(NamedTuple):
@@ -92,3 +97,89 @@ def start_over(node: TreeNode, target: str) -> None:
             restore(data_of(each.machine.userdata), userdata, (), each.in_force.deep_copy_keys)
     leave_for(node, target)
     ask_to_go_on(node, target)
+
+
+# -- sent by an operator, at a state boundary
+
+
+class Prospect(NamedTuple):
+    """The effects of sending a machine to a place: the checks of an expert's jump."""
+
+    why_not: str  # it cannot be entered now, or '' where it can
+    missing: Tuple[str, ...] = ()  # input keys that it would not find
+    repeats: Tuple[str, ...] = ()  # guarded states (`on_retry`) that may be repeated
+
+
+def jump_path_for(place: TreePlace) -> JumpPath:
+    """Return the way to a place from the innermost container around it that runs.
+
+    It is that from its own container where none runs.
+    """
+    sent: Optional[TreeNode] = place.node
+    while sent is not None and not is_executing(sent.machine):
+        sent = sent.parent
+    way = jump_path_to(sent, place) if sent is not None else None
+    return way or JumpPath((), place.node, (place,))
+
+
+def prospect_of(place: TreePlace, written: Tuple[str, ...] = ()) -> Prospect:
+    """Return what comes of sending the machine to a place.
+
+    :param written: userdata keys that are written for it.
+    """
+    node, label = place
+    labels = list(node.labels())
+    if label not in labels:
+        closed = {each: why_closed(node, each) for each in labels}
+        return Prospect(
+            '{} has no state {!r} to go to; allowed: {}'.format(
+                node.path, label, names(each for each in labels if not closed[each])
+            )
+        )
+    return _prospect_on(jump_path_for(place), written)
+
+
+def _prospect_on(way: JumpPath, written: Tuple[str, ...]) -> Prospect:
+    closed_now = why_closed_on(way)
+    if closed_now:
+        return Prospect('{} cannot be entered now: {}'.format(way.down[-1].label, closed_now))
+    return Prospect('', missing_for(way, written), repeated_on(way))
+
+
+def make_jump(node: TreeNode, jump: Jump) -> bool:
+    """Make the jump that was asked for, and return whether it was made.
+
+    To be called at a state boundary, with the machine's lock held where the engine holds it. What
+    has come in between may prevent it. A warning tells so.
+    """
+    label = current_label_of(node.machine)
+    place = place_at(node, jump.container, jump.state)
+    way = jump_path_to(node, place) if place is not None else None
+    why_not = _why_not(way, jump)
+    if way is None or why_not:
+        node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
+        return False
+    node.record(label).forget_entry()  # it may have been led to, and is not entered
+    entry = prepare_entry(way, jump.written, 'sent')
+    node.records.take_up_work()
+    by = jump.by or 'an operator'
+    data = {'missing_keys': list(entry.missing), 'userdata': entry.userdata}
+    if jump.container:
+        data['to'] = way.down[-1].path
+    node.emit(EventKind.SENT, state=label, target=way.first, by=jump.by, text=jump.text, data=data)
+    go_to(
+        node,
+        "State machine sent by {} to '{}' instead of '{}'".format(by, jump.named(), label),
+        way.first,
+    )
+    return True
+
+
+def _why_not(way: Optional[JumpPath], jump: Jump) -> str:
+    if way is None or way.left:
+        return 'there is no such state'
+    prospect = _prospect_on(way, jump.written)
+    unconfirmed = sorted(set(prospect.repeats).difference(jump.repeats))
+    if unconfirmed and not prospect.why_not:
+        return 'it may repeat {}, which nobody has confirmed'.format(', '.join(unconfirmed))
+    return prospect.why_not

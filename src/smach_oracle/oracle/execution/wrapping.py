@@ -24,7 +24,7 @@ from ..smach_private import (
     states_of,
     transitions_of,
 )
-from .item_gates import place_gates, remove_gates
+from .boundary import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
 
 

@@ -4,7 +4,6 @@ Userdata goes from container to container through the input and output keys of i
 """
 
 from typing import (
-    Any,
     FrozenSet,
     Iterable,
     List,
@@ -14,6 +13,7 @@ from typing import (
     Sequence,
     Set,
     Tuple,
+    Union,
 )
 
 import smach
@@ -21,7 +21,7 @@ import smach
 from ..smach_private import constants_of, data_of, items_label_of, states_of
 from .places import Link, TreePlace, levels_above, links_to
 from .repeats import repeated_by_going_to, why_closed
-from .snapshots import WriteWatch
+from .snapshots import UserdataGate, WriteWatch
 from .tree_node import TreeNode
 from .userdata_view import keys_after_jump, missing_keys
 
@@ -134,7 +134,7 @@ def hand_down(link: Link) -> None:
             link.below.userdata[key] = given[named]
 
 
-def hand_up(link: Link, written: Set[str], into: Any) -> Set[str]:
+def hand_up(link: Link, written: Set[str], into: Union[UserdataGate, smach.UserData]) -> Set[str]:
     """Hand output keys of a container that were written to the one above it.
 
     :param into: where they are written, by keys of the container above.
@@ -149,7 +149,7 @@ def hand_up(link: Link, written: Set[str], into: Any) -> Set[str]:
     return found
 
 
-def hand_on(link: Link, written: Set[str], into: Any) -> Set[str]:
+def hand_on(link: Link, written: Set[str], into: Union[UserdataGate, smach.UserData]) -> Set[str]:
     """Hand what was written in a container to the one below it that runs, by its input keys.
 
     :param into: where it is written, by keys of the container below.
@@ -167,7 +167,7 @@ def _inputs(link: Link) -> Sequence[Tuple[str, str]]:
     return [(key, link.remapping.get(key, key)) for key in link.below.get_registered_input_keys()]
 
 
-def _constants(link: Link) -> Mapping[str, Any]:
+def _constants(link: Link) -> Mapping[str, object]:
     return (
         constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine) else {}
     )

@@ -4,7 +4,7 @@ The *levels* of a failure are the wrapped containers that are being executed aro
 one above it, and so on to the top.
 """
 
-from typing import Any, Iterator, List, Mapping, NamedTuple, Optional
+from typing import Iterator, List, Mapping, NamedTuple, Optional, cast
 
 import smach
 
@@ -25,9 +25,9 @@ from .tree_node import TreeNode
 class Link(NamedTuple):
     """A container in the container around it, which may be a Concurrence or an Iterator."""
 
-    above: Any
+    above: smach.Container
     label: str
-    below: Any
+    below: smach.Container
 
     @property
     def remapping(self) -> Mapping[str, str]:
@@ -40,14 +40,14 @@ def links_to(node: TreeNode) -> Iterator[Link]:
 
     The top machine has none.
     """
-    above: Any = node.parent.machine if node.parent is not None else None
+    above: smach.Container = (node.parent or node).machine
     for label in node.below:
-        below = child_of(above, label)
+        below = cast(smach.Container, child_of(above, label))
         yield Link(above, label, below)
         above = below
 
 
-def child_of(container: Any, label: str) -> Any:
+def child_of(container: smach.Container, label: str) -> smach.State:
     """Return a state of a container of whatever kind."""
     if isinstance(container, smach.StateMachine):
         return states_of(container)[label]
