@@ -191,13 +191,6 @@ def set_current_label(machine: smach.StateMachine, label: Optional[str]) -> None
     machine._set_current_state(label)
 
 
-def set_current_state(
-    machine: smach.StateMachine, label: str, state: Optional[smach.State]
-) -> None:
-    """Make a state the current one for preempt requests, and nothing else."""
-    machine._current_label, machine._current_state = label, state
-
-
 def step_once(cls: Type[smach.StateMachine], machine: smach.StateMachine) -> Optional[str]:
     """Execute the current state and go on, as a class of machines does. The lock is held.
 

@@ -5,7 +5,8 @@ from typing import Any, Callable, Iterable, Iterator, Optional, Sized, Union, ca
 
 from smach_common.foreign import repr_of
 
-from ..identity import has_attribute, own_mark
+from ..identity import has_attribute
+from ..smach_private import items_of
 
 Tell = Callable[[str], None]
 Items = Union[Iterable[object], Callable[[], Iterable[object]]]
@@ -179,7 +180,7 @@ class TrackedItems:
 
 def can_be_indexed(iterator: Any) -> bool:
     """Whether what an Iterator goes through has the same items in the same order each time."""
-    items = own_mark(iterator, '_items')
+    items = items_of(iterator)
     items = items.given if isinstance(items, TrackedItems) else items
     if callable(items):
         return True  # whoever makes them again says what they are

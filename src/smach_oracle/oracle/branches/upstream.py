@@ -133,10 +133,10 @@ class _Asking:
         return (rebuild, two_classes(type(self)), _at_rest(dict(reduced[2]))) + tuple(reduced[3:])
 
     def _copy_input_keys(self, parent_ud: Optional[smach.UserData], ud: smach.UserData) -> None:
-        base: Any = super()
-        self._oracle_wrapper.take_inputs(
-            self, lambda: base._copy_input_keys(parent_ud, ud), parent_ud
-        )
+        def copy() -> None:
+            super(_Asking, self)._copy_input_keys(parent_ud, ud)  # type: ignore[misc]
+
+        self._oracle_wrapper.take_inputs(self, copy, parent_ud)
 
 
 Tables = Tuple[Any, Optional[smach.State], Mapping[str, smach.State]]

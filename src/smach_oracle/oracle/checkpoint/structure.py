@@ -23,6 +23,7 @@ from smach_oracle.store.rows import StoredTrial
 from smach_oracle.store.store_file import StoreFile
 
 from ..errors import SettingsError
+from ..machine.nesting import children_of
 from ..machine.tree_node import TreeNode
 from ..smach_private import (
     final_outcomes_of,
@@ -30,7 +31,6 @@ from ..smach_private import (
     loop_outcomes_of,
     outcome_map_of,
     remapping_in,
-    states_of,
     transitions_in,
 )
 from .stored_tree import StoredTree
@@ -128,9 +128,8 @@ def _containers(
 
 
 def _states(container: smach.Container, meta: str) -> Dict[str, smach.State]:
-    is_machine = isinstance(container, smach.StateMachine)
-    states = states_of(container) if is_machine else container.get_children()
-    return {str(label): state for label, state in dict(states).items() if label != meta}
+    states = dict(children_of(container))
+    return {str(label): state for label, state in states.items() if label != meta}
 
 
 def _container(container: smach.Container, meta: str) -> Plain:

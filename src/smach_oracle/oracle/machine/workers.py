@@ -12,12 +12,12 @@ from typing import Callable, Dict, List, NamedTuple, Optional
 import smach
 from smach_common.foreign import repr_of
 
-from ..identity import attribute_of, own_mark
+from ..identity import attribute_of
 from ..scope.background_call import BackgroundCall, KeptThread
 from ..scope.clock import Clock
 from ..scope.scope import CallEnd, Reason, Scope, inside
 from ..settings.settings import StateSettings
-from ..smach_private import set_executing
+from ..smach_private import mark_of, set_executing
 from .snapshots import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
@@ -184,7 +184,7 @@ def request_preempt(state: smach.State) -> None:
 def _stop_bare_machines(state: smach.State) -> None:
     """Let machines without an oracle end at their next state boundary, as both engines do then."""
     try:
-        if isinstance(state, smach.StateMachine) and own_mark(state, '_oracle') is None:
+        if isinstance(state, smach.StateMachine) and mark_of(state) is None:
             set_executing(state, False)
         for child in _children(state):
             _stop_bare_machines(child)
