@@ -23,8 +23,9 @@ from smach_oracle.oracle.decision.policy import BASELINES, POLICIES
 
 GROWTH_LIMIT = 1.5
 # in bare steps. Wanted are 75 us where the first executive took 62 us: 1.2 times its 1000 bare
-# steps. That is missed. The limit is what is reached, 2260, and a fifth.
-AIM, LIMIT = 1200.0, 3000.0
+# steps. That is missed: a precondition has a thread of its own since, which is 450 of them. The
+# limit is what is reached on a busy machine, 1830, and a fifth.
+AIM, LIMIT = 1200.0, 2200.0
 ROUNDS = 15
 MACHINES = 4  # with many visits: one that meets a busy moment is no measure
 FAILURES = 300

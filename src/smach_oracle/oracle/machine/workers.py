@@ -5,6 +5,7 @@ After a grace period it is abandoned. A function: it cannot be preempted, and is
 While an abandoned thread lives, what it runs is blocked: nobody enters it again.
 """
 
+import contextlib
 import functools
 import threading
 from typing import Callable, Dict, List, NamedTuple, Optional
@@ -165,8 +166,9 @@ class Workers:
 
     def end_idle_threads(self) -> None:
         """Let the threads end that were kept for further functions."""
-        while self._idle:
-            self._idle.pop().end()
+        with contextlib.suppress(IndexError):  # each thread has one who takes it out
+            while True:
+                self._idle.pop().end()
 
     def _block(self, target: object, call: BackgroundCall, why: str) -> None:
         with self._lock:
