@@ -38,6 +38,5 @@ def outside_main_thread(function: Callable[[], Result]) -> Result:
         looks_left -= rospy.core.is_shutdown_requested()
         if looks_left <= 0:
             raise rospy.ROSInterruptException('the node shuts down; the master has not answered')
-    if call.error is not None:
-        raise call.error
+    call.returned()
     return results[0]

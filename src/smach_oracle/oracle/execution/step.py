@@ -18,14 +18,13 @@ from ..machine.resumed import Unfinished
 from ..machine.site import Route
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..machine.workers import recall_preempts
+from ..machine.workers import Overrun, recall_preempts
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
 from ..recovery.failure import (
     Failure,
-    Overrun,
     judge,
     tell_failure,
     visit_result,

@@ -9,8 +9,9 @@ from ..machine.snapshots import UserdataGate
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import view_behind
+from ..machine.workers import Overrun
 from ..records.events import EventKind
-from ..recovery.failure import HeldBack, Overrun
+from ..recovery.failure import HeldBack
 from ..recovery.still_running import EndedByAnswer, WatchedVisit
 from ..smach_private import has_preempt_flag
 
@@ -97,13 +98,5 @@ def _execute_limited(node: TreeNode, record: StateRecord, state: smach.State) ->
             )
 
     gate = UserdataGate(machine, on_late_write)
-    result = node.tree.workers.run(
-        state,
-        view_behind(gate, machine, label, state),
-        gate,
-        label,
-        record.settings,
-    )
-    if result.error is not None:
-        raise result.error
-    return Overrun(result.overrun) if result.overrun else result.outcome
+    view = view_behind(gate, machine, label, state)
+    return node.tree.workers.run(state, view, gate, label, record.settings)

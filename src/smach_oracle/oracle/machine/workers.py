@@ -8,7 +8,7 @@ While an abandoned thread lives, what it runs is blocked: nobody enters it again
 import contextlib
 import functools
 import threading
-from typing import Callable, Dict, List, NamedTuple, Optional
+from typing import Callable, Dict, List, NamedTuple
 
 import smach
 from smach_common.foreign import repr_of
@@ -26,12 +26,10 @@ _LATE = 'still runs since it overran its time limit'
 _STOPPED = 'still runs since a preempt or a shutdown'
 
 
-class LimitedResult(NamedTuple):
-    """The result of a state or a function in its thread. One of the three is set."""
+class Overrun(NamedTuple):
+    """Stands in place of the outcome of a state or a function that overran, or still runs."""
 
-    outcome: object = None
-    error: Optional[BaseException] = None
-    overrun: str = ''  # what happened, in words
+    text: str  # what happened, in words
 
 
 class _Left(NamedTuple):
@@ -74,12 +72,12 @@ class Workers:
         gate: UserdataGate,
         label: str,
         settings: StateSettings,
-    ) -> LimitedResult:
+    ) -> object:
         """Execute `state` with the time limit and the grace period of some settings.
 
         The limit stands still while a person is asked about something inside the state.
-        `gate` is what `userdata` writes through. What the state raises is told in the result, not
-        raised.
+        `gate` is what `userdata` writes through. It returns the outcome, or an Overrun. It raises
+        what the state raises.
         """
         limit_s, grace_s = settings.time_limit_s or 0.0, settings.grace_period_s
         run = Scope(clock=self._clock, limit_s=limit_s)
@@ -111,13 +109,11 @@ class Workers:
             else:
                 end_late()
         if end is CallEnd.BY_ITSELF:
-            return LimitedResult(call.result, call.error)
+            return call.returned()
         ended = 'ended when it was preempted'
         if call.left:
             ended = 'was abandoned {:g} s after it was preempted'.format(grace_s)
-        return LimitedResult(
-            overrun='overran its time limit of {:g} s and {}'.format(limit_s, ended)
-        )
+        return Overrun('overran its time limit of {:g} s and {}'.format(limit_s, ended))
 
     def call(
         self,
@@ -126,12 +122,12 @@ class Workers:
         gate: UserdataGate,
         settings: StateSettings,
         scope: Scope,
-    ) -> LimitedResult:
+    ) -> object:
         """Call `function` until its time limit, if any, or until `scope` is cancelled.
 
         It has the grace period more to end by itself, in which it writes nothing any more, and is
-        left behind then. `gate` is what `userdata` writes through. What the function raises is told
-        in the result, not raised.
+        left behind then. `gate` is what `userdata` writes through. It returns what the function
+        returns, or an Overrun. It raises what that raises.
         """
         thread, limit_s = self._take_thread(), settings.time_limit_s
         call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
@@ -148,11 +144,11 @@ class Workers:
             else:
                 thread.end()
         if end is CallEnd.BY_ITSELF:
-            return LimitedResult(call.result, call.error)
+            return call.returned()
         why = 'was stopped by a preempt or a shutdown'
         if end is CallEnd.OVERRUN:
             why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
-        return LimitedResult(overrun=why + (' and was left behind' if call.left else ''))
+        return Overrun(why + (' and was left behind' if call.left else ''))
 
     def _take_thread(self) -> KeptThread:
         """Return a thread for a function: an idle one, or a new one."""

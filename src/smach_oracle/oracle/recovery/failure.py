@@ -17,6 +17,7 @@ from ..machine.resumed import Unfinished
 from ..machine.site import Route, failure_kind, route_of
 from ..machine.state_record import RateReading, StateRecord
 from ..machine.tree_node import TreeNode
+from ..machine.workers import Overrun
 from ..records.events import EventKind, FailureKind
 from ..records.visits import VisitResult
 from ..settings.failing_outcomes import is_preempted
@@ -98,12 +99,6 @@ def traceback_of(err: Exception) -> str:
 
 
 # -- judging
-
-
-class Overrun(NamedTuple):
-    """Stands in place of the outcome of a state that overran its time limit, or still runs."""
-
-    text: str
 
 
 class HeldBack(NamedTuple):

@@ -21,6 +21,7 @@ from ..machine.site import failure_kind, route_of
 from ..machine.snapshots import UserdataGate, WriteWatch, behind
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import view_behind, write_constants
+from ..machine.workers import Overrun
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
@@ -68,27 +69,20 @@ def _achieve(recovery: Recovery, spec: PreconditionSpec, elsewhere: 'List[_Elsew
 
 
 def _call(recovery: Recovery, spec: PreconditionSpec) -> None:
-    workers, settings = recovery.node.tree.workers, recovery.record.settings
-    wait_for_operator(recovery.node, (), spec.name, RUN, recovery.scope)
+    name, node, scope = spec.name, recovery.node, recovery.scope
+    wait_for_operator(node, (), name, RUN, scope)
     _check_free(recovery, spec.target)
-    gate = recovery.watch.gate.fork()
-    ended = workers.call(
-        spec.target,
-        behind(gate),
-        gate,
-        settings,
-        recovery.scope,
-    )
-    if isinstance(ended.error, Exception):
-        raise NotMet('{} raised {}'.format(spec.name, repr_of(ended.error))) from ended.error
-    if ended.error is not None:
-        raise ended.error
-    if ended.overrun:
-        raise NotMet('{} {}'.format(spec.name, ended.overrun))
-    if ended.outcome is None:
-        raise NotMet('{} returned None; True is met'.format(spec.name))
-    if not truth_of(ended.outcome):
-        raise NotMet('{} returned {}'.format(spec.name, repr_of(ended.outcome)))
+    gate, settings = recovery.watch.gate.fork(), recovery.record.settings
+    try:
+        result = node.tree.workers.call(spec.target, behind(gate), gate, settings, scope)
+    except Exception as err:
+        raise NotMet('{} raised {}'.format(name, repr_of(err))) from err
+    if isinstance(result, Overrun):
+        raise NotMet('{} {}'.format(name, result.text))
+    if result is None:
+        raise NotMet('{} returned None; True is met'.format(name))
+    if not truth_of(result):
+        raise NotMet('{} returned {}'.format(name, repr_of(result)))
 
 
 def _check_free(recovery: Recovery, target: object) -> None:
@@ -192,18 +186,11 @@ def _with_limit(
     if settings.time_limit_s is None:
         return state.execute(view_behind(gate, node.machine, label, state))
     gate = gate.fork()
-    result = node.tree.workers.run(
-        state,
-        view_behind(gate, node.machine, label, state),
-        gate,
-        label,
-        settings,
-    )
-    if result.error is not None:
-        raise result.error
-    if result.overrun:
-        raise NotMet(result.overrun)
-    return result.outcome
+    view = view_behind(gate, node.machine, label, state)
+    outcome = node.tree.workers.run(state, view, gate, label, settings)
+    if isinstance(outcome, Overrun):
+        raise NotMet(outcome.text)
+    return outcome
 
 
 def _judge(

@@ -83,6 +83,12 @@ class BackgroundCall:
             self.left = not self.done.is_set()
             return self.left
 
+    def returned(self) -> object:
+        """Return what the function has returned, or raise what it has raised."""
+        if self.error is not None:
+            raise self.error
+        return self.result
+
     def is_alive(self) -> bool:
         """Whether the thread lives."""
         return self._thread.is_alive()
