@@ -421,7 +421,7 @@ class OracleContainer(smach.StateMachine):
                 if not engine.lock_is_held:
                     lock.release()
 
-    def _state_ended(self, outcome: Any, error: Optional[Exception]) -> Optional[str]:
+    def _state_ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
         """Go on behind the current state, which was executed elsewhere, with the lock held."""
         return Step(self._oracle, self._oracle.record(str(self._current_label))).ended(
             outcome, error
@@ -435,7 +435,7 @@ class OracleContainer(smach.StateMachine):
         classes = two_classes(type(self))
         return reduced if classes is None else (rebuild, classes) + tuple(reduced[2:])
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         """A shallow copy gets a node of its own. A deep or pickled one brings it."""
         set_base: Optional[Callable[[Any], None]] = getattr(super(), '__setstate__', None)
         if set_base is not None:

@@ -17,6 +17,8 @@ from .wrapper import ContainerWrapper, wrapper_of
 class IteratorWrapper(ContainerWrapper):
     """The data kept for an Iterator."""
 
+    container: smach.Iterator
+
     def __init__(self, container: smach.Container, top: TreeNode, below: Labels) -> None:
         super().__init__(container, top, below)
         self._trial_id = ''  # that of `tracked`

@@ -106,6 +106,8 @@ class BranchSite(Site):
 class ConcurrenceSite(BranchSite):
     """The site of one state of a Concurrence."""
 
+    container: smach.Concurrence
+
     def settings_here(self, settings: Settings) -> Settings:
         """Keep the userdata at jumps: others write it at the same time."""
         return replace(settings, userdata='keep', deep_copy_keys=())
@@ -124,6 +126,8 @@ class ConcurrenceSite(BranchSite):
 
 class IteratorSite(BranchSite):
     """The site of the state of an Iterator."""
+
+    container: smach.Iterator
 
     def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""
@@ -151,7 +155,7 @@ class IteratorSite(BranchSite):
             node.warn(text.format(item, outcome), label)
 
 
-def loops(iterator: smach.Container, outcome: str) -> bool:
+def loops(iterator: smach.Iterator, outcome: str) -> bool:
     """Whether an outcome of its state leads an Iterator to the next item."""
     looping, breaking = loop_outcomes_of(iterator), break_outcomes_of(iterator)
     return outcome not in breaking and (not looping or outcome in looping)

@@ -58,7 +58,8 @@ from .transitions import (
 )
 from .wrapping import sync_oracle
 
-NO_FACTS: Mapping[str, Any] = {}
+Facts = Mapping[str, object]
+NO_FACTS: Facts = {}
 
 
 class Step:
@@ -71,7 +72,7 @@ class Step:
         self._machine = node.machine
         self._record = record
 
-    def ended(self, outcome: Any, error: Optional[Exception] = None) -> Optional[str]:
+    def ended(self, outcome: object, error: Optional[Exception] = None) -> Optional[str]:
         """Go on after the state has ended, through the oracle where it failed.
 
         It returns the container's outcome, or None where the machine goes on.
@@ -129,7 +130,7 @@ class Step:
     # -- why the oracle is entered
 
     def _left(
-        self, departure: Departure, outcome: Any, error: Optional[Exception]
+        self, departure: Departure, outcome: object, error: Optional[Exception]
     ) -> Union[Occasion, Stop]:
         """Go as a verdict of a container below says, which has left the present state."""
         node, record = self._node, self._record
@@ -299,9 +300,7 @@ class Step:
             obey_preempt(node, states_of(self._machine)[failure.state])
         return self._end(failure, ending)
 
-    def _end(
-        self, failure: Failure, ending: ContainerEnding, facts: Mapping[str, Any] = NO_FACTS
-    ) -> Stop:
+    def _end(self, failure: Failure, ending: ContainerEnding, facts: Facts = NO_FACTS) -> Stop:
         if ending.error is not None:
             if isinstance(ending.error, smach.InvalidUserCodeError):
                 smach.logerr("State '{}' ended in an error.".format(self._record.label))
@@ -311,7 +310,11 @@ class Step:
         return self._advance(failure.outcome, route, facts=facts)
 
     def _advance(
-        self, outcome: str, route: Route, learn: bool = False, facts: Mapping[str, Any] = NO_FACTS
+        self,
+        outcome: str,
+        route: Route,
+        learn: bool = False,
+        facts: Facts = NO_FACTS,
     ) -> Stop:
         """Make the transition that the author drew. `learn`: take the short way next time.
 

@@ -1,6 +1,6 @@
 """One execution of a container: what is true from its begin to its end, and no longer."""
 
-from typing import TYPE_CHECKING, Any, Dict, Iterable, Optional, Protocol, Tuple
+from typing import TYPE_CHECKING, Dict, Iterable, Optional, Protocol, Tuple
 
 import smach
 from smach_common.foreign import error_text
@@ -170,7 +170,7 @@ class Execution:
         """Note that a request was serviced: the next one is another."""
         self._is_preempt_told = False
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> Tuple[object, ...]:
         """A copied or pickled machine is not being executed."""
         return Execution, (self._node,)
 

@@ -2,7 +2,6 @@
 
 from typing import (
     TYPE_CHECKING,
-    Any,
     Dict,
     Iterable,
     List,
@@ -29,7 +28,7 @@ class Unfinished(NamedTuple):
     outcome: str
     text: str
     asks: str  # why a person is asked at once, '' where nobody is
-    snapshot: Optional[Mapping[str, Any]] = None  # userdata with which it began
+    snapshot: Optional[Mapping[str, object]] = None  # userdata with which it began
     keeps: bool = False  # where nobody answers, the trial is kept
 
 
@@ -172,6 +171,6 @@ class ResumedTrial:
             self._unfinished.pop(record, None)
             self._questions.pop(record, None)
 
-    def __reduce__(self) -> Tuple[Any, ...]:
+    def __reduce__(self) -> Tuple[object, ...]:
         """A copied or pickled machine goes on with no trial."""
         return ResumedTrial, ()

@@ -15,6 +15,7 @@ from ..records.visits import Visit
 from ..settings.settings import StateSettings
 
 if TYPE_CHECKING:
+    from .places import TreePlace
     from .userdata_view import StateView
 
 
@@ -100,7 +101,7 @@ class StateRecord:
         self._tried = '', 0
         self.entered_by_oracle = False  # at the coming visit
         # at the coming visit: the state in which each container below it begins
-        self.way_down: Tuple[Any, ...] = ()
+        self.way_down: Tuple['TreePlace', ...] = ()
         self._learned = 0  # successes by way of edges that the estimator knows
         # what of it the rates file has, as `base_of` tells it
         self.shared: Dict[str, object] = {}
@@ -135,7 +136,7 @@ class StateRecord:
         """Note that the oracle leads to the state, which is visited next."""
         self.entered_by_oracle = self.special = True
 
-    def go_down(self, way_down: Tuple[Any, ...]) -> None:
+    def go_down(self, way_down: Tuple['TreePlace', ...]) -> None:
         """Note in which state each container below begins at the visit that is next."""
         self.way_down = way_down
         self.special = self.special or bool(way_down)

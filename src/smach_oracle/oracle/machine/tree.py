@@ -197,7 +197,7 @@ class Tree:
             self._questions += 1
             return '{}-{}'.format(self.trial_id or new_id(), self._questions)
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         """Leave out what cannot travel with a pickled or copied machine.
 
         That is the expert, its connection, a clock that was handed in, locks, all that is under
@@ -210,6 +210,6 @@ class Tree:
         state['describe_failure'] = no_description
         return state
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
         self._be_at_rest()
