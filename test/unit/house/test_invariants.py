@@ -124,12 +124,9 @@ def test_no_module_but_its_own_writes_a_field_of_a_tree_node():
 
 
 def test_the_meta_state_runs_the_phases_of_the_page_in_its_order():
-    phases = parse(EXECUTIVE / 'recovery/phases.py')
-    (chain,) = (
-        each.values
-        for each in ast.walk(phases)
-        if isinstance(each, ast.BoolOp)
-        and 'obey_given' in {getattr(inner, 'id', '') for inner in ast.walk(each.values[0])}
+    (listed,) = (
+        [name.id for name in each.value.elts]
+        for each in parse(EXECUTIVE / 'recovery/phases.py').body
+        if isinstance(each, ast.AnnAssign) and each.target.id == 'PHASES'
     )
-    run = [call.func.id for call in chain if isinstance(call, ast.Call)]
-    assert run == [row[1].strip('`').partition('.')[2] for row in rows_of('phase')]
+    assert listed == [row[1].strip('`').partition('.')[2] for row in rows_of('phase')]

@@ -1,12 +1,12 @@
 """A recovery, phase by phase: the first that comes to a verdict ends it (paper, Algorithm 1).
 
 Each phase is a function of the recovery. It returns a verdict, or None to leave it to the next. A
-new way to recover is one more function here, and its place in `OracleState.execute`. Which phases
-do anything on which occasion is in a table of doc/executive_inside.md.
+new way to recover is one more function here, and its place in `PHASES`. Which phases do anything on
+which occasion is in a table of doc/executive_inside.md.
 """
 
 import threading
-from typing import Dict, FrozenSet, List, Optional, Tuple
+from typing import Callable, Dict, FrozenSet, List, Optional, Tuple
 
 import smach
 
@@ -298,6 +298,17 @@ def _obey(recovery: Recovery, answer: Answer) -> Verdict:
     return GiveUp(ending, answer.by, answer.why, above)
 
 
+# in this order. The last one comes to a verdict in any case
+PHASES: Tuple[Callable[[Recovery], Optional[Verdict]], ...] = (
+    obey_given,
+    wait_until_well,
+    ask_first,
+    decide,
+    escalate,
+    ask_expert,
+    fall_back,
+)
+
 _Led = Tuple[Labels, Labels, Optional[Transitions], int]
 _NOTHING: _Led = ((), (), None, 0)
 
@@ -356,16 +367,12 @@ class OracleState(smach.State):
         if recovery is None:
             raise TrialError('the meta state is entered by failures alone')
         try:
-            self._verdict = (
-                obey_given(recovery)
-                or wait_until_well(recovery)
-                or ask_first(recovery)
-                or decide(recovery)
-                or escalate(recovery)
-                or ask_expert(recovery)
-                or fall_back(recovery)
-            )  # every verdict counts as true, and the last phase has one
-            return leads_to(self._verdict)
+            for phase in PHASES:
+                verdict = phase(recovery)
+                if verdict is not None:
+                    self._verdict = verdict
+                    return leads_to(verdict)
+            raise TrialError('no phase of the recovery has come to a verdict')
         finally:
             with self._lock:
                 self._recovery = None
