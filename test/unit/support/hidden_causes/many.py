@@ -1,0 +1,60 @@
+"""Many machines under many policies, in several processes at a time."""
+
+import concurrent.futures
+import contextlib
+import multiprocessing
+import threading
+import time
+from typing import Iterable, List, NamedTuple, Optional, Tuple
+
+import smach
+
+from .orders import Arm
+from .running import Trial, run_machine
+
+
+class Ran(NamedTuple):
+    """One machine under one policy."""
+
+    seed: int
+    trials: Tuple[Trial, ...]
+    cpu_s: float
+
+
+class Runner(contextlib.ExitStack):
+    """Runs machines. What becomes of them depends on their seeds, and not on the number of jobs."""
+
+    def __init__(self, jobs: int) -> None:
+        super().__init__()
+        be_quiet()
+        self._pool: Optional[concurrent.futures.Executor] = None
+        if jobs > 1:
+            self._pool = self.enter_context(
+                concurrent.futures.ProcessPoolExecutor(
+                    jobs, multiprocessing.get_context('fork'), be_quiet
+                )
+            )
+
+    def run(self, arm: str, seeds: Iterable[int], trials: int) -> List[Ran]:
+        """Run the machines of these seeds under a policy, and return them in that order."""
+        work = [(arm, seed, trials) for seed in seeds]
+        if self._pool is None:
+            return [run_one(each) for each in work]
+        return list(self._pool.map(run_one, work))
+
+
+def be_quiet() -> None:
+    """Have SMACH log nothing. Upstream's Concurrence lets its threads raise."""
+
+    def silent(*said: object) -> None:
+        """A logger that nobody hears."""
+
+    smach.set_loggers(silent, silent, silent, silent)
+    threading.excepthook = silent
+
+
+def run_one(work: Tuple[str, int, int]) -> Ran:
+    """Run one machine: the policy by name, its seed, and the number of trials."""
+    arm, seed, trials = work
+    begin_s = time.process_time()
+    return Ran(seed, run_machine(seed, Arm(arm), trials), time.process_time() - begin_s)
