@@ -1,11 +1,13 @@
 """Stores where every container of a tree stands, before each state begins."""
 
+import functools
 import time
-from typing import Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import Callable, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
 
 import smach
+from smach_common.foreign import ends_program, error_text
 from smach_oracle.store.codecs import Codecs
-from smach_oracle.store.names import ASKED, AT, BEFORE, ENDED, FAILED, GOAL, IN, ITEMS
+from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, GOAL, IN, ITEMS
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
@@ -47,6 +49,34 @@ _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKin
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 
 
+LOST = (
+    '{0}: this trial is not stored any more, as a fault of the store kept it from being '
+    'written: {1}. The machine goes on. If its program is stopped now, the next start asks a '
+    'person before anything moves. Please report this fault'
+)
+
+
+def _while_it_works(store: Callable[..., None]) -> Callable[..., None]:
+    """Have a method of a Checkpointer stop no machine, whatever fails in it.
+
+    A moment that is stored in part would lead to a wrong place. So after a fault nothing is stored
+    but that there was one.
+    """
+
+    @functools.wraps(store)
+    def stored(self: 'Checkpointer', *args: object) -> None:
+        if self.is_broken:
+            return
+        try:
+            store(self, *args)
+        except BaseException as err:
+            if ends_program(err):
+                raise
+            self.tell_broken(err)
+
+    return stored
+
+
 class Checkpointer:
     """An observer of a tree's events that commits a moment to a store where it is due.
 
@@ -67,6 +97,7 @@ class Checkpointer:
         `behind`: the moment that it goes on from, where that is not the last one. `first`: what
         its first moment has besides.
         """
+        self.is_broken = False
         self._before, self._behind = before, behind
         self._top, self._writer, self._codecs = top, writer, codecs
         self._nodes: Dict[str, TreeNode] = {}
@@ -96,6 +127,7 @@ class Checkpointer:
         self._named = WeakIds()  # values that are named
         self._goals = set(() if before is None else before.goals)  # ids of stored ones
 
+    @_while_it_works
     def __call__(self, event: Event) -> None:
         """Take one event. See EventSource."""
         if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
@@ -147,11 +179,13 @@ class Checkpointer:
         """Return what a container and those around it have to commit, which run in one thread."""
         return self._pending.setdefault(_begins_line(node), [])
 
+    @_while_it_works
     def goal_begins(self, goal_id: str, server: str) -> None:
         """Store a goal that is about to be sent."""
         self._goals.add(goal_id)
         self._commit_by_hand('GOAL', (fact_of('', GOAL + goal_id, server),))
 
+    @_while_it_works
     def last_words(self, kind: str) -> None:
         """Store what has not been stored of the trial, which has ended, as a moment of a kind."""
         facts = [fact for line in self._pending.values() for fact in line]
@@ -162,6 +196,7 @@ class Checkpointer:
         self._pending = {}
         self._commit_by_hand(kind, (*facts, *self._ended_goals()))
 
+    @_while_it_works
     def keep_marks(self) -> None:
         """Store which states have begun, before one of them runs of which there is no event."""
         self._commit_by_hand('MARKS', tuple(self._marks()))
@@ -170,6 +205,12 @@ class Checkpointer:
         if self._top.tree.numbers_visits:
             for node in self._nodes.values():
                 yield from self._facts_of(node).marks()
+
+    def tell_broken(self, err: BaseException) -> None:
+        """Say that the trial is not stored any more, and store that."""
+        self.is_broken = True
+        smach.logerr(LOST.format(self._writer.path, error_text(err)))
+        self._commit_by_hand(BROKEN, ())
 
     def _commit_by_hand(self, kind: str, facts: Tuple[Fact, ...]) -> None:
         """Commit a moment that belongs to no event."""

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Callable, Iterator, List, Optional, Set, Tuple, TypeVar
 
 import smach
-from smach_common.foreign import ends_program, error_text
 from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.errors import StoreDamaged, StoreError
 from smach_oracle.store.holding import MachineLock
@@ -23,11 +22,11 @@ from ..identity import remove_identical
 from ..machine.nesting import branching_below, nodes_of
 from ..machine.tree import new_id, no_store
 from ..machine.tree_node import TreeNode
-from ..records.events import Event, EventKind
+from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.checks import ASK, RESTART
-from .checkpointer import Checkpointer, must_stop
+from .checkpointer import Checkpointer
 from .container_facts import fact_of
 from .resuming import Resumption, go_on
 from .stored_marks import marks_now, same_place
@@ -54,57 +53,6 @@ def understood(path: str) -> Iterator[None]:
             '{0}: is damaged, and its trial cannot go on: {1!r}. `oracle_state {0} '
             'drop` ends the trial, and a new one can begin'.format(path, err)
         ) from err
-
-
-LOST = (
-    '{0}: this trial is not stored any more, as a fault of the store kept it from being '
-    'written: {1}. The machine goes on. If its program is stopped now, the next start asks a '
-    'person before anything moves. Please report this fault'
-)
-
-
-class StoreObserver:
-    """The observer that stores a trial, and is told of goals.
-
-    A moment that is stored in part would lead to a wrong place. So after a fault nothing is stored
-    but that there was one.
-    """
-
-    def __init__(self, top: TreeNode, writer: StoreWriter, checkpointer: Checkpointer) -> None:
-        self._top, self._writer, self._checkpointer = top, writer, checkpointer
-        self._is_broken = False
-
-    def __call__(self, event: Event) -> None:
-        """Take one event. See EventSource."""
-        self._do(partial(self._checkpointer, event))
-
-    def goal_begins(self, goal_id: str, server: str) -> None:
-        """Store a goal that is about to be sent."""
-        self._do(partial(self._checkpointer.goal_begins, goal_id, server))
-
-    def keep_marks(self) -> None:
-        """Store which states have begun. See Checkpointer."""
-        self._do(self._checkpointer.keep_marks)
-
-    def last_words(self, kind: str) -> None:
-        """Store what has not been stored of the trial, which has ended, as a moment of a kind."""
-        self._do(partial(self._checkpointer.last_words, kind))
-
-    def _do(self, store: Callable[[], None]) -> None:
-        if self._is_broken:
-            return
-        try:
-            store()
-        except BaseException as err:
-            if ends_program(err):
-                raise
-            self._is_broken = True
-            smach.logerr(LOST.format(self._writer.path, error_text(err)))
-            top = self._top
-            self._writer.commit(
-                NewMoment(time.time(), top.events.last_seq, BROKEN, top.key, '', ()),
-                lambda: must_stop(top),
-            )
 
 
 # what may be resumed: the program was stopped, and the task was not done
@@ -286,17 +234,13 @@ class TrialStore:
             settings.checkpoint_wait_s,
             smach.logwarn,
         )
-        self._observer = StoreObserver(
+        self._observer = Checkpointer(
             top,
             self._writer,
-            Checkpointer(
-                top,
-                self._writer,
-                CODECS,
-                None if resumed is None else resumed.tree,
-                resumed.moment if resumed and resumed.is_earlier else None,
-                self._facts_of_new_names(resumed),
-            ),
+            CODECS,
+            None if resumed is None else resumed.tree,
+            resumed.moment if resumed and resumed.is_earlier else None,
+            self._facts_of_new_names(resumed),
         )
         GOALS.observers.append(self._observer.goal_begins)
         top.tree.keep_marks = self._observer.keep_marks

@@ -7,6 +7,7 @@ engines, `attentive`, which they look at in any case. Without a request a step c
 import contextlib
 import math
 import threading
+from dataclasses import dataclass
 from enum import Enum
 from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
 
@@ -44,32 +45,21 @@ class HeldPlace(NamedTuple):
         return '{} in {}'.format(self.state, self.path)
 
 
+@dataclass(eq=False)
 class Hold:
     """One wait. `Control` alone writes to it."""
 
-    __slots__ = (
-        'place',
-        'held_by',
-        'confirms',
-        'confirmed',
-        'stepped',
-        'may_be_sent',
-        'asks',
-        'autonomy',
-        'key',
-        'changed',
-    )
+    place: HeldPlace
+    held_by: HeldBy
+    confirms: bool  # whether it waits for a confirmation
+    confirmed: bool = False
+    stepped: bool = False
+    may_be_sent: bool = True  # whether the container can go to another state from here
+    asks: bool = True  # whether the autonomy of its state counts
+    autonomy: str = ''  # that by its settings
 
-    def __init__(self, place: HeldPlace, held_by: HeldBy, confirms: bool) -> None:
-        self.place = place
-        self.held_by = held_by
-        self.confirms = confirms  # whether it waits for a confirmation
-        self.confirmed = False
-        self.stepped = False
-        self.may_be_sent = True  # whether the container can go to another state from here
-        self.asks = True  # whether the autonomy of its state counts
-        self.autonomy = ''  # that by its settings
-        self.key = place.path  # by which jumps of the container are asked for
+    def __post_init__(self) -> None:
+        self.key = self.place.path  # by which jumps of the container are asked for
         self.changed = Flag()  # an operator has asked for something since it was looked at
 
     @property
@@ -170,8 +160,8 @@ class Control:
             if not (self._moving or self._jumps):
                 return None
             path = key()
-            self._note_arrived(path)
-            return self._pop_jump(path)
+            self.arrived(path)
+            return self.take_jump(path)
 
     def calm(self, engine: Engine) -> None:
         """Let a machine take the short way again, where nothing is set."""
@@ -223,7 +213,7 @@ class Control:
         with self._changed:
             self._judge_level(hold)  # it may have been set since it was looked up
             self._holds.append(hold)
-            self._note_arrived(hold.key)
+            self.arrived(hold.key)
 
     def end(self, hold: Hold) -> None:
         """Show that it waits no more."""
@@ -260,33 +250,24 @@ class Control:
     def level_of(self, place: HeldPlace, default: str) -> str:
         """Return the autonomy of a state. `default`: by its settings."""
         with self._changed:
-            return self._level_of(place, default)
-
-    def _level_of(self, place: HeldPlace, default: str) -> str:
-        for pattern, level in reversed(list(self._levels.values())):
-            if pattern.matches(*place):
-                return level
-        return default
+            for pattern, level in reversed(list(self._levels.values())):
+                if pattern.matches(*place):
+                    return level
+            return default
 
     def arrived(self, path: str) -> None:
         """Note that a container does not wait any more, or waits elsewhere."""
         with self._changed:
-            self._note_arrived(path)
-
-    def _note_arrived(self, path: str) -> None:
-        if self._moving.pop(path, None) is not None:
-            self._note_change()
+            if self._moving.pop(path, None) is not None:
+                self._note_change()
 
     def take_jump(self, path: str) -> Optional[Jump]:
         """Return where the container at `path` is to go, once."""
         with self._lock:
-            return self._pop_jump(path)
-
-    def _pop_jump(self, path: str) -> Optional[Jump]:
-        jump = self._jumps.pop(path, None)
-        if jump is not None:
-            self._note_change()
-        return jump
+            jump = self._jumps.pop(path, None)
+            if jump is not None:
+                self._note_change()
+            return jump
 
     # -- of the operator
 
@@ -330,13 +311,13 @@ class Control:
     def resume(self) -> Tuple[Hold, ...]:
         """Lift the pause. Return what waited because of it, or was sent from where it waited."""
         with self._changed:
-            held, moving = self._held(''), dict(self._moving) if self.paused else {}
+            held, moving = self.holds(), dict(self._moving) if self.paused else {}
             self.paused, self.paused_by = False, ''
             self._note_change()
             if not moving:
                 return held
             self._settle()
-            now = [each for each in self._held('') if each.key in moving]
+            now = [each for each in self.holds() if each.key in moving]
             return (
                 *held,
                 *now,
@@ -355,7 +336,7 @@ class Control:
         """
         with self._changed:
             self._settle()
-            held = self._held(path)
+            held = self.holds(path)
             for hold in held:
                 hold.stepped = True
             self._wake()
@@ -368,7 +349,7 @@ class Control:
         """
         with self._changed:
             self._settle()
-            held = tuple(each for each in self._held(path) if each.waits_for_confirmation)
+            held = tuple(each for each in self.holds(path) if each.waits_for_confirmation)
             for hold in held:
                 hold.confirmed = True
             self._wake()
@@ -378,17 +359,17 @@ class Control:
         """Wait a moment for containers that were just sent from where they waited."""
         self._changed.wait_for(lambda: not self._moving, _SETTLE_S)
 
-    def _held(self, path: str) -> Tuple[Hold, ...]:
-        return tuple(
-            each
-            for each in self._holds
-            if self._let_go(each) is None and path in ('', each.place.path)
-        )
+    def holds(self, path: str = '') -> Tuple[Hold, ...]:
+        """Return what waits now.
 
-    def holds(self) -> Tuple[Hold, ...]:
-        """Return what waits now."""
+        :param path: of the container. '' means every one.
+        """
         with self._changed:
-            return self._held('')
+            return tuple(
+                each
+                for each in self._holds
+                if self._let_go(each) is None and path in ('', each.place.path)
+            )
 
     def ask_jump(self, path: str, jump: Jump) -> None:
         """Send the container at `path` to a state at its next state boundary.
@@ -396,7 +377,7 @@ class Control:
         A later wish for the same container takes the place of an earlier one.
         """
         with self._changed:
-            for hold in self._held(''):
+            for hold in self.holds():
                 if hold.may_be_sent and hold.key == path:
                     self._moving[path] = HeldPlace(jump.container or hold.place.path, jump.state)
             self._jumps[path] = jump
@@ -441,7 +422,7 @@ class Control:
 
     def _judge_level(self, hold: Hold) -> None:
         if hold.asks:
-            hold.confirms = self._level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
+            hold.confirms = self.level_of(hold.place, hold.autonomy) == CONFIRM_FIRST
 
     def levels(self) -> Dict[str, str]:
         """Return the autonomy that was set at run time, by pattern."""

@@ -59,32 +59,6 @@ class StateRecord:
     them.
     """
 
-    __slots__ = (
-        'label',
-        'settings',
-        'fast',
-        'snapshot',
-        'recoveries',
-        'fallbacks',
-        'unwell_repeats',
-        '_tried',
-        'has_preconditions',
-        'special',
-        'view',
-        'longest_s',
-        'entered_by_oracle',
-        'way_down',
-        '_is_special',
-        '_estimator',
-        '_lock',
-        '_learned',
-        'shared',
-        '_retired',
-        '_edges',
-        '_visits',
-        '_visits_before',
-    )
-
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
         self.label = label
         self.fast: Dict[Any, FastEdge] = {}
@@ -283,14 +257,12 @@ class StateRecord:
 
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way."""
-        state = {name: getattr(self, name) for name in self.__slots__}
-        state.update(snapshot=None, view=None, way_down=())
+        state: Dict[str, object] = {**vars(self), 'snapshot': None, 'view': None, 'way_down': ()}
         del state['_lock']
         return state
 
     def __setstate__(self, state: Dict[str, object]) -> None:
-        for name, value in state.items():
-            setattr(self, name, value)
+        self.__dict__.update(state)
         self._lock = threading.RLock()
 
     def retire_edges(self) -> None:

@@ -19,8 +19,8 @@ class WrittenWord(str):
         word.value = value
         return word
 
-    def __getnewargs__(self) -> Tuple[str, Optional[bool]]:  # type: ignore[override]
-        return str(self), self.value
+    def __reduce__(self) -> Tuple[object, ...]:
+        return WrittenWord, (str(self), self.value)
 
 
 class WrittenInt(int):
