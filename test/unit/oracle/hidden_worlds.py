@@ -2,11 +2,10 @@
 
 from typing import Any, Dict, Iterable, Sequence, Tuple
 
+from fake_clock import FakeClock
 from hidden_causes.mix import MIX
 from hidden_causes.plan import DONE, MACHINE, TOP, Box, Leaf
 from hidden_causes.world import Causes, Condition, Disturbance, Work, World
-
-from smach_oracle.oracle.scope.clock import FakeClock
 
 EXACT = MIX._replace(spread=0.0, loops=0.0)
 

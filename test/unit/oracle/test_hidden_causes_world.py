@@ -1,6 +1,7 @@
 """The hidden world: each property of a condition is cured by what it says, and by nothing else."""
 
 import pytest
+from fake_clock import FakeClock
 from hidden_causes.chance import Chance, drawn
 from hidden_causes.mix import MIX
 from hidden_causes.world import (
@@ -14,8 +15,6 @@ from hidden_causes.world import (
     World,
 )
 from hidden_worlds import causes_of, does, world_of
-
-from smach_oracle.oracle.scope.clock import FakeClock
 
 LONG_S = 1e6
 AT_FIRST = Condition('light', holds_at_first=True, is_by_hand=False)

@@ -3,8 +3,7 @@
 import random
 from typing import Dict, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.decision.baselines import Baseline
-from smach_oracle.oracle.decision.policy import POLICIES, Action, Policy, Situation
+from smach_oracle.oracle.decision.policy import POLICIES, Action, Baseline, Policy, Situation
 
 ASK, GIVE_UP = 'ask', 'give_up'
 WAIT_S = 30.0

@@ -4,7 +4,7 @@ import collections
 import threading
 from typing import Counter, List, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert, Progress, Question
+from smach_oracle.oracle import Answer, AnswerKind, Expert, Question
 
 from .mix import Mix
 from .plan import DONE, Box, leaves_of
@@ -52,7 +52,7 @@ class Person(Expert):
         self._alike: Counter[str] = collections.Counter()
 
     def ask(
-        self, question: Question, cancelled: threading.Event, progress: Progress
+        self, question: Question, cancelled: threading.Event, progress: object
     ) -> Optional[Answer]:
         """Come, look, and help."""
         world, mix = self._world, self._mix

@@ -4,12 +4,13 @@ import contextlib
 from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Tuple
 from unittest import mock
 
+from fake_clock import FakeClock
+
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.decision.policy import POLICIES, Policy
 from smach_oracle.oracle.machine import tree
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.scope.clock import FakeClock
 
 from .building import Scene, build, keys_of
 from .causes import draw_causes
@@ -136,7 +137,7 @@ class Bed:
 @contextlib.contextmanager
 def _time_of(clock: FakeClock) -> Iterator[None]:
     """Have the machines that are wrapped within go by a clock."""
-    with mock.patch.object(tree, 'MonotonicClock', lambda: clock):
+    with mock.patch.object(tree, 'Clock', lambda: clock):
         yield
 
 

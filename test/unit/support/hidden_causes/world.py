@@ -16,7 +16,7 @@ nothing. Nothing here knows the ways of a policy.
 import math
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Set, Tuple
 
-from smach_oracle.oracle.scope.clock import FakeClock
+from fake_clock import FakeClock
 
 from .chance import drawn, exponential
 from .mix import Mix
