@@ -86,7 +86,7 @@ class Branch(smach.Container):
         """Have this state of the Concurrence or Iterator, with the outcomes that it has now."""
         label, outcomes = self._initial_state_label, state.get_registered_outcomes()
         self.userdata = container.userdata
-        self._state = self._states[label] = state
+        self.state = self._states[label] = state
         self._remappings[label] = {} if self.hands_on_userdata else remapping_in(container, label)
         if set(self._outcomes) != set(outcomes) or label not in self._transitions:
             self._outcomes = set(outcomes)
@@ -115,13 +115,9 @@ class Branch(smach.Container):
         if not self._is_under_way:
             self._rest()
 
-    def is_of(self, state: smach.State) -> bool:
-        """Whether it executes this state."""
-        return state is self._state
-
     def execute(self, userdata: smach.UserData) -> object:
         """Execute the state, and recover where it fails. Return its outcome."""
-        state = self._state
+        state = self.state
         if self._is_under_way:  # in another thread
             return state.execute(userdata)
         self._preempt_requested = False
@@ -188,7 +184,7 @@ class Branch(smach.Container):
         """
         node = self._oracle
         if end is None:
-            if self._state.preempt_requested():
+            if self.state.preempt_requested():
                 self._preempt_requested = True
             if self._item is not None:
                 self._item.begin_item()
@@ -235,7 +231,7 @@ class Branch(smach.Container):
     def request_preempt(self) -> None:
         """Preempt the state, or its recovery."""
         if not self._is_under_way:
-            self._state.request_preempt()
+            self.state.request_preempt()
         if self._is_under_way:  # it may have begun meanwhile, without a look at the request
             self._is_preempt_passed_on = False
             self._preempt_requested = True
@@ -258,7 +254,7 @@ class Branch(smach.Container):
 
     def recall_preempt(self) -> None:
         """Take a request back."""
-        self._state.recall_preempt()
+        self.state.recall_preempt()
         smach.Container.recall_preempt(self)
 
     # -- the container of one state

@@ -57,7 +57,7 @@ class IteratorWrapper(ContainerWrapper):
 
     def _begin(self) -> None:
         """Find out where it begins, and whether it goes on."""
-        items, trial_id = self.tracked, self._trial_now()
+        items, trial_id = self.tracked, self.top.tree.trial_id
         inside = tuple(wrapper.mark() for wrapper in self._iterators_around())
         if items is None or items.given is not items_of(self.container):
             items = TrackedItems(items_of(self.container), self._tell)
@@ -121,7 +121,7 @@ class IteratorWrapper(ContainerWrapper):
         top = self.top
         return take_snapshot(data, top.in_force.deep_copy_keys, top.warn_not_copied)
 
-    def leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
+    def _leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
         self._ended_with = None if self._is_left else outcome
         if self.tracked is not None and self.tracked.is_exhausted:
@@ -130,7 +130,7 @@ class IteratorWrapper(ContainerWrapper):
                 node = node_of(machine)
                 if node is not None:
                     node.execution.forget_unrecovered()
-        super().leave(outcome, error)
+        super()._leave(outcome, error)
 
     def __getstate__(self) -> Dict[str, Any]:
         return dict(

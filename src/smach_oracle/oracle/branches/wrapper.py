@@ -1,19 +1,17 @@
 """Concurrences and Iterators of a wrapped tree: what is kept for one, and its hook."""
 
+import contextlib
 import threading
-from types import TracebackType
 from typing import (
     Any,
     Callable,
     Dict,
-    Iterable,
     Iterator,
     List,
     Mapping,
-    NamedTuple,
     Optional,
+    Protocol,
     Tuple,
-    Type,
 )
 
 import smach
@@ -29,14 +27,25 @@ from .branch import Branch
 from .items import TrackedItems
 
 
-class _ResumedItem(NamedTuple):
-    """The values with which a container that was under way goes on. See `resume`."""
+class StoredPort(Protocol):
+    """The progress of a container when the program was stopped (`checkpoint.stored_tree`)."""
 
-    keys: Dict[str, Any]
-    gone: Tuple[str, ...]
-    item: int
-    tell: Callable[[Mapping[str, Any]], None]
-    trial_id: str
+    keys: Dict[str, Any]  # of its userdata
+    gone: List[str]  # keys that are not to be there
+    item: int  # number of the one to begin with, from 1. 0 means the first
+
+    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+        """Take the userdata as they are then."""
+
+
+class WrappedExecution:
+    """One execution of a Concurrence or an Iterator. `outcome`: with which it has ended.
+
+    `is_entered`: its branches have their oracles. Else it runs bare.
+    """
+
+    outcome: Optional[str] = None
+    is_entered = False
 
 
 class ContainerWrapper:
@@ -58,7 +67,7 @@ class ContainerWrapper:
         self.runners: Dict[str, Branch] = {}
         self._lock = threading.Lock()
         self._is_in_use = False
-        self._resumed: Optional[_ResumedItem] = None
+        self._resumed: Optional[Tuple[StoredPort, str]] = None  # with the id of its trial
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -75,9 +84,23 @@ class ContainerWrapper:
 
     # -- the hook
 
-    def execution(self, container: smach.Container) -> 'WrappedExecution':
+    @contextlib.contextmanager
+    def execution(self, container: smach.Container) -> Iterator[WrappedExecution]:
         """Return the context in which the container executes, its branches under their oracles."""
-        return WrappedExecution(self, container)
+        execution = WrappedExecution()
+        execution.is_entered = container is self.container and self._enter()
+        if not execution.is_entered:
+            yield execution
+            return
+        error: Optional[BaseException] = None
+        try:
+            yield execution
+        except BaseException as err:
+            error = err
+            self._explain(err)
+            raise
+        finally:
+            self._leave(execution.outcome, error)
 
     def take_inputs(
         self,
@@ -87,8 +110,15 @@ class ContainerWrapper:
     ) -> None:
         """Take the inputs, by `copy()`, and the userdata that `resume` was given."""
         copy()
-        if container is self.container:
-            self._take_over_userdata()
+        if container is not self.container:
+            return
+        stored, self._resumed = self._to_resume(), None
+        if stored is not None:
+            data = data_of(container.userdata)
+            for key in stored.gone:
+                data.pop(key, None)
+            data.update(stored.keys)
+            stored.complete_snapshots(data)
 
     def runner_of(self, container: smach.Container, label: str, state: smach.State) -> smach.State:
         """Return what executes a state.
@@ -96,12 +126,13 @@ class ContainerWrapper:
         A state that has been added since is executed as it is, and so is one of a shallow copy.
         """
         runner = self.runners.get(label) if container is self.container else None
-        return runner if runner is not None and runner.is_of(state) else state
+        return runner if runner is not None and runner.state is state else state
 
-    def enter(self) -> bool:
+    def _enter(self) -> bool:
         """Begin an execution. Return False where that cannot be, so that it runs bare."""
         with self._lock:
-            if self._is_in_use or not self._runs_in_tree():
+            runs = is_executing(self.top.machine) or self.top.has_running_ancestor()
+            if self._is_in_use or not runs:
                 return False
             self._is_in_use = True
         states = dict(self.states())
@@ -124,7 +155,7 @@ class ContainerWrapper:
         for branch in self.branches.values():
             branch.begin(None)
 
-    def leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
+    def _leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
         nodes = self.nodes()
         if nodes:
@@ -141,19 +172,9 @@ class ContainerWrapper:
 
     # -- going on after the program was stopped
 
-    def resume(
-        self,
-        keys: Mapping[str, Any],
-        gone: Iterable[str],
-        item: int,
-        tell: Callable[[Mapping[str, Any]], None],
-    ) -> None:
-        """Have this userdata at the next execution, once its inputs are copied.
-
-        `gone`: keys that are not to be there. `item`: number of the one to begin with, from 1.
-        0 means the first. `tell`: takes the userdata as they are then.
-        """
-        self._resumed = _ResumedItem(dict(keys), tuple(gone), item, tell, self._trial_now())
+    def resume(self, stored: StoredPort) -> None:
+        """Go on from there at the next execution of this trial, once its inputs are copied."""
+        self._resumed = stored, self.top.tree.trial_id
 
     def forget_resumed(self) -> None:
         """Begin the next execution from the start, whatever was under way in the program before."""
@@ -164,28 +185,13 @@ class ContainerWrapper:
         """Whether its next execution goes on where the program was stopped."""
         return self._to_resume() is not None
 
-    def _to_resume(self) -> Optional[_ResumedItem]:
+    def _to_resume(self) -> Optional[StoredPort]:
         """Return how it goes on, unless that was of a trial before."""
-        resumed = self._resumed
-        return resumed if resumed is not None and resumed.trial_id == self._trial_now() else None
+        if self._resumed is None or self._resumed[1] != self.top.tree.trial_id:
+            return None
+        return self._resumed[0]
 
-    def _take_over_userdata(self) -> None:
-        """Have the userdata that `resume` was given, at the first execution after it."""
-        resumed, self._resumed = self._to_resume(), None
-        if resumed is not None:
-            data = data_of(self.container.userdata)
-            for key in resumed.gone:
-                data.pop(key, None)
-            data.update(resumed.keys)
-            resumed.tell(data)
-
-    def _trial_now(self) -> str:
-        return self.top.tree.trial_id
-
-    def _runs_in_tree(self) -> bool:
-        return is_executing(self.top.machine) or self.top.has_running_ancestor()
-
-    def explain(self, error: BaseException) -> None:
+    def _explain(self, error: BaseException) -> None:
         """Have an error of the container say that a branch has ended the program by it.
 
         :raises TooDeepError: in its place, where too many containers lie in each other.
@@ -209,39 +215,6 @@ class ContainerWrapper:
     def __setstate__(self, state: Dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._lock = threading.Lock()
-
-
-class WrappedExecution:
-    """One execution of a Concurrence or an Iterator. `outcome`: with which it has ended.
-
-    It runs bare where its branches cannot have their oracles.
-    """
-
-    outcome: Optional[str] = None
-
-    def __init__(self, wrapper: ContainerWrapper, container: smach.Container) -> None:
-        self._wrapper = wrapper
-        self._container = container
-        self.is_entered = False
-
-    def __enter__(self) -> 'WrappedExecution':
-        wrapper = self._wrapper
-        self.is_entered = wrapper.container is self._container and wrapper.enter()
-        return self
-
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        if not self.is_entered:
-            return
-        try:
-            if error is not None:
-                self._wrapper.explain(error)
-        finally:
-            self._wrapper.leave(self.outcome, error)
 
 
 def wrapper_of(state: object) -> Optional[ContainerWrapper]:

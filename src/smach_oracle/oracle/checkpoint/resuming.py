@@ -263,8 +263,7 @@ class _Setting:
             return
         for path, wrapper in wrappers_in(node, stored.label):
             if self._has_begun(path):
-                told = self._resumption.tree.container(path)
-                wrapper.resume(told.keys, told.gone, told.item, told.complete_snapshots)
+                wrapper.resume(self._resumption.tree.container(path))
         asked = [self.set_container(each) for each in inside]
         if self._resumption.asks and not any(asked):
             self._ask_behind(node, label=stored.label, inside=inside)
