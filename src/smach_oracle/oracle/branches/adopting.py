@@ -10,7 +10,7 @@ from ..machine.tree_node import TreeNode
 from ..smach_private import Labels, set_mark
 from .branch import Branch
 from .iterator_wrapper import IteratorWrapper
-from .sites import ConcurrenceSite, IteratorSite
+from .sites import BranchSite, IteratorSite
 from .upstream import HOOK, ask_no_more, asks_hook, have_asked
 from .wrapper import ContainerWrapper, wrapper_of
 
@@ -79,7 +79,7 @@ def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
     node = TreeNode(cast(smach.StateMachine, branch), parent.tree, parent.settings, '')
     set_mark(branch, node)
     node.in_force.wrap_with(parent.in_force.strict, parent.in_force.nested, inherits=True)
-    node.site = IteratorSite(container, label) if is_item else ConcurrenceSite(container, label)
+    node.site = (IteratorSite if is_item else BranchSite)(container, label)
     node.lie_below(parent, wrapper.below)
     node.configure(parent.settings)
     return branch

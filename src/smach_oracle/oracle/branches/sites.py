@@ -20,14 +20,14 @@ from ..smach_private import (
     states_of,
 )
 
+NEXT_ITEM = 'the next item'
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
 
 
 class BranchSite(Site):
-    """The Concurrence or Iterator that holds a plain state, as the oracle of the state knows it."""
+    """The Concurrence that holds a plain state, as the oracle of the state knows it."""
 
     is_container = False
-    goes_on_with_any = True
     begins_by = EventKind.STATE_START
 
     def __init__(self, container: smach.Container, label: str) -> None:
@@ -37,6 +37,10 @@ class BranchSite(Site):
     def shown(self, node: TreeNode) -> smach.Container:
         """Return the container that people see."""
         return self.container
+
+    def settings_here(self, settings: Settings) -> Settings:
+        """Keep the userdata at jumps: others write it at the same time."""
+        return replace(settings, userdata='keep', deep_copy_keys=())
 
     def settings_of_state(self, settings: StateSettings) -> StateSettings:
         """Leave out preconditions by label: beside a branch is no state that could be run for it.
@@ -66,31 +70,29 @@ class BranchSite(Site):
         return settings.author_recoveries != 'override' and self._is_drawn(node, outcome)
 
     def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
-        raise NotImplementedError
+        """Whether the outcome map names it for the branch, and leads to what is no failure."""
+        return any(
+            not is_failure_above(node, name)
+            for name, conditions in _entries(outcome_map_of(self.container))
+            if dict(_entries(conditions)).get(self.label) == outcome
+        )
 
     def in_words(self, route: Route, outcome: str) -> Route:
         """Say where an outcome leads, for people."""
         return Route(self._leads_to(outcome), True)
 
     def _leads_to(self, outcome: str) -> str:
-        raise NotImplementedError
+        return 'the end of this branch'
 
     def choices(self, node: TreeNode, label: str) -> Tuple[OutcomeChoice, ...]:
         """Return the outcomes, and where they lead. Those that lead to the next item come first."""
-        last = [
-            (not self._goes_on_after(outcome), str(outcome), outcome)
+        choices = (
+            OutcomeChoice(outcome, self._leads_to(outcome))
             for outcome in states_of(node.machine)[label].get_registered_outcomes()
-        ]
-        return tuple(
-            OutcomeChoice(outcome, self._leads_to(outcome)) for _, _, outcome in sorted(last)
         )
-
-    def _goes_on_after(self, outcome: str) -> bool:
-        """Whether an outcome leads to the next item."""
-        return False
-
-    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
-        """Say nothing: the Concurrence or Iterator tells."""
+        return tuple(
+            sorted(choices, key=lambda choice: (choice.target != NEXT_ITEM, str(choice.outcome)))
+        )
 
     def ended_by(self, node: TreeNode, event: Event) -> Optional[str]:
         """Return the outcome with which the branch ends at an event, None for other events."""
@@ -103,29 +105,14 @@ class BranchSite(Site):
         return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
 
 
-class ConcurrenceSite(BranchSite):
-    """The site of one state of a Concurrence."""
+class IteratorSite(BranchSite):
+    """The Iterator that holds a plain state."""
 
     container: smach.Concurrence
 
     def settings_here(self, settings: Settings) -> Settings:
-        """Keep the userdata at jumps: others write it at the same time."""
-        return replace(settings, userdata='keep', deep_copy_keys=())
-
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
-        """Whether the outcome map names it for the branch, and leads to what is no failure."""
-        return any(
-            not is_failure_above(node, name)
-            for name, conditions in _entries(outcome_map_of(self.container))
-            if dict(_entries(conditions)).get(self.label) == outcome
-        )
-
-    def _leads_to(self, outcome: str) -> str:
-        return 'the end of this branch'
-
-
-class IteratorSite(BranchSite):
-    """The site of the state of an Iterator."""
+        """Return the settings of the whole machine as they are: its state runs alone."""
+        return settings
 
     container: smach.Iterator
 
@@ -138,13 +125,10 @@ class IteratorSite(BranchSite):
 
     def _leads_to(self, outcome: str) -> str:
         if loops(self.container, outcome):
-            return 'the next item'
+            return NEXT_ITEM
         return 'the end of the iteration, with {}'.format(
             final_outcomes_of(self.container).get(outcome, outcome)
         )
-
-    def _goes_on_after(self, outcome: str) -> bool:
-        return loops(self.container, outcome)
 
     def tell_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
         """Say which item is passed over where this failing outcome leads to the next one."""

@@ -83,7 +83,10 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
     ):
         machine.service_preempt()
     set_current_label(machine, None)
-    node.site.tell_end(label, outcome, container_outcome)
+    if node.site.is_container:
+        smach.loginfo(
+            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
+        )
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome
 

@@ -75,14 +75,13 @@ class Site:
     that depends on the place asks the site of the node.
 
     `is_container`: whether it is a container that its author made. It begins and ends by its own
-    events, and its states have userdata and neighbours. `label`: of the only state, else ''.
-    `goes_on_with_any`: whether it goes on by an outcome that its state has not registered.
+    events, its states have userdata and neighbours, and it goes on by registered outcomes alone.
+    `label`: of the only state, else ''.
     `begins_by`: the event by which it begins.
     """
 
     is_container = True
     label = ''
-    goes_on_with_any = False
     begins_by = EventKind.CONTAINER_START
 
     def shown(self, node: 'TreeNode') -> smach.Container:
@@ -120,10 +119,8 @@ class Site:
 
     def choices(self, node: 'TreeNode', label: str) -> Tuple[OutcomeChoice, ...]:
         """Return the outcomes of a state that lead on, and where, as an expert is shown them."""
-        routes = (
-            (outcome, route_of(node.machine, label, outcome))
-            for outcome in _outcomes_of(node, label)
-        )
+        outcomes = sorted(states_of(node.machine)[label].get_registered_outcomes(), key=str)
+        routes = ((outcome, route_of(node.machine, label, outcome)) for outcome in outcomes)
         return tuple(
             OutcomeChoice(outcome, route.target) for outcome, route in routes if route.target
         )
@@ -133,12 +130,6 @@ class Site:
     def tell_passed_over(self, node: 'TreeNode', label: str, outcome: str) -> None:
         """Say what the author passes over by a failing outcome that is foreseen."""
 
-    def tell_end(self, label: str, outcome: str, container_outcome: str) -> None:
-        """Log that the container ends."""
-        smach.loginfo(
-            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
-        )
-
     def ended_by(self, node: 'TreeNode', event: Event) -> Optional[str]:
         """Return the outcome with which it ends at an event of its own, None for other events."""
         is_end = event.kind is EventKind.CONTAINER_END and event.outcome
@@ -147,7 +138,3 @@ class Site:
     def is_line_over(self, node: 'TreeNode', event: Event) -> bool:
         """Whether no state follows in its thread, that of a Concurrence, after an event."""
         return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
-
-
-def _outcomes_of(node: 'TreeNode', label: str) -> Tuple[str, ...]:
-    return tuple(sorted(states_of(node.machine)[label].get_registered_outcomes(), key=str))

@@ -143,7 +143,7 @@ def _judge(
         )
         told = outcome if isinstance(outcome, str) else None
         failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told or '', text)
-        if node.site.goes_on_with_any and told is not None:
+        if told is not None and not node.site.is_container:
             return failure._replace(route=Route(told, False))
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast(str, outcome)
