@@ -5,29 +5,15 @@ from typing import Any, Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
 
 import smach
 
-from ..control.control import Control
 from ..machine.execution import runs_around
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import request_preempt
-from ..records.early_end import EarlyEnd
 from ..recovery.verdict import outcome_of_early_end
 from ..smach_private import Transitions, data_of, remapping_in, state_ended, step_once
 
 COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
 End = Tuple[object, Optional[Exception]]  # of a state: its outcome, and what it has raised
-# what an execution has, beside what `_be_at_rest` sets
-_OF_EXECUTION = (
-    '_state_transitioning_lock',
-    '_item',
-    '_record',
-    '_observers',
-    '_control',
-    '_early_end',
-    '_abandoned',
-    '_current_state',
-    '_preempted_state',
-)
 
 
 class ItemPort(Protocol):
@@ -96,10 +82,6 @@ class Branch(smach.Container):
         """Begin an execution of the Concurrence, for which there is no `item`, or Iterator."""
         node = self._oracle
         self._item = item
-        self._observers = node.events.observers
-        self._control: Control = node.tree.control
-        self._early_end: EarlyEnd = node.tree.early_end
-        self._abandoned = node.tree.workers.abandoned
         # the same for all items
         self._is_watched = bool(
             node.in_force.limits_autonomy() or node.tree.resumed.concerns(node) or runs_around(node)
@@ -123,15 +105,16 @@ class Branch(smach.Container):
         self._preempt_requested = False
         self._is_under_way = True  # from now on it takes the requests itself
         try:
-            record = self._record
-            execution = self._oracle.execution
+            record, node = self._record, self._oracle
+            tree, execution = node.tree, node.execution
+            control, early_end = tree.control, tree.early_end
             if (
                 record is None
                 or record.special
-                or self._observers
-                or self._abandoned
-                or self._control.is_set
-                or self._early_end.why is not None
+                or node.events.observers
+                or node.abandoned
+                or control.is_set
+                or early_end.why is not None
                 or execution.departure is not None
                 or execution.unrecovered
                 or state.preempt_requested()
@@ -156,20 +139,24 @@ class Branch(smach.Container):
                 return self._run((outcome, None))
             if (
                 self._preempt_requested
-                or self._control.is_set
-                or self._early_end.is_near
+                or control.is_set
+                or early_end.is_near
                 or execution.departure is not None
                 or smach.is_shutdown()
             ):
                 return self._run((outcome, None))
             edge.count += 1
-            self._oracle.records.history.visited(edge.visit, record.has_preconditions)
+            history = node.records.history
+            history.visits.append(edge.visit)
+            if not record.has_preconditions:
+                history.unconditioned = record.label
+            history.succeeded = record.label  # no other state is here
             record.snapshot = None
             if self._item is None:
                 self._rest()
             return outcome
         except (SystemExit, KeyboardInterrupt) as err:
-            self._early_end.of_program = err
+            self._oracle.tree.early_end.of_program = err
             self._oracle.records.drop_snapshots()
             self._rest()
             raise
@@ -279,8 +266,10 @@ class Branch(smach.Container):
     # -- pickling and copying
 
     def __getstate__(self) -> Dict[str, object]:
-        """Leave out what belongs to an execution."""
-        return {key: value for key, value in self.__dict__.items() if key not in _OF_EXECUTION}
+        """Leave out the lock. A copy of a branch is at rest."""
+        state = dict(self.__dict__)
+        del state['_state_transitioning_lock']
+        return state
 
     def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)

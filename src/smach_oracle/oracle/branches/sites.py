@@ -108,13 +108,9 @@ class BranchSite(Site):
 class IteratorSite(BranchSite):
     """The Iterator that holds a plain state."""
 
-    container: smach.Concurrence
-
     def settings_here(self, settings: Settings) -> Settings:
         """Return the settings of the whole machine as they are: its state runs alone."""
         return settings
-
-    container: smach.Iterator
 
     def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""
@@ -139,7 +135,7 @@ class IteratorSite(BranchSite):
             node.warn(text.format(item, outcome), label)
 
 
-def loops(iterator: smach.Iterator, outcome: str) -> bool:
+def loops(iterator: smach.Container, outcome: str) -> bool:
     """Whether an outcome of its state leads an Iterator to the next item."""
     looping, breaking = loop_outcomes_of(iterator), break_outcomes_of(iterator)
     return outcome not in breaking and (not looping or outcome in looping)
