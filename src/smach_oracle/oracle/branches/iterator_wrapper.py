@@ -4,13 +4,13 @@ from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
 
+from ..machine.items import TrackedItems
 from ..machine.nesting import children_of, machines_below
 from ..machine.snapshots import restore, take_snapshot
 from ..machine.tree_node import TreeNode, node_of
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
-from ..smach_private import Labels, data_of, items_of
-from .items import TrackedItems
+from ..smach_private import Labels, data_of, items_of, states_of
 from .wrapper import ContainerWrapper, wrapper_of
 
 
@@ -194,3 +194,14 @@ def _same(one: object, other: object) -> bool:
         return type(one) is type(other) and bool(one == other)
     except Exception:  # whatever a user's object raises, or an array that is no truth
         return False
+
+
+def ask_to_go_on(node: TreeNode, target: str) -> None:
+    """Note that the oracle goes to a state: an Iterator that has failed or was left goes on there.
+
+    Any other Iterator of the container begins again when it is entered.
+    """
+    for label, state in list(states_of(node.machine).items()):
+        wrapper = wrapper_of(state) if isinstance(state, smach.Container) else None
+        if isinstance(wrapper, IteratorWrapper):
+            wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

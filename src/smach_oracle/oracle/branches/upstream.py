@@ -9,6 +9,7 @@ from typing import Any, Dict, Mapping, Optional, Tuple, cast
 import smach
 
 from ..identity import set_class
+from ..machine.items import TrackedItems
 from ..machine.wrapped_classes import rebuild, two_classes, wrapped_class
 from ..smach_private import (
     items_of,
@@ -19,7 +20,6 @@ from ..smach_private import (
     states_of,
 )
 from .branch import Branch
-from .items import TrackedItems
 
 HOOK = 'execution_hook'  # the attribute by which our engine asks
 

@@ -18,13 +18,13 @@ import smach
 
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
+from ..machine.items import TrackedItems
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..smach_private import Labels, data_of, is_executing, mark_on
 from .branch import Branch
-from .items import TrackedItems
 
 
 class StoredPort(Protocol):

@@ -11,9 +11,7 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, G
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..branches.around import wrappers_around, wrappers_in
-from ..branches.wrapper import ContainerWrapper
-from ..machine.nesting import nodes_of
+from ..machine.nesting import Wrapper, nodes_of, wrappers_around, wrappers_in
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
@@ -114,7 +112,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
-        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, ContainerWrapper]]]] = {}
+        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, Wrapper]]]] = {}
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
@@ -311,7 +309,7 @@ class Checkpointer:
     def _below(self, path: str) -> List[TreeNode]:
         return [node for key, node in self._nodes.items() if (key + '/').startswith(path + '/')]
 
-    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
+    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, Wrapper]]:
         """Return what `wrappers_around` does, looked for once for each container."""
         kept = self._wrappers.get(node.key)
         if kept is None or kept[0] is not node:

@@ -7,12 +7,10 @@ import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
 from smach_oracle.store.rows import StoredTrial
 
-from ..branches.around import wrappers_in
-from ..branches.items import can_be_indexed
-from ..branches.wrapper import wrapper_of
 from ..errors import SettingsError
+from ..machine.items import can_be_indexed
 from ..machine.jump_path import JumpPath, jump_path_to
-from ..machine.nesting import branching_below, nodes_of
+from ..machine.nesting import branching_below, children_of, nodes_of, wrapper_of, wrappers_in
 from ..machine.places import TreePlace, place_named, places_of
 from ..machine.repeats import leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
@@ -424,8 +422,8 @@ def _is_wrapped_through(state: object) -> bool:
     return (
         wrapper is not None
         and all(
-            label in wrapper.branches or _is_wrapped_through(inner)
-            for label, inner in wrapper.states()
+            inner is None or label in wrapper.branches or _is_wrapped_through(inner)
+            for label, inner in children_of(wrapper.container).items()
         )
         and (not isinstance(state, smach.Iterator) or can_be_indexed(state))
     )

@@ -16,9 +16,9 @@ from smach_oracle.store.rows import Fact, NewMoment, StoredMoment, StoredTrial, 
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
 
-from ..branches.items import can_be_indexed
 from ..errors import CheckpointError, OracleError, SettingsError
 from ..identity import remove_identical
+from ..machine.items import can_be_indexed
 from ..machine.nesting import branching_below, nodes_of
 from ..machine.tree import new_id, no_store
 from ..machine.tree_node import TreeNode

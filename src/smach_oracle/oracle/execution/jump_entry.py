@@ -7,7 +7,7 @@ that is started over has its userdata as it was at first, in all containers of t
 from typing import Collection, Iterable, NamedTuple, Optional, Tuple
 
 from ..asking.question import names
-from ..branches.around import ask_to_go_on
+from ..branches.iterator_wrapper import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
 from ..control.control import Jump
 from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on

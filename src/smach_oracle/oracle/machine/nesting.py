@@ -1,7 +1,18 @@
 """Finds the machines nested in others, and those of them that are under an oracle."""
 
 from collections import deque
-from typing import Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
+from typing import (
+    Callable,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Protocol,
+    Tuple,
+    cast,
+)
 
 import smach
 
@@ -20,6 +31,26 @@ class Wrapper(Protocol):
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
+
+    @property
+    def item_number(self) -> int:
+        """The number of the item under way, from 1. 0 means none is."""
+
+    @property
+    def is_resumed(self) -> bool:
+        """Whether its next execution goes on where the program was stopped."""
+
+    def resume(
+        self,
+        keys: Mapping[str, object],
+        gone: Iterable[str],
+        item: int,
+        tell: Callable[[Mapping[str, object]], None],
+    ) -> None:
+        """Have its next execution go on there (`branches.wrapper`)."""
+
+    def forget_resumed(self) -> None:
+        """Have it begin from the start."""
 
 
 def wrapper_of(state: object) -> Optional[Wrapper]:
@@ -64,6 +95,30 @@ def branching_below(
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
                 yield path, state
             yield from branching_below(state, path)
+
+
+def wrappers_around(node: TreeNode) -> List[Tuple[str, Wrapper]]:
+    """Return them, each with its path, the outermost first."""
+    parent = node.parent
+    if parent is None or not node.runs_in_branch:
+        return []
+    found = []
+    for below, container in branching_below(parent.machine):
+        wrapper = wrapper_of(container)
+        if wrapper is not None and node.below[: len(below)] == below:
+            found.append(('/'.join((parent.key,) + below), wrapper))
+    return found
+
+
+def wrappers_in(node: TreeNode, label: str) -> List[Tuple[str, Wrapper]]:
+    """Return those in a state of a machine, down to the next machines, each with its path."""
+    return [
+        ('/'.join((node.key,) + below), wrapper)
+        for below, wrapper in (
+            (below, wrapper_of(container)) for below, container in branching_below(node.machine)
+        )
+        if wrapper is not None and below[0] == label
+    ]
 
 
 def children_of(container: object) -> Mapping[str, smach.State]:

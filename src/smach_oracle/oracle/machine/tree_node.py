@@ -17,8 +17,7 @@ from ..smach_private import (
     mark_on,
     states_of,
 )
-from .container_records import ContainerRecords
-from .container_settings import ContainerSettings
+from .container_records import ContainerRecords, ContainerSettings
 from .execution import Execution
 from .site import Site
 from .snapshots import NOT_COPIED, take_snapshot
