@@ -10,7 +10,6 @@ from typing import (
     List,
     Mapping,
     Optional,
-    Protocol,
     Tuple,
 )
 
@@ -25,17 +24,6 @@ from ..records.facts import BRANCHES
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..smach_private import Labels, data_of, is_executing, mark_on
 from .branch import Branch
-
-
-class StoredPort(Protocol):
-    """The progress of a container when the program was stopped (`checkpoint.stored_tree`)."""
-
-    keys: Dict[str, Any]  # of its userdata
-    gone: List[str]  # keys that are not to be there
-    item: int  # number of the one to begin with, from 1. 0 means the first
-
-    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
-        """Take the userdata as they are then."""
 
 
 class WrappedExecution:
@@ -67,7 +55,7 @@ class ContainerWrapper:
         self.runners: Dict[str, Branch] = {}
         self._lock = threading.Lock()
         self._is_in_use = False
-        self._resumed: Optional[Tuple[StoredPort, str]] = None  # with the id of its trial
+        self._resumed: Optional[Tuple[nesting.StoredPort, str]] = None  # with the id of its trial
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -172,7 +160,7 @@ class ContainerWrapper:
 
     # -- going on after the program was stopped
 
-    def resume(self, stored: StoredPort) -> None:
+    def resume(self, stored: nesting.StoredPort) -> None:
         """Go on from there at the next execution of this trial, once its inputs are copied."""
         self._resumed = stored, self.top.tree.trial_id
 
@@ -185,7 +173,7 @@ class ContainerWrapper:
         """Whether its next execution goes on where the program was stopped."""
         return self._to_resume() is not None
 
-    def _to_resume(self) -> Optional[StoredPort]:
+    def _to_resume(self) -> Optional[nesting.StoredPort]:
         """Return how it goes on, unless that was of a trial before."""
         if self._resumed is None or self._resumed[1] != self.top.tree.trial_id:
             return None

@@ -2,9 +2,8 @@
 
 from collections import deque
 from typing import (
-    Callable,
+    Any,
     Dict,
-    Iterable,
     Iterator,
     List,
     Mapping,
@@ -21,6 +20,17 @@ from ..smach_private import Labels, states_of
 from .tree_node import TreeNode, marked_node, node_of
 
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
+
+
+class StoredPort(Protocol):
+    """The progress of a container when the program was stopped (`checkpoint.stored_tree`)."""
+
+    keys: Dict[str, Any]  # of its userdata
+    gone: List[str]  # keys that are not to be there
+    item: int  # number of the one to begin with, from 1. 0 means the first
+
+    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+        """Take the userdata as they are then."""
 
 
 class Wrapper(Protocol):
@@ -40,14 +50,8 @@ class Wrapper(Protocol):
     def is_resumed(self) -> bool:
         """Whether its next execution goes on where the program was stopped."""
 
-    def resume(
-        self,
-        keys: Mapping[str, object],
-        gone: Iterable[str],
-        item: int,
-        tell: Callable[[Mapping[str, object]], None],
-    ) -> None:
-        """Have its next execution go on there (`branches.wrapper`)."""
+    def resume(self, stored: StoredPort) -> None:
+        """Have its next execution go on there."""
 
     def forget_resumed(self) -> None:
         """Have it begin from the start."""
