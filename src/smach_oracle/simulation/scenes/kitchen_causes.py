@@ -11,13 +11,11 @@ from .cause_draws import (
     LASTING,
     LASTING_SHARE,
     PASSING,
-    cloud_minutes,
-    dazzling,
     drawn_kinds,
-    passing_seconds,
 )
 from .drafts import caused, declared
 from .fridge import closing_hinge
+from .light_causes import LightCauses, View
 from .scene import LOCALISATION, Body, ClosingHinge, Disturbance, Near, SceneCause, Vector
 
 # why, and why so often: doc/protocol.md
@@ -161,65 +159,6 @@ def _crowded(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraf
     )
 
 
-def _glare(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """The low sun falls through a window, and a glass shelf throws it into the lens."""
-    minutes = float(generator.uniform(30.0, 90.0))
-    return _dazzled(
-        draft,
-        generator,
-        'glare',
-        60 * minutes,
-        'the low sun dazzles the camera for {:.0f} minutes'.format(minutes),
-    )
-
-
-def _reflex(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """Something shiny that moves throws light into the lens."""
-    seconds = passing_seconds(generator)
-    return _dazzled(
-        draft,
-        generator,
-        'reflex',
-        seconds,
-        'a reflection dazzles the camera for {:.1f} s'.format(seconds),
-    )
-
-
-def _dazzled(
-    draft: KitchenDraft, generator: np.random.Generator, kind: str, seconds: float, text: str
-) -> KitchenDraft:
-    """From when the camera has turned to the drinks for the first time."""
-    values = dazzling(EYE, LOOKS_AT, np.array(draft.drinks[TARGET].position), generator)
-    return caused(
-        draft,
-        kind,
-        text,
-        Disturbance('glare', 'look_at', values + (('duration', seconds),), near=BEFORE_SHELF),
-    )
-
-
-def _dim_light(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """A cloud, in a kitchen without lamps."""
-    brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
-    values = (('brightness', brightness), ('duration', 60 * minutes))
-    text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
-        100 * brightness, minutes
-    )
-    return caused(
-        draft, 'dim_light', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF)
-    )
-
-
-def _shadow(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
-    """Somebody stands in the light."""
-    brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
-    values = (('brightness', brightness), ('duration', seconds))
-    text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
-        seconds, 100 * brightness
-    )
-    return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values, near=BEFORE_SHELF))
-
-
 def _slippery_drink(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
     friction, mass = float(generator.uniform(0.045, 0.08)), float(generator.uniform(0.6, 0.75))
     drinks = (
@@ -266,15 +205,15 @@ def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
 
 
 Maker = Callable[[KitchenDraft, np.random.Generator], KitchenDraft]
+_IN_THE_LIGHT: LightCauses[KitchenDraft] = LightCauses(
+    View(EYE, LOOKS_AT, near=BEFORE_SHELF), lambda draft: draft.drinks[TARGET].position
+)
 MAKERS: Dict[str, Maker] = {
     'base_misplaced': _base_misplaced,
     'door_falls_shut': _door_falls_shut,
     'door_swings_back': _door_swings_back,
     'crowded': _crowded,
-    'glare': _glare,
-    'reflex': _reflex,
-    'dim_light': _dim_light,
-    'shadow': _shadow,
+    **_IN_THE_LIGHT.makers(),
     'slippery_drink': _slippery_drink,
     'drink_moved': _drink_moved,
 }

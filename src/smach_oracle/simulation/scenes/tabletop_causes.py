@@ -17,12 +17,10 @@ from .cause_draws import (
     LASTING,
     LASTING_SHARE,
     PASSING,
-    cloud_minutes,
-    dazzling,
     drawn_kinds,
-    passing_seconds,
 )
 from .drafts import caused, declared
+from .light_causes import LightCauses, View
 from .scene import Body, Disturbance, SceneCause
 
 TABLE_TOP = 0.72  # m
@@ -112,59 +110,6 @@ def _left_arm() -> JointChain:
     return JointChain.from_urdf(
         pr2_urdf().read_text(), BASE_FRAME, TOOL_FRAME['left'], {'torso_lift_joint': TORSO}
     )
-
-
-def _glare(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """The low sun falls through a window, and something shiny throws it into the lens."""
-    minutes = float(generator.uniform(30.0, 90.0))
-    return _dazzled(
-        draft,
-        generator,
-        'glare',
-        60 * minutes,
-        'the low sun dazzles the camera for {:.0f} minutes'.format(minutes),
-    )
-
-
-def _reflex(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """Something shiny that moves throws light into the lens."""
-    seconds = passing_seconds(generator)
-    return _dazzled(
-        draft,
-        generator,
-        'reflex',
-        seconds,
-        'a reflection dazzles the camera for {:.1f} s'.format(seconds),
-    )
-
-
-def _dazzled(
-    draft: TabletopDraft, generator: np.random.Generator, kind: str, seconds: float, text: str
-) -> TabletopDraft:
-    values = dazzling(EYE_LOOKING, LOOKS_AT, np.array(draft.things[TARGET].position), generator)
-    return caused(
-        draft, kind, text, Disturbance('glare', 'look_at', values + (('duration', seconds),))
-    )
-
-
-def _dim_light(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """A cloud, in a room without lamps."""
-    brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
-    values = (('brightness', brightness), ('duration', 60 * minutes))
-    text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
-        100 * brightness, minutes
-    )
-    return caused(draft, 'dim_light', text, Disturbance('dim', 'look_at', values))
-
-
-def _shadow(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
-    """Somebody stands in the light."""
-    brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
-    values = (('brightness', brightness), ('duration', seconds))
-    text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
-        seconds, 100 * brightness
-    )
-    return caused(draft, 'shadow', text, Disturbance('dim', 'look_at', values))
 
 
 def _crowded(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
@@ -345,12 +290,12 @@ def radius_of(thing: Body) -> float:
 
 
 Maker = Callable[[TabletopDraft, np.random.Generator], Optional[TabletopDraft]]
+_IN_THE_LIGHT: LightCauses[TabletopDraft] = LightCauses(
+    View(EYE_LOOKING, LOOKS_AT), lambda draft: draft.things[TARGET].position
+)
 MAKERS: Dict[str, Maker] = {
     'arm_in_view': _arm_in_view,
-    'glare': _glare,
-    'reflex': _reflex,
-    'dim_light': _dim_light,
-    'shadow': _shadow,
+    **_IN_THE_LIGHT.makers(),
     'crowded': _crowded,
     'slippery_object': _slippery_object,
     'object_moved': _object_moved,

@@ -11,7 +11,7 @@ from smach_oracle.simulation.physics.camera import INTRINSICS
 from smach_oracle.simulation.physics.passing import pass_time
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
-from smach_oracle.simulation.scenes.cause_draws import dazzling
+from smach_oracle.simulation.scenes.light_causes import dazzling
 from smach_oracle.simulation.scenes.scene import Disturbance
 
 LOOK = (0.72, -0.05, 0.75)
