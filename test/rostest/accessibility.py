@@ -18,8 +18,10 @@ axe.run(document, { ...only, resultTypes: ["violations"] }).then(({ violations }
     + [...any, ...all, ...none].map(({ message }) => message).join("; ")))))),
 (err) => done([String(err)]));"""
 THEME = """
-document.documentElement.dataset.theme = arguments[0];
+const button = document.querySelector('[title^="Colours"]');
+while (!button.textContent.toLowerCase().endsWith(arguments[0])) button.click();
 return getComputedStyle(document.documentElement).colorScheme;"""
+CHOSEN = 'return document.querySelector(\'[title^="Colours"]\').textContent.slice(2).toLowerCase()'
 RESTS = (
     'return document.getAnimations().every((each) => each.playState !== "running"'
     ' || each.effect.getTiming().iterations === Infinity)'
@@ -31,7 +33,7 @@ def violations(browser):
     if not browser.run('return Boolean(window.axe)'):
         browser.run(axe_core())
     browser.driver.set_script_timeout(60)
-    chosen = browser.run('return document.documentElement.dataset.theme')
+    chosen = browser.run(CHOSEN)
     found = []
     try:
         for theme, system, rules in LOOKS:

@@ -9,8 +9,8 @@ from typing import Callable, List, NamedTuple, Tuple
 
 import numpy as np
 
-from .cause_draws import cloud_minutes
 from .chance import generator_for
+from .light_causes import cloud_minutes
 
 DAY_H = 10.0  # hours of work a day
 # h of the day, earliest and latest, at which the sun begins to stand low in the window

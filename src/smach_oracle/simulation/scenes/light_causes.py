@@ -58,7 +58,7 @@ class LightCauses(Generic[Draft]):
 
     def _dim_light(self, draft: Draft, generator: np.random.Generator) -> Draft:
         """A cloud, in a room without lamps."""
-        brightness, minutes = float(generator.uniform(0.1, 0.4)), _cloud_minutes(generator)
+        brightness, minutes = float(generator.uniform(0.1, 0.4)), cloud_minutes(generator)
         text = 'a cloud leaves {:.0f}% of the light for {:.0f} minutes'.format(
             100 * brightness, minutes
         )
@@ -86,7 +86,7 @@ def _passing_seconds(generator: np.random.Generator) -> float:
     return float(min(60.0, generator.lognormal(np.log(4.0), 0.8)))
 
 
-def _cloud_minutes(generator: np.random.Generator) -> float:
+def cloud_minutes(generator: np.random.Generator) -> float:
     """Draw how long, min, a cloud hides the sun."""
     return float(min(60.0, generator.lognormal(np.log(8.0), 0.6)))
 

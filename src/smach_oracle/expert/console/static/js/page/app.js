@@ -33,11 +33,11 @@ const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': '
 const RECONNECT_AFTER_S = 22; // of silence: the connection may lead nowhere
 /** @type {Set<keyof Commands>} */
 const UNTOLD = new Set(['hello', 'watch', 'look', 'view', 'release', 'drive']);
-/** @type {{ [theme in Theme]: { words: string, next: Theme } }} */
+/** @type {{ [theme in Theme]: { words: string, dark: string, next: Theme } }} dark: its media */
 const THEMES = {
-  auto: { words: '◐ Auto', next: 'light' },
-  light: { words: '○ Light', next: 'dark' },
-  dark: { words: '● Dark', next: 'auto' },
+  auto: { words: '◐ Auto', dark: '(prefers-color-scheme: dark)', next: 'light' },
+  light: { words: '○ Light', dark: 'not all', next: 'dark' },
+  dark: { words: '● Dark', dark: 'all', next: 'auto' },
 };
 
 /** @implements {AppOfPanels} */
@@ -215,7 +215,7 @@ export class App {
   /** @param {Theme} theme */
   setTheme(theme) {
     this.theme = theme;
-    document.documentElement.dataset['theme'] = theme;
+    part('dark').setAttribute('media', THEMES[theme].dark);
     remember('theme', theme);
     setText(this.themeButton, THEMES[theme].words);
   }
