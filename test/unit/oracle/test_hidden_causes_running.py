@@ -7,6 +7,7 @@ from hidden_causes.costs import Prices, difference, standard_error, summarise
 from hidden_causes.many import Runner
 from hidden_causes.orders import WAYS, Arm, Ordered, Shuffled
 from hidden_causes.person import Remedy
+from hidden_causes.plan import DONE, MACHINE, Box, Leaf
 from hidden_causes.running import CUT_OFF, FAILED, FALSE, TRUE, Bed, Trial, run_machine
 from hidden_causes.search import LONGEST, best_order
 from hidden_causes.world import Condition, Disturbance, Work
@@ -15,6 +16,7 @@ from hidden_worlds import EXACT, causes_of, chain_of
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policy import Action, Past, Preconditions, Situation
+from smach_oracle.oracle.records.events import EventKind
 
 POSE = Condition('pose', {'LOOK': 1.0}, is_goal=False)
 PICKED = Condition('picked', {'PICK': 1.0}, is_goal=True)
@@ -209,6 +211,69 @@ def test_after_a_trial_that_was_cut_off_the_next_one_begins_as_usual():
     assert {trial.failures for trial in trials} == {30}
 
 
+def test_each_trial_begins_with_a_person_who_has_not_been_asked():
+    with bed_of(chosen('ask'), [LIGHT, PICKED], ['light'], ['light']) as bed:
+        trials = [bed.trial(number) for number in range(EXACT.most_questions + 2)]
+    assert [(trial.ended, trial.questions) for trial in trials] == [(TRUE, 1)] * len(trials)
+
+
+def test_the_oracle_hears_what_a_state_says_of_its_failure():
+    texts = []
+    with bed_of(chosen('ask'), [LIGHT, PICKED], ['light'], ['light']) as bed:
+        bed.machine.events.observers.append(
+            lambda event: event.kind is EventKind.FAILURE and texts.append(event.text)
+        )
+        bed.trial(0)
+    assert texts == ['not light']
+
+
+def test_a_state_with_several_failing_outcomes_ends_by_its_text():
+    leaf = Leaf(
+        'TOP/PICK',
+        (DONE,),
+        ('aborted', 'lost'),
+        False,
+        {DONE: DONE, 'aborted': 'aborted', 'lost': 'lost'},
+    )
+    box = Box('TOP', MACHINE, (leaf,), ('aborted', 'lost'), {})
+    names = ['light{}'.format(number) for number in range(30)]
+    causes = causes_of(
+        [LIGHT._replace(name=name, noticed=1.0) for name in names],
+        {'PICK': Work(tuple(names))},
+        [Disturbance(name, 'PICK', 0.05, (name,)) for name in names],
+    )
+    ends = {}
+    with Bed(box, causes, None, EXACT) as bed:
+        state = bed.machine.get_children()['PICK']
+        bed.machine.register_termination_cb(
+            lambda ud, states, outcome: ends.setdefault(state.text, set()).add(outcome)
+        )
+        for number in range(150):
+            state.text = ''
+            bed.trial(number)
+    del ends['']  # without a failure
+    outcomes = [each for found in ends.values() for each in found]
+    assert all(len(found) == 1 for found in ends.values())
+    assert outcomes.count('aborted') > outcomes.count('lost') > 0
+
+
+def test_an_author_leads_back_twice_in_a_trial_at_most_and_a_list_takes_that_for_no_double():
+    leads = {DONE: 'PICK', 'again': 'LOOK', 'aborted': 'aborted'}
+    chain = chain_of('LOOK', 'PICK')
+    look = Leaf('TOP/LOOK', (DONE, 'again'), ('aborted',), False, leads)
+    box = chain._replace(children=(look, chain.children[1]))
+    causes = causes_of(
+        [PICKED],
+        {
+            'LOOK': Work(takes_s=60.0, appends_to='seen'),
+            'PICK': Work(takes_s=60.0, reads='seen'),
+        },
+    )
+    with Bed(box, causes, chosen('ask'), EXACT._replace(loops=1.0)) as bed:
+        trials = [bed.trial(number) for number in range(3)]
+    assert trials == [Trial(TRUE, 0, 0, 0, pytest.approx(4.0), 0.0, 0)] * 3
+
+
 # -- the userdata
 
 
@@ -289,6 +354,12 @@ def test_each_order_is_drawn_as_often_and_stays_for_its_trial():
     assert [tuple(Shuffled('other').order(situation(0, trial))) for trial in range(9)] != [
         tuple(policy.order(situation(0, trial))) for trial in range(9)
     ]
+
+
+def test_a_policy_that_draws_draws_otherwise_on_each_machine_unless_it_is_told_how():
+    own, other = (Arm('random').policy(seed) for seed in (1, 2))
+    assert own.seed != other.seed
+    assert Arm('random:seed=5').policy(1).seed == Arm('random:seed=5').policy(2).seed == 5
 
 
 @pytest.mark.parametrize(
