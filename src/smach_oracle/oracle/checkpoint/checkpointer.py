@@ -6,7 +6,7 @@ from typing import Callable, Dict, FrozenSet, Iterator, List, Optional, Sequence
 
 import smach
 from smach_common.foreign import ends_program, error_text
-from smach_oracle.store.codecs import Codecs
+from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, GOAL, IN, ITEMS
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
@@ -85,30 +85,25 @@ class Checkpointer:
         self,
         top: TreeNode,
         writer: StoreWriter,
-        codecs: Codecs,
-        before: Optional[StoredTree] = None,
-        behind: Optional[int] = None,
-        first: Sequence[Fact] = (),
+        before: StoredTree,
+        behind: Optional[int],
+        first: Sequence[Fact],
     ) -> None:
-        """`before`: what is stored of the trial, where it is resumed.
+        """`before`: what is stored of the trial, nothing where it is new.
 
         `behind`: the moment that it goes on from, where that is not the last one. `first`: what
         its first moment has besides.
         """
         self.is_broken = False
         self._before, self._behind = before, behind
-        self._top, self._writer, self._codecs = top, writer, codecs
+        self._top, self._writer = top, writer
         self._nodes: Dict[str, TreeNode] = {}
         self._facts: Dict[str, ContainerFacts] = {}
         self._userdata: Dict[str, UserdataFacts] = {}
         # by where a line of steps begins: what one of them commits, the others may not yet have
         self._pending: Dict[str, List[Fact]] = {_begins_line(top): list(first)}
         # numbers, by path of the Iterator
-        self._items = (
-            {}
-            if before is None
-            else {path: told.item for path, told in before.containers.items() if told.item}
-        )
+        self._items = {path: told.item for path, told in before.containers.items() if told.item}
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
@@ -117,13 +112,11 @@ class Checkpointer:
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
         # paths and keys of what is named. Of a trial that goes on its first part has done so
-        self._told = (
-            set()
-            if before is None
-            else {(path, key) for path, told in before.containers.items() for key in told.missing}
-        )
+        self._told = {
+            (path, key) for path, told in before.containers.items() for key in told.missing
+        }
         self._named = WeakIds()  # values that are named
-        self._goals = set(() if before is None else before.goals)  # ids of stored ones
+        self._goals = set(before.goals)  # ids of stored ones
 
     @_while_it_works
     def __call__(self, event: Event) -> None:
@@ -251,9 +244,7 @@ class Checkpointer:
     def _facts_of(self, node: TreeNode) -> ContainerFacts:
         facts = self._facts.get(node.key)
         if facts is None:
-            facts = self._facts[node.key] = ContainerFacts(
-                node, None if self._before is None else self._before.container(node.key)
-            )
+            facts = self._facts[node.key] = ContainerFacts(node, self._before.container(node.key))
         return facts
 
     def _enters_again(self, node: TreeNode) -> bool:
@@ -385,7 +376,7 @@ class Checkpointer:
         userdata = self._userdata.get(path)
         if userdata is None:
             userdata = self._userdata[path] = UserdataFacts(
-                self._codecs, path, lambda out: self._tell(path, out)
+                CODECS, path, lambda out: self._tell(path, out)
             )
         yield from userdata.changed(data, reached)
 

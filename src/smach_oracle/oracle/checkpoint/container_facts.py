@@ -39,16 +39,15 @@ def fact_of(path: str, name: str, plain: object) -> Fact:
 class ContainerFacts:
     """Tells what of a container's records differs from what is stored."""
 
-    def __init__(self, node: TreeNode, before: Optional[StoredContainer] = None) -> None:
-        """`before`: what is stored of it, where the trial is resumed."""
+    def __init__(self, node: TreeNode, before: StoredContainer) -> None:
+        """`before`: what is stored of it."""
         self._node = node
         self._path = node.key
-        self._execution = 0 if before is None else before.execution  # number of the present one
+        self._execution = before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
         self._marks: Dict[str, List[object]] = {}  # by label
         self._latest: Optional[Visit] = None  # that is stored
-        # stored ones of this execution
-        self._visits = 0 if before is None else before.visits_of_execution
+        self._visits = before.visits_of_execution  # that are stored
 
     def begin_execution(self) -> Iterator[Fact]:
         """Yield what is new where the container begins to execute."""

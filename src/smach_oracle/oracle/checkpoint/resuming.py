@@ -329,8 +329,7 @@ class _Setting:
         stood = self._resumption.tree.container(top.key)
         stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at_there
         self._resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
-        there = StoredContainer()
-        there.at = at
+        there = StoredContainer(at)
         record = place.node.record(place.label)
         if asked and asked[0] == place.label and not self._resumption.is_earlier:
             self._resumed.reopen(record, asked[1])
@@ -377,28 +376,17 @@ class _Setting:
         why = _why(self._resumption) if self._resumption.asks or is_open else ''
         # a branch has the userdata of the Concurrence or Iterator that holds it
         snapshots = self._resumption.tree.container(node.path).snapshots
+        kind, outcome, text = FailureKind.INTERRUPTED, '', STOPPED
         if stored.phase == FAILED:
-            kind, outcome, text = cast(Tuple[int, str, str], stored.at[2:5])
+            number, outcome, text = cast(Tuple[int, str, str], stored.at[2:5])
             if outcome and outcome not in transitions_of(node.machine).get(stored.label, ()):
-                kind, text = FailureKind.INTERRUPTED, GONE.format('outcome ' + outcome)
-                outcome = ''
-            return Unfinished(
-                FailureKind(kind),
-                outcome,
-                text,
-                why,
-                snapshots.get(stored.label),
-                self._resumption.asks,
-            )
-        node.records.marks.of(stored.label).spent = True  # it may have been done
-        return Unfinished(
-            FailureKind.INTERRUPTED,
-            '',
-            STOPPED,
-            why,
-            snapshots.get(stored.label),
-            self._resumption.asks,
-        )
+                outcome, text = '', GONE.format('outcome ' + outcome)
+            else:
+                kind = FailureKind(number)
+        else:
+            node.records.marks.of(stored.label).spent = True  # it may have been done
+        snapshot = snapshots.get(stored.label)
+        return Unfinished(kind, outcome, text, why, snapshot, self._resumption.asks)
 
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
         """Return the containers directly in a state, or None where it can only go on as a whole."""

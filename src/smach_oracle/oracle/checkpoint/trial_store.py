@@ -237,8 +237,7 @@ class TrialStore:
         self._observer = Checkpointer(
             top,
             self._writer,
-            CODECS,
-            None if resumed is None else resumed.tree,
+            StoredTree({}, {}) if resumed is None else resumed.tree,
             resumed.moment if resumed and resumed.is_earlier else None,
             self._facts_of_new_names(resumed),
         )

@@ -112,13 +112,11 @@ class History:
         :param initial: the container's initial state.
         :param successes: number of successes of `state` in all.
         """
-        streak = self._streak
-        fails_last = streak.state == state
         return FailureContext(
             state,
             initial,
-            fails_last,
-            fails_last and streak.successes == successes,
+            self._streak.state == state,
+            self.failing_since(state, successes),
             self.unconditioned,
             self.succeeded_before(state, successes),
         )
@@ -138,10 +136,9 @@ class History:
 
         :param successes: number of successes of `state` in all.
         """
-        streak = self._streak
-        if streak.state == state and streak.successes == successes and streak.anchored:
-            return streak.anchor
-        return self._latest_other(state)
+        if self.failing_since(state, successes) and self._streak.anchored:
+            return self._streak.anchor
+        return self.succeeded if self.succeeded != state else self.succeeded_other
 
     def failed(self, state: str, successes: int) -> None:
         """Note that `state` failed, before the visit is added.
@@ -167,9 +164,6 @@ class History:
             self.visits[-1] = visit
         else:
             self.visits.append(visit)
-
-    def _latest_other(self, state: str) -> Optional[str]:
-        return self.succeeded if self.succeeded != state else self.succeeded_other
 
     def told(self) -> Told:
         """Return all but the visits as plain data, for `take_over`."""
