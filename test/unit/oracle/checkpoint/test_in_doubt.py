@@ -92,7 +92,7 @@ def test_what_may_have_run_meanwhile_is_not_repeated_by_itself(tmp_path, way):
 
 
 def test_a_fault_before_the_first_state_is_asked_about_as_well(tmp_path, monkeypatch):
-    monkeypatch.setattr(Checkpointer, '__call__', fault)
+    monkeypatch.setattr(Checkpointer, '_begin_trial', fault)
     killed = killed_in(tmp_path / 'killed', chain(*LABELS), 'CARRY', **NEVER)
     monkeypatch.undo()
     assert killed.run()['ended_by'] == 'kept'
