@@ -22,7 +22,7 @@ from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, data_of, names_that_engine_lacks, opened_container
+from .smach_private import Transitions, data_of, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -56,6 +56,9 @@ class OracleContainer(smach.StateMachine):
     >>> [(row.state, row.successes, row.failures) for row in machine.rates()]
     [('PICK', 1, 1)]
     """
+
+    _constants: Dict[str, Mapping[str, Any]] = {}  # of engines that have none, never written
+    _pause_requested = False  # of engines that do not pause
 
     def __init__(
         self,
@@ -445,8 +448,3 @@ class OracleContainer(smach.StateMachine):
         if self._oracle.machine is not self:
             self._oracle = self._oracle.twin_for(self)
         renew_attributes(self)
-
-
-# A name that the class has too costs 80 ns at each look (CPython 3.11): not where it is in vain
-for _name, _value in names_that_engine_lacks().items():
-    setattr(OracleContainer, _name, _value)

@@ -89,16 +89,6 @@ def initial_label_of(machine: smach.StateMachine) -> str:
     return machine._initial_state_label or ''
 
 
-def names_that_engine_lacks() -> Dict[str, object]:
-    """Return what a machine of this engine has not, with the values of a machine that lacks it.
-
-    Older engines know no constants, and upstream's no pause.
-    """
-    machine = smach.StateMachine(['done'])
-    lacking = {'_constants': {}, '_pause_requested': False}
-    return {name: value for name, value in lacking.items() if not hasattr(machine, name)}
-
-
 def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
     """Return the sets of a state's input and output keys themselves.
 
