@@ -13,7 +13,7 @@ from hidden_causes.running import TRUE, Bed, run_machine
 
 MACHINES = [draw(seed) for seed in range(600)]
 PLAIN = [box for machine in MACHINES for box in boxes_of(machine) if box.kind == MACHINE]
-UNDISTURBED = MIX._replace(amount=(1e-12, 2e-12), noise=(0.0, 0.0), sure=1.0, fades=0.0)
+UNDISTURBED = MIX._replace(amount=(1e-12, 2e-12), noise=0.0, sure=1.0, fades=0.0)
 
 
 def shares(counts):
@@ -198,6 +198,22 @@ def test_no_property_of_a_condition_says_what_another_is():
         lambda each: True,
     )
     assert 0.02 < hopeless < 0.1, 'some failures have no cure at all'
+
+
+def test_machines_differ_in_the_mix_and_have_it_on_the_average():
+    shares_by_hand, heals = [], []
+    for seed, box in enumerate(MACHINES):
+        conditions = draw_causes(seed, box, MIX).conditions.values()
+        around = [each for each in conditions if each.holds_at_first]
+        if len(around) >= 6:
+            heals.append(sum(each.heals_s is not None for each in around) / len(around))
+        shares_by_hand.append(sum(each.is_by_hand for each in conditions) / len(conditions))
+    assert len(heals) > 50
+    mean = sum(heals) / len(heals)
+    variance = sum((each - mean) ** 2 for each in heals) / len(heals)
+    # of machines that all have the mix itself it is 0.023
+    assert mean == pytest.approx(MIX.heals['around'], abs=0.06) and variance > 0.04
+    assert sum(shares_by_hand) / len(shares_by_hand) == pytest.approx(0.87, abs=0.03)
 
 
 def test_a_plan_has_its_states_in_the_order_in_which_they_come():

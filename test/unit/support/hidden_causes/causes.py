@@ -61,6 +61,18 @@ class _Drawing:
         self._places = places_of(box)
         self._needs: Dict[str, List[str]] = {leaf.path: [] for leaf in leaves_of(box)}
         self._conditions: Dict[str, Condition] = {}
+        self._heals = {kind: self._own(share) for kind, share in mix.heals.items()}
+        self._by_hand = {kind: self._own(share) for kind, share in mix.by_hand.items()}
+        self._worsens = self._own(mix.worsens)
+        self._used_up = self._own(mix.used_up)
+        self._variants = self._own(mix.variants)
+        self._breaks_two = self._own(mix.breaks_two)
+        self._noise = self._own(mix.noise)
+
+    def _own(self, chance: float) -> float:
+        """The chance of this machine: machines differ, and have the mix's on the average."""
+        factor = self._chance.between(1.0 - self._mix.varies, 1.0 + self._mix.varies)
+        return chance * factor if chance <= 0.5 else 1.0 - (1.0 - chance) * factor
 
     def causes(self) -> Causes:
         for number in range(len(self._places)):
@@ -82,7 +94,7 @@ class _Drawing:
         is_goal = not users or chance.happens(mix.goal)
         name = 'c{}'.format(len(self._conditions) + 1)
         used_up = ''
-        if users and place.comes_once and users[-1].comes_once and chance.happens(mix.used_up):
+        if users and place.comes_once and users[-1].comes_once and chance.happens(self._used_up):
             used_up, is_goal = users[-1].leaf.path, False
         sure = chance.happens(mix.sure)
         made = 1.0 if sure else chance.between(*mix.unsure)
@@ -139,13 +151,13 @@ class _Drawing:
     def _with_chances(self, condition: Condition, kind: str) -> Condition:
         """What everything else that can be about a condition is drawn for."""
         chance, mix = self._chance, self._mix
-        heals = chance.happens(mix.heals[kind])
-        worse = chance.happens(mix.worsens)
+        heals = chance.happens(self._heals[kind])
+        worse = chance.happens(self._worsens)
         return condition._replace(
             heals_s=chance.magnitude(*mix.heals_s) if heals else None,
-            is_by_hand=chance.happens(mix.by_hand[kind]),
+            is_by_hand=chance.happens(self._by_hand[kind]),
             variant=1 + int(chance.draw() * mix.most_variants)
-            if chance.happens(mix.variants)
+            if chance.happens(self._variants)
             else 0,
             worse=chance.between(*mix.worse) if worse else 0.0,
             worsens=chance.by_weight(mix.what_worsens),
@@ -170,7 +182,7 @@ class _Drawing:
             before = chance.one_of(in_need)
             first = chance.one_of(self._needs[before])
             breaks = (first,)
-            if chance.happens(mix.breaks_two):
+            if chance.happens(self._breaks_two):
                 breaks += (chance.one_of(self._behind(first)),)
             drawn.append(
                 (
@@ -212,7 +224,7 @@ class _Drawing:
         return Work(
             tuple(dict.fromkeys(self._needs[leaf.path])),
             takes_s=chance.magnitude(*mix.takes_s),
-            noise=chance.between(*mix.noise),
+            noise=2.0 * self._noise * chance.draw(),
             is_once=comes_once and chance.happens(mix.once),
             can_fail=bool(leaf.failing) or chance.happens(mix.raises),
             appends_to=kept.key if kept and fills else '',

@@ -3,7 +3,8 @@
 No figure says what cures a failure. A condition has properties, each drawn by itself: who makes it
 hold, whether time does, whether a person can, what spoils it. What cures follows from these, from
 where the machine stands, and from what was done before. The figures are guesses at a robot at work,
-fixed before any policy was measured with them, and no measurement of one.
+and no measurement of one. They were set by the shares of failing trials and of false successes that
+they lead to, before there was a policy with a list of ways. A change of them makes other machines.
 """
 
 from typing import Dict, NamedTuple, Tuple
@@ -17,10 +18,13 @@ class Mix(NamedTuple):
     again: float = 0.3  # of that chance is left at later executions of a state in a trial
     disturbances: float = 0.8  # for each condition
     breaks_two: float = 0.25  # disturbances that break a second condition, too
-    noise: Tuple[float, float] = (0.0, 0.015)  # an execution fails for no reason that stays
+    noise: float = 0.0075  # an execution fails for no reason that stays; by state, up to twice this
     drifts: Dict[str, float] = {
         'steady': 0.5, 'rising': 0.15, 'falling': 0.15, 'step': 0.1, 'wave': 0.1,
     }  # fmt: skip
+
+    # -- how much machines differ: a chance, or what it lacks to 1, varies by machine by this share
+    varies: float = 0.8
 
     # -- what a state makes, for one that comes later
     used: float = 0.75  # products that a later state needs
