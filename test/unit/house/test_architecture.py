@@ -96,7 +96,13 @@ def functions():
     """The functions of the page's Python files, as {(file, name): the names that they use}."""
     uses = collections.defaultdict(set)
     for name in {step[0] for step in STEPS if step[0].endswith('.py')}:
-        for node in ast.walk(ast.parse(text_of(name))):
+        tree = ast.parse(text_of(name))
+        lists = {
+            node.target.id: node.value
+            for node in tree.body
+            if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Tuple)
+        }
+        for node in ast.walk(tree):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 uses[name, node.name] |= {
                     inner.attr if isinstance(inner, ast.Attribute) else inner.func.id
@@ -104,6 +110,13 @@ def functions():
                     if isinstance(inner, ast.Attribute)
                     or isinstance(inner, ast.Call)
                     and isinstance(inner.func, ast.Name)
+                }
+                # a list of functions that it goes through
+                uses[name, node.name] |= {
+                    getattr(each, 'id', '')
+                    for inner in ast.walk(node)
+                    if isinstance(inner, ast.Name) and inner.id in lists
+                    for each in lists[inner.id].elts
                 }
     return uses
 
@@ -162,6 +175,7 @@ def sent(step, after):
 # how one function hands over to the next
 WORDS = {
     'calls': calls,
+    'list': lambda step, after: step[0] == after[0] and after[1] in functions()[step[:2]],
     'returns': returns,
     'callback': lambda step, after: is_value(after[1], after[0]),
     'observer': lambda step, after: is_value(after[1], after[0]),

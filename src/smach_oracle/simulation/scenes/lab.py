@@ -13,13 +13,14 @@ from smach_oracle.pr2.kitchen import Kitchen, odom_from_pose
 
 from . import kitchen_scene, tabletop_scene
 from .calibration import JOINTS, camera_error_of, encoder_errors_of
-from .cause_draws import LASTING_SHARE, dazzling
+from .cause_draws import LASTING_SHARE
 from .chance import generator_for
 from .drafts import Draft, caused
 from .kitchen_causes import EYE, STEADY
 from .kitchen_causes import LOOKS_AT as INTO_FRIDGE
 from .kitchen_causes import with_causes as with_kitchen_causes
 from .lab_hours import Spell, Values, drifting, spells, worn
+from .light_causes import dazzling
 from .scene import Body, Disturbance, RobotStart, Scene, Vector
 from .tabletop_causes import EYE_LOOKING, LOOKS_AT, TABLE_TOP, TORSO, TabletopDraft
 from .tabletop_causes import with_causes as with_table_causes
