@@ -17,12 +17,12 @@ from .wrapper import ContainerWrapper, wrapper_of
 
 def adopt_branches(parent: TreeNode) -> None:
     """Put the branches below a wrapped machine, down to the next machine, under oracles."""
-    for below, container in list(branching_below(parent.machine)):
+    for labels, container in list(branching_below(parent.machine)):
         wrapper = wrapper_of(container)
         if wrapper is None and parent.in_force.nested:
-            wrapper = _new_wrapper(parent, below, container)
+            wrapper = _new_wrapper(parent, labels, container)
         if wrapper is not None:
-            _take_notice(wrapper, parent, below)
+            _take_notice(wrapper, parent, labels)
 
 
 def release_branches(machine: object) -> None:
@@ -35,7 +35,7 @@ def release_branches(machine: object) -> None:
 
 
 def _new_wrapper(
-    parent: TreeNode, below: Labels, container: smach.Container
+    parent: TreeNode, labels: Labels, container: smach.Container
 ) -> Optional[ContainerWrapper]:
     asks = asks_hook(type(container))
     try:
@@ -44,27 +44,27 @@ def _new_wrapper(
     except TypeError as err:
         smach.logwarn(
             '{}/{}: its states get no oracle, since its class cannot be extended ({})'.format(
-                parent.path, '/'.join(below), err
+                parent.path, '/'.join(labels), err
             )
         )
         return None
     kind = IteratorWrapper if isinstance(container, smach.Iterator) else ContainerWrapper
-    wrapper = kind(container, parent, below)
+    wrapper = kind(container, parent, labels)
     own_attributes(container).update({WRAPPER: wrapper, **({HOOK: wrapper} if asks else {})})
     return wrapper
 
 
-def _take_notice(wrapper: ContainerWrapper, parent: TreeNode, below: Labels) -> None:
+def _take_notice(wrapper: ContainerWrapper, parent: TreeNode, labels: Labels) -> None:
     """Have a branch for each plain state that there is now."""
-    if wrapper.top.tree is not parent.tree:
-        wrapper.top, wrapper.below = parent, below
-    if wrapper.top is not parent:
+    if wrapper.parent.tree is not parent.tree:
+        wrapper.parent, wrapper.labels_from_parent = parent, labels
+    if wrapper.parent is not parent:
         return  # it is in two places: the first one is used
     found: Dict[str, Branch] = {}
     for label, state in wrapper.states():
         if label and not isinstance(state, smach.Container):
             branch = wrapper.branches.get(label)
-            if branch is None and parent.wraps(below + (label,)):
+            if branch is None and parent.wraps(labels + (label,)):
                 branch = _new_branch(wrapper, label)
             if branch is not None:
                 found[label] = branch
@@ -73,13 +73,13 @@ def _take_notice(wrapper: ContainerWrapper, parent: TreeNode, below: Labels) -> 
 
 
 def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
-    parent, container = wrapper.top, wrapper.container
+    parent, container = wrapper.parent, wrapper.container
     is_item = isinstance(wrapper, IteratorWrapper)
     branch = Branch(label, is_alone=is_item)
     node = TreeNode(cast(smach.StateMachine, branch), parent.tree, parent.settings, '')
     set_mark(branch, node)
     node.in_force.wrap_with(parent.in_force.strict, parent.in_force.nested, inherits=True)
     node.site = (IteratorSite if is_item else BranchSite)(container, label)
-    node.lie_below(parent, wrapper.below)
+    node.lie_below(parent, wrapper.labels_from_parent)
     node.configure(parent.settings)
     return branch

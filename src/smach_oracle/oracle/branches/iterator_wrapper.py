@@ -19,8 +19,8 @@ class IteratorWrapper(ContainerWrapper):
 
     container: smach.Iterator
 
-    def __init__(self, container: smach.Container, top: TreeNode, below: Labels) -> None:
-        super().__init__(container, top, below)
+    def __init__(self, container: smach.Container, parent: TreeNode, labels: Labels) -> None:
+        super().__init__(container, parent, labels)
         self._trial_id = ''  # that of `tracked`
         self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
@@ -57,7 +57,7 @@ class IteratorWrapper(ContainerWrapper):
 
     def _begin(self) -> None:
         """Find out where it begins, and whether it goes on."""
-        items, trial_id = self.tracked, self.top.tree.trial_id
+        items, trial_id = self.tracked, self.parent.tree.trial_id
         inside = tuple(wrapper.mark() for wrapper in self._iterators_around())
         if items is None or items.given is not items_of(self.container):
             items = TrackedItems(items_of(self.container), self._tell)
@@ -85,16 +85,16 @@ class IteratorWrapper(ContainerWrapper):
         return self._rounds, self.tracked.number if self.tracked is not None else 0
 
     def _iterators_around(self) -> Iterator['IteratorWrapper']:
-        node: Optional[TreeNode] = self.top
-        below: Tuple[str, ...] = self.below
+        node: Optional[TreeNode] = self.parent
+        labels: Tuple[str, ...] = self.labels_from_parent
         while node is not None:
             container: object = node.machine
-            for label in below[:-1]:
+            for label in labels[:-1]:
                 container = children_of(container)[label]
                 wrapper = wrapper_of(container)
                 if isinstance(wrapper, IteratorWrapper):
                     yield wrapper
-            below = node.below
+            labels = node.labels_from_parent
             node = node.parent
 
     def _pass_on(self, items: TrackedItems) -> None:
@@ -105,7 +105,7 @@ class IteratorWrapper(ContainerWrapper):
                 inner.ask_to_go_on(not items.is_finished)
 
     def _tell(self, text: str) -> None:
-        self.top.warn(text, '/'.join(self.below))
+        self.parent.warn(text, '/'.join(self.labels_from_parent))
 
     def begin_item(self) -> None:
         """Note that an item begins."""
@@ -118,8 +118,8 @@ class IteratorWrapper(ContainerWrapper):
         self.at_item = self._snapshot(data)
 
     def _snapshot(self, data: Mapping[str, Any]) -> Dict[str, Any]:
-        top = self.top
-        return take_snapshot(data, top.in_force.deep_copy_keys, top.warn_not_copied)
+        parent = self.parent
+        return take_snapshot(data, parent.in_force.deep_copy_keys, parent.warn_not_copied)
 
     def _leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
@@ -165,7 +165,7 @@ class IteratorWrapper(ContainerWrapper):
 
         `userdata`: what the inputs are copied from.
         """
-        iterator, own, top = self.container, data_of(self.container.userdata), self.top
+        iterator, own, parent = self.container, data_of(self.container.userdata), self.parent
         both = set(iterator.get_registered_input_keys()).intersection(
             iterator.get_registered_output_keys()
         )
@@ -177,9 +177,9 @@ class IteratorWrapper(ContainerWrapper):
             self.tracked is not None
             and not self.tracked.is_finished
             and self.at_item is not None
-            and top.settings.userdata == 'restore'
+            and parent.settings.userdata == 'restore'
         ):
-            restore(own, self.at_item, (), top.in_force.deep_copy_keys)
+            restore(own, self.at_item, (), parent.in_force.deep_copy_keys)
         return {
             key: own[key]
             for key, value in given.items()

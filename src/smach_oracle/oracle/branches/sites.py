@@ -147,9 +147,9 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     By its name alone where another Concurrence or Iterator is around it.
     """
     parent = node.parent
-    if parent is None or len(node.below) != 1:
+    if parent is None or len(node.labels_from_parent) != 1:
         return outcome in node.in_force.failing
-    (label,) = node.below
+    (label,) = node.labels_from_parent
     kind = failure_kind(
         outcome,
         route_of(parent.machine, label, outcome),

@@ -46,11 +46,11 @@ class ContainerWrapper:
 
     tracked: Optional[TrackedItems] = None  # of an Iterator
 
-    def __init__(self, container: smach.Container, top: TreeNode, below: Labels) -> None:
-        """`top`: the node of the wrapped machine around it. `below`: the labels from there."""
+    def __init__(self, container: smach.Container, parent: TreeNode, labels: Labels) -> None:
+        """`parent`: the node of the wrapped machine around it. `labels`: from there."""
         self.container = container
-        self.top = top
-        self.below = below
+        self.parent = parent
+        self.labels_from_parent = labels
         self.branches: Dict[str, Branch] = {}
         self.runners: Dict[str, Branch] = {}
         self._lock = threading.Lock()
@@ -119,7 +119,7 @@ class ContainerWrapper:
     def _enter(self) -> bool:
         """Begin an execution. Return False where that cannot be, so that it runs bare."""
         with self._lock:
-            runs = is_executing(self.top.machine) or self.top.has_running_ancestor()
+            runs = is_executing(self.parent.machine) or self.parent.has_running_ancestor()
             if self._is_in_use or not runs:
                 return False
             self._is_in_use = True
@@ -162,7 +162,7 @@ class ContainerWrapper:
 
     def resume(self, stored: nesting.StoredPort) -> None:
         """Go on from there at the next execution of this trial, once its inputs are copied."""
-        self._resumed = stored, self.top.tree.trial_id
+        self._resumed = stored, self.parent.tree.trial_id
 
     def forget_resumed(self) -> None:
         """Begin the next execution from the start, whatever was under way in the program before."""
@@ -175,7 +175,7 @@ class ContainerWrapper:
 
     def _to_resume(self) -> Optional[nesting.StoredPort]:
         """Return how it goes on, unless that was of a trial before."""
-        if self._resumed is None or self._resumed[1] != self.top.tree.trial_id:
+        if self._resumed is None or self._resumed[1] != self.parent.tree.trial_id:
             return None
         return self._resumed[0]
 
@@ -185,8 +185,8 @@ class ContainerWrapper:
         :raises TooDeepError: in its place, where too many containers lie in each other.
         """
         if isinstance(error, smach.InvalidStateError):
-            error.__cause__ = error.__cause__ or self.top.tree.early_end.of_program
-        too_deep = too_deep_here(self.top, error) if too_deep_below(error) is None else None
+            error.__cause__ = error.__cause__ or self.parent.tree.early_end.of_program
+        too_deep = too_deep_here(self.parent, error) if too_deep_below(error) is None else None
         if too_deep is not None:
             raise too_deep from None
 

@@ -385,7 +385,7 @@ class Checkpointer:
         for path, _ in self._wrappers_around(node):
             self._wrote[path] = node.key
         yield from self._keys_around(node)
-        if node.parent is not None and len(node.below) == 1:
+        if node.parent is not None and len(node.labels_from_parent) == 1:
             self._wrote[node.parent.key] = node.key
             yield from self._keys(node.parent.key, data_of(node.parent.machine.userdata), None)
 

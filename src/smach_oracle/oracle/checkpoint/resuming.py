@@ -276,7 +276,11 @@ class _Setting:
             around + inside,
             _why(self._resumption),
             [node.record(label)]
-            + [each.parent.record(each.below[0]) for each in around if each.parent is not None],
+            + [
+                each.parent.record(each.labels_from_parent[0])
+                for each in around
+                if each.parent is not None
+            ],
         )
 
     def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[TreePlace]:
@@ -390,7 +394,11 @@ class _Setting:
 
     def _inside(self, node: TreeNode, label: str) -> Optional[List[TreeNode]]:
         """Return the containers directly in a state, or None where it can only go on as a whole."""
-        inside = [each for each in self._nodes if each.parent is node and each.below[0] == label]
+        inside = [
+            each
+            for each in self._nodes
+            if each.parent is node and each.labels_from_parent[0] == label
+        ]
         state = states_of(node.machine).get(label)
         return inside if inside and _is_wrapped_through(state) else None
 

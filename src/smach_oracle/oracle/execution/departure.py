@@ -123,7 +123,7 @@ def _leave_way(left: List[TreeNode]) -> None:
 
     :param left: innermost first. That of the failure ends by itself.
     """
-    around = [link.below for node in reversed(left) for link in links_to(node)]
+    around = [link.inner_container for node in reversed(left) for link in links_to(node)]
     for container in around[:-1]:
         wrapper = wrapper_of(container)
         if isinstance(wrapper, IteratorWrapper):
@@ -176,10 +176,10 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
     if not inner or other is None:
         return None
     path = others[0].path
-    for label, link in zip(inner[-1].below, links_to(inner[-1])):
+    for label, link in zip(inner[-1].labels_from_parent, links_to(inner[-1])):
         path = '{}/{}'.format(path, label)
         if not other.failed.startswith(path + '/'):
-            return None if link.below is nodes[0].machine else link.below
+            return None if link.inner_container is nodes[0].machine else link.inner_container
     return None
 
 

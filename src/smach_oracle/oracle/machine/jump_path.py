@@ -19,7 +19,7 @@ from typing import (
 import smach
 
 from ..smach_private import constants_of, data_of, items_label_of, states_of
-from .places import Link, TreePlace, levels_above, links_to
+from .places import ContainerLink, TreePlace, levels_above, links_to
 from .repeats import repeated_by_going_to, why_closed
 from .snapshots import UserdataGate, WriteWatch
 from .tree_node import TreeNode
@@ -64,7 +64,7 @@ def jump_path_to(node: TreeNode, place: TreePlace) -> Optional[JumpPath]:
         below = down[0].node
         if below.parent is None:
             return None
-        down.insert(0, TreePlace(below.parent, below.below[0]))
+        down.insert(0, TreePlace(below.parent, below.labels_from_parent[0]))
     index = next(i for i, level in enumerate(levels) if level is down[0].node)
     return JumpPath(tuple(levels[:index]), levels[index], tuple(down))
 
@@ -113,7 +113,7 @@ def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
 def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
     """Return the userdata keys of a container when it begins, from those of the one above it."""
     for link in links_to(below):
-        child = link.below
+        child = link.inner_container
         keys = set(data_of(child.userdata)).union(
             key for key in child.get_registered_input_keys() if link.remapping.get(key, key) in keys
         )
@@ -126,30 +126,34 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
 # -- userdata between containers
 
 
-def hand_down(link: Link) -> None:
+def hand_down(link: ContainerLink) -> None:
     """Give a container its input keys, as when it begins."""
-    given = {**data_of(link.above.userdata), **_constants(link)}
+    given = {**data_of(link.outer_container.userdata), **_constants(link)}
     for key, named in _inputs(link):
         if named in given:
-            link.below.userdata[key] = given[named]
+            link.inner_container.userdata[key] = given[named]
 
 
-def hand_up(link: Link, written: Set[str], into: Union[UserdataGate, smach.UserData]) -> Set[str]:
+def hand_up(
+    link: ContainerLink, written: Set[str], into: Union[UserdataGate, smach.UserData]
+) -> Set[str]:
     """Hand output keys of a container that were written to the one above it.
 
     :param into: where they are written, by keys of the container above.
     :returns: the keys written there.
     """
     found = set()
-    for key in link.below.get_registered_output_keys():
-        if key in written and key in data_of(link.below.userdata):
+    for key in link.inner_container.get_registered_output_keys():
+        if key in written and key in data_of(link.inner_container.userdata):
             named = link.remapping.get(key, key)
-            into[named] = data_of(link.below.userdata)[key]
+            into[named] = data_of(link.inner_container.userdata)[key]
             found.add(named)
     return found
 
 
-def hand_on(link: Link, written: Set[str], into: Union[UserdataGate, smach.UserData]) -> Set[str]:
+def hand_on(
+    link: ContainerLink, written: Set[str], into: Union[UserdataGate, smach.UserData]
+) -> Set[str]:
     """Hand what was written in a container to the one below it that runs, by its input keys.
 
     :param into: where it is written, by keys of the container below.
@@ -157,17 +161,22 @@ def hand_on(link: Link, written: Set[str], into: Union[UserdataGate, smach.UserD
     """
     found = set()
     for key, named in _inputs(link):
-        if named in written and named in data_of(link.above.userdata):
-            into[key] = data_of(link.above.userdata)[named]
+        if named in written and named in data_of(link.outer_container.userdata):
+            into[key] = data_of(link.outer_container.userdata)[named]
             found.add(key)
     return found
 
 
-def _inputs(link: Link) -> Sequence[Tuple[str, str]]:
-    return [(key, link.remapping.get(key, key)) for key in link.below.get_registered_input_keys()]
+def _inputs(link: ContainerLink) -> Sequence[Tuple[str, str]]:
+    return [
+        (key, link.remapping.get(key, key))
+        for key in link.inner_container.get_registered_input_keys()
+    ]
 
 
-def _constants(link: Link) -> Mapping[str, object]:
+def _constants(link: ContainerLink) -> Mapping[str, object]:
     return (
-        constants_of(link.above, link.label) if isinstance(link.above, smach.StateMachine) else {}
+        constants_of(link.outer_container, link.label)
+        if isinstance(link.outer_container, smach.StateMachine)
+        else {}
     )

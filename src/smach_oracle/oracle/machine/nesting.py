@@ -109,7 +109,7 @@ def wrappers_around(node: TreeNode) -> List[Tuple[str, Wrapper]]:
     found = []
     for below, container in branching_below(parent.machine):
         wrapper = wrapper_of(container)
-        if wrapper is not None and node.below[: len(below)] == below:
+        if wrapper is not None and node.labels_from_parent[: len(below)] == below:
             found.append(('/'.join((parent.key,) + below), wrapper))
     return found
 
@@ -153,9 +153,9 @@ def items_under_way(node: TreeNode) -> str:
     """Say which items of the Iterators around a container are under way, the innermost first."""
     found: List[str] = []
     while node.parent is not None:
-        state: object = states_of(node.parent.machine).get(node.below[0])
+        state: object = states_of(node.parent.machine).get(node.labels_from_parent[0])
         around: List[str] = []
-        for label in node.below[1:] + ('',):
+        for label in node.labels_from_parent[1:] + ('',):
             wrapper = wrapper_of(state)
             words = wrapper.in_words() if wrapper is not None else ''
             if words:

@@ -144,7 +144,9 @@ class Oracle:
     @property
     def name(self) -> str:
         """Return the name of the machine where it is the top one, else its label."""
-        return self._node.below[-1] if self._node.below else self._node.name
+        return (
+            self._node.labels_from_parent[-1] if self._node.labels_from_parent else self._node.name
+        )
 
     @property
     def is_named(self) -> bool:

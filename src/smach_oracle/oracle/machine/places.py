@@ -22,29 +22,29 @@ from .state_record import StateRecord
 from .tree_node import TreeNode
 
 
-class Link(NamedTuple):
+class ContainerLink(NamedTuple):
     """A container in the container around it, which may be a Concurrence or an Iterator."""
 
-    above: smach.Container
+    outer_container: smach.Container
     label: str
-    below: smach.Container
+    inner_container: smach.Container
 
     @property
     def remapping(self) -> Mapping[str, str]:
-        """Key of the container above by key of the one below, where they differ."""
-        return remapping_in(self.above, self.label)
+        """Key of the outer container by key of the inner one, where they differ."""
+        return remapping_in(self.outer_container, self.label)
 
 
-def links_to(node: TreeNode) -> Iterator[Link]:
+def links_to(node: TreeNode) -> Iterator[ContainerLink]:
     """Yield the links from the wrapped container above one to it, from above to below.
 
     The top machine has none.
     """
-    above: smach.Container = (node.parent or node).machine
-    for label in node.below:
-        below = cast(smach.Container, child_of(above, label))
-        yield Link(above, label, below)
-        above = below
+    outer: smach.Container = (node.parent or node).machine
+    for label in node.labels_from_parent:
+        inner = cast(smach.Container, child_of(outer, label))
+        yield ContainerLink(outer, label, inner)
+        outer = inner
 
 
 def child_of(container: smach.Container, label: str) -> smach.State:
@@ -68,7 +68,7 @@ def levels_above(node: TreeNode) -> Iterator[TreeNode]:
 def _executes(above: TreeNode, child: TreeNode) -> bool:
     """Whether a container is now in the state that holds the one below it."""
     machine = above.machine
-    state = states_of(machine).get(child.below[0])
+    state = states_of(machine).get(child.labels_from_parent[0])
     return is_executing(machine) and state is not None and current_state_of(machine) is state
 
 
@@ -106,7 +106,7 @@ def _state_before(node: TreeNode) -> str:
     for above in levels_above(node):
         if not is_direct(child):
             break
-        context = above.records.failure_context(above.record(child.below[0]), '')
+        context = above.records.failure_context(above.record(child.labels_from_parent[0]), '')
         name = above.in_force.policy.step_back_target(context)
         if name:
             return name if '/' in name else '{}/{}'.format(above.relative_path, name)
@@ -219,7 +219,7 @@ def _where_it_is(node: TreeNode, name: str) -> str:
     return 'in other containers there is ' + ', '.join(sorted(paths)) if paths else ''
 
 
-def _around(node: TreeNode) -> List[TreeNode]:
+def _node_and_above(node: TreeNode) -> List[TreeNode]:
     """Return a container and all wrapped ones around it."""
     found = [node]
     while found[-1].parent is not None:
@@ -228,14 +228,17 @@ def _around(node: TreeNode) -> List[TreeNode]:
 
 
 def _is_around(place: TreePlace, node: TreeNode) -> bool:
-    return any(each.parent is place.node and each.below[0] == place.label for each in _around(node))
+    return any(
+        each.parent is place.node and each.labels_from_parent[0] == place.label
+        for each in _node_and_above(node)
+    )
 
 
 def _is_in_iterator(place: TreePlace, node: TreeNode) -> bool:
     """Whether an Iterator lies between a place and what is around both."""
-    common, inner = _around(node), place.node
+    common, inner = _node_and_above(node), place.node
     while inner.parent is not None and not any(inner is each for each in common):
-        if any(isinstance(link.above, smach.Iterator) for link in links_to(inner)):
+        if any(isinstance(link.outer_container, smach.Iterator) for link in links_to(inner)):
             return True
         inner = inner.parent
     return False

@@ -137,4 +137,4 @@ class Site:
 
     def is_line_over(self, node: 'TreeNode', event: Event) -> bool:
         """Whether no state follows in its thread, that of a Concurrence, after an event."""
-        return event.kind is EventKind.CONTAINER_END and len(node.below) > 1
+        return event.kind is EventKind.CONTAINER_END and len(node.labels_from_parent) > 1

@@ -47,10 +47,11 @@ def entered_by_failures_alone(label: str) -> smach.InvalidStateError:
 class TreeNode:
     """Everything an OracleContainer keeps beside what its machine keeps.
 
-    `parent`: node of the nearest wrapped container above, None for the top one. `below`: labels
-    that lead here from the parent, those of a Concurrence or Iterator in between included.
-    `in_force`: its settings. `records`: what it has learned and remembers. `engine`: how its engine
-    steps. `execution`: the present one, or the latest. `site`: where its states run.
+    `parent`: node of the nearest wrapped container above, None for the top one.
+    `labels_from_parent`: those that lead from there to here, those of a Concurrence or Iterator in
+    between included. `in_force`: its settings. `records`: what it has learned and remembers.
+    `engine`: how its engine steps. `execution`: the present one, or the latest. `site`: where its
+    states run.
     """
 
     site = Site()
@@ -60,7 +61,7 @@ class TreeNode:
     ) -> None:
         self.machine = machine
         self.parent: Optional['TreeNode'] = None
-        self.below: Labels = ()
+        self.labels_from_parent: Labels = ()
         self._name = name
         self.in_force = ContainerSettings(settings)
         self.records = ContainerRecords(settings.history_length)
@@ -91,9 +92,9 @@ class TreeNode:
         """Whether it was given."""
         return bool(self._name)
 
-    def lie_below(self, parent: Optional['TreeNode'], below: Labels) -> None:
+    def lie_below(self, parent: Optional['TreeNode'], labels: Labels) -> None:
         """Have this place in a tree. None: on its own, or at the top."""
-        self.parent, self.below = parent, below
+        self.parent, self.labels_from_parent = parent, labels
 
     @property
     def path(self) -> str:
@@ -108,7 +109,7 @@ class TreeNode:
         labels: Labels = ()
         node = self
         while node.parent is not None:
-            labels = node.below + labels
+            labels = node.labels_from_parent + labels
             node = node.parent
         return labels, node
 
@@ -190,7 +191,7 @@ class TreeNode:
     @property
     def runs_in_branch(self) -> bool:
         """Whether a Concurrence or an Iterator lies between it and the wrapped container above."""
-        return len(self.below) > 1 or not self.site.is_container
+        return len(self.labels_from_parent) > 1 or not self.site.is_container
 
     def runs_beside_others(self) -> bool:
         """Whether a Concurrence or an Iterator is around it."""

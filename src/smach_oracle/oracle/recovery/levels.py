@@ -45,14 +45,14 @@ def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     """Whether an Iterator around a container goes on after it has ended with an outcome."""
     if not node.site.is_container:
         return False
-    around: Any = states_of(above.machine)[node.below[0]]
-    for label in node.below[1:-1]:
+    around: Any = states_of(above.machine)[node.labels_from_parent[0]]
+    for label in node.labels_from_parent[1:-1]:
         around = around.get_children()[label]
     # what only the settings call a failure its author has not foreseen
     return (
         isinstance(around, smach.Iterator)
         and outcome in loop_outcomes_of(around)
-        and not _is_overridden(above, node.below)
+        and not _is_overridden(above, node.labels_from_parent)
         and outcome in node.in_force.failing
     )
 
@@ -74,7 +74,7 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
                 if _is_passed_over(node, above, outcome)
                 else None
             )
-        label = node.below[0]
+        label = node.labels_from_parent[0]
         route, kind = _judged_above(above, label, outcome)
         if kind is FailureKind.NOT_A_FAILURE or not route.target:
             return None
@@ -119,7 +119,7 @@ def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
     child, above = node, node.parent
     while above is not None:
-        state = states_of(above.machine).get(child.below[0])
+        state = states_of(above.machine).get(child.labels_from_parent[0])
         label = current_label_of(above.machine)
         if above.tree.is_precondition(above, state):
             return True

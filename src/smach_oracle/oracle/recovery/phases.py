@@ -212,7 +212,7 @@ def _decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple
     below, ending = recovery.node, recovery.natural_ending()
     for level in levels:
         failure = failure_above(
-            level, below.below[0], ending, '{}: {}'.format(below.path, recovery.cause)
+            level, below.labels_from_parent[0], ending, '{}: {}'.format(below.path, recovery.cause)
         )
         if failure is None or recovery.is_over():
             return None

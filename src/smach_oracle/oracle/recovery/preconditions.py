@@ -237,7 +237,7 @@ class _Elsewhere:
         self._runs = not way.down[1:]  # whether its container is one around the failed state
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
-        data = [data_of(link.below.userdata) for link in self._down[:-1]]
+        data = [data_of(link.inner_container.userdata) for link in self._down[:-1]]
         self._before: List[Tuple[Dict[str, object], Dict[str, object]]] = [
             (each, dict(each)) for each in data
         ]
@@ -259,9 +259,9 @@ class _Elsewhere:
         """Hand what the state wrote to the container of the failed state, as its author says."""
         written = set(self.gate.written)
         for link in reversed(self._down):
-            written = hand_up(link, written, self._writer_of(link.above))
+            written = hand_up(link, written, self._writer_of(link.outer_container))
         for link in self._on:
-            written = hand_on(link, written, self._writer_of(link.below))
+            written = hand_on(link, written, self._writer_of(link.inner_container))
 
     def _writer_of(self, container: smach.Container) -> Union[UserdataGate, smach.UserData]:
         return self._own if container.userdata is self._userdata else container.userdata

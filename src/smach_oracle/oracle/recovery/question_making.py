@@ -149,7 +149,7 @@ def _entered_on(way: JumpPath) -> Iterator[smach.State]:
     for place, below in zip(way.down, way.down[1:]):
         around: Any = states_of(place.node.machine)[place.label]
         yield around
-        for label in below.node.below[1:]:
+        for label in below.node.labels_from_parent[1:]:
             around = around.get_children()[label]
             yield around
     last = way.down[-1]
