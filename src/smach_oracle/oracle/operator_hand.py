@@ -181,7 +181,7 @@ class OperatorHand:
                     state, ', '.join(prospect.repeats)
                 )
             )
-        sent = jump_path_for(place).meets
+        sent = jump_path_for(place).meeting_node
         if sent.machine.is_running():
             text = self._ask_jump(
                 sent,

@@ -233,7 +233,7 @@ class Bench:
         self.machine.request_preempt()
         injection.take_out()
         if not Scope().wait(_GRACE_S, call.done):
-            call.leave()
+            call.leave_behind()
 
 
 class _TrialNotes:

@@ -159,7 +159,7 @@ def run(work, limit_s=None, grace_s=0.0, scope=None):
     stopped = threading.Event()
     call = BackgroundCall(lambda: work(stopped), 'a test')
     end = Scope(scope or Scope(), limit_s=limit_s).run(call, grace_s, stopped.set)
-    return end, call.left, call
+    return end, call.was_left_behind, call
 
 
 def test_a_call_that_ends_by_itself_has_its_result_and_is_not_stopped():
@@ -196,7 +196,7 @@ def test_ctrl_c_in_the_thread_that_waits_leaves_the_call_behind_without_a_grace(
     call = BackgroundCall(lambda: go.wait(20.0), 'a test')
     with pytest.raises(KeyboardInterrupt):
         Scope(clock=Interrupted(), limit_s=300.0).run(call, 300.0, stopped.set)
-    assert call.left and stopped.is_set()
+    assert call.was_left_behind and stopped.is_set()
     go.set()
 
 
@@ -215,4 +215,4 @@ def test_the_time_of_a_limit_that_others_pause_is_given_back():
     time.sleep(0.05)  # as long as it takes to look
     assert not go.is_set()
     clock.advance(31.0)
-    assert ended.result() is CallEnd.OVERRUN and not call.left
+    assert ended.result() is CallEnd.OVERRUN and not call.was_left_behind

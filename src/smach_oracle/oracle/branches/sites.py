@@ -126,7 +126,7 @@ class IteratorSite(BranchSite):
             final_outcomes_of(self.container).get(outcome, outcome)
         )
 
-    def tell_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
+    def tell_item_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
         """Say which item is passed over where this failing outcome leads to the next one."""
         wrapper = wrapper_of(self.container)
         item = wrapper.in_words() if wrapper is not None else ''

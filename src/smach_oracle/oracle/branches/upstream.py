@@ -52,7 +52,7 @@ def ask_no_more(container: smach.Container) -> None:
         set_class(container, made_of[1])
 
 
-class _OfBranch:
+class _BranchMethod:
     """A method of the branch of a stand-in, without a frame of its own on the stack."""
 
     def __init__(self, name: str) -> None:
@@ -62,7 +62,7 @@ class _OfBranch:
         return self if stand_in is None else getattr(stand_in.branch, self._name)
 
 
-class StandIn:
+class BranchStandIn:
     """Executes by a branch. In all else it is the user's state.
 
     Its place is in the tables of a container alone, and only while that executes. Whoever asks the
@@ -73,9 +73,9 @@ class StandIn:
         self.branch = branch
         self.state = state
 
-    execute = _OfBranch('execute')
-    request_preempt = _OfBranch('request_preempt')
-    recall_preempt = _OfBranch('recall_preempt')
+    execute = _BranchMethod('execute')
+    request_preempt = _BranchMethod('request_preempt')
+    recall_preempt = _BranchMethod('recall_preempt')
 
     def preempt_requested(self) -> bool:
         """Whether the branch or the state has a request that was not serviced."""
@@ -90,9 +90,9 @@ class StandIn:
     __class__ = cast(Any, property(lambda self: type(self.state)))
 
 
-def _real(state: object) -> Any:
+def _users_state(state: object) -> Any:
     """Return the user's state, whatever stands in for it."""
-    return state.state if type(state) is StandIn else state
+    return state.state if type(state) is BranchStandIn else state
 
 
 class _Asking:
@@ -118,12 +118,12 @@ class _Asking:
         base: Any = super()
         children: Dict[str, smach.State] = base.get_children()
         if self._oracle_wrapper.runners:
-            return {label: _real(state) for label, state in children.items()}
+            return {label: _users_state(state) for label, state in children.items()}
         return children
 
     def __getitem__(self, label: str) -> smach.State:
         base: Any = super()
-        state: smach.State = _real(base.__getitem__(label))
+        state: smach.State = _users_state(base.__getitem__(label))
         return state
 
     def __reduce_ex__(self, protocol: Any) -> Tuple[Any, ...]:
@@ -149,7 +149,7 @@ def _stand_in(container: Any, hook: Any) -> Tables:
         if state is None:
             return None
         runner = hook.runner_of(container, label, state)
-        return StandIn(runner, state) if isinstance(runner, Branch) else state
+        return BranchStandIn(runner, state) if isinstance(runner, Branch) else state
 
     if isinstance(container, smach.Iterator):
         own = items_of(container), iterated_state_of(container)
@@ -172,7 +172,7 @@ def _give_back(container: Any, own: Tables) -> None:
     set_items(
         container,
         items if isinstance(now[0], TrackedItems) else now[0],
-        state if type(now[1]) is StandIn else now[1],
+        state if type(now[1]) is BranchStandIn else now[1],
     )
 
 
@@ -180,10 +180,10 @@ def _at_rest(attributes: Dict[str, Any]) -> Dict[str, Any]:
     """Return the attributes of a container for a copy, as they are while it is at rest."""
     if '_states' in attributes:
         attributes['_states'] = {
-            label: _real(state) for label, state in attributes['_states'].items()
+            label: _users_state(state) for label, state in attributes['_states'].items()
         }
     if '_state' in attributes:
-        attributes['_state'] = _real(attributes['_state'])
+        attributes['_state'] = _users_state(attributes['_state'])
     items = attributes.get('_items')
     if isinstance(items, TrackedItems):
         attributes['_items'] = items.given

@@ -143,7 +143,7 @@ def _down_to(node: TreeNode, path: str) -> Sequence[TreePlace]:
     """Return the way down from a container to a place to which a jump was under way."""
     place = next((each for each in places_of(node) if each.path == path), None)
     way = None if place is None else jump_path_to(node, place)
-    return way.down[1:] if way is not None and way.meets is node else ()
+    return way.entered_places[1:] if way is not None and way.meeting_node is node else ()
 
 
 def forget_resumed(node: TreeNode) -> None:
@@ -190,15 +190,15 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     stood = resumption.tree.container(top.key)
     way = _jump_path_named(top, resumption.begins_at) if resumption.begins_at else None
     if way is not None:
-        stood.at = [way.first, BEFORE]
+        stood.at = [way.first_label, BEFORE]
     elif top.has(stood.label) and stood.sent is not None:
         way = _jump_path_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
     if way is not None:
-        leave_unconfirmed(top, way.first)
+        leave_unconfirmed(top, way.first_label)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
     if resumption.begins_at and way is not None:
-        top.tree.resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
-        _Setting(resumption, nodes).ask_at(way.down)
+        top.tree.resumed.enter_at(top, EntryPoint(stood, way.entered_places[1:]))
+        _Setting(resumption, nodes).ask_at(way.entered_places)
     else:
         _Setting(resumption, nodes).set_container(top)
 
@@ -331,8 +331,8 @@ class _Setting:
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
-        stood.at, asked, at = [way.first, BEFORE], stored.asked, stored.at_there
-        self._resumed.enter_at(top, EntryPoint(stood, way.down[1:]))
+        stood.at, asked, at = [way.first_label, BEFORE], stored.asked, stored.at_there
+        self._resumed.enter_at(top, EntryPoint(stood, way.entered_places[1:]))
         there = StoredContainer(at)
         record = place.node.record(place.label)
         if asked and asked[0] == place.label and not self._resumption.is_earlier:

@@ -83,22 +83,22 @@ class Applying:
             node.records.history.count_superseded(record.label, outcome)
 
     def _jump(self, jump: JumpTo) -> None:
-        node, way = self._node, jump.way
+        node, way = self._node, jump.jump_path
         if jump.restarts:  # with the userdata of the start in all containers
-            start_over(node, way.first)
+            start_over(node, way.first_label)
             userdata, missing = 'start', None
         else:
             entry = prepare_entry(way, jump.written, 'jumping')
             userdata, missing = entry.userdata, entry.missing
-        self._note_entry(way.first)
-        self._go_on(way.first, jump.by, jump.text, userdata, missing, self._across(way))
+        self._note_entry(way.first_label)
+        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, self._across(way))
 
     def _across(self, way: JumpPath) -> Mapping[str, str]:
         """Return what is told of a jump that crosses containers."""
-        below = self._occasion.below
+        lower = self._occasion.lower_verdict
         return {
-            **({} if below is None else {'from': below.failed}),
-            **({'to': way.down[-1].path} if len(way.down) > 1 else {}),
+            **({} if lower is None else {'from': lower.failed}),
+            **({'to': way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
         }
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:
@@ -180,7 +180,7 @@ class Applying:
 
     def _is_told(self, target: str, by: str) -> bool:
         """Whether the observers hear of it: not where an uncounted visit is made again."""
-        again = self._occasion.first is FirstStep.ENTER_AGAIN and target == self._record.label
+        again = self._occasion.first_step is FirstStep.ENTER_AGAIN and target == self._record.label
         return bool(by) or not again
 
     def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, object]) -> None:

@@ -19,7 +19,7 @@ from ..machine.tree_node import TreeNode, node_of
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
-from ..recovery.occasions import FromBelow
+from ..recovery.occasions import LowerVerdict
 from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
 from ..smach_private import current_label_of, current_state_of, states_of
 
@@ -32,14 +32,16 @@ class Departure:
         self.verdict = verdict
         self.arrives_at = arrives_at
         self.failed = failed
-        self._repeated = set(repeated_on(verdict.way)) if isinstance(verdict, JumpTo) else set()
+        self._repeated = (
+            set(repeated_on(verdict.jump_path)) if isinstance(verdict, JumpTo) else set()
+        )
 
-    def from_below(self) -> FromBelow:
+    def lower_verdict(self) -> LowerVerdict:
         """Return what it is to the level that follows it."""
         verdict = self.verdict
         if isinstance(verdict, GiveUp):
             verdict = verdict._replace(level=None)  # it is the one that ends
-        return FromBelow(verdict, self.failed, self.why_not)
+        return LowerVerdict(verdict, self.failed, self.why_not)
 
     def why_not(self) -> str:
         """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
@@ -48,12 +50,12 @@ class Departure:
         """
         if not isinstance(self.verdict, JumpTo):
             return ''
-        way = self.verdict.way
+        way = self.verdict.jump_path
         closed = why_closed_on(way)
         repeated = sorted(set(repeated_on(way)).difference(self._repeated))
         if not (closed or repeated):
             return ''
-        place = way.down[-1].path
+        place = way.entered_places[-1].path
         return 'cannot go to {}: {}'.format(
             place,
             closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
@@ -80,15 +82,15 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     containers is preempted.
     """
     level = arrives_at(verdict)
-    left = [] if level is None else _left_for(node, level)
-    if level is None or not left:
+    left_nodes = [] if level is None else _nodes_left_for(node, level)
+    if level is None or not left_nodes:
         return False
     departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
-    nodes = [*left, level]
+    nodes = [*left_nodes, level]
     others = _claim(nodes, departure)
     if others:
         _preempt(_container_apart(nodes, others))
-        _leave_way(nodes[: -len(others)])
+        _preempt_left_nodes(nodes[: -len(others)])
         return False
     smach.loginfo(
         '{}/{} is left for {}'.format(
@@ -96,13 +98,13 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
         )
     )
     _preempt(current_state_of(level.machine))
-    _leave_way(left)
+    _preempt_left_nodes(left_nodes)
     return True
 
 
 def _in_words(verdict: Verdict) -> str:
     if isinstance(verdict, JumpTo):
-        return verdict.way.down[-1].path
+        return verdict.jump_path.entered_places[-1].path
     return 'its end with {}'.format(verdict.ending.outcome if isinstance(verdict, GiveUp) else '')
 
 
@@ -114,16 +116,16 @@ def _preempt(state: Optional[smach.State]) -> None:
         smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 
 
-def _leave_way(left: List[TreeNode]) -> None:
+def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
     """Preempt the containers around a failure that are left, as far as they are not yet.
 
     Iterators among them are told that they are left. Upstream's Concurrence hands a preempt on at
     some time later, and once in an execution. Until then an Iterator on the way would go on with
     its next item.
 
-    :param left: innermost first. That of the failure ends by itself.
+    :param left_nodes: innermost first. That of the failure ends by itself.
     """
-    around = [link.inner_container for node in reversed(left) for link in links_to(node)]
+    around = [link.inner_container for node in reversed(left_nodes) for link in links_to(node)]
     for container in around[:-1]:
         wrapper = wrapper_of(container)
         if isinstance(wrapper, IteratorWrapper):
@@ -132,13 +134,13 @@ def _leave_way(left: List[TreeNode]) -> None:
             _preempt(container)
 
 
-def _left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
+def _nodes_left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
     """Return the containers from that of a failure up to below a level. None if it is no level."""
-    left = [node]
+    left_nodes = [node]
     for level in levels_above(node):
         if level is arrives_at:
-            return left
-        left.append(level)
+            return left_nodes
+        left_nodes.append(level)
     return []
 
 

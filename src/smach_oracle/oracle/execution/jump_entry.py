@@ -37,21 +37,21 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
     :param written: its userdata keys that survive a restore.
     :param sent: what is done, for a warning.
     """
-    node, target = way.meets, way.first
+    node, target = way.meeting_node, way.first_label
     forget_resumed(node)
     missing = missing_for(way, written)
     snapshot = node.record(target).snapshot if node.settings.userdata == 'restore' else None
     if snapshot is not None:
         restore(data_of(node.machine.userdata), snapshot, written, node.in_force.deep_copy_keys)
-    leave_for(node, target, way.down[1:])
-    for place in way.down:
+    leave_for(node, target, way.entered_places[1:])
+    for place in way.entered_places:
         ask_to_go_on(place.node, place.label)
     if missing:
-        place = way.down[-1]
+        place = way.entered_places[-1]
         place.node.warn(
             '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
         )
-    node.record(target).go_down(way.down[1:])
+    node.record(target).go_down(way.entered_places[1:])
     return JumpEntry(missing, 'keep' if snapshot is None else 'restore')
 
 
@@ -61,8 +61,8 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     :param written: keys of the container that holds the whole way, written for it.
     """
     missing = missing_on(way, written)
-    node, label = way.down[-1]
-    if not missing or node is not way.meets:  # keys of its own may have the same names
+    node, label = way.entered_places[-1]
+    if not missing or node is not way.meeting_node:  # keys of its own may have the same names
         return missing
     remapping = remapping_of(node.machine, label)
     return tuple(key for key in missing if remapping.get(key, key) not in written)
@@ -142,7 +142,9 @@ def prospect_of(place: TreePlace, written: Tuple[str, ...] = ()) -> Prospect:
 def _prospect_on(way: JumpPath, written: Tuple[str, ...]) -> Prospect:
     closed_now = why_closed_on(way)
     if closed_now:
-        return Prospect('{} cannot be entered now: {}'.format(way.down[-1].label, closed_now))
+        return Prospect(
+            '{} cannot be entered now: {}'.format(way.entered_places[-1].label, closed_now)
+        )
     return Prospect('', missing_for(way, written), repeated_on(way))
 
 
@@ -165,18 +167,20 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     by = jump.by or 'an operator'
     data = {'missing_keys': list(entry.missing), 'userdata': entry.userdata}
     if jump.container:
-        data['to'] = way.down[-1].path
-    node.emit(EventKind.SENT, state=label, target=way.first, by=jump.by, text=jump.text, data=data)
+        data['to'] = way.entered_places[-1].path
+    node.emit(
+        EventKind.SENT, state=label, target=way.first_label, by=jump.by, text=jump.text, data=data
+    )
     go_to(
         node,
         "State machine sent by {} to '{}' instead of '{}'".format(by, jump.named(), label),
-        way.first,
+        way.first_label,
     )
     return True
 
 
 def _why_not(way: Optional[JumpPath], jump: Jump) -> str:
-    if way is None or way.left:
+    if way is None or way.left_containers:
         return 'there is no such state'
     prospect = _prospect_on(way, jump.written)
     unconfirmed = sorted(set(prospect.repeats).difference(jump.repeats))

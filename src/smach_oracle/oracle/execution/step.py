@@ -155,7 +155,7 @@ class Step:
             None,
         )
         return occasions.arrived(
-            failure, self._context(), departure.from_below(), told, departure.is_own(node)
+            failure, self._context(), departure.lower_verdict(), told, departure.is_own(node)
         )
 
     def _warn_raised(self, error: Exception, when: str) -> None:
@@ -261,7 +261,7 @@ class Step:
         record.learn(True)
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
-            node.site.tell_passed_over(node, failure.state, failure.outcome)
+            node.site.tell_item_passed_over(node, failure.state, failure.outcome)
             return self._end(failure, natural_ending(node, failure))
         if is_settled(node, failure):
             ending = natural_ending(node, failure)
@@ -370,7 +370,7 @@ class Step:
                 state=record.label,
                 outcome=occasion.outcome,
                 target=meta_label,
-                **(NO_FACTS if occasion.below is None else LEFT),
+                **(NO_FACTS if occasion.lower_verdict is None else LEFT),
             )
         # sync_oracle refuses any other state of this name
         meta = cast(OracleState, states_of(self._machine)[meta_label])

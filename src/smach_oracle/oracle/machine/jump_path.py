@@ -29,26 +29,26 @@ from .userdata_view import keys_after_jump, missing_keys
 class JumpPath(NamedTuple):
     """The way from a container to a place: out to where they meet, and down again.
 
-    `left`: the containers that are left, innermost first. `meets`: the innermost container that
-    holds both. `down`: its own state that is entered, then the states in which the containers below
-    it begin. The last one is the place.
+    `left_containers`: those that are left, innermost first. `meeting_node`: of the innermost one
+    that holds both. `entered_places`: its own state that is entered, then the states in which the
+    containers below it begin. The last one is the place.
     """
 
-    left: Tuple[TreeNode, ...]
-    meets: TreeNode
-    down: Tuple[TreePlace, ...]
+    left_containers: Tuple[TreeNode, ...]
+    meeting_node: TreeNode
+    entered_places: Tuple[TreePlace, ...]
 
     @property
-    def first(self) -> str:
-        """Return the label of the state of `meets` that is entered."""
-        return self.down[0].label
+    def first_label(self) -> str:
+        """Return the label of the state of the `meeting_node` that is entered."""
+        return self.entered_places[0].label
 
     def kept(self, watch: WriteWatch) -> FrozenSet[str]:
         """Return the keys that a recovery wrote and that survive a restore where the ways meet.
 
         None survives where the container in which they were written is left.
         """
-        return frozenset(watch.written_in(self.meets.machine))
+        return frozenset(watch.written_in(self.meeting_node.machine))
 
 
 def jump_path_to(node: TreeNode, place: TreePlace) -> Optional[JumpPath]:
@@ -74,10 +74,10 @@ def jump_path_to(node: TreeNode, place: TreePlace) -> Optional[JumpPath]:
 
 def why_closed_on(way: JumpPath) -> str:
     """Return why a place, or one on the way down, cannot be entered now, '' where it can."""
-    for place in way.down:
+    for place in way.entered_places:
         why = why_closed(place.node, place.label)
         if why:
-            return why if place is way.down[-1] else '{} {}'.format(place.path, why)
+            return why if place is way.entered_places[-1] else '{} {}'.format(place.path, why)
     return ''
 
 
@@ -88,24 +88,24 @@ def closed_in_words(way: JumpPath, name: str) -> str:
     """
     why = why_closed_on(way)
     # of what lies on the way down it names the path
-    return '{} {}'.format(name, why) if why and not why.startswith(way.meets.path) else why
+    return '{} {}'.format(name, why) if why and not why.startswith(way.meeting_node.path) else why
 
 
 def repeated_on(way: JumpPath) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a place."""
-    return repeated_by_going_to(way.meets, way.first)
+    return repeated_by_going_to(way.meeting_node, way.first_label)
 
 
 def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
     """Return the input keys of a place's state that would be missing after the jump.
 
-    :param written: keys of the container `meets` that survive a restore.
+    :param written: keys of the container of `meeting_node` that survive a restore.
     """
-    node, label = way.down[-1]
+    node, label = way.entered_places[-1]
     if not states_of(node.machine)[label].get_registered_input_keys():
         return ()
-    keys = set(keys_after_jump(way.meets, way.first, tuple(written)))
-    for below in way.down[1:]:
+    keys = set(keys_after_jump(way.meeting_node, way.first_label, tuple(written)))
+    for below in way.entered_places[1:]:
         keys = _keys_below(below.node, keys)
     return missing_keys(node.machine, label, keys)
 

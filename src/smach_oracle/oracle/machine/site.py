@@ -127,7 +127,7 @@ class Site:
 
     # -- what is told
 
-    def tell_passed_over(self, node: 'TreeNode', label: str, outcome: str) -> None:
+    def tell_item_passed_over(self, node: 'TreeNode', label: str, outcome: str) -> None:
         """Say what the author passes over by a failing outcome that is foreseen."""
 
     def ended_by(self, node: 'TreeNode', event: Event) -> Optional[str]:

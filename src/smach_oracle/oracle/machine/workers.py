@@ -32,7 +32,7 @@ class Overrun(NamedTuple):
     text: str  # what happened, in words
 
 
-class _Left(NamedTuple):
+class _AbandonedCall(NamedTuple):
     """A call that was left behind."""
 
     target: object  # the state or the function, kept so that its id stays its own
@@ -46,7 +46,7 @@ class Workers:
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._lock = threading.Lock()
-        self.abandoned: Dict[int, _Left] = {}
+        self.abandoned: Dict[int, _AbandonedCall] = {}
         # states with a time limit whose thread lives, and those that are asked about if they take
         # long
         self.under_way: Dict[int, Scope] = {}
@@ -57,11 +57,11 @@ class Workers:
         if not self.abandoned:
             return ''
         with self._lock:
-            left = self.abandoned.get(id(target))
-            if left is None:
+            abandoned = self.abandoned.get(id(target))
+            if abandoned is None:
                 return ''
-            if left.call.is_alive():
-                return left.why
+            if abandoned.call.is_alive():
+                return abandoned.why
             del self.abandoned[id(target)]
             return ''
 
@@ -100,7 +100,7 @@ class Workers:
         try:
             end = run.run(call, grace_s, stop)
         finally:
-            if call.left:
+            if call.was_left_behind:
                 self._block(state, call, _LATE)
                 run.cancel(Reason.LEFT_BEHIND)
                 _stop_bare_machines(state)
@@ -111,7 +111,7 @@ class Workers:
         if end is CallEnd.BY_ITSELF:
             return call.returned()
         ended = 'ended when it was preempted'
-        if call.left:
+        if call.was_left_behind:
             ended = 'was abandoned {:g} s after it was preempted'.format(grace_s)
         return Overrun('overran its time limit of {:g} s and {}'.format(limit_s, ended))
 
@@ -136,7 +136,7 @@ class Workers:
         try:
             end = within.run(call, settings.grace_period_s, gate.shut)
         finally:
-            if call.left:
+            if call.was_left_behind:
                 is_late = end is CallEnd.OVERRUN and scope.reason is None
                 self._block(function, call, _LATE if is_late else _STOPPED)
             if end is CallEnd.BY_ITSELF and not self.abandoned:
@@ -148,7 +148,7 @@ class Workers:
         why = 'was stopped by a preempt or a shutdown'
         if end is CallEnd.OVERRUN:
             why = 'overran its time limit of {:g} s'.format(limit_s or 0.0)
-        return Overrun(why + (' and was left behind' if call.left else ''))
+        return Overrun(why + (' and was left behind' if call.was_left_behind else ''))
 
     def _take_thread(self) -> KeptThread:
         """Return a thread for a function: an idle one, or a new one."""
@@ -168,7 +168,7 @@ class Workers:
 
     def _block(self, target: object, call: BackgroundCall, why: str) -> None:
         with self._lock:
-            self.abandoned[id(target)] = _Left(target, call, why)
+            self.abandoned[id(target)] = _AbandonedCall(target, call, why)
 
 
 def request_preempt(state: smach.State) -> None:

@@ -19,7 +19,7 @@ from .recovery import Decided, Recovery
 def decide_on_level(recovery: Recovery, why_not_above: Callable[[], str]) -> Decided:
     """Run the preconditions that the policy wants, and say what it does.
 
-    `recovery.way` is the way to the place where it goes then, None where it goes nowhere.
+    `recovery.jump_path` is the way to the place where it goes then, None where it goes nowhere.
 
     :param why_not_above: says why no level above is to be disturbed by this failure.
     """
@@ -67,7 +67,7 @@ def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Deci
     decider, why_not = (Decider.AUTHOR, why_not) if why_not else _what_prevents(recovery, way)
     if why_not:
         return decider, recovery.facts(Action.ASK, blocked=why_not)
-    recovery.way = way
+    recovery.jump_path = way
     facts = recovery.facts(action, target=_named(recovery, way), wait_s=policy.wait_s(situation))
     record.note_tried(goes(facts), reading.successes)
     return decider, facts
@@ -91,7 +91,7 @@ def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePla
 
 def _named(recovery: Recovery, way: JumpPath) -> str:
     """Return the label of a place, or its path where it is in another container."""
-    place = way.down[-1]
+    place = way.entered_places[-1]
     return place.label if place.node is recovery.node else place.path
 
 
@@ -109,7 +109,7 @@ def _what_prevents(recovery: Recovery, way: JumpPath) -> Tuple[Decider, str]:
 
 def why_repeats_on(recovery: Recovery, way: JumpPath) -> str:
     """Say what would be repeated if the machine went to a place by itself, or '' if nothing."""
-    repeated, place = repeated_on(way), way.down[-1]
+    repeated, place = repeated_on(way), way.entered_places[-1]
     if not repeated:
         return ''
     target = _named(recovery, way)

@@ -118,7 +118,7 @@ class Inquiry:
 
         def progress(what: str, by: str, text: str) -> None:
             # an interface's start and end are told by the oracle itself
-            if what in _TOLD and not port.left:
+            if what in _TOLD and not port.was_left_behind:
                 self._tell(_TOLD[what], by=by, text=text)
 
         port = BackgroundCall(lambda: call(progress), 'smach_oracle expert')
@@ -127,7 +127,7 @@ class Inquiry:
             self._wait_for(port)
         except BaseException:  # Ctrl-C in the machine's thread
             self._cancelled.set()
-            port.leave()
+            port.leave_behind()
             raise
         if not isinstance(port.error, Exception) or isinstance(port.error, AnswerError):
             if port.error is not None:
@@ -143,7 +143,7 @@ class Inquiry:
             return
         self._cancelled.set()
         patience = Scope(clock=self._scope.clock)  # in which nothing ends it
-        if not patience.wait(_PATIENCE_S, port.done) and port.leave():
+        if not patience.wait(_PATIENCE_S, port.done) and port.leave_behind():
             self._recovery.warn(
                 "the expert's port goes on although its question was taken back; it is left behind"
             )

@@ -38,10 +38,10 @@ class Foreseen(NamedTuple):
     """The reason why the end of a container is left to the one above it."""
 
     text: str
-    passed_over: str = ''  # the outcome with which an item of an Iterator is passed over
+    item_outcome: str = ''  # the outcome with which an item of an Iterator is passed over
 
 
-def _is_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
+def _is_item_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     """Whether an Iterator around a container goes on after it has ended with an outcome."""
     if not node.site.is_container:
         return False
@@ -71,7 +71,7 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
         if not is_direct(node):
             return (
                 Foreseen('{} {} -> the next item'.format(node.path, outcome), outcome)
-                if _is_passed_over(node, above, outcome)
+                if _is_item_passed_over(node, above, outcome)
                 else None
             )
         label = node.labels_from_parent[0]
@@ -171,8 +171,12 @@ def decide_above(
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
-    way = jump_path_to(below, above.way.down[-1]) if above.way is not None else None
-    if above.way is None or way is None:
+    way = (
+        jump_path_to(below, above.jump_path.entered_places[-1])
+        if above.jump_path is not None
+        else None
+    )
+    if above.jump_path is None or way is None:
         record.take_back_failure()
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
@@ -180,7 +184,7 @@ def decide_above(
     tell_failure(level, record, failure, continuous, reading)
     sentence = tell_decision(above, decided)
     record.recoveries += 1
-    kept, restarts = above.way.kept(above.watch), facts.action is Action.RESTART
+    kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
     return JumpTo(way, '', sentence, kept, level, restarts), facts.wait_s
 
 

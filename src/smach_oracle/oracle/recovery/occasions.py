@@ -34,7 +34,7 @@ class Superseding(enum.Enum):
     RECORDS = 'records'  # in the history, where it is counted already
 
 
-class FromBelow(NamedTuple):
+class LowerVerdict(NamedTuple):
     """A verdict on a failure in a container below, which was left for this one."""
 
     verdict: Verdict
@@ -49,7 +49,7 @@ class Occasion(NamedTuple):
     context: FailureContext
     outcome: str  # with what the state has ended, '' where it has not
     what: str  # the same in a word, for the log
-    first: FirstStep = FirstStep.DECIDE
+    first_step: FirstStep = FirstStep.DECIDE
     superseding: Superseding = Superseding.TAKES_BACK
     continuous: bool = False
     is_told: bool = True  # the observers hear of a transition to the oracle
@@ -57,7 +57,7 @@ class Occasion(NamedTuple):
     why: str = ''  # a person is asked, or the robot is not well, '' where a preempt came meanwhile
     keeps: bool = False  # without an answer the trial is kept for the next start
     answer: Optional[Answer] = None  # given while the state still ran
-    below: Optional[FromBelow] = None
+    lower_verdict: Optional[LowerVerdict] = None
 
 
 def failed(failure: Failure, context: FailureContext, continuous: bool = False) -> Occasion:
@@ -82,7 +82,7 @@ def interrupted(
     if failure.is_held_back:
         return occasion._replace(keeps=True)
     return occasion._replace(
-        first=FirstStep.ASK, why=before.asks, keeps=before.keeps, continuous=False
+        first_step=FirstStep.ASK, why=before.asks, keeps=before.keeps, continuous=False
     )
 
 
@@ -103,7 +103,11 @@ def ended_by_answer(
 
 
 def arrived(
-    failure: Failure, context: FailureContext, below: FromBelow, outcome: str, is_own: bool
+    failure: Failure,
+    context: FailureContext,
+    lower_verdict: LowerVerdict,
+    outcome: str,
+    is_own: bool,
 ) -> Occasion:
     """A state was left for this level. `failure`: if it has to be asked about.
 
@@ -117,7 +121,7 @@ def arrived(
         FirstStep.OBEY,
         Superseding.TAKES_BACK if is_own else Superseding.RECORDS,
         is_logged=False,
-        below=below,
+        lower_verdict=lower_verdict,
     )
 
 
@@ -127,13 +131,15 @@ def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
     `why`: the robot is not well, or '' where a preempt or a shutdown is under way.
     """
     return failed(failure, context)._replace(
-        first=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why
+        first_step=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why
     )
 
 
 def often_unwell(failure: Failure, context: FailureContext, continuous: bool, why: str) -> Occasion:
     """A state has failed while the robot was not well, too often not to be counted."""
-    return failed(failure, context, continuous)._replace(first=FirstStep.WAIT_AND_DECIDE, why=why)
+    return failed(failure, context, continuous)._replace(
+        first_step=FirstStep.WAIT_AND_DECIDE, why=why
+    )
 
 
 def still_running(failure: Failure) -> Occasion:
@@ -148,7 +154,7 @@ def log_occasion(occasion: Occasion, place: str) -> None:
         return
     failure = occasion.failure
     words = failure.details or in_words(failure)
-    if occasion.first is FirstStep.ENTER_AGAIN:
+    if occasion.first_step is FirstStep.ENTER_AGAIN:
         # what the wait says in the log is one sentence for all who wait
         smach.loginfo('{} failed, which is not counted: {}'.format(place, words))
     elif failure.is_held_back:  # what was in doubt, or had not begun, has not failed

@@ -34,7 +34,7 @@ from .levels import (
     runs_as_precondition,
     tell_decision,
 )
-from .occasions import FirstStep, FromBelow
+from .occasions import FirstStep, LowerVerdict
 from .recovery import Recovery
 from .stop import preempt_beside
 from .verdict import ContainerEnding, GiveUp, JumpTo, Supersede, Verdict, leads_to, natural_ending
@@ -47,7 +47,7 @@ def obey_given(recovery: Recovery) -> Optional[Verdict]:
     occasion = recovery.occasion
     if occasion.answer is not None:
         return _obey_answer(recovery, occasion.answer)
-    return None if occasion.below is None else _follow(recovery, occasion.below)
+    return None if occasion.lower_verdict is None else _follow(recovery, occasion.lower_verdict)
 
 
 def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
@@ -57,7 +57,7 @@ def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
     verdict = _obey(recovery, answer)
     closed = ''
     if answer.kind is AnswerKind.GOTO and isinstance(verdict, JumpTo):
-        closed = why_closed_on(verdict.way)
+        closed = why_closed_on(verdict.jump_path)
     if not closed:
         return verdict
     recovery.ask_at_once(
@@ -70,9 +70,9 @@ def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
     return recovery.end_unaided() if recovery.budget.why_over() else None
 
 
-def _follow(recovery: Recovery, below: FromBelow) -> Optional[Verdict]:
-    why_not = below.why_not()
-    return _ask_since(recovery, why_not) if why_not else below.verdict
+def _follow(recovery: Recovery, lower: LowerVerdict) -> Optional[Verdict]:
+    why_not = lower.why_not()
+    return _ask_since(recovery, why_not) if why_not else lower.verdict
 
 
 def _ask_since(recovery: Recovery, why: str) -> Optional[Verdict]:
@@ -84,7 +84,7 @@ def _ask_since(recovery: Recovery, why: str) -> Optional[Verdict]:
 
 def wait_until_well(recovery: Recovery) -> Optional[Verdict]:
     """Wait for a robot that was not well when the state failed. It may then enter it again."""
-    first, why = recovery.occasion.first, recovery.occasion.why
+    first, why = recovery.occasion.first_step, recovery.occasion.why
     if first not in (FirstStep.ENTER_AGAIN, FirstStep.WAIT_AND_DECIDE):
         return None
     if not why:
@@ -111,7 +111,7 @@ def _enter_again(recovery: Recovery) -> Optional[Verdict]:
 def ask_first(recovery: Recovery) -> Optional[Verdict]:
     """Leave the decision to a person where the machine is not to move by itself."""
     occasion = recovery.occasion
-    return _ask_since(recovery, occasion.why) if occasion.first is FirstStep.ASK else None
+    return _ask_since(recovery, occasion.why) if occasion.first_step is FirstStep.ASK else None
 
 
 # -- the decision
@@ -137,7 +137,7 @@ def decide(recovery: Recovery) -> Optional[Verdict]:
 
 def _follow_policy(recovery: Recovery, facts: DecisionFacts) -> Verdict:
     """Carry out a decision that asks nobody."""
-    way = recovery.way
+    way = recovery.jump_path
     if way is None:
         return _give_way(
             recovery, _why_nobody_is_asked(recovery) or Foreseen('the policy asks nobody')
@@ -202,8 +202,8 @@ def _why_left_to_others(recovery: Recovery) -> str:
 
 def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
     """End the container, and leave all else to who is above it."""
-    if why.passed_over:
-        recovery.warn('its item is passed over with {}'.format(why.passed_over))
+    if why.item_outcome:
+        recovery.warn('its item is passed over with {}'.format(why.item_outcome))
     return recovery.give_up('{}: {}'.format(recovery.cause, why.text))
 
 

@@ -232,9 +232,11 @@ class _Elsewhere:
         _check(way)
         self._own = own
         self._userdata = node.machine.userdata
-        self._down = [link for below in way.down[1:] for link in links_to(below.node)]
-        self._on = [link for left in reversed(way.left) for link in links_to(left)]
-        self._runs = not way.down[1:]  # whether its container is one around the failed state
+        self._down = [link for below in way.entered_places[1:] for link in links_to(below.node)]
+        self._on = [link for left in reversed(way.left_containers) for link in links_to(left)]
+        self._runs = not way.entered_places[
+            1:
+        ]  # whether its container is one around the failed state
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
         data = [data_of(link.inner_container.userdata) for link in self._down[:-1]]
@@ -268,10 +270,10 @@ class _Elsewhere:
 
 
 def _check(way: JumpPath) -> None:
-    for place in way.down[1:]:
+    for place in way.entered_places[1:]:
         if is_executing(place.node.machine):
             raise NotMet('{} runs at this time'.format(place.node.path))
-    for place in way.down[:-1]:
+    for place in way.entered_places[:-1]:
         guarded = place.node.settings_of(place.label).on_retry != ALLOW
         if guarded and place.node.records.marks.of(place.label).done:
             raise _not_repeated(place.path)

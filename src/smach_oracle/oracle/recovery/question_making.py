@@ -91,7 +91,7 @@ def _jump_paths(node: TreeNode) -> Iterator[JumpPath]:
 
 
 def _target(node: TreeNode, way: JumpPath) -> Target:
-    place = way.down[-1]
+    place = way.entered_places[-1]
     return '' if place.node is node else place.node.path, place.label
 
 
@@ -99,13 +99,13 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
     for way in _jump_paths(recovery.node):
         container, label = target = _target(recovery.node, way)
-        record, waits_on = way.down[-1].node.record(label), _waits_on(recovery, target)
+        record, waits_on = way.entered_places[-1].node.record(label), _waits_on(recovery, target)
         yield StateChoice(
             label,
             1.0 - record.rate,
             int(record.failure_class),
             record.visits,
-            missing_on(way, () if way.left else written),
+            missing_on(way, () if way.left_containers else written),
             tuple(spec.name for spec in record.settings.preconditions),
             '' if waits_on else why_closed_on(way),
             () if waits_on else repeated_on(way),
@@ -146,13 +146,13 @@ def _entered_on(way: JumpPath) -> Iterator[smach.State]:
 
     Containers between two places, such as a Concurrence in an Iterator, are among them.
     """
-    for place, below in zip(way.down, way.down[1:]):
+    for place, below in zip(way.entered_places, way.entered_places[1:]):
         around: Any = states_of(place.node.machine)[place.label]
         yield around
         for label in below.node.labels_from_parent[1:]:
             around = around.get_children()[label]
             yield around
-    last = way.down[-1]
+    last = way.entered_places[-1]
     yield states_of(last.node.machine)[last.label]
 
 

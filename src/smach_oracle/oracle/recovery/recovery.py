@@ -43,9 +43,10 @@ class Recovery:
     A preempt or a shutdown cancels its `scope`, and so does the end of what goes on around it. The
     phases run in the machine's thread. `cancel` may be called from any thread.
 
-    `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked. `way`:
-    where it has decided to go. `decided`: to ask. `cause`: of the decision. `begin_question`: is
-    called before each question. `takes`: whether an answer comes in time, once it is here.
+    `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked.
+    `jump_path`: where it has decided to go. `decided`: to ask. `cause`: of the decision.
+    `begin_question`: is called before each question. `takes`: whether an answer comes in time, once
+    it is here.
     """
 
     asks_at_once = False  # no policy has a say
@@ -57,7 +58,7 @@ class Recovery:
     question_id = ''  # of the last question
     reading: Optional[RateReading] = None
     running: Optional[smach.State] = None  # as a precondition
-    way: Optional[JumpPath] = None
+    jump_path: Optional[JumpPath] = None
     why_no_answer = ''
 
     def __init__(
@@ -190,7 +191,9 @@ class Recovery:
         if not (health.is_set and isinstance(verdict, JumpTo)):
             return verdict
         why = health.why_unwell(self.scope)
-        if why and not self.wait_until_well('is left for ' + verdict.way.down[-1].label, why):
+        if why and not self.wait_until_well(
+            'is left for ' + verdict.jump_path.entered_places[-1].label, why
+        ):
             return self.end_early()
         return verdict
 

@@ -30,7 +30,7 @@ class ContainerEnding(NamedTuple):
 class JumpTo(NamedTuple):
     """Go to a state, its userdata as the settings say."""
 
-    way: JumpPath
+    jump_path: JumpPath
     by: str = ''  # the expert's name
     text: str = ''
     # userdata keys of the container where the ways meet that survive a restore
@@ -74,7 +74,7 @@ def arrives_at(verdict: Verdict) -> Optional[TreeNode]:
     None means no other.
     """
     if isinstance(verdict, JumpTo):
-        return verdict.way.meets if verdict.way.left else None
+        return verdict.jump_path.meeting_node if verdict.jump_path.left_containers else None
     return verdict.level if isinstance(verdict, GiveUp) else None
 
 
@@ -86,7 +86,7 @@ def leads_to(verdict: Verdict) -> str:
     if arrives_at(verdict) is not None:
         return ''
     if isinstance(verdict, JumpTo):
-        return verdict.way.first
+        return verdict.jump_path.first_label
     if isinstance(verdict, Supersede):
         return verdict.outcome
     return verdict.ending.state or verdict.ending.outcome or ''

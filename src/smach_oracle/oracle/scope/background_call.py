@@ -44,8 +44,8 @@ class KeptThread:
 class BackgroundCall:
     """One call, in a copy of the caller's context.
 
-    Its result, or what it raised, counts until `leave`. `on_late_end` is then called in the thread
-    once the function has ended after all.
+    Its result, or what it raised, counts until `leave_behind`. `on_late_end` is then called in the
+    thread once the function has ended after all.
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class BackgroundCall:
         self.result: object = None
         self.error: Optional[BaseException] = None
         self.done = Flag()
-        self.left = False
+        self.was_left_behind = False
         self._function = function
         self._on_late_end = on_late_end
         self._lock = threading.Lock()
@@ -77,11 +77,11 @@ class BackgroundCall:
     def _run(self) -> None:
         self._context.run(self._work)
 
-    def leave(self) -> bool:
+    def leave_behind(self) -> bool:
         """Leave the thread to itself. Return False where it has ended after all."""
         with self._lock:
-            self.left = not self.done.is_set()
-            return self.left
+            self.was_left_behind = not self.done.is_set()
+            return self.was_left_behind
 
     def returned(self) -> object:
         """Return what the function has returned, or raise what it has raised."""
@@ -101,7 +101,7 @@ class BackgroundCall:
             self.error = err
         with self._lock:
             self.done.set()
-            late = self.left
+            late = self.was_left_behind
         if late and self._on_late_end is not None:
             self._on_late_end()
 

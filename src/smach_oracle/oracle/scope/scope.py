@@ -193,7 +193,7 @@ class Scope:
         period then in which to end, and is left to itself after that. Where this thread itself is
         interrupted, as by Ctrl-C, it has none.
 
-        :returns: how it has ended. `call.left` says whether it has not.
+        :returns: how it has ended. `call.was_left_behind` says whether it has not.
         """
         call.start()
         try:
@@ -202,13 +202,13 @@ class Scope:
                 stop()
         except BaseException:
             stop()
-            call.leave()
+            call.leave_behind()
             raise
         if end is not CallEnd.BY_ITSELF:
             try:
                 Scope(clock=self.clock).wait(grace_s, call.done)
             finally:
-                call.leave()
+                call.leave_behind()
         return end
 
     def _wait_for_end(self, done: Flag) -> CallEnd:
