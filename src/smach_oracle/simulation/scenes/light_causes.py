@@ -43,7 +43,7 @@ class LightCauses(Generic[Draft]):
 
     def _reflex(self, draft: Draft, generator: np.random.Generator) -> Draft:
         """Something shiny that moves throws light into the lens."""
-        seconds = _passing_seconds(generator)
+        seconds = passing_seconds(generator)
         text = 'a reflection dazzles the camera for {:.1f} s'.format(seconds)
         return self._dazzled(draft, generator, 'reflex', seconds, text)
 
@@ -66,7 +66,7 @@ class LightCauses(Generic[Draft]):
 
     def _shadow(self, draft: Draft, generator: np.random.Generator) -> Draft:
         """Somebody stands in the light."""
-        brightness, seconds = float(generator.uniform(0.3, 0.6)), _passing_seconds(generator)
+        brightness, seconds = float(generator.uniform(0.3, 0.6)), passing_seconds(generator)
         text = 'somebody stands in the light for {:.1f} s: {:.0f}% of it'.format(
             seconds, 100 * brightness
         )
@@ -81,7 +81,7 @@ class LightCauses(Generic[Draft]):
         )
 
 
-def _passing_seconds(generator: np.random.Generator) -> float:
+def passing_seconds(generator: np.random.Generator) -> float:
     """Draw how long, s, somebody stands in the light, or something that moves reflects it."""
     return float(min(60.0, generator.lognormal(np.log(4.0), 0.8)))
 

@@ -10,10 +10,9 @@ from smach_oracle.simulation.scenes.cause_draws import (
     ANOTHER,
     LASTING,
     PASSING,
-    cloud_minutes,
     drawn_kinds,
-    passing_seconds,
 )
+from smach_oracle.simulation.scenes.light_causes import cloud_minutes, passing_seconds
 from smach_oracle.simulation.scenes.tasks import TASKS, draw
 
 CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
