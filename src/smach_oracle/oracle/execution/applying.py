@@ -97,7 +97,7 @@ class Applying:
         """Return what is told of a jump that crosses containers."""
         lower = self._occasion.lower_verdict
         return {
-            **({} if lower is None else {'from': lower.failed}),
+            **({} if lower is None else {'from': lower.failed_path}),
             **({'to': way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
         }
 

@@ -27,11 +27,11 @@ from ..smach_private import current_label_of, current_state_of, states_of
 class Departure:
     """A verdict on its way from the container of a failure to the level that follows it."""
 
-    def __init__(self, verdict: Verdict, arrives_at: TreeNode, failed: str) -> None:
-        """`failed`: path of the failed state."""
+    def __init__(self, verdict: Verdict, arrives_at: TreeNode, failed_path: str) -> None:
+        """`failed_path`: that of the failed state."""
         self.verdict = verdict
         self.arrives_at = arrives_at
-        self.failed = failed
+        self.failed_path = failed_path
         self._repeated = (
             set(repeated_on(verdict.jump_path)) if isinstance(verdict, JumpTo) else set()
         )
@@ -41,7 +41,7 @@ class Departure:
         verdict = self.verdict
         if isinstance(verdict, GiveUp):
             verdict = verdict._replace(level=None)  # it is the one that ends
-        return LowerVerdict(verdict, self.failed, self.why_not)
+        return LowerVerdict(verdict, self.failed_path, self.why_not)
 
     def why_not(self) -> str:
         """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
@@ -180,7 +180,7 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
     path = others[0].path
     for label, link in zip(inner[-1].labels_from_parent, links_to(inner[-1])):
         path = '{}/{}'.format(path, label)
-        if not other.failed.startswith(path + '/'):
+        if not other.failed_path.startswith(path + '/'):
             return None if link.inner_container is nodes[0].machine else link.inner_container
     return None
 

@@ -151,7 +151,7 @@ class Step:
             record.label,
             FailureKind.TIME_LIMIT,
             told,
-            'was left, as {} failed'.format(departure.failed),
+            'was left, as {} failed'.format(departure.failed_path),
             None,
         )
         return occasions.arrived(

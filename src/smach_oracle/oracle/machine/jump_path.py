@@ -4,6 +4,7 @@ Userdata goes from container to container through the input and output keys of i
 """
 
 from typing import (
+    Collection,
     FrozenSet,
     Iterable,
     List,
@@ -23,7 +24,7 @@ from .places import ContainerLink, TreePlace, levels_above, links_to
 from .repeats import repeated_by_going_to, why_closed
 from .snapshots import UserdataGate, WriteWatch
 from .tree_node import TreeNode
-from .userdata_view import keys_after_jump, missing_keys
+from .userdata_view import missing_keys
 
 
 class JumpPath(NamedTuple):
@@ -104,10 +105,19 @@ def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
     node, label = way.entered_places[-1]
     if not states_of(node.machine)[label].get_registered_input_keys():
         return ()
-    keys = set(keys_after_jump(way.meeting_node, way.first_label, tuple(written)))
+    keys = set(_keys_after_jump(way.meeting_node, way.first_label, tuple(written)))
     for below in way.entered_places[1:]:
         keys = _keys_below(below.node, keys)
     return missing_keys(node.machine, label, keys)
+
+
+def _keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:
+    """Return the container's userdata keys as they would be after a jump to a state."""
+    now = data_of(node.machine.userdata)
+    snapshot = node.record(label).snapshot
+    if node.settings.userdata == 'keep' or snapshot is None:
+        return tuple(now)
+    return tuple(set(snapshot).difference(written).union(key for key in written if key in now))
 
 
 def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:

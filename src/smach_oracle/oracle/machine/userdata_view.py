@@ -1,6 +1,6 @@
 """The userdata of a state: the container's userdata by the state's own key names."""
 
-from typing import Collection, Iterable, Mapping, Tuple, cast
+from typing import Iterable, Mapping, Tuple, cast
 
 import smach
 
@@ -15,7 +15,6 @@ from ..smach_private import (
     states_of,
 )
 from .snapshots import UserdataGate, behind
-from .tree_node import TreeNode
 
 
 def write_constants(userdata: smach.UserData, constants: Mapping[str, object]) -> None:
@@ -107,12 +106,3 @@ def missing_keys(
     remapping = remapping_of(machine, label)
     inputs = states_of(machine)[label].get_registered_input_keys()
     return tuple(sorted(key for key in inputs if remapping.get(key, key) not in present))
-
-
-def keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tuple[str, ...]:
-    """Return the container's userdata keys as they would be after a jump to a state."""
-    now = data_of(node.machine.userdata)
-    snapshot = node.record(label).snapshot
-    if node.settings.userdata == 'keep' or snapshot is None:
-        return tuple(now)
-    return tuple(set(snapshot).difference(written).union(key for key in written if key in now))

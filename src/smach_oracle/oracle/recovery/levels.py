@@ -97,7 +97,7 @@ def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, Fai
     )
 
 
-def failure_above(
+def _failure_above(
     above: TreeNode, label: str, ending: ContainerEnding, text: str
 ) -> Optional[Failure]:
     """Return the failure that the end of a container is on the level above, else None.
@@ -148,7 +148,24 @@ def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNod
     return found
 
 
-def decide_above(
+def decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
+    """Return what the innermost level decides that does not ask, or None where all ask."""
+    below, ending = recovery.node, recovery.natural_ending()
+    for level in levels:
+        failure = _failure_above(
+            level, below.labels_from_parent[0], ending, '{}: {}'.format(below.path, recovery.cause)
+        )
+        if failure is None or recovery.is_over():
+            return None
+        decision = _decide_above(recovery, level, failure)
+        if decision is not None:
+            return decision
+        below = level
+        ending = natural_ending(level, failure)
+    return None
+
+
+def _decide_above(
     recovery: Recovery, level: TreeNode, failure: Failure
 ) -> Optional[Tuple[JumpTo, float]]:
     """Have a level above decide about its own state, as if that had failed.

@@ -38,7 +38,7 @@ class LowerVerdict(NamedTuple):
     """A verdict on a failure in a container below, which was left for this one."""
 
     verdict: Verdict
-    failed: str  # path of the state that failed
+    failed_path: str  # of the state that failed
     why_not: Callable[[], str]  # what prevents it by now, '' where nothing does
 
 

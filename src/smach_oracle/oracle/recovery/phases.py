@@ -6,7 +6,7 @@ which occasion is in a table of doc/executive_inside.md.
 """
 
 import threading
-from typing import Callable, Dict, FrozenSet, List, Optional, Tuple
+from typing import Callable, Dict, FrozenSet, Optional, Tuple
 
 import smach
 
@@ -18,7 +18,6 @@ from ..machine.health_watch import FAILED
 from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
 from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
-from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..scope.scope import standing_still
 from ..smach_private import Labels, Transitions, remapping_of, states_of, transitions_of
@@ -27,8 +26,7 @@ from .falling_back import fall_back, fallback_in_words
 from .inquiry import Inquiry
 from .levels import (
     Foreseen,
-    decide_above,
-    failure_above,
+    decided_above,
     foreseen_above,
     levels_that_may_decide,
     runs_as_precondition,
@@ -37,7 +35,7 @@ from .levels import (
 from .occasions import FirstStep, LowerVerdict
 from .recovery import Recovery
 from .stop import preempt_beside
-from .verdict import ContainerEnding, GiveUp, JumpTo, Supersede, Verdict, leads_to, natural_ending
+from .verdict import ContainerEnding, GiveUp, JumpTo, Supersede, Verdict, leads_to
 
 # -- what comes before a decision
 
@@ -172,7 +170,7 @@ def escalate(recovery: Recovery) -> Optional[Verdict]:
         else _asked_in_words(recovery)
     )
     tell_decision(recovery, (decider, facts._replace(asked=asked)))
-    outer = _decided_above(recovery, levels)
+    outer = decided_above(recovery, levels)
     if recovery.is_over():
         return recovery.end_early()
     if outer is not None:
@@ -205,23 +203,6 @@ def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
     if why.item_outcome:
         recovery.warn('its item is passed over with {}'.format(why.item_outcome))
     return recovery.give_up('{}: {}'.format(recovery.cause, why.text))
-
-
-def _decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
-    """Return what the innermost level decides that does not ask, or None where all ask."""
-    below, ending = recovery.node, recovery.natural_ending()
-    for level in levels:
-        failure = failure_above(
-            level, below.labels_from_parent[0], ending, '{}: {}'.format(below.path, recovery.cause)
-        )
-        if failure is None or recovery.is_over():
-            return None
-        decision = decide_above(recovery, level, failure)
-        if decision is not None:
-            return decision
-        below = level
-        ending = natural_ending(level, failure)
-    return None
 
 
 # -- the expert
