@@ -248,11 +248,10 @@ class Container(State):
         one.
         """
         runner = self._runner(label, state)
-        left = [each for each in (runner, state) if each.preempt_requested()]
-        if left:
-            for each in (runner, state):
-                each.recall_preempt()
-        return bool(left)
+        asked = runner.preempt_requested() or (runner is not state and state.preempt_requested())
+        if asked:
+            runner.recall_preempt()  # which takes that of its state back, too
+        return bool(asked)
 
     def _copy_output_keys(self, ud: Any, parent_ud: Any) -> None:
         """Copy this container's output keys to the parent's userdata. A missing one is a

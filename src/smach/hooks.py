@@ -40,7 +40,8 @@ class ExecutionHook(object):
     This one changes nothing. A container may have one hook, which is set while it is at rest.
 
     ``runners``: by label, what executes a state in its place. It needs the methods ``execute(ud)``,
-    ``request_preempt()``, ``preempt_requested()`` and ``recall_preempt()`` of a state. Whoever asks
+    ``request_preempt()``, ``preempt_requested()`` and ``recall_preempt()`` of a state. The last one
+    takes back what its state was asked, too. Whoever asks
     the container for its children gets the states.
     """
 

@@ -1,11 +1,15 @@
 """Concurrences and Iterators of a wrapped tree stay what their user holds."""
 
 import copy
+import os
 import pickle
+import signal
+import threading
 
 import pytest
 from branch_machines import Item, both, inside, iterator_over
 from machines import FakeExpert, Scripted, Watched, goto
+from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer, unwrap
@@ -257,3 +261,81 @@ def test_rates_of_the_branches_of_one_concurrence_are_kept_in_one_file(tmp_path)
     other = Watched(inside(both(Scripted(), Scripted())), settings={'rates_file': file}, name='TOP')
     assert other.run() == 'done'
     assert (other.rate('LEFT').failures, other.rate('RIGHT').failures) == (1, 2)
+
+
+def test_an_attribute_of_a_state_is_not_hidden_while_it_runs():
+    """A class of a user's reads its states where they are kept."""
+
+    class Reads(smach.Concurrence):
+        def execute(self, parent_ud=None):
+            found.extend((each.state, each.branch) for each in self._states.values())
+            return super().execute(parent_ud)
+
+    found = []
+    concurrence = both(Scripted(), Scripted())
+    concurrence.__class__ = Reads
+    for state in concurrence.get_children().values():
+        state.state, state.branch = 'open', 'left'
+    assert Watched(inside(concurrence)).run() == 'done'
+    assert found == [('open', 'left')] * 2
+
+
+def test_what_is_no_outcome_is_not_told_as_one():
+    class Counts(smach.Concurrence):
+        def execute(self, parent_ud=None):
+            super().execute(parent_ud)
+            return 5
+
+    concurrence = both(Scripted(), Scripted())
+    concurrence.__class__ = Counts
+    machine = Watched(inside(concurrence), recover=False)
+    with pytest.raises(smach.InvalidTransitionError):
+        machine.run()
+    ends = [each for each in machine.of(EventKind.CONTAINER_END) if each.path.endswith('ALL')]
+    assert [(each.outcome, each.text) for each in ends] == [('', '')]
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')),
+    reason="upstream's Concurrence waits for a branch without end",
+)
+def test_a_branch_that_a_thread_was_left_in_has_its_oracle_again():
+    """Ctrl-C leaves a state behind that has heeded its preempt and works on."""
+
+    def works_on(state, ud):
+        assert wait_for(state.preempt_requested)
+        state.service_preempt()
+        waits_for.wait(20.0)
+        return 'ok'
+
+    def presses_ctrl_c(state, ud):
+        os.kill(os.getpid(), signal.SIGINT)
+        assert wait_for(state.preempt_requested)
+        return 'preempted'
+
+    waits_for = threading.Event()
+    left = Scripted(works_on, 'aborted')
+    right = Scripted(presses_ctrl_c)
+    machine = Watched(inside(both(left, right)))
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            machine.run()
+        assert machine.run() == 'done'
+    finally:
+        waits_for.set()
+    assert (left.runs, right.runs) == (3, 2), 'its failure was not recovered in the branch'
+
+
+def test_a_branch_that_cannot_be_preempted_is_named(log):
+    class Refuses(Scripted):
+        def request_preempt(self):
+            raise ValueError('mine')
+
+    refuses = Refuses(lambda state, ud: wait_for(lambda: 'raised' in str(log)) and 'ok')
+    machine = Watched(
+        inside(both(refuses, Scripted('aborted'), child_termination_cb=lambda outcomes: True)),
+        settings=ASKS,
+    )
+    machine.run()
+    (said,) = [text for level, text in log if level == 'err' and 'mine' in text]
+    assert said.startswith("Preempting state 'LEFT' raised:") and 'Traceback' in said

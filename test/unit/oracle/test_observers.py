@@ -45,6 +45,21 @@ def test_an_observer_that_fails_is_named_once_and_gets_what_follows(log, error):
     assert 'broken' in said and 'TRIAL_START of TOP' in said and 'has missed this event' in said
 
 
+def test_an_observer_whose_class_cannot_be_asked_stops_nothing(log):
+    class Hides:
+        @property
+        def __class__(self):
+            raise RuntimeError('no class')
+
+        def __call__(self, event):
+            raise ValueError('no')
+
+    machine = machine_of(lambda label: None, 'A')
+    machine.events.observers.append(Hides())
+    assert machine.execute() == 'ok'
+    assert len([text for level, text in log if level == 'err']) == 1
+
+
 def test_each_observer_that_fails_is_named(log):
     def fails(name):
         def observer(event):

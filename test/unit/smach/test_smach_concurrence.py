@@ -39,6 +39,20 @@ def test_all_children_run_at_the_same_time_and_the_slowest_ends_it(said):
     assert "Concurrent state 'A' returned outcome 'done' on termination." in said('info')
 
 
+def test_each_child_is_asked_once_for_its_preempt():
+    class Counts(Fixed):
+        def preempt_requested(self):
+            asked.append('requested')
+            return True
+
+        def recall_preempt(self):
+            asked.append('recall')
+
+    asked = []
+    assert concurrence({'A': Counts('done')}).execute() == 'done'
+    assert asked == ['requested', 'recall']
+
+
 def test_the_satisfied_entry_with_most_conditions_wins():
     outcome_map = {
         'done': {'A': 'done'},

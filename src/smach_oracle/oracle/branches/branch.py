@@ -1,6 +1,7 @@
 """A branch: a plain state of a Concurrence or an Iterator, under an oracle of its own."""
 
 import threading
+import traceback
 from typing import Any, Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
 
 import smach
@@ -8,7 +9,6 @@ import smach
 from ..machine.execution import runs_around
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..machine.workers import request_preempt
 from ..recovery.verdict import outcome_of_early_end
 from ..smach_private import Transitions, data_of, remapping_in, state_ended, step_once
 
@@ -56,7 +56,8 @@ class Branch(smach.Container):
 
     def _be_at_rest(self) -> None:
         self._state_transitioning_lock = threading.RLock()
-        self._is_under_way = False
+        self._execution_number = 1  # of the container
+        self._under_way_in = 0  # that execution, 0 while it is not under way
         self._preempt_requested = False
         self._item: Optional[ItemPort] = None
         self._record: Optional[StateRecord] = None
@@ -82,6 +83,8 @@ class Branch(smach.Container):
         """Begin an execution of the Concurrence, for which there is no `item`, or Iterator."""
         node = self._oracle
         self._item = item
+        # a thread of an earlier execution may have been left behind in it
+        self._execution_number += 1
         # the same for all items
         self._is_watched = bool(
             node.in_force.limits_autonomy() or node.tree.resumed.concerns(node) or runs_around(node)
@@ -92,18 +95,21 @@ class Branch(smach.Container):
         by_label = self._oracle.records.by_label
         self._record = None if self._is_watched else by_label.get(self._initial_state_label)
 
+    def _is_under_way(self) -> bool:
+        return self._under_way_in == self._execution_number
+
     def end(self) -> None:
         """Note that an execution of the container is over: another thread may have one, too."""
-        if not self._is_under_way:
+        if not self._is_under_way():
             self._rest()
 
     def execute(self, userdata: smach.UserData) -> object:
         """Execute the state, and recover where it fails. Return its outcome."""
-        state = self.state
-        if self._is_under_way:  # in another thread
+        state, number = self.state, self._execution_number
+        if self._under_way_in == number:  # in another thread
             return state.execute(userdata)
         self._preempt_requested = False
-        self._is_under_way = True  # from now on it takes the requests itself
+        self._under_way_in = number  # from now on it takes the requests itself
         try:
             record, node = self._record, self._oracle
             tree, execution = node.tree, node.execution
@@ -161,7 +167,8 @@ class Branch(smach.Container):
             self._rest()
             raise
         finally:
-            self._is_under_way = False
+            if self._under_way_in == number:
+                self._under_way_in = 0
 
     def _run(self, end: Optional[End]) -> Optional[str]:
         """Execute the state, through the oracle where it fails, and return its outcome.
@@ -217,9 +224,9 @@ class Branch(smach.Container):
 
     def request_preempt(self) -> None:
         """Preempt the state, or its recovery."""
-        if not self._is_under_way:
+        if not self._is_under_way():
             self.state.request_preempt()
-        if self._is_under_way:  # it may have begun meanwhile, without a look at the request
+        if self._is_under_way():  # it may have begun meanwhile, without a look at the request
             self._is_preempt_passed_on = False
             self._preempt_requested = True
             with self._state_transitioning_lock:
@@ -237,7 +244,14 @@ class Branch(smach.Container):
             asked.recall_preempt()
         self._preempted_label, self._preempted_state = self._current_label, state
         self._is_preempt_passed_on = True
-        request_preempt(state)
+        try:
+            state.request_preempt()
+        except Exception:
+            smach.logerr(
+                'Preempting state {!r} raised:\n{}'.format(
+                    self._current_label, traceback.format_exc()
+                )
+            )
 
     def recall_preempt(self) -> None:
         """Take a request back."""

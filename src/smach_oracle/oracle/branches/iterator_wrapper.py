@@ -121,9 +121,9 @@ class IteratorWrapper(ContainerWrapper):
         parent = self.parent
         return take_snapshot(data, parent.in_force.deep_copy_keys, parent.warn_not_copied)
 
-    def _leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
+    def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
-        self._ended_with = None if self._is_left else outcome
+        self._ended_with = outcome if isinstance(outcome, str) and not self._is_left else None
         if self.tracked is not None and self.tracked.is_exhausted:
             # the author has gone on behind it where an oracle has given up
             for _, machine in machines_below(self.container):

@@ -59,7 +59,7 @@ class _BranchMethod:
         self._name = name
 
     def __get__(self, stand_in: Any, owner: Optional[type] = None) -> Any:
-        return self if stand_in is None else getattr(stand_in.branch, self._name)
+        return self if stand_in is None else getattr(stand_in.branch_of_stand_in, self._name)
 
 
 class BranchStandIn:
@@ -70,8 +70,9 @@ class BranchStandIn:
     """
 
     def __init__(self, branch: Branch, state: smach.State) -> None:
-        self.branch = branch
-        self.state = state
+        # names that no user's state has: they would hide its own
+        self.branch_of_stand_in = branch
+        self.state_of_stand_in = state
 
     execute = _BranchMethod('execute')
     request_preempt = _BranchMethod('request_preempt')
@@ -79,20 +80,21 @@ class BranchStandIn:
 
     def preempt_requested(self) -> bool:
         """Whether the branch or the state has a request that was not serviced."""
-        return bool(self.branch.preempt_requested() or self.state.preempt_requested())
+        branch, state = self.branch_of_stand_in, self.state_of_stand_in
+        return bool(branch.preempt_requested() or state.preempt_requested())
 
     def __getattr__(self, name: str) -> Any:
-        if name in ('branch', 'state'):  # while it is copied
+        if name in ('branch_of_stand_in', 'state_of_stand_in'):  # while it is copied
             raise AttributeError(name)
-        return getattr(self.state, name)
+        return getattr(self.state_of_stand_in, name)
 
     # that of the user's state: upstream's Iterator, and users, ask for it by `isinstance`
-    __class__ = cast(Any, property(lambda self: type(self.state)))
+    __class__ = cast(Any, property(lambda self: type(self.state_of_stand_in)))
 
 
 def _users_state(state: object) -> Any:
     """Return the user's state, whatever stands in for it."""
-    return state.state if type(state) is BranchStandIn else state
+    return state.state_of_stand_in if type(state) is BranchStandIn else state
 
 
 class _Asking:

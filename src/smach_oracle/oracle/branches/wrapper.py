@@ -143,14 +143,17 @@ class ContainerWrapper:
         for branch in self.branches.values():
             branch.begin(None)
 
-    def _leave(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
-        """Tell that the container has ended, and let its states execute by themselves again."""
+    def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
+        """Tell that the container has ended, and let its states execute by themselves again.
+
+        `outcome`: that of a user's own class may be anything.
+        """
         nodes = self.nodes()
         if nodes:
             nodes[0].emit(
                 EventKind.CONTAINER_END,
                 text=why_no_outcome(outcome, error),
-                outcome=outcome or '',
+                outcome=outcome if isinstance(outcome, str) else '',
             )
         for runner in self.runners.values():
             runner.end()

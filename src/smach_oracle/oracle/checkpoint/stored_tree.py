@@ -211,14 +211,14 @@ class _Reading:
             # of an earlier version the name says when
             execution, number = map(int, when or of.split(':'))
             self._visits.setdefault(path, {})[execution, number] = Visit(
-                str(state), str(outcome), VisitResult(int(result))
+                str(state), str(outcome), VisitResult(cast(int, result))
             )
         elif word == names.STATE:
             told = container.states[of] = _plain(value, cast(StoredState, {}))
             if 'mark' in told:  # of an earlier version
                 container.marks[of] = told['mark']
         elif word == names.MARK:
-            container.marks[of] = _plain(value, [0, 0, 0, 0])[:4]
+            container.marks[of] = _plain(value, [])[:4]
         elif word == names.AT:
             at = container.at = _plain(value, [])
             is_sent = fact.kind == names.EDIT

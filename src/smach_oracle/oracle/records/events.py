@@ -24,7 +24,7 @@ import threading
 from enum import IntEnum
 from time import time
 from types import MethodType
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, cast
 
 from smach_common.foreign import ends_program, error_text, repr_of
 
@@ -231,6 +231,7 @@ def _in_words(observer: Observer) -> Tuple[str, str]:
     """Return what the log calls an observer, and what its failure means for the user."""
     is_method = type(observer) is MethodType
     owner: object = getattr(observer, '__self__', None) if is_method else observer
-    if isinstance(owner, OwnObserver) and issubclass(type(owner), OwnObserver):
-        return owner.observer_name, owner.without_it
+    if issubclass(type(owner), OwnObserver):  # `isinstance` would ask a property of the user's
+        own = cast(OwnObserver, owner)
+        return own.observer_name, own.without_it
     return 'the observer {}'.format(repr_of(observer)), 'it has missed this event'
