@@ -5,6 +5,7 @@ from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
 
 import smach
 from smach_oracle.oracle import oracle_of
+from smach_oracle.oracle.machine.site import Route, route_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 
@@ -58,6 +59,13 @@ def test_an_outcome_registered_too_late_to_lead_anywhere_is_recovered_from():
     state.register_outcomes(['late'])
     assert machine.run() == 'done'
     assert kinds_of(machine) == [FailureKind.UNREGISTERED_OUTCOME]
+
+
+def test_an_outcome_that_leads_to_what_is_not_there_leads_nowhere():
+    machine = smach.StateMachine(['done'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'GONE'})
+    assert route_of(machine, 'A', 'ok') == Route('', False)
 
 
 def test_a_listed_outcome_is_a_failure_though_it_would_end_the_machine_well():

@@ -352,3 +352,14 @@ def test_context_variables_reach_the_worker():
     variable.set('set')
     limited(Scripted(lambda self, ud: seen.append(variable.get()) or 'ok'), **LIMITED).run()
     assert seen == ['set']
+
+
+def test_a_preempt_request_that_cannot_be_taken_back_is_told(log):
+    class Keeps(Scripted):
+        def recall_preempt(self):
+            raise ValueError('mine')
+
+    worker.recall_preempts(Keeps())
+    ((level, text),) = log
+    assert level == 'warn' and text.startswith('Could not take a preempt request back from')
+    assert 'mine' in text

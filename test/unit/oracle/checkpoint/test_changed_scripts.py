@@ -180,6 +180,14 @@ def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
     assert after.diary.count('begins')['C'] == 1
 
 
+def test_the_script_that_went_on_is_no_changed_one_later(folder):
+    before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
+    before.run(kill_at=points_of(folder, BEFORE) // 2)
+    after.run(kill_at=2)
+    told = KilledMachine(folder, RENAMED).run()  # it needs no map any more
+    assert told.get('outcome') == 'succeeded', told
+
+
 def test_killed_once_more_it_still_goes_on(folder):
     """The names are kept from the first moment of the second part on."""
     points = points_of(folder, BEFORE)
