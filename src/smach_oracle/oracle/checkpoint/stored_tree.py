@@ -218,7 +218,8 @@ class _Reading:
             if 'mark' in told:  # of an earlier version
                 container.marks[of] = told['mark']
         elif word == names.MARK:
-            container.marks[of] = _plain(value, [])[:4]
+            mark: List[int] = _plain(value, [])
+            container.marks[of] = mark[:4]
         elif word == names.AT:
             at = container.at = _plain(value, [])
             is_sent = fact.kind == names.EDIT
