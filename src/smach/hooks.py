@@ -41,8 +41,8 @@ class ExecutionHook(object):
 
     ``runners``: by label, what executes a state in its place. It needs the methods ``execute(ud)``,
     ``request_preempt()``, ``preempt_requested()`` and ``recall_preempt()`` of a state. The last one
-    takes back what its state was asked, too. Whoever asks
-    the container for its children gets the states.
+    takes back what its state was asked, too. Whoever asks the container for its children gets the
+    states.
     """
 
     def __init__(self) -> None:
