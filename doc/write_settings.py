@@ -43,17 +43,19 @@ class Row(NamedTuple):
 def rows() -> Dict[str, Row]:
     """Return every setting by its key."""
     return {
-        key: Row(plain(getattr(usual, key)), facts['text'], star)
+        key: Row(plain(key, getattr(usual, key)), facts['text'], star)
         for usual, star in ((Settings(), ''), (StateSettings(), ' *'))
         for key, facts in settings_of(type(usual)).items()
     }
 
 
-def plain(value: Any) -> Any:
+def plain(key: str, value: Any) -> Any:
     """Return a default as a file gives it."""
     if isinstance(value, tuple):
         return value[0] if value[-1:] == ('',) else list(value)  # 'stop', which names nothing
-    return {None: 0, Budget(): {}}[value] if value in (None, Budget()) else value
+    if value is None:
+        return 0 if key == 'time_limit_s' else None
+    return {} if value == Budget() else value
 
 
 def without_markdown(text: str) -> str:
@@ -88,8 +90,8 @@ def in_table(key: str, row: Row) -> str:
         default = 'none'
     elif isinstance(default, list):
         default = ', '.join(default)
-    elif isinstance(default, bool):
-        default = str(default).lower()
+    elif default is None or isinstance(default, bool):
+        default = yaml.safe_dump(default).split('\n')[0]
     elif isinstance(default, float):
         default = '{:g}'.format(default)
     return '| `{}`{} | {} | {} |\n'.format(key, row.star, default, row.text)

@@ -10,7 +10,7 @@ import re
 import sys
 from typing import List, Optional, Sequence
 
-from smach_oracle.oracle.settings.failing_outcomes import DEFAULT_FAILING_OUTCOMES, FailingNames
+from smach_oracle.oracle.settings.failing_outcomes import FORMER_FAILING_OUTCOMES, FailingNames
 from smach_oracle.oracle.settings.paths import path_of
 
 from . import table
@@ -74,9 +74,9 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         '--failing-outcomes',
         nargs='+',
         metavar='NAME',
-        default=list(DEFAULT_FAILING_OUTCOMES),
+        default=list(FORMER_FAILING_OUTCOMES),
         help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
-            ' '.join(DEFAULT_FAILING_OUTCOMES)
+            ' '.join(FORMER_FAILING_OUTCOMES)
         ),
     )
     return parser.parse_args(argv)

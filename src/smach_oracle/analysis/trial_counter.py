@@ -9,9 +9,13 @@ from typing import Any, Dict, Mapping, Optional, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by, last_stored
-from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingNames
+from smach_oracle.oracle.settings.failing_outcomes import (
+    FORMER_FAILING_OUTCOMES,
+    PREEMPTED,
+    FailingNames,
+)
 
-DEFAULT_FAILING = FailingNames()
+DEFAULT_FAILING = FailingNames(FORMER_FAILING_OUTCOMES)
 AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
 

@@ -9,7 +9,7 @@ import rosbag
 from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by
-from smach_oracle.oracle.settings.failing_outcomes import DEFAULT_FAILING_OUTCOMES, FailingNames
+from smach_oracle.oracle.settings.failing_outcomes import FORMER_FAILING_OUTCOMES, FailingNames
 
 from .observed_trial import ObservedTrial, TrialEvidence
 
@@ -17,7 +17,7 @@ _EVENTS = '/oracle/events'
 
 
 def recorded_trials(
-    path: str, failing_outcomes: Iterable[str] = DEFAULT_FAILING_OUTCOMES
+    path: str, failing_outcomes: Iterable[str] = FORMER_FAILING_OUTCOMES
 ) -> List[ObservedTrial]:
     """Return the trials of a bag, or of all bags in a folder, by the time of their beginning.
 

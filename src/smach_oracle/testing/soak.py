@@ -233,7 +233,7 @@ class _SoakRunner:
                 )
             )
 
-    def _failing_outcomes(self, machine: smach.StateMachine) -> Tuple[str, ...]:
+    def _failing_outcomes(self, machine: smach.StateMachine) -> Optional[Tuple[str, ...]]:
         if isinstance(machine, OracleContainer) and self._plan.settings is None:
             return oracle_of(machine).settings.failing_outcomes
         return as_settings(self._plan.settings, None).failing_outcomes

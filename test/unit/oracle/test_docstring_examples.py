@@ -15,6 +15,7 @@ from smach_oracle.oracle.decision import failure_rate, policy
 from smach_oracle.oracle.execution import wrapping
 from smach_oracle.oracle.machine import oracle
 from smach_oracle.oracle.records import events
+from smach_oracle.oracle.settings import failing_outcomes
 
 FINDER = doctest.DocTestFinder()
 SHOWN = [
@@ -26,6 +27,7 @@ SHOWN = [
     smach_oracle.oracle.register_codec,
     wrapping.unwrap,
     oracle.Oracle,
+    failing_outcomes.FailingNames,
     question.Expert,
     events,
     policy.Policy,

@@ -7,7 +7,6 @@ import smach
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.machine.site import Route, route_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
-from smach_oracle.oracle.settings.failing_outcomes import FailingNames
 
 
 def kinds_of(machine):
@@ -138,48 +137,6 @@ def test_a_listed_failure_with_a_transition_to_another_state_stays_with_its_auth
     machine = author_recovers({'states': {'PICK': {'failure_outcomes': ['aborted']}}})
     machine.run()
     assert machine.visits() == ['PICK', 'RESET', 'PICK']
-
-
-@pytest.mark.parametrize(
-    'name',
-    [
-        'aborted',
-        'ABORTED',
-        'Failed',
-        'grasp_failed',
-        'grasp-failure',
-        'graspFailed',
-        'IOError',
-        'pick_ERROR',
-        'place2Failed',
-    ],
-)
-def test_names_that_sound_like_a_failure(name):
-    assert name in FailingNames()
-
-
-@pytest.mark.parametrize(
-    'name',
-    [
-        'preempted',
-        'Preempted',
-        'done',
-        'unfailed',
-        'terror',
-        'failed_over',
-        '',
-        'aborted2',
-        'TERROR',
-    ],
-)
-def test_names_that_do_not_sound_like_a_failure(name):
-    assert name not in FailingNames()
-
-
-def test_preempted_is_no_failure_even_where_it_is_named():
-    assert 'preempted' not in FailingNames(['preempted'])
-    assert 'grasp_lost' in FailingNames(['lost'])
-    assert 'aborted' not in FailingNames([])
 
 
 def test_other_failing_outcomes_of_the_machine_can_be_named():

@@ -383,8 +383,8 @@ def test_the_question_says_the_items_of_all_levels():
 
 
 def test_a_machine_in_an_iterator_says_the_item_and_the_iterator_goes_on_with_it():
-    runs = Scripted('ok', 'lost', 'aborted', outcomes=('ok', 'lost', 'aborted'))
-    inner = chain_of(runs, outcomes=('done', 'lost', 'aborted'))
+    runs = Scripted('ok', 'gone', 'aborted', outcomes=('ok', 'gone', 'aborted'))
+    inner = chain_of(runs, outcomes=('done', 'gone', 'aborted'))
     iterator = smach.Iterator(
         outcomes=['finished', 'aborted'],
         input_keys=[],
@@ -395,7 +395,7 @@ def test_a_machine_in_an_iterator_says_the_item_and_the_iterator_goes_on_with_it
     )
     with iterator:
         smach.Iterator.set_contained_state(
-            'EACH', inner, loop_outcomes=['done'], final_outcome_map={'lost': 'aborted'}
+            'EACH', inner, loop_outcomes=['done'], final_outcome_map={'gone': 'aborted'}
         )
     expert = FakeExpert(goto('INNER'), goto('A'))
     machine = Watched(
@@ -407,7 +407,7 @@ def test_a_machine_in_an_iterator_says_the_item_and_the_iterator_goes_on_with_it
     assert machine.run() == 'done'
     assert [question.failed_state for question in expert.questions] == ['INNER', 'A']
     assert expert.questions[1].text == 'item 2 of 3'
-    assert runs.runs == 5, 'a, b lost, b failed, b, c'
+    assert runs.runs == 5, 'a, b gone, b failed, b, c'
 
 
 def test_a_precondition_of_an_item_is_a_function_or_a_state_and_its_check_runs():

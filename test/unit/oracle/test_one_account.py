@@ -99,13 +99,13 @@ def test_an_exception_is_passed_through_all_levels_once():
 
 def test_a_failure_of_the_outer_state_in_its_own_right_has_an_account_of_its_own():
     """The inner machine ends by its author's transition, in what the outer one lists."""
-    inner = smach.StateMachine(outcomes=['done', 'lost'])
+    inner = smach.StateMachine(outcomes=['done', 'gone'])
     with inner:
-        smach.StateMachine.add('LOOK', Scripted('lost', outcomes=('ok', 'lost')), {'ok': 'done'})
-    outer = smach.StateMachine(outcomes=['done', 'lost'])
+        smach.StateMachine.add('LOOK', Scripted('gone', outcomes=('ok', 'gone')), {'ok': 'done'})
+    outer = smach.StateMachine(outcomes=['done', 'gone'])
     with outer:
         smach.StateMachine.add('INNER', inner)
-    machine = Watched(outer, settings={'states': {'INNER': {'failure_outcomes': ['lost']}}})
+    machine = Watched(outer, settings={'states': {'INNER': {'failure_outcomes': ['gone']}}})
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'INNER')]
 

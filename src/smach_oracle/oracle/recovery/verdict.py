@@ -111,7 +111,7 @@ def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
         return _ending_by(failure.route)
     if failure.error is not None:
         return ContainerEnding(error=failure.error())
-    outcome = failing_outcome(node, node.in_force.failing.words)
+    outcome = failing_outcome(node, node.in_force.failing.first)
     if outcome is not None:
         return ContainerEnding(outcome=outcome)
     return ContainerEnding(

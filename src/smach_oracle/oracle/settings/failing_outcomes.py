@@ -1,11 +1,24 @@
 """Decides which outcomes sound like a failure. Pure, and without smach."""
 
 import re
-from typing import Dict, Iterable, Pattern
+from typing import Callable, Dict, Iterable, List, Optional, Pattern
 
-DEFAULT_FAILING_OUTCOMES = ('aborted', 'failed', 'failure', 'error')
 PREEMPTED = 'preempted'
+# the rule of earlier versions, by which their trials are counted. These come first of several
+FORMER_FAILING_OUTCOMES = ('aborted', 'failed', 'failure', 'error')
 _MOST_KNOWN = 1000  # names. A state may make up outcomes without end
+
+# what public programs call a failure, see doc/executive.md
+_FAILURES = frozenset(
+    FORMER_FAILING_OUTCOMES + ('fail', 'abort', 'timeout', 'timedout', 'unreachable', 'lost')
+)
+_SUCCESSES = frozenset(('succeeded', 'successful', 'success', 'completed'))
+_NEGATIONS = frozenset(('no', 'not', 'non', 'never', 'without'))
+# what follows the word where a failure is over, or was provided for: failed_over, error_cleared
+_SETTLED = frozenset(
+    ('over', 'safe', 'free', 'cleared', 'handled', 'recovered', 'resolved', 'fixed', 'ok')
+)
+_WORDS = re.compile(r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+')
 
 
 def is_preempted(outcome: object) -> bool:
@@ -14,19 +27,32 @@ def is_preempted(outcome: object) -> bool:
 
 
 class FailingNames:
-    """Tells whether an outcome names a failure: one of the given words, whole or as a suffix.
+    """Tells whether an outcome names a failure, by its own words or by those that a user has given.
 
-    A suffix begins after `_`, `-` or a change to a capital: grasp_failed, Grasp-Error, graspFailed,
-    IOError. Case is ignored otherwise. `preempted` is never a failure.
+    `first`: names that come first where a container has several such outcomes.
+
+    >>> by_name = FailingNames()
+    >>> [name in by_name for name in ('graspFailed', 'LOST_LINE', 'timed_out', 'not_completed')]
+    [True, True, True, True]
+    >>> [name in by_name for name in ('no_error', 'failed_over', 'preempted', 'blackboard')]
+    [False, False, False, False]
+    >>> 'lost_line' in FailingNames(['lost']), 'line_lost' in FailingNames(['lost'])
+    (False, True)
+
+    By its own words: it begins or ends with a word of failure, and none of its words turns that
+    around. It is also a failure if it says that something has not succeeded. A word begins after
+    what is no letter, and with a capital. Numbers do not count.
+
+    By words of a user: it is one of them, or ends with one after `_`, `-` or a change to a capital.
+    Case does not matter otherwise. `preempted` is never a failure.
     """
 
-    def __init__(self, words: Iterable[str] = DEFAULT_FAILING_OUTCOMES) -> None:
-        self.words = tuple(words)
-        self._whole = _pattern(r'(?:^|.*[_\-])(?:{})$', self.words, re.IGNORECASE | re.DOTALL)
-        capitalised = tuple(
-            word[:1].upper() + word[1:] for word in self.words if word[:1].isalpha()
+    def __init__(self, words: Optional[Iterable[str]] = None) -> None:
+        """`words`: those that a user has given. None means that the names' own words count."""
+        self.first = FORMER_FAILING_OUTCOMES if words is None else tuple(words)
+        self._names_failure: Callable[[str], bool] = (
+            _sounds_failing if words is None else _ends_with(self.first)
         )
-        self._camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
         self._known: Dict[str, bool] = {}  # of names that were asked about
 
     def __contains__(self, outcome: object) -> bool:
@@ -34,12 +60,46 @@ class FailingNames:
             return False
         known = self._known.get(outcome)
         if known is None:
-            known = not is_preempted(outcome) and bool(
-                self._whole.match(outcome) or self._camel.match(outcome)
-            )
+            known = not is_preempted(outcome) and self._names_failure(outcome)
             if len(self._known) < _MOST_KNOWN:
                 self._known[outcome] = known
         return known
+
+
+def sounds_like_success(outcome: str) -> bool:
+    """Whether an outcome is called a success: that is no failure wherever its author leads it."""
+    words = _words_of(outcome)
+    return bool(words) and words[-1] in _SUCCESSES and not _NEGATIONS.intersection(words)
+
+
+def _sounds_failing(outcome: str) -> bool:
+    words = _words_of(outcome)
+    if not words or words == ['pre', 'empted']:
+        return False
+    if 'unsuccessful' in words or 'unsucceeded' in words:
+        return True
+    if _NEGATIONS.intersection(words):
+        return words[-1] in _SUCCESSES and words[-2] in _NEGATIONS
+    return words[-1] in _FAILURES or (words[0] in _FAILURES and words[-1] not in _SETTLED)
+
+
+def _words_of(outcome: str) -> List[str]:
+    """Return the words of a name in lower case, with `time out` and `timed out` as one."""
+    words: List[str] = []
+    for word in _WORDS.findall(outcome):
+        word = word.lower()
+        if word == 'out' and words and words[-1] in ('time', 'timed'):
+            words[-1] = 'timeout'
+        else:
+            words.append(word)
+    return words
+
+
+def _ends_with(words: Iterable[str]) -> Callable[[str], bool]:
+    whole = _pattern(r'(?:^|.*[_\-])(?:{})$', words, re.IGNORECASE | re.DOTALL)
+    capitalised = tuple(word[:1].upper() + word[1:] for word in words if word[:1].isalpha())
+    camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
+    return lambda outcome: bool(whole.match(outcome) or camel.match(outcome))
 
 
 def _pattern(form: str, words: Iterable[str], flags: int) -> Pattern[str]:

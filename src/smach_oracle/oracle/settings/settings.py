@@ -23,7 +23,6 @@ from .checks import (
     setting,
     settings_of,
 )
-from .failing_outcomes import DEFAULT_FAILING_OUTCOMES
 from .health import HealthCondition, checked_health
 from .interfaces import START_LIMIT_S, InterfaceOffer, checked_interfaces
 from .names import Nested, check_name, checked_nested, did_you_mean, exactness, matches
@@ -121,11 +120,11 @@ class Settings:
         'how it decides ([policies.md](policies.md)): {}; with parameters a mapping with its '
         '`name`'.format(', '.join(POLICIES)),
     )
-    failing_outcomes: Tuple[str, ...] = setting(
-        DEFAULT_FAILING_OUTCOMES,
-        values.words,
-        'outcomes of containers that [are failures](executive.md#what-is-a-failure): whole, or as '
-        'a suffix',
+    failing_outcomes: Optional[Tuple[str, ...]] = setting(
+        None,
+        values.optional(values.words),
+        'outcomes of containers that are failures: a list of names, whole or as a suffix. null: by '
+        '[the words of their names](executive.md#what-is-a-failure)',
     )
     userdata: str = setting(
         'restore',
