@@ -19,6 +19,7 @@ import yaml
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'src'))
 
+from smach_oracle.oracle.decision.ways import Prices  # noqa: E402
 from smach_oracle.oracle.settings.checks import Budget, settings_of  # noqa: E402
 from smach_oracle.oracle.settings.settings import Settings, StateSettings  # noqa: E402
 
@@ -51,6 +52,8 @@ def rows() -> Dict[str, Row]:
 
 def plain(key: str, value: Any) -> Any:
     """Return a default as a file gives it."""
+    if isinstance(value, Prices):
+        return value._asdict()
     if isinstance(value, tuple):
         return value[0] if value[-1:] == ('',) else list(value)  # 'stop', which names nothing
     if value is None:
@@ -88,6 +91,10 @@ def in_table(key: str, row: Row) -> str:
     default = row.default
     if default in ('', [], {}):
         default = 'none'
+    elif isinstance(default, dict):
+        default = '`{}`'.format(
+            yaml.safe_dump(default, default_flow_style=True, width=WIDTH).strip()
+        )
     elif isinstance(default, list):
         default = ', '.join(default)
     elif default is None or isinstance(default, bool):

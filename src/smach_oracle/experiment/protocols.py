@@ -74,7 +74,12 @@ class ProtocolChoice(NamedTuple):
 
 def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the main table's parts: the compared variants, and the others in one replicate."""
-    others = [name for name in sorted(POLICIES) if name not in COMPARED + ('prose',)]
+    # those that go by ways are not in this protocol: they came after it
+    others = [
+        name
+        for name, policy in sorted(POLICIES.items())
+        if name not in COMPARED + ('prose',) and not policy.goes_by_ways
+    ]
     for task in choice.tasks:
         trials = TASKS[task][1]
         yield choice.part(

@@ -1,7 +1,7 @@
 """The names of facts in a store, and the phases of a container: the format of what is stored."""
 
 # of a container
-AT, HISTORY, EXECUTION = 'at', 'history', 'execution'
+AT, HISTORY, EXECUTION, STREAKS = 'at', 'history', 'execution', 'streaks'
 ASKED, ITEMS = 'asked', 'items'
 # how the names of such facts begin: of a visit, a state, the mark of one that has begun, a userdata
 # key, one that was kept out

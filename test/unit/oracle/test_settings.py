@@ -38,7 +38,7 @@ def test_the_defaults_are_those_of_the_design():
     ) == (10, 0.1, 0.4, 0.75, 5)
     assert (settings.policy, settings.userdata, settings.on_no_answer) == (
         'prose',
-        'restore',
+        None,
         ('stop', ''),
     )
     assert settings.still_running_factor == 10
@@ -55,7 +55,7 @@ def test_the_defaults_are_those_of_the_design():
             {'policy': 'guess'},
             'policy',
             'guess',
-            'algorithm1, always_ask, ladder, prose, random, restart, retry, step_back',
+            'algorithm1, always_ask, escalating, ladder, prose, random, restart, retry, step_back',
         ),
         ({'memory': 0}, 'memory', 0, 'whole number'),
         ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
@@ -268,6 +268,7 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'failure_outcomes',
         'author_recoveries',
         'userdata',
+        'cost',
         'deep_copy_keys',
         'time_limit_s',
         'grace_period_s',

@@ -4,6 +4,7 @@ from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
 
+from ..decision.ways import RESTORE
 from ..machine.items import TrackedItems
 from ..machine.nesting import children_of, machines_below
 from ..machine.snapshots import restore, take_snapshot
@@ -177,7 +178,7 @@ class IteratorWrapper(ContainerWrapper):
             self.tracked is not None
             and not self.tracked.is_finished
             and self.at_item is not None
-            and parent.settings.userdata == 'restore'
+            and parent.in_force.userdata == RESTORE
         ):
             restore(own, self.at_item, (), parent.in_force.deep_copy_keys)
         return {

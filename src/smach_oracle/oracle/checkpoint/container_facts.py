@@ -19,7 +19,7 @@ from typing import (
 import smach
 from smach_common.foreign import ends_program, text_of, type_name
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
-from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, VISIT
+from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, STREAKS, VISIT
 from smach_oracle.store.rows import Fact
 
 from ..machine.tree_node import TreeNode
@@ -61,6 +61,9 @@ class ContainerFacts:
         history = self._node.records.history
         yield from self._new_visits(history)
         yield from self._if_new(HISTORY, history.told())
+        streaks = self._node.records.streaks.told()
+        if streaks or STREAKS in self._stored:  # else there is none, as under most policies
+            yield from self._if_new(STREAKS, streaks)
         for label in labels:
             record = self._node.records.by_label.get(label)
             if record is not None:

@@ -113,6 +113,7 @@ class EntryPoint:
             node.records.history.take_over(
                 stored.visits, stored.visits_of_execution, stored.history, node.has
             )
+        node.records.streaks.take_over(stored.streaks)
 
     def enter(self, node: TreeNode) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""

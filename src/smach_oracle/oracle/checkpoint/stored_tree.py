@@ -26,6 +26,7 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..records.events import EventKind
 from ..records.history import Told
+from ..records.streaks import Told as Streaks
 from ..records.visits import Visit, VisitResult
 
 _Plain = TypeVar('_Plain')
@@ -57,6 +58,7 @@ class StoredContainer:
     at: List[object] = field(default_factory=list)
     execution: int = 0
     history: Optional[Told] = None
+    streaks: Streaks = field(default_factory=dict)
     visits: List[Visit] = field(default_factory=list)
     visits_of_execution: int = 0
     states: Dict[str, StoredState] = field(default_factory=dict)
@@ -232,6 +234,8 @@ class _Reading:
                 there.begun.add(str(at[0]))
         elif word == names.HISTORY:
             container.history = _plain(value, container.history)
+        elif word == names.STREAKS:
+            container.streaks = _plain(value, container.streaks)
         elif word == names.ASKED:
             container.asked = _plain(value, [])
         elif word == names.ITEMS:

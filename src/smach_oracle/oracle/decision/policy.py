@@ -7,10 +7,11 @@ doc/policies.md holds each policy as a table, cell by cell. The tests read those
 
 import random
 from enum import Enum
-from typing import Dict, Mapping, NamedTuple, Optional, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from .failure_rate import FailureClass
+from .ways import KEEP, RESTORE, Prices, StreakSoFar, Way
 
 
 class Action(str, Enum):
@@ -51,6 +52,20 @@ class Past(NamedTuple):
     restarts: int = 0  # of the top machine
     place: str = ''  # path of the state, and its visits in this trial, for a policy that draws
     trial: int = 0  # how many trials the machine has begun before this one
+    attempts: int = 0  # recoveries of this trial, from failures of all states
+    usual_minutes: Optional[float] = None  # the median of earlier trials. None: there was none
+
+
+class Menu(NamedTuple):
+    """What a policy that goes by ways chooses from. `ways`: those of the failure, in any order.
+
+    `has_expert`: somebody can be asked.
+    """
+
+    ways: Tuple[Way, ...] = ()
+    streak: StreakSoFar = StreakSoFar()
+    prices: Prices = Prices()
+    has_expert: bool = True
 
 
 class Situation(NamedTuple):
@@ -60,6 +75,7 @@ class Situation(NamedTuple):
     preconditions: Preconditions
     continuous: bool
     past: Past = Past()
+    menu: Menu = Menu()
 
 
 class Policy:
@@ -75,11 +91,14 @@ class Policy:
 
     `asks`: whether it may ask. A policy that may not ask ends the container where others would ask.
     `draws`: whether it wants to know the place of the failure (`Past.place`). `parameters`: the
-    values that may be set, with their defaults.
+    values that may be set, with their defaults. `goes_by_ways`: whether it chooses from the menu
+    (`order`), and not by a table (`decide`). `userdata`: that of its jumps, unless a user sets it.
     """
 
     name = ''
     asks = True
+    goes_by_ways = False
+    userdata = RESTORE
     restarts = False  # whether it may start the script over
     draws = False
     parameters: Mapping[str, float] = {}
@@ -103,6 +122,13 @@ class Policy:
     def may_do(self, situation: Situation) -> Tuple[Action, ...]:
         """Return all that `decide` may return. More than one action where that is drawn."""
         return (self.decide(situation),)
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the ways that it would go, in this order. It asks where none is left.
+
+        For a policy that goes by ways.
+        """
+        raise NotImplementedError
 
     def why(self, situation: Situation) -> str:
         """Say why it gives up or asks, as a clause, or '' where its cell says it all."""
@@ -325,9 +351,110 @@ class Ladder(Baseline):
         )
 
 
+# -- policies that go by ways
+
+
+class Escalating(Policy):
+    """Tries the cheapest way first and then dearer ones, each once in a streak, and then asks.
+
+    doc/ways.md says what a way costs, and when it does not pay. Microreboot escalates likewise: it
+    starts the smallest part again first (Candea et al., OSDI 2004).
+    """
+
+    name = 'escalating'
+    goes_by_ways = True
+    userdata = KEEP
+    most_of_streak = 4  # ways
+    most_of_trial = 8  # ways, of all states
+    most_trials = 3.0  # so many times an usual trial a streak may take
+    asking_minutes = 5.0  # of the robot, until a question is answered
+    expert_minutes = 2.0  # of the person who answers it
+    harm_chance = 1.0 / 30  # of each state that is entered again
+    # what is left of the hope that the state succeeds without any other one
+    hope = {FailureClass.LOW: 1.0, FailureClass.MODERATE: 0.5, FailureClass.HIGH: 0.25}
+    hope_after_each = 0.5  # way of the streak that has entered it again
+
+    def is_continuous(self, context: FailureContext) -> bool:
+        """Return whether the last failure was of the same state, which has not succeeded since."""
+        return context.failing_since
+
+    def runs_preconditions(self, failure_class: FailureClass) -> bool:
+        """Return False: they are a way."""
+        return False
+
+    def step_back_target(self, context: FailureContext) -> str:
+        """Return the last successful state before the failed one, as `prose` does."""
+        return context.initial if context.succeeded_before is None else context.succeeded_before
+
+    def decide(self, situation: Situation) -> Action:
+        """Return the action of the way that comes first."""
+        ways = self.order(situation)
+        if not ways:
+            return Action.ASK
+        return Action.REVISIT if ways[0].enters_again else Action.STEP_BACK
+
+    def may_do(self, situation: Situation) -> Tuple[Action, ...]:
+        """Return all of its actions: the menu is known only once a state has failed."""
+        return Action.REVISIT, Action.STEP_BACK, Action.ASK
+
+    def cost(self, way: Way, situation: Situation) -> float:
+        """Return what a way costs, in minutes of the robot."""
+        prices = situation.menu.prices
+        harm = prices.harm * self.harm_chance * len(way.repeats)
+        cost = prices.robot_minute * way.minutes + harm
+        if not way.enters_again:
+            return cost
+        entered = situation.menu.streak.times_entered_again
+        return cost / self.hope[situation.failure_class] / self.hope_after_each**entered
+
+    def price_of_asking(self, situation: Situation) -> float:
+        """Return what it costs to ask, or to lose the trial where there is nobody to ask."""
+        prices = situation.menu.prices
+        if not situation.menu.has_expert:
+            return prices.lost_trial
+        return (
+            prices.robot_minute * self.asking_minutes + prices.expert_minute * self.expert_minutes
+        )
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the ways that are open, untried and pay, the cheapest first."""
+        if self._spent(situation):
+            return ()
+        menu, limit = situation.menu, self.price_of_asking(situation)
+        priced = [(self.cost(way, situation), way) for way in self._left(menu)]
+        priced.sort(key=lambda each: each[0])
+        return tuple(way for cost, way in priced if cost < limit)
+
+    def _left(self, menu: Menu) -> List[Way]:
+        return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
+
+    def _spent(self, situation: Situation) -> str:
+        past, streak = situation.past, situation.menu.streak
+        if streak.attempts >= self.most_of_streak:
+            return '{} attempts have not helped'.format(streak.attempts)
+        if past.attempts >= self.most_of_trial:
+            return "the trial's {} attempts are spent".format(self.most_of_trial)
+        usual = past.usual_minutes
+        if usual is not None and streak.minutes > max(self.most_trials * usual, 1.0):
+            return 'its attempts take longer than {:g} trials'.format(self.most_trials)
+        return ''
+
+    def why(self, situation: Situation) -> str:
+        """Say why it asks."""
+        spent = self._spent(situation)
+        if spent or self.order(situation):
+            return spent
+        left = self._left(situation.menu)
+        if not left:
+            return (
+                'no other way is open' if not situation.menu.streak.tried else 'all ways are tried'
+            )
+        return 'no way is left that costs less than to ask'
+
+
 BASELINES: Tuple[Policy, ...] = (Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())
 POLICIES: Dict[str, Policy] = {
-    policy.name: policy for policy in (Algorithm1(), Prose(), *BASELINES)
+    policy.name: policy for policy in (Algorithm1(), Prose(), Escalating(), *BASELINES)
 }
 NO_PARAMETERS: Mapping[str, float] = {}
 

@@ -10,6 +10,7 @@ from ..asking.question import names
 from ..branches.iterator_wrapper import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
 from ..control.control import Jump
+from ..decision.ways import KEEP, RESTORE
 from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace, place_at
@@ -40,7 +41,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
     node, target = way.meeting_node, way.first_label
     forget_resumed(node)
     missing = missing_for(way, written)
-    snapshot = node.record(target).snapshot if node.settings.userdata == 'restore' else None
+    snapshot = node.record(target).snapshot if node.in_force.userdata == RESTORE else None
     if snapshot is not None:
         restore(data_of(node.machine.userdata), snapshot, written, node.in_force.deep_copy_keys)
     leave_for(node, target, way.entered_places[1:])
@@ -52,7 +53,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
             '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
         )
     node.record(target).go_down(way.entered_places[1:])
-    return JumpEntry(missing, 'keep' if snapshot is None else 'restore')
+    return JumpEntry(missing, KEEP if snapshot is None else RESTORE)
 
 
 def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:

@@ -135,6 +135,8 @@ def _end_trial(
     node.tree.control.end_trial()
     node.tree.workers.end_idle_threads()
     why = _trial_end(node, outcome, error)
+    if why is TrialEnd.OUTCOME:
+        node.tree.budget.end()
     if why is TrialEnd.KEPT:
         node.machine.service_preempt()
         for state in states_of(node.machine).values():
@@ -157,6 +159,11 @@ def _settings(node: TreeNode) -> Dict[str, object]:
     return {
         'policy': settings.policy,
         **{'policy.' + name: value for name, value in parameters},
+        **(
+            {'cost.' + name: value for name, value in settings.cost._asdict().items()}
+            if node.in_force.policy.goes_by_ways
+            else {}
+        ),
         'memory': defaults.memory,
         'estimator': defaults.estimator,
         'prior': defaults.prior,

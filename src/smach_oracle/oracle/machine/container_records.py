@@ -6,6 +6,7 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 from ..decision.failure_rate import base_of
 from ..decision.policy import FailureContext, Policy, policy_named
 from ..records.history import History
+from ..records.streaks import Streaks
 from ..records.visits import Visit, VisitMarks, VisitResult
 from ..settings.failing_outcomes import FailingNames
 from ..settings.names import Nested, Strictness
@@ -33,6 +34,7 @@ class ContainerSettings:
         self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
         self.failing = FailingNames(settings.failing_outcomes)
         self.deep_copy_keys = settings.deep_copy_keys
+        self.userdata = settings.userdata or self.policy.userdata  # after a jump
 
     def wrap_with(
         self,
@@ -91,6 +93,7 @@ class ContainerRecords:
         self.by_label: Dict[str, StateRecord] = {}
         self.history = History(history_length)
         self.marks = VisitMarks()
+        self.streaks = Streaks()
         # before a stop that was obeyed, each with the snapshot of its latest entry
         self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, object]]], ...]] = None
         self._is_drawn = False  # the next state is what the author drew after `preempted`
@@ -137,12 +140,14 @@ class ContainerRecords:
         """Forget what belongs to a trial. The rates stay."""
         self.history.begin_trial()
         self.marks.begin_trial()
+        self.streaks.begin_trial()
         for record in self.by_label.values():
             record.begin_trial()
 
-    def drop_snapshots(self) -> None:
+    def end_execution(self) -> None:
         """Let go of the userdata that snapshots refer to, and of entries that never came."""
         self.take_up_work()
+        self.streaks.end_execution()
         for record in self.by_label.values():
             record.snapshot = None
             if record.way_down or record.entered_by_oracle:
@@ -238,6 +243,7 @@ class ContainerRecords:
         twin.by_label = copy.deepcopy(self.by_label)
         twin.history = copy.deepcopy(self.history)
         twin.marks = VisitMarks()
+        twin.streaks = Streaks()
         twin.take_up_work()
         twin.oracle_edges = dict(self.oracle_edges)
         twin.to_come = dict(self.to_come)

@@ -119,7 +119,7 @@ class Execution:
             why = why_no_outcome(outcome, error)
             node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
         self.runs_around = ()
-        node.records.drop_snapshots()
+        node.records.end_execution()
 
     def begin_branch(self, has_ended: bool) -> bool:
         """Begin as that of a branch, which its Concurrence or Iterator may execute several times.

@@ -19,6 +19,7 @@ from typing import (
 
 import smach
 
+from ..decision.ways import KEEP
 from ..smach_private import constants_of, data_of, items_label_of, states_of
 from .places import ContainerLink, TreePlace, levels_above, links_to
 from .repeats import repeated_by_going_to, why_closed
@@ -115,7 +116,7 @@ def _keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tu
     """Return the container's userdata keys as they would be after a jump to a state."""
     now = data_of(node.machine.userdata)
     snapshot = node.record(label).snapshot
-    if node.settings.userdata == 'keep' or snapshot is None:
+    if node.in_force.userdata == KEEP or snapshot is None:
         return tuple(now)
     return tuple(set(snapshot).difference(written).union(key for key in written if key in now))
 

@@ -323,7 +323,7 @@ class TreeNode:
     def begin_once_more(self) -> None:
         """Begin an execution as the one that is there already."""
         self.execution.renew()
-        self.records.drop_snapshots()
+        self.records.end_execution()
         self.begin_execution()
 
     def begin_stepping(self) -> None:

@@ -1,12 +1,15 @@
 """Counts what is left of a trial's budget, for all containers of a tree."""
 
 import threading
-from typing import List, Optional, Sequence, Tuple
+from collections import deque
+from statistics import median
+from typing import Deque, List, Optional, Sequence, Tuple
 
 from ..scope.clock import Clock, PausableClock
 from ..settings.checks import Budget
 
 _LEAST_S = 0.001  # 0 s would be without end
+_TRIALS = 20  # of which the median is taken
 
 
 class TrialBudget:
@@ -19,6 +22,7 @@ class TrialBudget:
     def __init__(self, clock: Clock) -> None:
         self._lock = threading.Lock()
         self.time = PausableClock(clock)
+        self._usual_s: Deque[float] = deque(maxlen=_TRIALS)  # of earlier trials
         self.begin(Budget())
 
     def begin(self, limits: Budget) -> None:
@@ -27,6 +31,21 @@ class TrialBudget:
             self._limits = limits
             self._recoveries = self._questions = 0
             self.time.begin()
+
+    def end(self) -> None:
+        """Note how long a trial took that has ended by itself."""
+        self._usual_s.append(self.time.now())
+
+    @property
+    def usual_minutes(self) -> Optional[float]:
+        """The median of the latest trials of this program. None means there was none."""
+        times = list(self._usual_s)
+        return median(times) / 60.0 if times else None
+
+    @property
+    def recoveries(self) -> int:
+        """The recoveries that are spent."""
+        return self._recoveries
 
     def spent(self) -> List[float]:
         """Return the recoveries, the questions and the seconds spent."""

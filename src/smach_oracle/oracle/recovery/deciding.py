@@ -2,18 +2,22 @@
 
 from typing import Callable, Optional, Tuple
 
-from ..decision.policy import Action, Past, Preconditions, Situation
+from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes, going_would_repeat
+from ..decision.ways import Way, WayKind
 from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
 from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.repeats import has_visited
 from ..records.events import EventKind
 from ..records.facts import Decider
+from ..records.streaks import OpenStreak
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from ..smach_private import initial_label_of
+from .menu import menu_of, visited_before
 from .preconditions import why_not_met
 from .recovery import Decided, Recovery
+from .verdict import streak_of
 
 
 def decide_on_level(recovery: Recovery, why_not_above: Callable[[], str]) -> Decided:
@@ -55,6 +59,8 @@ def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Deci
         recovery.occasion.continuous,
         Past(record.recoveries, node.tree.restarts.count, drawn, node.tree.trials - 1),
     )
+    if policy.goes_by_ways:
+        return _choose(recovery, situation, why_not_above)
     action = policy.decide(situation)
     if action in (Action.ASK, Action.GIVE_UP):
         return Decider.POLICY, recovery.facts(action, blocked=policy.why(situation))
@@ -71,6 +77,62 @@ def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Deci
     facts = recovery.facts(action, target=_named(recovery, way), wait_s=policy.wait_s(situation))
     record.note_tried(goes(facts), reading.successes)
     return decider, facts
+
+
+def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[], str]) -> Decided:
+    """Choose the first way of the policy's order, whose preconditions are met."""
+    node, record, policy, budget = (
+        recovery.node,
+        recovery.record,
+        recovery.node.in_force.policy,
+        recovery.budget,
+    )
+    successes = record.totals[0]
+    streak = streak_of(node, record) or node.records.streaks.begin(
+        record.label,
+        OpenStreak(successes, budget.time.now(), visited_before(node, record.label)),
+    )
+    has_expert = node.tree.expert is not None and not budget.why_no_question()
+    past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)
+    paths = {
+        way._replace(blocked=_why_blocked(recovery, way, path, why_not_above)): path
+        for way, path in menu_of(node, record, streak.visited)
+    }
+    while True:
+        so_far = streak.so_far(budget.time.now())
+        recovery.menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
+        situation = situation._replace(past=past, menu=recovery.menu)
+        recovery.order = policy.order(situation)
+        if not recovery.order:
+            return Decider.POLICY, recovery.facts(Action.ASK, blocked=policy.why(situation))
+        way = recovery.order[0]
+        if way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
+            break
+        if recovery.stopped():
+            return Decider.POLICY, recovery.facts(Action.ASK)
+        streak.note(way.key, False)
+    spent = budget.take_recovery()
+    if spent:
+        recovery.order = ()
+        return Decider.BUDGET, recovery.facts(Action.ASK, blocked=spent)
+    recovery.jump_path = paths[way]
+    action = Action.REVISIT if way.enters_again else Action.STEP_BACK
+    target = _named(recovery, recovery.jump_path)
+    facts = recovery.facts(action, target=target, wait_s=way.wait_s)
+    record.note_tried(goes(facts), successes)
+    return Decider.POLICY, facts
+
+
+def _why_blocked(
+    recovery: Recovery, way: Way, path: JumpPath, why_not_above: Callable[[], str]
+) -> str:
+    """Say why a way of the menu is not open, '' where it is."""
+    return (
+        (why_not_above() if path.left_containers else '')
+        or why_repeats_on(recovery, path)
+        or closed_in_words(path, _named(recovery, path))
+        or (_function_that_runs(recovery) if way.kind is WayKind.PREPARE else '')
+    )
 
 
 def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePlace]]:
@@ -142,10 +204,13 @@ def _run_preconditions(recovery: Recovery) -> Preconditions:
     reading = recovery.reading
     if reading is not None and not policy.runs_preconditions(reading.failure_class):
         return Preconditions.NOT_MET
-    for spec in specs:
-        if recovery.stopped() or not _run_precondition(recovery, spec):
-            return Preconditions.NOT_MET
-    return Preconditions.MET
+    return Preconditions.MET if _are_brought_about(recovery) else Preconditions.NOT_MET
+
+
+def _are_brought_about(recovery: Recovery) -> bool:
+    """Run the preconditions up to one that cannot be met. Return whether there is none."""
+    specs = recovery.record.settings.preconditions
+    return all(not recovery.stopped() and _run_precondition(recovery, spec) for spec in specs)
 
 
 def _run_precondition(recovery: Recovery, spec: PreconditionSpec) -> bool:

@@ -1,6 +1,6 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
 
-from typing import Any, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import smach
 
@@ -202,7 +202,8 @@ def _decide_above(
     sentence = tell_decision(above, decided)
     record.recoveries += 1
     kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
-    return JumpTo(way, '', sentence, kept, level, restarts), facts.wait_s
+    jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
+    return jump, facts.wait_s
 
 
 def _foreseen_behind(level: TreeNode, failure: Failure) -> str:
@@ -223,6 +224,21 @@ def tell_decision(recovery: Recovery, decided: Decided) -> str:
             target=facts.target,
             continuous=recovery.occasion.continuous,
             text=sentence,
-            data={DECIDED_BY: decider.value},
+            data={DECIDED_BY: decider.value, **_menu_facts(recovery)},
         )
     return sentence
+
+
+def _menu_facts(recovery: Recovery) -> Dict[str, object]:
+    """Return what is recorded of a menu, and of the order in which the policy would go its ways."""
+    menu = recovery.menu
+    if menu is None:
+        return {}
+    return {
+        'order': [way.key for way in recovery.order],
+        'menu': [way._asdict() for way in menu.ways],
+        'streak': menu.streak._asdict(),
+        'has_expert': menu.has_expert,
+        'attempts': recovery.budget.recoveries,
+        'usual_minutes': recovery.budget.usual_minutes,
+    }

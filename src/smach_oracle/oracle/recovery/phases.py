@@ -143,13 +143,17 @@ def _follow_policy(recovery: Recovery, facts: DecisionFacts) -> Verdict:
     recovery.record.recoveries += 1
     restarts = facts.action is Action.RESTART
     written: FrozenSet[str] = frozenset() if restarts else way.kept(recovery.watch)
-    return _wait_and_jump(recovery, facts.wait_s, JumpTo(way, written=written, restarts=restarts))
+    jump = JumpTo(way, written=written, restarts=restarts, chosen=recovery.chosen)
+    return _wait_and_jump(recovery, facts.wait_s, jump)
 
 
 def _wait_and_jump(recovery: Recovery, wait_s: float, jump: JumpTo) -> Verdict:
     if wait_s and not recovery.has_waited(wait_s):
         return recovery.end_early()
-    return recovery.when_well(jump)
+    verdict = recovery.when_well(jump)
+    if isinstance(verdict, JumpTo) and verdict.chosen is not None:
+        verdict.chosen.note(bool(verdict.jump_path.left_containers))
+    return verdict
 
 
 # -- the levels above
@@ -223,6 +227,7 @@ def ask_expert(recovery: Recovery) -> Optional[Verdict]:
 
 def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
     node, budget = recovery.node, recovery.budget
+    node.records.streaks.end(recovery.record.label)
     deadline_s, recovery.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
     with standing_still(node.execution.runs_around), early_end.asking():

@@ -6,8 +6,9 @@ from typing import Any, Callable, List, Optional, Tuple
 import smach
 
 from ..asking.question import Answer
-from ..decision.policy import Action
+from ..decision.policy import Action, Menu
 from ..decision.sentence import DecisionFacts, cause_of
+from ..decision.ways import Way
 from ..machine.jump_path import JumpPath
 from ..machine.snapshots import WriteWatch
 from ..machine.state_record import RateReading, StateRecord
@@ -18,6 +19,7 @@ from ..scope.scope import Reason, Scope, standing_still
 from .occasions import Occasion
 from .stop import preempt_beside
 from .verdict import (
+    ChosenWay,
     ContainerEnding,
     GiveUp,
     JumpTo,
@@ -44,7 +46,8 @@ class Recovery:
     phases run in the machine's thread. `cancel` may be called from any thread.
 
     `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked.
-    `jump_path`: where it has decided to go. `decided`: to ask. `cause`: of the decision.
+    `jump_path`: where it has decided to go. `menu`, `order`: of a policy that goes by ways, and the
+    ways as it would go them, the first one now. `decided`: to ask. `cause`: of the decision.
     `begin_question`: is called before each question. `takes`: whether an answer comes in time, once
     it is here.
     """
@@ -59,6 +62,8 @@ class Recovery:
     reading: Optional[RateReading] = None
     running: Optional[smach.State] = None  # as a precondition
     jump_path: Optional[JumpPath] = None
+    menu: Optional[Menu] = None
+    order: Tuple[Way, ...] = ()
     why_no_answer = ''
 
     def __init__(
@@ -145,6 +150,11 @@ class Recovery:
             not_failed=self.failure.why_none,
             **fields,
         )
+
+    @property
+    def chosen(self) -> Optional[ChosenWay]:
+        """Return the way that it has decided for, None where there is no menu."""
+        return ChosenWay(self.node, self.record, self.order[0].key) if self.order else None
 
     # -- waits
 

@@ -10,11 +10,14 @@ from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 import smach
 
 from ..machine.jump_path import JumpPath
+from ..machine.places import levels_above
 from ..machine.site import Route, route_of
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
+from ..records.streaks import OpenStreak
 from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
-from ..smach_private import states_of
+from ..smach_private import current_label_of, states_of
 from .failure import Failure
 
 
@@ -27,6 +30,32 @@ class ContainerEnding(NamedTuple):
     obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
 
 
+class ChosenWay(NamedTuple):
+    """A way of the menu that a policy has chosen. `key`: the name by which its streak knows it."""
+
+    node: TreeNode
+    record: StateRecord
+    key: str
+
+    def note(self, leaves: bool) -> None:
+        """Note that it is gone now, also in the streaks of the states around.
+
+        `leaves`: the container, which ends by it.
+        """
+        streak = streak_of(self.node, self.record)
+        if streak is not None:
+            streak.note(self.key, leaves)
+        for level in levels_above(self.node):
+            around = streak_of(level, level.record(str(current_label_of(level.machine))))
+            if around is not None:
+                around.attempts += 1
+
+
+def streak_of(node: TreeNode, record: StateRecord) -> Optional[OpenStreak]:
+    """Return the streak of a state, None where none goes on."""
+    return node.records.streaks.of(record.label, record.totals[0])
+
+
 class JumpTo(NamedTuple):
     """Go to a state, its userdata as the settings say."""
 
@@ -37,6 +66,7 @@ class JumpTo(NamedTuple):
     written: FrozenSet[str] = frozenset()
     decided_by: Optional[TreeNode] = None  # the level above, as if its own state had failed
     restarts: bool = False  # with the userdata of the start, in all containers
+    chosen: Optional[ChosenWay] = None  # of the streak that it belongs to
 
 
 class Supersede(NamedTuple):

@@ -34,6 +34,7 @@ from typing import (
 from smach_common.foreign import error_text
 
 from ..decision.policy import POLICIES
+from ..decision.ways import Prices
 from ..errors import SettingsError
 from ..identity import attribute_of
 from ..number_checks import is_number, is_whole
@@ -395,3 +396,19 @@ def checked_budget(key: str, given: object) -> Budget:
     """
     limits = vars(given) if isinstance(given, Budget) else given
     return Budget(**checked(Budget, key + '.', section(key, limits, settings_of(Budget))))
+
+
+_PRICE = number(0, 1e6, 'a price from 0 to 1000000, in minutes of the robot')
+
+
+def checked_prices(key: str, given: object) -> Prices:
+    """Check for what things cost. A price that is not given has its default.
+
+    :raises SettingsError: naming key, value and what is allowed.
+    """
+    if isinstance(given, Prices):
+        given = given._asdict()
+    prices = section(key, given, Prices._fields)
+    return Prices(
+        **{name: _PRICE('{}.{}'.format(key, name), value) for name, value in prices.items()}
+    )

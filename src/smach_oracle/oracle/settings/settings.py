@@ -10,6 +10,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
 from ..decision.policy import POLICIES
+from ..decision.ways import Prices
 from ..errors import SettingsError
 from . import checks as values
 from .checks import (
@@ -126,11 +127,19 @@ class Settings:
         'outcomes of containers that are failures: a list of names, whole or as a suffix. null: by '
         '[the words of their names](executive.md#what-is-a-failure)',
     )
-    userdata: str = setting(
-        'restore',
-        values.choice(('restore', 'keep')),
+    userdata: Optional[str] = setting(
+        None,
+        values.optional(values.choice(('restore', 'keep'))),
         'the userdata [after a jump](executive.md#userdata-on-a-jump): `restore`: as it was when '
-        'the target was last entered; `keep`: as it is',
+        'the target was last entered; `keep`: as it is; unset: as is usual for the policy, '
+        '`keep` under `escalating`, else `restore`',
+    )
+    cost: Prices = setting(
+        Prices(),
+        values.checked_prices,
+        'what a policy that [goes by ways](ways.md#what-a-way-costs) reckons with, in minutes of '
+        'the robot: `{robot_minute: 1, expert_minute: 5, lost_trial: 60, harm: 30}`, or some of '
+        'these',
     )
     deep_copy_keys: Tuple[str, ...] = setting(
         (),
