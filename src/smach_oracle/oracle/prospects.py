@@ -1,6 +1,6 @@
 """Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
 
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import smach
 
@@ -43,7 +43,9 @@ class ContainerProspect(NamedTuple):
 
     `guarded`: the states at or below it that the oracle repeats by no decision of its own. A
     Concurrence or an Iterator whose plain states have oracles `has_branches`: it is no wrapped
-    container, and the oracle of each state knows that state alone.
+    container, and the oracle of each state knows that state alone. `unknown_ends`: those whose
+    names say neither success nor failure. Of a nested container they are those in which a failure
+    ends it, and that the container around it takes for none.
     """
 
     path: str
@@ -56,6 +58,7 @@ class ContainerProspect(NamedTuple):
     states: Tuple[StateProspect, ...]
     guarded: Tuple[str, ...] = ()
     has_branches: bool = False
+    unknown_ends: Tuple[str, ...] = ()
 
 
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
@@ -97,6 +100,7 @@ def _container(node: TreeNode, decides: bool) -> ContainerProspect:
     machine: Any = node.machine
     initial = initial_label_of(machine) or next(iter(node.labels()), '')
     shown = node.site.shown(node)
+    states = tuple(_state(node, label, decides) for label in node.labels())
     return ContainerProspect(
         node.path,
         shown,
@@ -105,10 +109,34 @@ def _container(node: TreeNode, decides: bool) -> ContainerProspect:
         node.settings,
         node.parent is None,
         node.tree.recover,
-        tuple(_state(node, label, decides) for label in node.labels()),
+        states,
         tuple(_guarded(node)),
         not node.site.is_container,
+        _unknown_ends(node, states),
     )
+
+
+def _unknown_ends(node: TreeNode, states: Sequence[StateProspect]) -> Tuple[str, ...]:
+    """Return the ends whose meaning is not known, of a nested container where that matters."""
+    if not node.site.is_container:
+        return ()
+    unknown = node.in_force.rule.unknown(node.site.shown(node).get_registered_outcomes())
+    if node.parent is None:
+        return unknown
+    if len(node.labels_from_parent) > 1:
+        return ()  # it lies in a Concurrence or an Iterator, whose author says what its ends mean
+    around, label = node.parent, node.labels_from_parent[0]
+    settings = around.settings_of(label)
+    return tuple(
+        end
+        for end in unknown
+        if any(_ends_by_failure(state, end) for state in states)
+        and not _outcome(around, label, end, settings).is_failure
+    )
+
+
+def _ends_by_failure(state: StateProspect, end: str) -> bool:
+    return any(each.is_failure and each.route == Route(end, False) for each in state.outcomes)
 
 
 def _guarded(node: TreeNode) -> Iterator[str]:

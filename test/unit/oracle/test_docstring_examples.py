@@ -15,7 +15,7 @@ from smach_oracle.oracle.decision import failure_rate, policy
 from smach_oracle.oracle.execution import wrapping
 from smach_oracle.oracle.machine import oracle
 from smach_oracle.oracle.records import events
-from smach_oracle.oracle.settings import failing_outcomes
+from smach_oracle.oracle.settings import failing_outcomes, failure_rule
 
 FINDER = doctest.DocTestFinder()
 SHOWN = [
@@ -33,6 +33,7 @@ SHOWN = [
     policy.Policy,
     failure_rate.FailureRate,
     failure_rate.ExponentialFailureRate,
+    failure_rule.FailureRule,
     smach_oracle.testing.Bench,
     smach_oracle.testing.expert,
     smach_oracle.testing.faults,

@@ -21,6 +21,7 @@ from smach_oracle.oracle.decision.failure_rate import (
 )
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records import rates_file
+from smach_oracle.oracle.settings.failure_rule import rule_in
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 
@@ -342,7 +343,8 @@ def test_the_record_of_a_trial_tells_how_to_go_on_after_it(tmp_path):
         0.4,
     )
     assert learned == json.loads(path.read_text())['containers']
-    rates_file.write_learned(str(tmp_path / 'again.json'), learned)
+    rule = rule_in(watch.events[0].data)
+    rates_file.write_learned(str(tmp_path / 'again.json'), learned, rule)
     assert (tmp_path / 'again.json').read_text() == path.read_text()
     plain = watched(Scripted('aborted'))
     plain.machine.execute()

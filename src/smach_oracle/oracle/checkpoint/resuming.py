@@ -19,6 +19,7 @@ from ..machine.tree_node import TreeNode, node_of
 from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
+from ..settings.failure_rule import RULE, FailureRule
 from ..smach_private import data_of, initial_label_of, set_current_label, states_of, transitions_of
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_marks import Marks, let_repeat, take_over_marks
@@ -44,6 +45,7 @@ class Resumption(NamedTuple):
     is_earlier: bool = False  # whether later moments of the trial are stored
     renamed: Mapping[str, str] = {}  # paths of states by those that they had
     structure: str = ''  # id of that which was stopped
+    rule: Optional[FailureRule] = None  # by which its failures were told, None: not known
 
     @property
     def age_s(self) -> float:
@@ -61,6 +63,13 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
             resumption.age_s,
         )
     )
+    rule = top.in_force.rule
+    if resumption.rule not in (None, rule):
+        smach.logwarn(
+            '{}: failures are told {} from now on, and were told {} before'.format(
+                top.path, rule, resumption.rule
+            )
+        )
     for change in resumption.changes:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
     for old, new in resumption.renamed.items():
@@ -75,6 +84,7 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
             'moment': resumption.moment,
             'stopped_s': round(resumption.age_s, 3),
             'changes': resumption.changes,
+            RULE: rule.as_data(),
         },
     )
 

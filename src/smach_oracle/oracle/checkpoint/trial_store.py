@@ -26,6 +26,7 @@ from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.checks import ASK, RESTART
+from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
 from .checkpointer import Checkpointer
 from .container_facts import fact_of
 from .resuming import Resumption, go_on
@@ -215,6 +216,7 @@ class TrialStore:
             is_earlier=bool(earlier),
             renamed=changed.names,
             structure=changed.before,
+            rule=rule_in(tree.whole) or (FORMER_RULE if tree.containers else None),
         )
 
     def begin_trial(self, resumed: Optional[Resumption]) -> None:
@@ -239,17 +241,22 @@ class TrialStore:
             self._writer,
             StoredTree({}, {}) if resumed is None else resumed.tree,
             resumed.moment if resumed and resumed.is_earlier else None,
-            self._facts_of_new_names(resumed),
+            self._first_facts(resumed),
         )
         GOALS.observers.append(self._observer.goal_begins)
         top.tree.keep_marks = self._observer.keep_marks
         top.events.observers.insert(0, self._observer)  # before who may hold the machine up
 
-    def _facts_of_new_names(self, resumed: Optional[Resumption]) -> List[Fact]:
-        """Return what is stored of a trial that goes on with other names of states."""
+    def _first_facts(self, resumed: Optional[Resumption]) -> List[Fact]:
+        """Return what is stored of the whole trial as it begins, or goes on.
+
+        One that goes on may do so by another rule of failures, and with other names of states.
+        """
+        rule = fact_of('', RULE, self._top.in_force.rule.as_data())
         if resumed is None or not resumed.renamed:
-            return []
+            return [rule]
         return [
+            rule,
             fact_of('', STRUCTURE, self._structure.id),
             fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)]),
         ]

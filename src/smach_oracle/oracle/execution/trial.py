@@ -23,8 +23,10 @@ from ..records.facts import ENDED_BY, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
+from ..settings.failure_rule import RULE
 from ..smach_private import initial_label_of, states_of
 from .jump_entry import may_start_over
+from .unknown_ends import tell_unknown_ends
 from .wrapping import adopt, bring_up_to_date
 
 _running: List[TreeNode] = []  # top nodes of the trials of this process
@@ -98,10 +100,12 @@ class ContainerRun(Execution):
                     'initial': [initial_label_of(node.machine)],
                     'recovers': node.tree.recover,
                     'settings': _settings(node),
+                    RULE: node.in_force.rule.as_data(),
                 },
             )
         else:
             tell_resumed(node, resumed)
+        tell_unknown_ends(node)
         node.tree.control.begin_trial()
         self._is_trial = True
         _running.append(node)

@@ -8,7 +8,7 @@ from ..decision.policy import FailureContext, Policy, policy_named
 from ..records.history import History
 from ..records.streaks import Streaks
 from ..records.visits import Visit, VisitMarks, VisitResult
-from ..settings.failing_outcomes import FailingNames
+from ..settings.failure_rule import FailureRule
 from ..settings.names import Nested, Strictness
 from ..settings.settings import ALLOW, RUN, Settings, StateSettings
 from .state_record import FastEdge, StateRecord
@@ -32,7 +32,8 @@ class ContainerSettings:
         self.of_machine = settings
         self._checked_states = -1  # number of states for which they were last checked
         self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
-        self.failing = FailingNames(settings.failing_outcomes)
+        self.rule = FailureRule(settings.failing_outcomes)
+        self.failing = self.rule.failing
         self.deep_copy_keys = settings.deep_copy_keys
         self.userdata = settings.userdata or self.policy.userdata  # after a jump
 

@@ -73,7 +73,7 @@ def save_rates(node: TreeNode) -> None:
     claim(path, _name(top), top.tree)
     try:
         with node.tree.rates_lock:
-            share_rates(path, _name(top), nodes_of(top.machine))
+            share_rates(path, _name(top), nodes_of(top.machine), top.in_force.rule)
     except OSError as err:
         node.warn_once(path, 'rates file {} cannot be written: {}'.format(path, err))
 
@@ -85,7 +85,7 @@ def load_rates(node: TreeNode) -> None:
         node.tree.rates_loaded = path
         if path:
             claim(path, _name(node), node.tree)
-        read_rates(path, _name(node), nodes_of(node.machine), is_shared=True)
+        read_rates(path, _name(node), nodes_of(node.machine), True, node.in_force.rule)
 
 
 def write_by_hand(node: TreeNode, path: str) -> None:
@@ -94,12 +94,14 @@ def write_by_hand(node: TreeNode, path: str) -> None:
     :raises OSError: where it cannot be written.
     """
     claim(path, _name(node.top()), node.tree)
-    write_rates(path, _name(node.top()), nodes_of(node.machine))
+    top = node.top()
+    write_rates(path, _name(top), nodes_of(node.machine), top.in_force.rule)
 
 
 def read_by_hand(node: TreeNode, path: str) -> None:
     """Take over what a file has of a machine."""
-    read_rates(path, _name(node.top()), nodes_of(node.machine), is_shared=False)
+    top = node.top()
+    read_rates(path, _name(top), nodes_of(node.machine), False, top.in_force.rule)
 
 
 def _name(top: TreeNode) -> str:

@@ -10,6 +10,8 @@ snapshot}}, "machines": {NAME: containers}}, with PATH relative to the top machi
 machines then, for programs that do not know "machines". A machine without a name goes by ''.
 "states": {NAME: {PATH: [STATE]}} has the states of each, also those without a result. "renamed":
 {NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
+"failure_rules": {NAME: RULE} has the rule by which failures of a machine were told when it last
+wrote. Files of earlier versions do not have it.
 """
 
 import contextlib
@@ -30,10 +32,12 @@ from typing import (
     Protocol,
     Sequence,
     Set,
+    Tuple,
 )
 
 import smach
 
+from ..settings.failure_rule import RULE, FailureRule, rule_in
 from .folder_locks import folder_lock, is_claimed
 
 FORMAT = 'smach_oracle rates'
@@ -47,6 +51,11 @@ FROM_NAMELESS = (
     'Rates file {}: {!r} is new there, and begins with what machines without a name '
     'have learned of its states'
 )
+OTHER_RULE = (
+    'Rates file {}: when the rates of {} were learned, failures were told {}. Now they are told '
+    '{}. The rates stay, and change with the coming results'
+)
+NOT_NAMED = 'by the rule of an earlier version, or by a list'
 States = Dict[str, Mapping[str, object]]  # what was learned, by label
 Containers = Dict[str, States]  # by path below the top machine
 Labels = Dict[str, List[str]]  # by path, too
@@ -56,12 +65,20 @@ class Machines(Dict[str, Containers]):
     """What a file has, by the names of machines, '' for one that has none."""
 
     def __init__(
-        self, content: Mapping[str, Containers], states: object = None, renamed: object = None
+        self,
+        content: Mapping[str, Containers],
+        states: object = None,
+        renamed: object = None,
+        rules: object = None,
     ) -> None:
-        """`states`: of each. `renamed`: new names, by those whose rates have gone there, too."""
+        """`states`: of each. `renamed`: new names, by those whose rates have gone there, too.
+
+        `rules`: by which failures were told, as plain data.
+        """
         super().__init__(content)
         self.states: Dict[str, Labels] = states if isinstance(states, dict) else {}
         self.renamed: Dict[str, str] = renamed if isinstance(renamed, dict) else {}
+        self.rules: Dict[str, object] = rules if isinstance(rules, dict) else {}
 
 
 class Learner(Protocol):
@@ -99,7 +116,7 @@ def learned_by(containers: Iterable[Learner]) -> Containers:
     return learned
 
 
-def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
+def share_rates(path: str, name: str, learners: Iterable[Learner], rule: FailureRule) -> None:
     """Add to `path` what a machine has learned, and take over what others have added.
 
     It is written atomically and durably.
@@ -108,19 +125,22 @@ def share_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
         file is then untouched, and the next call adds what this one did not.
     """
     learners, path = list(learners), os.path.realpath(path)
-    with _rewritten(path, name, learners) as machines:
+    with _rewritten(path, name, learners, rule) as machines:
         done = _merge(path, machines.setdefault(name, {}), learners)
     for share in done:
         share()
 
 
 @contextlib.contextmanager
-def _rewritten(path: str, name: str, learners: Sequence[Learner]) -> Iterator[Machines]:
+def _rewritten(
+    path: str, name: str, learners: Sequence[Learner], rule: FailureRule
+) -> Iterator[Machines]:
     """Have what the file has changed by the body, and written."""
     with folder_lock(os.path.dirname(path)):
         machines = _to_change(path)
         yield machines
         machines.states[name] = _labels(learners)
+        machines.rules[name] = rule.as_data()
         _write(path, machines, name)
 
 
@@ -146,7 +166,7 @@ def _merge(
     return done
 
 
-def write_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
+def write_rates(path: str, name: str, learners: Iterable[Learner], rule: FailureRule) -> None:
     """Write what a machine has learned to `path`, in place of what the file had of it.
 
     Atomically and durably. What the file has of other machines stays.
@@ -154,18 +174,23 @@ def write_rates(path: str, name: str, learners: Iterable[Learner]) -> None:
     :raises OSError: where it cannot be written. The old file is then untouched.
     """
     learners = list(learners)
-    with _rewritten(os.path.realpath(path), name, learners) as machines:
+    with _rewritten(os.path.realpath(path), name, learners, rule) as machines:
         machines[name] = learned_by(learners)
 
 
-def write_learned(path: str, containers: Mapping[str, States]) -> None:
+def write_learned(
+    path: str, containers: Mapping[str, States], rule: Optional[FailureRule] = None
+) -> None:
     """Write what `learned_by` returned, in place of all that the file had.
+
+    `rule`: by which failures were told, where that is known.
 
     :raises OSError: where it cannot be written. The old file is then untouched.
     """
     path = os.path.realpath(path)
     with folder_lock(os.path.dirname(path)):
-        _write(path, Machines({'': dict(containers)}), '')
+        rules = {} if rule is None else {'': rule.as_data()}
+        _write(path, Machines({'': dict(containers)}, rules=rules), '')
 
 
 def _write(path: str, machines: Machines, name: str) -> None:
@@ -178,6 +203,8 @@ def _write(path: str, machines: Machines, name: str) -> None:
     content = {'format': FORMAT, 'version': VERSION, 'containers': containers}
     if set(machines) != {''}:
         content['machines'], content['states'] = machines, machines.states
+    if machines.rules:
+        content['failure_rules'] = machines.rules
     if machines.renamed:
         content['renamed'] = machines.renamed
     text = json.dumps(content, indent=1, sort_keys=True)
@@ -204,7 +231,9 @@ def _write(path: str, machines: Machines, name: str) -> None:
             os.close(descriptor)
 
 
-def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: bool) -> None:
+def read_rates(
+    path: str, name: str, learners: Iterable[Learner], is_shared: bool, rule: FailureRule
+) -> None:
     """Take over the rates in `path`. `is_shared`: the machine adds to this file later.
 
     A machine that the file does not know takes over what a machine with the same states has
@@ -225,11 +254,13 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
         return
     if machines is None:
         return
-    containers = (
-        machines[name]
+    containers, told = (
+        (machines[name], machines.rules.get(name))
         if name in machines
         else _inherited(os.path.realpath(path), name, learners, is_shared)
     )
+    if any(containers.values()):
+        _tell_other_rule(path, name, told, rule)
     for learner in learners:
         for label, learned in containers.get(learner.relative_path, {}).items():
             try:
@@ -238,35 +269,42 @@ def read_rates(path: str, name: str, learners: Iterable[Learner], is_shared: boo
                 _tell_unusable(path, label, learner, err)
 
 
-def _inherited(path: str, name: str, learners: Sequence[Learner], is_shared: bool) -> Containers:
+def _inherited(
+    path: str, name: str, learners: Sequence[Learner], is_shared: bool
+) -> Tuple[Containers, object]:
     """Return what a machine had learned under its name before, nothing where there is none.
+
+    With it comes the rule by which failures were told then, as plain data.
 
     The file then has it under the new name, too, and no other machine takes it over. What machines
     without a name have learned stays for the others: in a file of an earlier version it may be of
     several.
     """
     containers: Containers = {}
+    told: object = None
     try:
         with folder_lock(os.path.dirname(path)):
             machines = _to_change(path)
             if name in machines:  # by now
-                return machines[name]
+                return machines[name], machines.rules.get(name)
             before = _name_before(path, machines, learners)
             if before is None:
-                return {}
-            containers = machines[before]
+                return {}, None
+            containers, told = machines[before], machines.rules.get(before)
             tell = smach.logwarn if before else smach.loginfo  # of before names
             tell((INHERITS if before else FROM_NAMELESS).format(path, name, before))
             if is_shared and before:
                 machines[name] = containers
                 machines.states[name] = _labels(learners)
                 machines.renamed[before] = name
+                if told is not None:
+                    machines.rules[name] = told
                 _write(path, machines, name)
     except OSError as err:
         smach.logwarn(
             'Rates file {}: that {!r} is new cannot be noted there: {}'.format(path, name, err)
         )
-    return containers
+    return containers, told
 
 
 def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> Optional[str]:
@@ -288,6 +326,18 @@ def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> 
     if not free:
         return None
     return max(free, key=lambda each: (bool(each), _size(machines[each])))
+
+
+def _tell_other_rule(path: str, name: str, told: object, rule: FailureRule) -> None:
+    """Say that failures were told by another rule when the rates of a machine were learned.
+
+    A file of an earlier version names no rule. It may have been the list that is set now.
+    """
+    before = rule_in({RULE: told})
+    if before != rule and (before is not None or rule.words is None):
+        tell = smach.loginfo if before is None else smach.logwarn
+        whose = repr(name) if name else 'its states'
+        tell(OTHER_RULE.format(path, whose, NOT_NAMED if before is None else before, rule))
 
 
 def _labels(learners: Sequence[Learner]) -> Labels:
@@ -339,7 +389,9 @@ def _read(path: str, then: str) -> Optional[Machines]:
             for containers in machines.values()
         ):
             raise ValueError('it has no states')
-        return Machines(machines, content.get('states'), content.get('renamed'))
+        return Machines(
+            machines, content.get('states'), content.get('renamed'), content.get('failure_rules')
+        )
     except FileNotFoundError:
         return None
     except (ValueError, RecursionError) as err:

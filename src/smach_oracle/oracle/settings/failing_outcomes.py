@@ -68,12 +68,12 @@ class FailingNames:
 
 def sounds_like_success(outcome: str) -> bool:
     """Whether an outcome is called a success: that is no failure wherever its author leads it."""
-    words = _words_of(outcome)
+    words = words_of(outcome)
     return bool(words) and words[-1] in _SUCCESSES and not _NEGATIONS.intersection(words)
 
 
 def _sounds_failing(outcome: str) -> bool:
-    words = _words_of(outcome)
+    words = words_of(outcome)
     if not words or words == ['pre', 'empted']:
         return False
     if 'unsuccessful' in words or 'unsucceeded' in words:
@@ -83,7 +83,7 @@ def _sounds_failing(outcome: str) -> bool:
     return words[-1] in _FAILURES or (words[0] in _FAILURES and words[-1] not in _SETTLED)
 
 
-def _words_of(outcome: str) -> List[str]:
+def words_of(outcome: str) -> List[str]:
     """Return the words of a name in lower case, with `time out` and `timed out` as one."""
     words: List[str] = []
     for word in _WORDS.findall(outcome):
