@@ -10,7 +10,7 @@ import re
 import sys
 from typing import List, Optional, Sequence
 
-from smach_oracle.oracle.settings.failing_outcomes import FORMER_FAILING_OUTCOMES, FailingNames
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
 from . import table
@@ -24,7 +24,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
     args = _parse(argv)
     try:
-        found = load_trials(args.folders, FailingNames(args.failing_outcomes))
+        listed = args.failing_outcomes
+        found = load_trials(args.folders, FailureRule(tuple(listed)) if listed else None)
         variants = count_variants(found.trials)
         sys.stdout.write(table.format_text(variants, found.trials))
         code = report_skipped(found.skipped)
@@ -74,10 +75,8 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         '--failing-outcomes',
         nargs='+',
         metavar='NAME',
-        default=list(FORMER_FAILING_OUTCOMES),
-        help='outcomes of a trial that are failures, whole or as a suffix (default: {})'.format(
-            ' '.join(FORMER_FAILING_OUTCOMES)
-        ),
+        help='outcomes of a trial that are failures, whole or as a suffix; all others are then '
+        'successes (default: each trial is counted by the rule that its record names)',
     )
     return parser.parse_args(argv)
 

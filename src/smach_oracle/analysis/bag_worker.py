@@ -15,6 +15,7 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import NOT_COUNTED, told_in_words
 from smach_oracle.oracle.records.short_text import shortened
+from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, RULE, rule_in
 
 from .bag_events import BagError, EventReader
 from .bag_machines import FailureImage, RecordedContainer, RecordedMachines, read_machines
@@ -102,6 +103,7 @@ def _summary(fields: Dict[str, Any]) -> TrialSummary:
             bags=(),
             failures_by_state=tuple((name, count) for name, count in fields['failures_by_state']),
             settings=tuple((name, value) for name, value in fields['settings']),
+            rule=rule_in({RULE: fields['rule']}) or FORMER_RULE,
         )
     )
 
@@ -146,7 +148,7 @@ def _fields(events: Sequence[Event]) -> Dict[str, Any]:
     if not all(math.isfinite(event.wall_time) for event in events):
         raise BagReadError('damaged, or no bag: an event has no time')
     summary = summarise(events)
-    fields = dict(summary._asdict(), ending=summary.ending.value)
+    fields = dict(summary._asdict(), ending=summary.ending.value, rule=summary.rule.as_data())
     for of_bags in ('bags', 'cause', 'truth'):
         del fields[of_bags]
     return fields

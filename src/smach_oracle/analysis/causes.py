@@ -2,6 +2,7 @@
 
 from typing import Dict, List, NamedTuple, Sequence
 
+from .trial_counter import TrialEnding
 from .trials import TrialSummary
 from .variants import find_variants
 
@@ -20,6 +21,7 @@ class CauseRow(NamedTuple):
     asked: int  # in which a question was put to the expert
     ended_in_success: int  # by the machine's outcome
     true_success: int  # by the world's judge
+    other_end: int = 0  # the machine's outcome says neither success nor failure
 
 
 def cause_rows(trials: Sequence[TrialSummary]) -> List[CauseRow]:
@@ -51,6 +53,7 @@ def _row(experiment: str, variant: str, kind: str, trials: Sequence[TrialSummary
         sum(trial.questions > 0 for trial in trials),
         sum(trial.succeeded for trial in trials),
         sum(trial.truth is not None and trial.truth.success for trial in trials),
+        sum(trial.ending is TrialEnding.OTHER for trial in trials),
     )
 
 
@@ -61,6 +64,9 @@ def format_causes(rows: Sequence[CauseRow]) -> str:
     heading = '  {:<{}}{:>8}{:>8}{:>11}{:>7}{:>11}{:>14}'.format(
         'cause', width, 'trials', 'failed', 'recovered', 'asked', 'succeeded', 'true success'
     )
+    has_other = any(row.other_end for row in rows)
+    if has_other:
+        heading += '{:>11}'.format('other end')
     variant = ('', '')
     for row in rows:
         if (row.experiment, row.variant) != variant:
@@ -81,5 +87,6 @@ def format_causes(rows: Sequence[CauseRow]) -> str:
                 row.ended_in_success,
                 row.true_success,
             )
+            + ('{:>11}'.format(row.other_end) if has_other else '')
         )
     return '\n'.join(lines + ['']) if lines else ''

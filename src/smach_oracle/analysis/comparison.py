@@ -27,6 +27,7 @@ from .pairing import (
     pairs_to_test,
 )
 from .reading import report_error
+from .trial_counter import TrialEnding
 from .trial_rows import LOST, TrialRow, read_rows
 
 SECONDS_PER_HOUR = 3600.0
@@ -40,6 +41,10 @@ SHARES: Tuple[Tuple[str, Happened], ...] = (
     ('false success', lambda row: row.ending == 'success' and not row.succeeded),
     ('lost or hung', lambda row: row.ending == LOST),
 )
+
+
+def _ended_otherwise(row: TrialRow) -> bool:
+    return row.ending == TrialEnding.OTHER.value
 
 
 class Share(NamedTuple):
@@ -80,7 +85,10 @@ def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
     parts: Dict[int, List[TrialRow]] = {}
     for row in rows:
         parts.setdefault(row.replicate, []).append(row)
-    return [_share(name, happened, rows, list(parts.values())) for name, happened in SHARES]
+    shares = list(SHARES)
+    if any(map(_ended_otherwise, rows)):
+        shares.append(('other end', _ended_otherwise))
+    return [_share(name, happened, rows, list(parts.values())) for name, happened in shares]
 
 
 def _share(

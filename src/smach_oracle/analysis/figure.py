@@ -18,6 +18,7 @@ DPI = 300
 # Okabe and Ito's palette: distinct with all common kinds of colour vision, and by their darkness
 # in grey.
 BLUE, VERMILLION, BLACK = '#0072B2', '#D55E00', '#000000'
+GREEN = '#009E73'
 STYLE = {
     'font.size': 7.5,
     'axes.labelsize': 8,
@@ -204,6 +205,7 @@ def _draw_needed(axes: Any, variants: Dict[bool, VariantSeries], legend_columns:
             'failed, with oracle',
             lambda trial: trial.ending is TrialEnding.FAILURE,
         ),
+        *_other_ends(variants),
         (
             False,
             BLACK,
@@ -231,6 +233,19 @@ def _draw_needed(axes: Any, variants: Dict[bool, VariantSeries], legend_columns:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True, steps=(1, 2, 5, 10)))
     axes.set_ylabel('Trials (cumulative)')
     _legend_above(axes, legend_columns)
+
+
+def _other_ends(variants: Dict[bool, VariantSeries]) -> List[Any]:
+    """Return the lines of trials whose ends say neither success nor failure, where there are."""
+    lines = (
+        (True, GREEN, (0, (1, 1)), 1.2, 'other end, with oracle', _ended_otherwise),
+        (False, GREEN, (0, (3, 1.5)), 0.9, 'other end, without oracle', _ended_otherwise),
+    )
+    return [line for line in lines if any(map(_ended_otherwise, variants[line[0]].trials))]
+
+
+def _ended_otherwise(trial: TrialSummary) -> bool:
+    return trial.ending is TrialEnding.OTHER
 
 
 def _legend_above(axes: Any, columns: int) -> None:

@@ -5,7 +5,10 @@ Definitions: doc/statistics.md.
 
 import csv
 import json
+from collections import Counter
 from typing import IO, Any, Dict, List, Optional, Sequence
+
+from smach_oracle.oracle.settings.failure_rule import BY_NAME_VERSION, FORMER_RULE, RULE
 
 from .bag_events import SkippedBag
 from .causes import cause_rows, format_causes
@@ -15,6 +18,7 @@ from .variants import (
     ANSWERED,
     ENDED_IN_FAILURE,
     NOT_ANSWERED,
+    OTHER_END,
     RECOVERIES,
     TRUE_SUCCESS,
     Count,
@@ -32,7 +36,7 @@ def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary
     lines = _paper_table(variants)
     for variant in variants:
         lines += [''] + _variant_lines(variant)
-    return '\n'.join(lines) + '\n' + format_causes(cause_rows(trials))
+    return '\n'.join(lines) + '\n' + format_causes(cause_rows(trials)) + _rules(trials)
 
 
 def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
@@ -45,6 +49,8 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
         'Ended in failure',
     ]
     names = [RECOVERIES, ANSWERED, ENDED_IN_FAILURE]
+    if any(variant.has(OTHER_END) for variant in variants):
+        headings, names = headings + ['Other end'], names + [OTHER_END]
     if any(variant.truth_known for variant in variants):
         headings, names = headings + ['True success'], names + [TRUE_SUCCESS]
     rows = [headings]
@@ -72,6 +78,8 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
 
 def _share(variant: VariantCounts, name: str) -> str:
     found = [count for count in variant.counts if count.name == name]
+    if name == OTHER_END and not found:
+        return '0 (0.0%)'
     return '{} ({:.1f}%)'.format(found[0].trials, 100 * found[0].share) if found else 'unknown'
 
 
@@ -119,6 +127,22 @@ def _count_line(count: Count) -> str:
     ).rstrip()
 
 
+def _rules(trials: Sequence[TrialSummary]) -> str:
+    """Return the rules by which failures were told, where the trials have several."""
+    counts = Counter(trial.rule for trial in trials)
+    if len(counts) < 2 and not any(rule.is_of_later_version for rule in counts):
+        return ''
+    lines = ['', 'These trials told failures by different rules. Each is counted by its own:']
+    if len(counts) < 2:
+        lines = ['', 'A later version of smach_oracle has recorded these trials:']
+    for rule, number in sorted(counts.items(), key=lambda each: str(each[0])):
+        note = ''
+        if rule.is_of_later_version:
+            note = ' (not known here: counted as version {})'.format(BY_NAME_VERSION)
+        lines.append('  {:>6} {}{}'.format(number, rule, note))
+    return '\n'.join(lines) + '\n'
+
+
 def over_replicates(count: Count) -> str:
     """Return the interval over replicates in words.
 
@@ -155,8 +179,12 @@ def _variant_data(variant: VariantCounts) -> Dict[str, Any]:
 
 
 def _trial_data(trial: TrialSummary) -> Dict[str, Any]:
+    data = trial._asdict()
+    del data['rule']
+    if trial.rule != FORMER_RULE:
+        data[RULE] = trial.rule.as_data()
     return dict(
-        trial._asdict(),
+        data,
         ending=trial.ending.value,
         failures_by_state=dict(trial.failures_by_state),
         settings=dict(trial.settings),
@@ -191,6 +219,7 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             'unwell_s',
             'resumed',
             'down_s',
+            'rule',
         )
     ]
     writer = csv.writer(target, lineterminator='\n')

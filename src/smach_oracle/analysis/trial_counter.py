@@ -9,13 +9,13 @@ from typing import Any, Dict, Mapping, Optional, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by, last_stored
-from smach_oracle.oracle.settings.failing_outcomes import (
-    FORMER_FAILING_OUTCOMES,
-    PREEMPTED,
-    FailingNames,
+from smach_oracle.oracle.settings.failure_rule import (
+    FORMER_RULE,
+    EndMeaning,
+    FailureRule,
+    rule_in,
 )
 
-DEFAULT_FAILING = FailingNames(FORMER_FAILING_OUTCOMES)
 AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
 
@@ -25,21 +25,31 @@ class TrialEnding(Enum):
     SUCCESS = 'success'
     FAILURE = 'failure'
     PREEMPTED = 'preempted'  # by request, or by a shutdown or Ctrl-C
+    OTHER = 'other'  # it ended, and nothing says whether that is a success
     UNFINISHED = 'unfinished'  # no end was recorded, it still runs, or is kept to go on later
+
+
+_ENDINGS = {
+    EndMeaning.SUCCESS: TrialEnding.SUCCESS,
+    EndMeaning.FAILURE: TrialEnding.FAILURE,
+    EndMeaning.PREEMPTED: TrialEnding.PREEMPTED,
+    EndMeaning.UNKNOWN: TrialEnding.OTHER,
+}
 
 
 class TrialCounter:
     """The counts of one trial so far. Its events are added in the order of their numbers."""
 
-    def __init__(self, failing: FailingNames = DEFAULT_FAILING) -> None:
-        """`failing`: outcomes of the top machine that are failures."""
+    def __init__(self, rule: Optional[FailureRule] = None) -> None:
+        """`rule`: says which outcomes of the top machine are failures. None: that of its record."""
         self.trial_id = ''
         self.experiment = ''  # path of the top machine
         self.start_time = 0.0  # s since the epoch, the machine's own clock
         self.recoveries = 0  # of the oracle, without the expert
         self.unwell_s = 0.0  # in which it waited until the robot was well
         self._unwell_since_s: Optional[float] = None
-        self._failing = failing
+        self._rule = rule
+        self._recorded_rule: Optional[FailureRule] = None
         self._start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
         self._earliest_s = self._latest_s = self._before_s = 0.0
@@ -89,10 +99,18 @@ class TrialCounter:
         end = self._end
         if end is None or ended_by(end, self._state_seen) is TrialEnd.KEPT:
             return TrialEnding.UNFINISHED
-        if end.outcome.lower() == PREEMPTED or (not end.outcome and self._was_stopped(end)):
-            return TrialEnding.PREEMPTED
-        failed = not end.outcome or end.outcome in self._failing  # none: it ended in an exception
-        return TrialEnding.FAILURE if failed else TrialEnding.SUCCESS
+        if end.outcome:
+            return _ENDINGS[self.rule.meaning(end.outcome)]
+        # otherwise it ended in an exception
+        return TrialEnding.PREEMPTED if self._was_stopped(end) else TrialEnding.FAILURE
+
+    @property
+    def rule(self) -> FailureRule:
+        """Return the rule that says what its end means.
+
+        It is that of its record. A record of an earlier version names none.
+        """
+        return self._rule or self._recorded_rule or FORMER_RULE
 
     @property
     def outcome(self) -> str:
@@ -133,10 +151,12 @@ class TrialCounter:
         if event.kind == EventKind.TRIAL_START:
             self.experiment = _experiment(event)
             self._start = event.data if isinstance(event.data, Mapping) else {}
+            self._recorded_rule = rule_in(event.data)
         elif event.kind == EventKind.RESUMED:
             self.resumed += 1
             self._count_down_time(event)
             self._end = None  # it was stopped, and has not ended
+            self._recorded_rule = rule_in(event.data) or self._recorded_rule
         elif event.kind == EventKind.TRIAL_END:
             self._end = self._end or event
         elif event.kind == EventKind.STATE_START:

@@ -58,13 +58,14 @@ class TrialRow(NamedTuple):
     def succeeded(self) -> bool:
         """Whether it truly ended in success: by machine and judge, by the machine if none judged.
 
-        Another object than the one that was meant is no success.
+        Another object than the one that was meant is no success. Where the machine's outcome says
+        neither success nor failure, the judge alone says it.
         """
-        return (
-            self.ending == TrialEnding.SUCCESS.value
-            and self.true_success is not False
-            and not self.wrong_object
-        )
+        if self.wrong_object:
+            return False
+        if self.ending == TrialEnding.OTHER.value:
+            return self.true_success is True
+        return self.ending == TrialEnding.SUCCESS.value and self.true_success is not False
 
     @property
     def intervened(self) -> bool:

@@ -4,11 +4,11 @@ import os
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event
-from smach_oracle.oracle.settings.failing_outcomes import FailingNames
+from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 
 from .bag_events import BagError, RecordedCause, SkippedBag
 from .reading import read_bags
-from .trial_counter import DEFAULT_FAILING, TrialCounter, TrialEnding
+from .trial_counter import TrialCounter, TrialEnding
 from .truth import Truth, TruthFiles
 
 
@@ -36,6 +36,7 @@ class TrialSummary(NamedTuple):
     unwell_s: float = 0.0  # in which it waited until the robot was well
     resumed: int = 0  # how often it went on after its program was stopped
     down_s: float = 0.0  # of `duration_s`: in which its program did not run
+    rule: FailureRule = FORMER_RULE  # by which its end is a success or a failure
 
     @property
     def replicate(self) -> str:
@@ -55,8 +56,10 @@ class Trials(NamedTuple):
     skipped: List[SkippedBag]
 
 
-def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) -> Trials:
+def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Trials:
     """Read all bags in folders and below. Those that cannot be used are listed with the reason.
+
+    :param rule: for all trials. None means that each is counted by the rule of its record.
 
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.
@@ -74,7 +77,7 @@ def load_trials(places: Sequence[str], failing: FailingNames = DEFAULT_FAILING) 
                 ', '.join(places), count + len(skipped), reasons
             )
         )
-    trials = gathered.summaries(failing)
+    trials = gathered.summaries(rule)
     return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
 
 
@@ -92,11 +95,11 @@ class _TrialEvents:
             self._bags.setdefault(event.trial_id, {})[path] = None
         self._causes.update(causes)
 
-    def summaries(self, failing: FailingNames) -> List[TrialSummary]:
+    def summaries(self, rule: Optional[FailureRule]) -> List[TrialSummary]:
         truths = TruthFiles()
         found = []
         for trial_id, by_number in self.events.items():
-            trial = summarise(list(by_number.values()), tuple(self._bags[trial_id]), failing)
+            trial = summarise(list(by_number.values()), tuple(self._bags[trial_id]), rule)
             cause = self._causes.get(trial_id)
             truth = truths.of(trial.replicate, cause.seed if cause else None)
             found.append(trial._replace(cause=cause, truth=truth))
@@ -104,10 +107,10 @@ class _TrialEvents:
 
 
 def summarise(
-    events: Iterable[Event], bags: Tuple[str, ...] = (), failing: FailingNames = DEFAULT_FAILING
+    events: Iterable[Event], bags: Tuple[str, ...] = (), rule: Optional[FailureRule] = None
 ) -> TrialSummary:
-    """Sum up the events of one trial, at least one, in any order."""
-    counter = TrialCounter(failing)
+    """Sum up the events of one trial, at least one, in any order. `rule`: as in `load_trials`."""
+    counter = TrialCounter(rule)
     for event in sorted(events, key=lambda event: event.seq):
         counter.add(event)
     return TrialSummary(
@@ -129,6 +132,7 @@ def summarise(
         unwell_s=counter.unwell_s,
         resumed=counter.resumed,
         down_s=counter.down_s,
+        rule=counter.rule,
     )
 
 

@@ -16,6 +16,7 @@ QUESTIONS = 'questions to the expert'
 ANSWERED = 'answered'
 NOT_ANSWERED = 'not answered'
 ENDED_IN_FAILURE = 'ended in failure'
+OTHER_END = 'other end'
 TRUE_SUCCESS = 'true success'
 _BY_EVENTS: Tuple[Tuple[str, Callable[[TrialSummary], int]], ...] = (
     ('failures of states', lambda trial: trial.failures),
@@ -27,13 +28,17 @@ _BY_EVENTS: Tuple[Tuple[str, Callable[[TrialSummary], int]], ...] = (
 _ENDINGS = {
     TrialEnding.SUCCESS: 'ended in success',
     TrialEnding.FAILURE: ENDED_IN_FAILURE,
+    TrialEnding.OTHER: OTHER_END,
     TrialEnding.PREEMPTED: 'preempted',
     TrialEnding.UNFINISHED: 'unfinished',
 }
-_BY_TRUTH: Tuple[Tuple[str, Callable[[bool, bool], bool]], ...] = (
-    (TRUE_SUCCESS, lambda claimed, true: true),
-    ('false success', lambda claimed, true: claimed and not true),
-    ('false failure', lambda claimed, true: true and not claimed),
+_BY_TRUTH: Tuple[Tuple[str, Callable[[TrialEnding, bool], bool]], ...] = (
+    (TRUE_SUCCESS, lambda ending, true: true),
+    ('false success', lambda ending, true: ending is TrialEnding.SUCCESS and not true),
+    (
+        'false failure',
+        lambda ending, true: true and ending not in (TrialEnding.SUCCESS, TrialEnding.OTHER),
+    ),
 )
 
 # a trial's settings in an order: key, value if it is a number, else its text
@@ -69,6 +74,10 @@ class VariantCounts(NamedTuple):
     def of(self, name: str) -> Count:
         """Return the count of that name."""
         return next(item for item in self.counts if item.name == name)
+
+    def has(self, name: str) -> bool:
+        """Whether there is a count of that name: of other ends only where there are some."""
+        return any(item.name == name for item in self.counts)
 
 
 class VariantTrials(NamedTuple):
@@ -183,7 +192,11 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
     trials, parts = variant.trials, variant.replicates()
     known = [trial for trial in trials if trial.truth is not None]
     counts = [_by_events(name, number, trials, parts) for name, number in _BY_EVENTS]
-    counts += [make_count(name, _ended(ending), trials, parts) for ending, name in _ENDINGS.items()]
+    counts += [
+        make_count(name, _ended(ending), trials, parts)
+        for ending, name in _ENDINGS.items()
+        if ending is not TrialEnding.OTHER or any(map(_ended(ending), trials))
+    ]
     if known:
         counts += [
             make_count(name, _found(holds), known, _by_replicate(known))
@@ -217,8 +230,8 @@ def _ended(ending: TrialEnding) -> Callable[[TrialSummary], bool]:
     return lambda trial: trial.ending is ending
 
 
-def _found(holds: Callable[[bool, bool], bool]) -> Callable[[TrialSummary], bool]:
-    return lambda trial: trial.truth is not None and holds(trial.succeeded, trial.truth.success)
+def _found(holds: Callable[[TrialEnding, bool], bool]) -> Callable[[TrialSummary], bool]:
+    return lambda trial: trial.truth is not None and holds(trial.ending, trial.truth.success)
 
 
 def make_count(

@@ -111,6 +111,9 @@ def describe_variants(jobs: Sequence[ExperimentJob]) -> List[str]:
 def describe_trials(trials: Sequence[TrialSummary], recovers: bool) -> str:
     """Say what came of some trials, in numbers of trials."""
     failed = '{} failed'.format(sum(trial.ending is TrialEnding.FAILURE for trial in trials))
+    others = sum(trial.ending is TrialEnding.OTHER for trial in trials)
+    if others:
+        failed += ', {} with another end'.format(others)
     if not recovers:
         return failed
     return '{} with failures, {} recovered, {} asked, {}'.format(

@@ -19,6 +19,7 @@ from smach_oracle.analysis.trials import TrialSummary, summarise
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.rates_file import write_learned
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 
 from .plan import ExperimentError, write_json
 
@@ -115,7 +116,8 @@ class ReplicateRecords:
         self._keep_lost({number: why for number, why in lost.items() if number < next_trial})
         self._keep_truths({self._first_seed + number for number in numbers[: len(done)]})
         learned = [each.learned for each in done] or kept.learned
-        self._restore_rates(learned[-1] if learned else None)
+        rule = done[-1].summary.rule if done else None
+        self._restore_rates(learned[-1] if learned else None, rule)
         return JobProgress(
             done,
             self._lost(),
@@ -229,9 +231,11 @@ class ReplicateRecords:
             os.fsync(stream.fileno())
         os.replace(str(temporary), str(self.truth))
 
-    def _restore_rates(self, learned: Optional[Mapping[str, Any]]) -> None:
+    def _restore_rates(
+        self, learned: Optional[Mapping[str, Any]], rule: Optional[FailureRule]
+    ) -> None:
         if learned is not None:
-            write_learned(str(self.rates), learned)
+            write_learned(str(self.rates), learned, rule)
         elif self.rates.exists():
             self.rates.unlink()
 

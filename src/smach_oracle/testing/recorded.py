@@ -9,7 +9,8 @@ import rosbag
 from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by
-from smach_oracle.oracle.settings.failing_outcomes import FORMER_FAILING_OUTCOMES, FailingNames
+from smach_oracle.oracle.settings.failing_outcomes import FailingNames
+from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, rule_in
 
 from .observed_trial import ObservedTrial, TrialEvidence
 
@@ -17,25 +18,25 @@ _EVENTS = '/oracle/events'
 
 
 def recorded_trials(
-    path: str, failing_outcomes: Iterable[str] = FORMER_FAILING_OUTCOMES
+    path: str, failing_outcomes: Optional[Iterable[str]] = None
 ) -> List[ObservedTrial]:
     """Return the trials of a bag, or of all bags in a folder, by the time of their beginning.
 
     Bags that are still written are left out. An exception that ended a trial is a RuntimeError with
     its text.
 
-    :param failing_outcomes: as in the settings of the oracle that ran them.
+    :param failing_outcomes: those that are failures. None means by the rule that each trial names.
     :raises OSError: where there is no such bag or folder.
     :raises rosbag.ROSBagException: where a bag cannot be read.
     """
     place = Path(path)
     bags = sorted(place.glob('*.bag')) if place.is_dir() else [place]
-    failing = FailingNames(failing_outcomes)
+    failing = None if failing_outcomes is None else FailingNames(failing_outcomes)
     trials = [trial for bag in bags for trial in _trials_in(bag, failing)]
     return sorted(trials, key=lambda trial: trial.events[0].wall_time)
 
 
-def _trials_in(path: Path, failing: FailingNames) -> List[ObservedTrial]:
+def _trials_in(path: Path, failing: Optional[FailingNames]) -> List[ObservedTrial]:
     events: List[Event] = []
     with rosbag.Bag(str(path)) as bag:
         topics = [topic for topic in bag.get_type_and_topic_info()[1] if topic.endswith(_EVENTS)]
@@ -49,13 +50,16 @@ def _trials_in(path: Path, failing: FailingNames) -> List[ObservedTrial]:
     ]
 
 
-def _trial_of(events: List[Event], failing: FailingNames) -> ObservedTrial:
+def _trial_of(events: List[Event], failing: Optional[FailingNames]) -> ObservedTrial:
     end = events[-1] if events[-1].kind is EventKind.TRIAL_END else None
     entered = any(event.kind is EventKind.STATE_START for event in events)
     error: Optional[BaseException] = None
     if end is not None and ended_by(end, entered) in (TrialEnd.ERROR, TrialEnd.STOPPED):
         error = RuntimeError(end.text)
     outcome = end.outcome if end is not None and end.outcome else None
+    if failing is None:
+        told = [rule for rule in (rule_in(event.data) for event in events) if rule is not None]
+        failing = told[-1].failing if told else FORMER_RULE.failing
     return ObservedTrial(TrialEvidence(outcome, error, events, failing=failing))
 
 

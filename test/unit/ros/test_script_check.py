@@ -122,6 +122,28 @@ def test_the_report_says_what_the_oracle_may_do_in_each_state(check):
     assert 'OUTCOME succeeded' in errors and 'SAYS' not in report
 
 
+PARKS = """
+    carry = smach.StateMachine(['done', 'left'])
+    with carry:
+        smach.StateMachine.add('LIFT', Runs(), {'succeeded': 'done', 'aborted': 'left',
+                                                'preempted': 'left'})
+    sm = smach.StateMachine(['parked', 'aborted'])
+    with sm:
+        smach.StateMachine.add('CARRY', carry, {'done': 'parked', 'left': 'parked'})
+    sm.execute()
+"""
+
+
+def test_the_report_names_ends_that_say_neither_success_nor_failure_and_what_settles_it(check):
+    code, report, errors = check(PARKS)
+    assert code == 0, errors
+    top, nested = ' '.join(report.split()).split('TASK/CARRY begins')
+    assert 'other ends parked: nothing says whether' in top and 'failing_outcomes' in top
+    assert 'other ends left: a failure leads here' in nested
+    code, report, errors = check(PARKS, 'failing_outcomes: [aborted]')
+    assert code == 0 and 'other ends' not in report, errors
+
+
 def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(check):
     code, report, _ = check("""
         first, second = machine('A', 'B'), machine('C')

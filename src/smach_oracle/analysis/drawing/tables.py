@@ -28,6 +28,7 @@ SHARES = (
     'false success',
     'lost or hung',
 )
+OTHER_END = 'other end'  # there only where a variant has some
 OVER_REPLICATES = ('true success', 'interventions', 'a question asked', 'recovered')
 # of Costs, and what it is called
 COSTS: Tuple[Tuple[str, str], ...] = (
@@ -99,8 +100,8 @@ def _main(title: str, variants: Dict[str, List[TrialRow]]) -> str:
     shares = [{share.name: share for share in shares_of(rows)} for rows in variants.values()]
     costs: List[Costs] = [costs_of(rows) for rows in variants.values()]
     lines = [['trials', *(str(len(rows)) for rows in variants.values())]]
-    for name in SHARES:
-        lines.append([name, *(percent(each[name]) for each in shares)])
+    for name in SHARES + ((OTHER_END,) if any(OTHER_END in each for each in shares) else ()):
+        lines.append([name, *(percent(each[name]) if name in each else '0' for each in shares)])
         if name in OVER_REPLICATES and any(each[name].over_replicates for each in shares):
             lines.append([name + ', replicates', *(over_replicates(each[name]) for each in shares)])
     for name, head in COSTS:

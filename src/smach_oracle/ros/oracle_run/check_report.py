@@ -61,6 +61,7 @@ def _heading(container: ContainerProspect) -> List[str]:
         container.path, container.initial or '(no state)', ', '.join(map(str, container.outcomes))
     )
     lines = wrapped(title, 0, 4)
+    lines += _entry('other ends', _unknown_ends(container), 2)
     if not container.recovers:
         return lines + wrapped('The oracle recovers nothing here: it observes.', 2)
     if not container.is_top and settings.escalate:
@@ -86,6 +87,22 @@ def _heading(container: ContainerProspect) -> List[str]:
         2,
     )
     return lines
+
+
+def _unknown_ends(container: ContainerProspect) -> str:
+    """Name the ends whose names say neither success nor failure, and what settles it."""
+    if not container.unknown_ends:
+        return ''
+    if not container.is_top:
+        return (
+            '{}: a failure leads here, and the machine around it takes it as no failure, since the '
+            'name does not say it'.format(', '.join(container.unknown_ends))
+        )
+    return (
+        '{}: nothing says whether this is a success or a failure. A trial that ends so counts as '
+        '"other end". To settle it, list all failing ends in failing_outcomes (the others are then '
+        'successes), or choose a name that says it, such as {}_succeeded'
+    ).format(', '.join(container.unknown_ends), container.unknown_ends[0])
 
 
 def _policy(settings: Settings) -> str:

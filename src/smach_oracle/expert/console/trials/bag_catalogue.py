@@ -17,7 +17,7 @@ import rospy
 from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
 from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
 from smach_oracle.analysis.trials import TrialSummary
-from smach_oracle.analysis.variants import Count, count_variant, find_variants
+from smach_oracle.analysis.variants import OTHER_END, Count, count_variant, find_variants
 from smach_oracle.forking import unlock
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.packages import lacking
@@ -46,6 +46,7 @@ _COUNTS = {
 _ENDINGS = {
     'success': 'ended in success',
     'failure': 'ended in failure',
+    'other': OTHER_END,
     'preempted': 'preempted',
     'unfinished': 'unfinished',
 }
@@ -304,7 +305,11 @@ def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
                 'experiment': variant.experiment,
                 'arm': variant.name,
                 'trials': variant.trials,
-                'endings': {key: variant.of(name).trials for key, name in _ENDINGS.items()},
+                'endings': {
+                    key: variant.of(name).trials
+                    for key, name in _ENDINGS.items()
+                    if variant.has(name)
+                },
                 'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()},
                 'unwell_s': unwell(found.trials),
             }

@@ -9,7 +9,7 @@ from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.analysis.trials import TrialSummary
 
-ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.PREEMPTED)
+ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.OTHER, TrialEnding.PREEMPTED)
 COUNTED = ('failures', 'recoveries', 'questions', 'answered')
 
 
@@ -37,7 +37,11 @@ def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[
         'experiment': experiment,
         'oracle': oracle,
         'trials': len(trials),
-        'endings': {ending.value: endings[ending] for ending in ENDINGS},
+        'endings': {
+            ending.value: endings[ending]
+            for ending in ENDINGS
+            if ending is not TrialEnding.OTHER or endings[ending]
+        },
         'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED},
         'unwell_s': unwell(trials),
     }

@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Tuple
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.settings.failing_outcomes import FailingNames
+from smach_oracle.oracle.settings.failure_rule import EndMeaning
 
 from ..feeds.views import event_view
 from .counts_table import counts_table, has_oracle
@@ -23,7 +23,7 @@ MOST_DETAILED = 60
 MOST_EVENTS = 4000  # of a trial: the first ones
 MOST_BYTES = 16 * 2**20  # of the events of all trials, as they are kept
 SHOWN_TRIALS = 300
-_FAILING = FailingNames()
+_NOT_WELL = (EndMeaning.FAILURE, EndMeaning.PREEMPTED)
 
 
 class _LoggedTrial:
@@ -86,11 +86,7 @@ class TrialLog:
                 robot,
                 event,
                 ended
-                and (
-                    not event.outcome
-                    or event.outcome in _FAILING
-                    or event.outcome.lower() == 'preempted'
-                ),
+                and (not event.outcome or trial.counts.rule.meaning(event.outcome) in _NOT_WELL),
             )
 
     def end_missing(self, robot: str) -> None:

@@ -66,6 +66,17 @@ def test_they_are_counted_as_the_analysis_counts_them(folder):
     assert not section()['broken'] and section()['waiting'] == 0
 
 
+def test_a_trial_of_a_bag_whose_end_says_nothing_is_counted_apart(folder, tmp_path):
+    assert 'other' not in catalogue_of(folder)[1]()['table'][0]['endings']
+    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
+    machine = FakeMachine(recorder)
+    machine.emit(EventKind.TRIAL_START, data={'recovers': True, 'failure_rule': {'by_name': 1}})
+    machine.emit(EventKind.TRIAL_END, outcome='parked')
+    assert recorder.close(30.0)
+    _, section = catalogue_of(str(tmp_path))
+    assert section()['table'][0]['endings']['other'] == 1
+
+
 def test_nothing_of_where_they_lie_is_told_and_broken_ones_are_named(folder, tmp_path):
     shutil.copytree(folder, str(tmp_path / 'deep'))
     (tmp_path / 'deep' / 'torn.bag').write_bytes(b'#ROSBAG V2.0\n' + os.urandom(300))

@@ -162,6 +162,25 @@ def test_the_table_counts_trials_in_which_it_happened_and_how_often():
     )
 
 
+def test_a_trial_whose_end_says_nothing_is_counted_apart_where_there_is_one():
+    def parked(number, rule):
+        return [
+            event(EventKind.TRIAL_START, trial=str(number), data={'failure_rule': rule}),
+            event(EventKind.TRIAL_END, trial=str(number), outcome='parked'),
+        ]
+
+    by_name, listed = parked(1, {'by_name': 1}), parked(2, {'failing_outcomes': ['aborted']})
+    log = TrialLog()
+    for each in by_name + listed:
+        log.add('/robot', each)
+    rows = {row['id']: row for row in log.overview()['trials']}
+    assert (rows['1']['ending'], rows['2']['ending']) == ('other', 'success')
+    (row,) = counts_table(map(count, (by_name, listed)))
+    assert row['endings'] == {'success': 1, 'failure': 0, 'other': 1, 'preempted': 0}
+    (row,) = counts_table([count(listed)])
+    assert 'other' not in row['endings']
+
+
 def test_the_table_lists_the_time_in_which_trials_waited_until_the_robot_was_well():
     trials = run_trials(3)
     for waited_s, events in zip((2.5, 4.0), trials):

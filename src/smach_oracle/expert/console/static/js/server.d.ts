@@ -262,7 +262,8 @@ export interface Trial {
   experiment: string;
   start: number;
   end: number;
-  ending: 'success' | 'failure' | 'preempted' | 'unfinished' | ''; // '': it runs
+  // 'other': neither a success nor a failure by its outcome; '': it runs
+  ending: 'success' | 'failure' | 'other' | 'preempted' | 'unfinished' | '';
   outcome: string;
   oracle: boolean; // whether it recovers
   failures: number;
@@ -281,7 +282,9 @@ export interface CountsRow {
   oracle?: boolean; // of trials that were heard
   arm?: string; // of trials of bags: the variant
   trials: number;
-  endings: { success: number; failure: number; preempted: number; unfinished?: number };
+  // other: only where there are some
+  endings: { success: number; failure: number; other?: number; preempted: number;
+    unfinished?: number };
   counts: { failures: Count; recoveries: Count; questions: Count; answered: Count };
   unwell_s: number; // in which they waited, all together, until the robot was well
 }

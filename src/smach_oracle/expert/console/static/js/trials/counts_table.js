@@ -5,21 +5,28 @@ import { duration, percent } from '../page/format.js';
 
 /** @typedef {import('../server').CountsRow} CountsRow */
 
+const OTHER_END = 'Other end'; // the outcome says neither success nor failure
 const COLUMNS = ['Experiment', 'Variant', 'Trials', 'Failures', 'Oracle recoveries', 'Questions',
-  'Expert interventions', 'Ended in failure', 'Waited until well'];
+  'Expert interventions', 'Ended in failure', OTHER_END, 'Waited until well'];
 
 /**
  * @param {string} caption
  * @param {CountsRow[]} rows
  */
 export function countsTable(caption, rows) {
-  const titles = COLUMNS.map((title) => h('th', { scope: 'col' }, title));
+  const others = rows.some(({ endings }) => endings.other);
+  const titles = COLUMNS.filter((title) => others || title !== OTHER_END)
+    .map((title) => h('th', { scope: 'col' }, title));
   return h('table', {}, h('caption', {}, caption), h('thead', {}, h('tr', {}, titles)),
-    h('tbody', {}, rows.map(rowOf)));
+    h('tbody', {}, rows.map((row) => rowOf(row, others))));
 }
 
-/** @param {CountsRow} row */
-function rowOf({ experiment, arm, oracle, trials, counts, endings, unwell_s: unwell }) {
+/**
+ * @param {CountsRow} row
+ * @param {boolean} others whether there is a column of other ends
+ */
+function rowOf(row, others) {
+  const { experiment, arm, oracle, trials, counts, endings, unwell_s: unwell } = row;
   /** @param {number} found of the trials */
   const share = (found) => h('td', { class: 'number' }, found,
     h('span', { class: 'dim' }, ' ' + percent(found / trials)));
@@ -27,6 +34,6 @@ function rowOf({ experiment, arm, oracle, trials, counts, endings, unwell_s: unw
     h('td', {}, arm || (oracle ? 'with oracle' : 'without oracle')),
     h('td', { class: 'number' }, trials),
     share(counts.failures.trials), share(counts.recoveries.trials), share(counts.questions.trials),
-    share(counts.answered.trials), share(endings.failure),
+    share(counts.answered.trials), share(endings.failure), others && share(endings.other || 0),
     h('td', { class: 'number' }, unwell ? duration(unwell) : '–'));
 }

@@ -8,8 +8,8 @@ import { redraw } from '../page/redraw.js';
 /** @typedef {import('../server').Trial} Trial */
 
 /** @type {{ [ending in Trial['ending']]: string }} */
-const ENDINGS = { success: 'good', failure: 'bad', preempted: 'warn', unfinished: 'warn',
-  '': 'accent' };
+const ENDINGS = { success: 'good', failure: 'bad', other: 'warn', preempted: 'warn',
+  unfinished: 'warn', '': 'accent' };
 /** @type {{ [name: string]: { title: string, fits: (trial: Trial) => boolean } | undefined }} */
 const FILTERS = {
   all: { title: 'All trials', fits: () => true },
