@@ -32,7 +32,7 @@ def said(log):
 
 
 def test_the_first_trial_names_such_ends_once_in_a_process(log, name):
-    for _ in range(2):  # as a program does that builds its machine anew for each trial
+    for _ in range(2):  # as a program does that builds a new machine for each trial
         machine = OracleContainer.wrap(mission('parked', 'left', 'aborted'), name=name)
         assert not said(log)[1:]
         machine.execute()
