@@ -39,6 +39,12 @@ class MapBox(NamedTuple):
     yaw: float
     upright_cylinder: bool = False  # of the wider side's diameter, in place of the box
 
+    def beyond(self, points: np.ndarray) -> np.ndarray:
+        """(..., 2) m by which points (..., 3) lie beyond its sides, below 0 between them."""
+        turn = from_rpy((0, 0, 0), yaw=self.yaw)[:2, :2]
+        found: np.ndarray = np.abs((points - self.centre)[..., :2] @ turn) - self.half[:2]
+        return found
+
 
 def kitchen_from(settings: object) -> Kitchen:
     """The map with some of its values given, as from a parameter.

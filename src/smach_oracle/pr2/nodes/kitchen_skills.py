@@ -22,6 +22,7 @@ from smach_oracle.msg import (
 from ..kitchen import Kitchen, base_from_fridge
 from ..perception.drink import things_on_shelf
 from ..perception.own_limbs import limbs_of
+from ..perception.standing import look_of
 from ..planning.arm import (
     Arm,
     SkillContext,
@@ -163,6 +164,7 @@ class KitchenSkills(Manipulation):
         check_is_there(image, target)
         others = things_on_shelf(image, self.kitchen, fridge, limbs)
         target = seen_again(target, others) if driven else target
+        self.hands.send(arm, look_of(image, target))
         try:
             with self.firmer_after_slip(goal.attempt) as effort:
                 held = pick_from_fridge(
@@ -188,8 +190,9 @@ class KitchenSkills(Manipulation):
         palm = pose_in_base(goal.pose, self.context.robot, 'pose')[:3, 3]
         report('handing over')
         self.hands.feel(self.context.robot)
-        held = self.hands.find(arm) or unknown_held(self.context, arm)
-        hand_over(self.context, arm, palm, held)
+        with self.telling_of_losses(arm):
+            held = self.hands.find(arm) or unknown_held(self.context, arm)
+            hand_over(self.context, arm, palm, held, self.hands.meant(arm))
         return HandOverResult()
 
 

@@ -2,7 +2,7 @@
 
 import contextlib
 from functools import partial
-from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Type
+from typing import Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Type
 
 import numpy as np
 
@@ -25,11 +25,12 @@ from smach_oracle.msg import (
 )
 from smach_oracle.oracle.number_checks import is_number
 
-from ..fingers import stands_open
+from ..fingers import may_hold, stands_open
 from ..kitchen import MapBox
 from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
 from ..perception.own_limbs import limbs_of
+from ..perception.standing import look_of, why_not_standing
 from ..perception.tabletop import SAME_SIZE, find_tabletop, things_on_table
 from ..planning.arm import (
     FEEL_EFFORT,
@@ -44,6 +45,7 @@ from ..planning.arm import (
 from ..planning.collision_map import (
     MOST_BOXES,
     PADDING,
+    TABLE,
     CollisionMap,
     CollisionMapStore,
     around,
@@ -56,7 +58,7 @@ from ..robot import ARMS, BASE_FRAME, TOOL_FRAME
 from ..skills.arms_aside import arms_aside, is_aside
 from ..skills.hand_memory import HandMemory, MindfulRobot
 from ..skills.pick import FIRM, HeldObject, ObjectSlipped, pick
-from ..skills.place import NEAR, RETREAT, ObjectLost, place, put_back, stands_there
+from ..skills.place import NEAR, RETREAT, HoldsNothing, ObjectLost, place, put_back
 from ..skills.spots import FARTHEST
 from ..skills.spots import USUAL as USUAL_SPOT
 from .frames import box_in_base, point_in_base, pose_in_base, pose_message
@@ -79,6 +81,10 @@ def elsewhere_of(attempt: int) -> int:
     :param attempt: of a goal.
     """
     return max(0, attempt - 1)
+
+
+def _without_table(boxes: Mapping[str, MapBox]) -> List[MapBox]:
+    return [box for name, box in boxes.items() if name != TABLE]
 
 
 def check_is_there(image: CameraImage, target: UprightBox) -> None:
@@ -164,7 +170,9 @@ class Manipulation:
         boxes = around(made, target)
         self._put_back(arm, boxes)
         report('looking whether the object is still there')
-        check_is_there(self.context.robot.see(), target)
+        image = self.context.robot.see()
+        check_is_there(image, target)
+        self.hands.send(arm, look_of(image, target))
         report('choosing a grasp')
         with self._withdrawing(arm, boxes):
             if self._begins and not goal.attempt:
@@ -188,7 +196,8 @@ class Manipulation:
 
         An empty hand succeeds where a thing like that stands there, and the map has none there.
 
-        :raises SkillError: where it does not, or there is no such spot.
+        :raises SkillError: where there is no such spot, the hand has lost its object, the object
+            lies or leans in the end, or it is another one than PICK was sent to take.
         """
         arm = known_arm(goal.arm)
         robot = self.context.robot
@@ -200,32 +209,39 @@ class Manipulation:
         made = self.maps.find(goal.map_id) if goal.map_id else self._seen()
         held, boxes = self._held_object(arm, grasp, made)
         report('looking at the place')
-        if stands_open(encoder_readings(robot), arm) and self._is_placed(
-            arm, centre, goal.tolerance, held, made
+        if (
+            stands_open(encoder_readings(robot), arm)
+            and not self.hands.has_lost(arm)
+            and not self._why_not_placed(arm, centre, goal.tolerance, held, made)
         ):
             return PlaceResult()
         boxes.update(self._standing_at(arm, centre, goal.tolerance, held, boxes))
         report('choosing a way')
         try:
             with self._withdrawing(arm, boxes, ObjectLost), self.firmer_after_slip():
-                stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
-        except ObjectLost:
-            if self._is_placed(arm, centre, goal.tolerance, held, made):
+                with self.telling_of_losses(arm):
+                    stood = place(self.context, arm, centre, held, boxes, tolerance=goal.tolerance)
+        except HoldsNothing as err:
+            why = self._why_not_placed(arm, centre, goal.tolerance, held, made)
+            if not why:
                 return PlaceResult()
-            raise
+            raise HoldsNothing('{}, and {}'.format(err, why)) from err
         report('looking whether it stands there')
         arms_aside(self.context, [arm], {**boxes, 'placed': MapBox(stood, held.half, 0.0)})
-        others = [box for name, box in boxes.items() if name != 'table']
-        if not stands_there(self.context.robot.see(), stood, held, others):
-            raise SkillError('the object was let go, but nothing stands at its place')
+        why = why_not_standing(
+            robot.see(), stood, held.half, _without_table(boxes), self.hands.meant(arm)
+        )
+        if why:
+            raise SkillError('the object was let go, but ' + why)
         return PlaceResult()
 
-    def _is_placed(
+    def _why_not_placed(
         self, arm: str, centre: np.ndarray, tolerance: float, held: HeldObject, made: CollisionMap
-    ) -> bool:
+    ) -> str:
         """Take an empty hand away from a place, and look whether it has put its object down there.
 
         :param made: a map of what stood there before.
+        :returns: why it does not stand there, or ''.
         """
         robot = self.context.robot
         robot.look_at(centre)
@@ -234,12 +250,22 @@ class Manipulation:
                 draw_back(hand, RETREAT, hand.space.names(), SLOW)
         arms_aside(self.context, [arm], made.boxes)
         limbs = limbs_of(self._links, encoder_readings(robot))
-        return any(
-            np.hypot(*(box.centre - centre)[:2]) < (tolerance or USUAL_SPOT) + KNOWN
-            and np.abs(box.size - 2 * held.half).max() < SAME_SIZE
-            and nearest_object(made, box.centre) is None
-            for box in things_on_table(robot.see(), limbs)
-        )
+        image, why = robot.see(), 'nothing stands at its place'
+        for box in things_on_table(image, limbs):
+            if (
+                np.hypot(*(box.centre - centre)[:2]) >= (tolerance or USUAL_SPOT) + KNOWN
+                or nearest_object(made, box.centre) is not None
+            ):
+                continue
+            middle = box.centre + [0.0, 0.0, held.half[2] - box.size[2] / 2]
+            why = why_not_standing(
+                image, middle, held.half, _without_table(made.boxes), self.hands.meant(arm)
+            )
+            if not why and np.abs(box.size - 2 * held.half).max() >= SAME_SIZE:
+                why = 'a thing of another size stands at its place'
+            if not why:
+                return ''
+        return why
 
     def _standing_at(
         self,
@@ -269,6 +295,24 @@ class Manipulation:
                 if name.startswith('object')
             )
         }
+
+    @contextlib.contextmanager
+    def telling_of_losses(self, arm: str) -> Iterator[None]:
+        """Remember a loss on the way, and refuse to put down what was lost before.
+
+        What a hand has dropped may stand where it fell, upside down. So no look decides about it.
+
+        :raises ObjectLost: where the hand has lost its object, and holds nothing since.
+        """
+        if self.hands.has_lost(arm) and not may_hold(encoder_readings(self.context.robot), arm):
+            raise ObjectLost('the {} hand holds nothing: it has lost its object'.format(arm))
+        try:
+            yield
+        except HoldsNothing:
+            raise
+        except ObjectLost:
+            self.hands.lose(arm)
+            raise
 
     def forget_slips(self) -> None:
         """The next grip is as gentle as the first."""

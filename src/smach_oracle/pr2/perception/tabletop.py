@@ -23,6 +23,7 @@ from .clusters import (
     limb_beside,
 )
 from .colours import SAME, SAME_POINT, name_of, unlikeness
+from .standing import UPRIGHT
 from .touching import part_of, parts_by_colour, why_several
 
 GRASPABLE = 0.085  # m: what fits between the finger tips
@@ -188,6 +189,7 @@ def _like(
     :raises NotSeen: where none does.
     """
     alike: List[Tuple[float, int, Cluster]] = []
+    lying: Optional[Cluster] = None
     for cluster in clusters:
         near = unlikeness(cloud.colour[tuple(cluster.pixels.T)], like.colour) < SAME_POINT
         for part in (cluster, part_of(cluster, near, plane)):
@@ -197,6 +199,15 @@ def _like(
             differs = float(unlikeness(_colour(cloud, part), like.colour))
             if differs < SAME and np.abs(off).max() < SAME_SIZE:
                 alike.append((differs / SAME + np.abs(off).max() / SAME_SIZE, len(alike), part))
+            elif differs < SAME and _lies(part.box.size, like.size):
+                lying = part
+    if not alike and lying is not None:
+        raise NotSeen(
+            'what was seen first, {} and {}, lies on the table at x {:.2f}, y {:.2f} m: the hand '
+            'takes only what stands'.format(
+                name_of(like.colour) or 'dark', _in_cm(like.size), *lying.box.centre[:2]
+            )
+        )
     if not alike:
         raise NotSeen(
             'what was seen first, {} and {}, is not among the {} things on the table: '
@@ -218,6 +229,11 @@ def _in_cm(size: np.ndarray) -> str:
 
 def _extents(size: np.ndarray) -> np.ndarray:
     return np.array([max(size[:2]), min(size[:2]), size[2]])
+
+
+def _lies(size: np.ndarray, stood: np.ndarray) -> bool:
+    """Whether a thing is about as long as another was high, and less high than that."""
+    return bool(size[2] < UPRIGHT * stood[2] and abs(max(size[:2]) - stood[2]) < SAME_SIZE)
 
 
 def _check(cloud: OrganizedCloud, cluster: Cluster, what: str) -> None:

@@ -1,10 +1,11 @@
 """What the robot's hands hold, as far as it can know: by what it did with them, and by its fingers.
 
 A hand that has opened, or has closed on nothing, holds nothing. So what a hand held once does not
-count for good, as in the next trial.
+count for good, as in the next trial. The looks of the thing that a hand was sent to take count
+until it is sent for another: whoever has put it down looks whether it stands.
 """
 
-from typing import Dict, Optional, Sequence
+from typing import Dict, Optional, Sequence, Set
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike
 
 from ..fingers import LEAST_GAP, may_hold
+from ..perception.standing import UNKNOWN, StandingLook
 from ..planning.arm import encoder_readings
 from ..robot import GripperState, Robot
 from ..work_costs import Work
@@ -23,6 +25,8 @@ class HandMemory:
 
     def __init__(self) -> None:
         self._held: Dict[str, HeldObject] = {}
+        self._meant: Dict[str, StandingLook] = {}
+        self._lost: Set[str] = set()
 
     def keep(self, arm: str, held: HeldObject) -> None:
         """A hand holds this from now on."""
@@ -31,6 +35,23 @@ class HandMemory:
     def find(self, arm: str) -> Optional[HeldObject]:
         """Return what a hand holds, or None where nothing is known of it."""
         return self._held.get(arm)
+
+    def send(self, arm: str, look: StandingLook) -> None:
+        """A hand is sent to take a thing that looks like this."""
+        self._meant[arm] = look
+        self._lost.discard(arm)
+
+    def meant(self, arm: str) -> StandingLook:
+        """Return the looks of the thing that a hand was last sent to take."""
+        return self._meant.get(arm, UNKNOWN)
+
+    def lose(self, arm: str) -> None:
+        """A hand has lost its thing on the way."""
+        self._lost.add(arm)
+
+    def has_lost(self, arm: str) -> bool:
+        """Whether a hand has lost the thing that it was last sent to take."""
+        return arm in self._lost
 
     def forget(self, arm: str) -> None:
         """A hand holds nothing that is known."""

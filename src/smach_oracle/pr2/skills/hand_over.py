@@ -13,6 +13,7 @@ from smach_oracle.geometry.depth import points_of
 
 from ..fingers import stands_open
 from ..kitchen import MapBox
+from ..perception.standing import UNKNOWN, StandingLook, why_not_standing
 from ..planning.arm import (
     SLOW,
     Arm,
@@ -24,7 +25,7 @@ from ..planning.arm import (
 )
 from ..planning.travel import carry, draw_back, stow
 from .pick import HeldObject
-from .place import RETREAT, ObjectLost, place, stands_there
+from .place import RETREAT, HoldsNothing, place
 
 PALM = 'palm'
 NEAR = 0.16  # m around the place where the palm is expected, horizontally
@@ -39,17 +40,24 @@ UP = 0.10  # m, straight up from a palm
 LEAST_TOP = 40  # points
 
 
-def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:
+def hand_over(
+    context: SkillContext,
+    arm: str,
+    expected: np.ndarray,
+    held: HeldObject,
+    look: StandingLook = UNKNOWN,
+) -> None:
     """Set the held object down on a palm. An empty one succeeds where it is seen to stand there.
 
     :param expected: (3,) m in base_footprint, the middle of the palm's upper face, right to some
         0.1 m.
+    :param look: the looks of the object while it stood.
     :raises SkillError: where no palm is seen, the object cannot be brought there, or it does not
         stand there then.
     """
     context.robot.look_at(expected)
     if stands_open(encoder_readings(context.robot), arm):
-        if _is_given(context, arm, expected, held):
+        if _is_given(context, arm, expected, held, look):
             return
     else:
         _clear_view(context, arm, expected, held)
@@ -58,17 +66,24 @@ def hand_over(context: SkillContext, arm: str, expected: np.ndarray, held: HeldO
     top = palm.centre + [0.0, 0.0, palm.half[2]]
     try:
         stood = place(context, arm, top + [0.0, 0.0, held.half[2]], held, boxes, PALM, gently=True)
-    except ObjectLost:
-        if _is_given(context, arm, expected, held):
+    except HoldsNothing:
+        if _is_given(context, arm, expected, held, look):
             return
         raise
     boxes['given'] = MapBox(stood, held.half, 0.0)
     stow(context, (arm,), boxes)
-    if not stands_there(context.robot.see(), stood, held):
-        raise SkillError('it was let go, but it does not stand in the hand')
+    why = why_not_standing(context.robot.see(), stood, held.half, look=look)
+    if why:
+        raise SkillError('it was let go on the palm, but ' + why)
 
 
-def _is_given(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> bool:
+def _is_given(
+    context: SkillContext,
+    arm: str,
+    expected: np.ndarray,
+    held: HeldObject,
+    look: StandingLook,
+) -> bool:
     """Take an empty hand away from a palm, and look whether the object stands there."""
     boxes = _about_palm(expected)
     with Arm(context, arm, boxes, seed_of(arm, expected)) as hand:
@@ -77,7 +92,9 @@ def _is_given(context: SkillContext, arm: str, expected: np.ndarray, held: HeldO
     stow(context, (arm,), boxes)
     image = context.robot.see()
     top = middle_of_top(image, expected, 2 * held.half[2])
-    return top is not None and stands_there(image, top - [0.0, 0.0, held.half[2]], held)
+    if top is None:
+        return False
+    return not why_not_standing(image, top - [0.0, 0.0, held.half[2]], held.half, look=look)
 
 
 def _clear_view(context: SkillContext, arm: str, expected: np.ndarray, held: HeldObject) -> None:

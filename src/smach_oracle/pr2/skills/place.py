@@ -4,12 +4,9 @@ from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tupl
 
 import numpy as np
 
-from smach_oracle.geometry.box import upright_box
-from smach_oracle.geometry.camera_image import CameraImage
-from smach_oracle.geometry.depth import points_of
-from smach_oracle.geometry.pieces import largest_piece
 from smach_oracle.geometry.transforms import from_rpy, inverse, transform
 
+from ..fingers import LEAST_GAP
 from ..kitchen import MapBox
 from ..planning.arm import (
     FAST,
@@ -27,7 +24,7 @@ from ..planning.collision_map import with_margin
 from ..planning.planner import PlanningError
 from ..robot import GRIPPER_OPEN
 from .pick import FIRM, HeldObject
-from .spots import USUAL, beyond, free_spots
+from .spots import USUAL, free_spots
 
 EFFORT = 40000  # collision checks for the choice of a path, about 3 s
 CAREFUL = 0.25  # of the joints' velocity limits, with what has slipped before
@@ -46,15 +43,7 @@ ENOUGH_TO_LET_GO = 0.02
 TURNS = np.linspace(-np.pi, np.pi, 24, endpoint=False)
 SLACK = 0.16  # m that the height asked for may differ from the one at which the object stands
 
-NEAR = 0.05  # m around the place, within which an image must show the object
-UPRIGHT = 0.75  # of its height at least: less, and it lies
-# m by which what leans by 15 degrees is wider than what stands. Noise, and a map that is off, make
-# less of it
-LEANING = 0.015
-CELL = 0.012  # m: points that are closer than this belong together
-BLUR = 0.005  # m by which an edge is seen beside where it is
-LEAST_POINTS = 40
-COLUMNS = 320  # of an image that are looked at
+NEAR = 0.05  # m beside where it was taken, within which an object is put back there
 
 
 class _PlacePath(NamedTuple):
@@ -68,6 +57,10 @@ class _PlacePath(NamedTuple):
 
 class ObjectLost(SkillError):
     """The hand turned out to be empty."""
+
+
+class HoldsNothing(ObjectLost):
+    """The hand was empty before it set off. It may have put down its object at an earlier try."""
 
 
 def place(
@@ -99,8 +92,9 @@ def place(
                 'there is nothing to stand on: the collision map has no {}'.format(support)
             )
         if hand.close(held.effort) == 0:
-            raise ObjectLost('the {} hand holds nothing'.format(arm))
-        centre = _on_support(centre, held, boxes[support], HOVER if gently else DROP)
+            raise HoldsNothing('the {} hand holds nothing'.format(arm))
+        drop = HOVER if gently else DROP
+        centre = _on_support(centre, held, boxes[support], drop)
         hand.space.attach(held.half - 0.004, held.tool_from_object)
         spots, taken = free_spots(centre, tolerance, held.half, boxes, support)
         if not spots:
@@ -114,6 +108,8 @@ def place(
         if hand.close(held.effort) == 0:
             raise ObjectLost('the object was lost on the way to its place')
         hand.follow(path.down, SLOW)
+        if hand.gap() < LEAST_GAP:
+            raise ObjectLost('the object was lost while it was lowered')
         back = path.back
         if gently:
             _settle(hand)
@@ -124,7 +120,7 @@ def place(
         hand.follow(back, SLOW)
         if path.gap < GRIPPER_OPEN:
             hand.open()
-        return centre
+        return centre - [0.0, 0.0, drop]
 
 
 def _settle(hand: Arm) -> None:
@@ -182,44 +178,10 @@ def put_back(
         hand.open()
 
 
-def stands_there(
-    image: CameraImage, centre: np.ndarray, held: HeldObject, others: Sequence[MapBox] = ()
-) -> bool:
-    """Whether an image shows something as high as the object, and upright, at its place.
-
-    :param centre: (3,) m in base_footprint, where the object's centre should be.
-    :param others: what stands beside the place. It does not count.
-    """
-    stride = image.stride(COLUMNS)
-    points = points_of(
-        image.depth[::stride, ::stride], image.intrinsics, image.base_from_camera, stride=stride
-    ).reshape(-1, 3)
-    beside = np.hypot(points[:, 0] - centre[0], points[:, 1] - centre[1])
-    bottom = centre[2] - held.half[2]
-    there = points[
-        (beside < NEAR)
-        & (points[:, 2] > bottom + 0.02)
-        & (points[:, 2] < bottom + 3 * held.half[2])
-    ]
-    for box in others:
-        there = there[(beyond(there, box) >= BLUR).any(axis=1)]
-    high = (
-        len(there) >= LEAST_POINTS
-        and np.percentile(there[:, 2], 90) > bottom + UPRIGHT * 2 * held.half[2]
-    )
-    return bool(high) and not _leans(there, held)
-
-
-def _leans(points: np.ndarray, held: HeldObject) -> bool:
-    """Whether something at its place (n, 3) takes up more of it than the object that stands."""
-    own = points[largest_piece(points, CELL)]
-    return upright_box(own, float(own[:, 2].min())).wide > 2 * max(held.half[:2]) + LEANING
-
-
 def _on_support(centre: np.ndarray, held: HeldObject, support: MapBox, drop: float) -> np.ndarray:
     """The place asked for, `drop` m above the height at which the object stands."""
     top = support.centre[2] + support.half[2]
-    inside = beyond(centre, support)
+    inside = support.beyond(centre)
     height = top + held.half[2]
     x, y, z = centre
     if max(inside) > 0 or abs(z - height) > SLACK:

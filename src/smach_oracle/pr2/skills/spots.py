@@ -4,8 +4,6 @@ from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
 
-from smach_oracle.geometry.transforms import from_rpy
-
 from ..kitchen import MapBox
 
 GRID = 0.02  # m between spots
@@ -63,13 +61,6 @@ def _room(spot: np.ndarray, half: np.ndarray, box: MapBox) -> float:
     """m between something round that stands at a spot and a box, below 0 where they meet."""
     if abs(spot[2] - box.centre[2]) > half[2] + box.half[2]:
         return float('inf')
-    outside = np.maximum(beyond(spot, box), 0.0)
+    outside = np.maximum(box.beyond(spot), 0.0)
     # the narrower side, for what is long may be turned
     return float(np.hypot(*outside) - min(half[:2]))
-
-
-def beyond(points: np.ndarray, box: MapBox) -> np.ndarray:
-    """(..., 2) m by which points (..., 3) lie beyond a box's sides, below 0 between them."""
-    turn = from_rpy((0, 0, 0), yaw=box.yaw)[:2, :2]
-    found: np.ndarray = np.abs((points - box.centre)[..., :2] @ turn) - box.half[:2]
-    return found
