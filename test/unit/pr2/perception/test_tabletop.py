@@ -212,6 +212,15 @@ def test_what_is_too_large_for_the_gripper_is_said_with_its_size():
     )
 
 
+def test_what_lies_is_told_to_lie_and_not_taken_for_what_stood():
+    stood = Body('carton', 'box', (0.06, 0.05, 0.13), (0.7, 0.0, 0.785), colour=(0.1, 0.3, 0.8))
+    lies = stood._replace(size=(0.06, 0.13, 0.05), position=(0.7, 0.1, 0.745))
+    seen = find_tabletop(image_of([TABLE, stood]))
+    like = Look(seen.colours[0], seen.objects[0].size)
+    told = reason(image_of([TABLE, lies, can(0.6, -0.1, colour=(0.8, 0.1, 0.1))]), like=like)
+    assert 'lies on the table at x 0.70, y 0.10 m: the hand takes only what stands' in told
+
+
 def test_an_arm_that_is_not_known_of_is_no_object():
     beam = Body('beam', 'box', (0.5, 0.1, 0.1), (0.7, 0.0, 0.95), yaw=0.6)
     assert 'is an arm in the view?' in reason(image_of([TABLE, can(0.9, 0.25), beam]))
