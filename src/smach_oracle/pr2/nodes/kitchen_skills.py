@@ -22,7 +22,7 @@ from smach_oracle.msg import (
 from ..kitchen import Kitchen, base_from_fridge
 from ..perception.drink import things_on_shelf
 from ..perception.own_limbs import limbs_of
-from ..perception.standing import look_of
+from ..perception.upright import look_of
 from ..planning.arm import (
     Arm,
     SkillContext,

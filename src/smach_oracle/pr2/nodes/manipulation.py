@@ -30,8 +30,8 @@ from ..kitchen import MapBox
 from ..perception.absence import sees_past
 from ..perception.clusters import NotSeen
 from ..perception.own_limbs import limbs_of
-from ..perception.standing import look_of, why_not_standing
 from ..perception.tabletop import SAME_SIZE, find_tabletop, things_on_table
+from ..perception.upright import look_of, why_not_standing
 from ..planning.arm import (
     FEEL_EFFORT,
     SLOW,

@@ -23,8 +23,8 @@ from .clusters import (
     limb_beside,
 )
 from .colours import SAME, SAME_POINT, name_of, unlikeness
-from .standing import UPRIGHT
 from .touching import part_of, parts_by_colour, why_several
+from .upright import UPRIGHT
 
 GRASPABLE = 0.085  # m: what fits between the finger tips
 LARGEST = 0.35  # m: no object to be handled is wider or taller

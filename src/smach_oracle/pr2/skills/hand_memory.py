@@ -13,7 +13,7 @@ from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import VectorLike
 
 from ..fingers import LEAST_GAP, may_hold
-from ..perception.standing import UNKNOWN, StandingLook
+from ..perception.upright import UNKNOWN, StandingLook
 from ..planning.arm import encoder_readings
 from ..robot import GripperState, Robot
 from ..work_costs import Work

@@ -13,7 +13,7 @@ from smach_oracle.geometry.depth import points_of
 
 from ..fingers import stands_open
 from ..kitchen import MapBox
-from ..perception.standing import UNKNOWN, StandingLook, why_not_standing
+from ..perception.upright import UNKNOWN, StandingLook, why_not_standing
 from ..planning.arm import (
     SLOW,
     Arm,

@@ -7,7 +7,7 @@ from worlds import CAN, TABLE
 
 from smach_oracle.geometry.box import UprightBox
 from smach_oracle.pr2.kitchen import MapBox
-from smach_oracle.pr2.perception.standing import StandingLook, look_of, why_not_standing
+from smach_oracle.pr2.perception.upright import StandingLook, look_of, why_not_standing
 
 PLACE = np.array([0.6, -0.35, CAN.position[2]])
 HALF = np.array([0.031, 0.031, 0.06])

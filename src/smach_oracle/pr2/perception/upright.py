@@ -124,7 +124,7 @@ def _seen_at(
 def _lean_of(
     image: CameraImage, points: np.ndarray, centre: np.ndarray, half: np.ndarray
 ) -> Optional[float]:
-    """Return by how much the top of a thing (n, 3) is inclined, rad, or None where it has none."""
+    """Return the inclination of the top of a thing (n, 3), rad, or None where it has none."""
     upper = points[points[:, 2] > centre[2]]
     top = find_plane(upper, generator_of(image), FLAT, STEEPEST, LEAST_TOP)
     return None if top is None else float(np.arccos(min(1.0, top.normal[2])))

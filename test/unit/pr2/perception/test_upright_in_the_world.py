@@ -6,7 +6,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from smach_oracle.pr2.perception.standing import why_not_standing
+from smach_oracle.pr2.perception.upright import why_not_standing
 from smach_oracle.simulation.physics.camera import take_image
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
