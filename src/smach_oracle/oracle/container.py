@@ -189,7 +189,7 @@ class OracleContainer(smach.StateMachine):
         more = {} if constants is None else {'constants': constants}
         added: smach.State = smach.StateMachine.add(label, state, transitions, remapping, **more)
         if given:
-            marked_node(machine).in_force.given_with_add[label] = given
+            marked_node(machine).in_force.give_with_add(label, given)
         return state if added is None else added
 
     # -- what adapters read. See oracle_of
@@ -293,11 +293,17 @@ class OracleContainer(smach.StateMachine):
 
         It raises what a StateMachine raises.
         """
-        if self._oracle.tree.is_parents and not self.is_running():
+        if self._oracle.tree.is_parents() and not self.is_running():
             return execute_bare(self, *args, **kwargs)
-        with ContainerRun(self._oracle, self.new_trial_id) as run:
-            if run.begins():
+        run = ContainerRun(self._oracle)
+        try:
+            if run.begins(self.new_trial_id):
                 run.outcome = super().execute(*args, **kwargs)
+        except BaseException as err:
+            run.error = err
+            raise
+        finally:
+            run.is_over()
         return run.outcome
 
     def request_preempt(self) -> None:
@@ -310,27 +316,27 @@ class OracleContainer(smach.StateMachine):
         node = self._oracle
         if node.engine.stepped:
             node.begin_once_more()
-        how = ''
+        if node.execution.is_led():
+            self._start_elsewhere()
+        super().call_start_cbs()
+
+    def _start_elsewhere(self) -> None:
+        node, how = self._oracle, 'starting'
         if node.execution.starts_in in self._states:
             self._set_current_state(node.execution.starts_in)
-            how = 'starting'
         entry = node.tree.resumed.take_entry(node)
         if entry is not None:
             entry.enter(node)
             how = 'going on'
-        if how:
-            smach.loginfo(
-                "State machine {} in state '{}' with userdata: \n\t{}".format(
-                    how, self._current_label, list(self.userdata.keys())
-                )
+        smach.loginfo(
+            "State machine {} in state '{}' with userdata: \n\t{}".format(
+                how, self._current_label, list(self.userdata.keys())
             )
-        super().call_start_cbs()
+        )
 
     def _tell_start(self) -> None:
         """Log where it starts. Upstream's engine does not ask."""
-        node = self._oracle
-        is_led = node.execution.starts_in in self._states
-        if not is_led and node.tree.resumed.entry_of(node) is None:
+        if not self._oracle.execution.is_led():
             super()._tell_start()
 
     def _update_once(self) -> Optional[str]:

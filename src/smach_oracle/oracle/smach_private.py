@@ -23,7 +23,7 @@ from typing import (
 
 import smach
 
-from .identity import WeakIdentityMap, own_attributes, own_mark
+from .identity import own_attributes, own_mark
 
 Labels = Tuple[str, ...]
 Transitions = Dict[str, Optional[str]]
@@ -308,9 +308,6 @@ def remapping_in(container: object, label: str) -> Mapping[str, str]:
     return tables.get(label) or {}
 
 
-_STEP_AS_DRAWN: WeakIdentityMap[type, bool] = WeakIdentityMap()
-
-
 class EngineProbe:
     """Finds out how the SMACH engine steps, when an execution comes to its first state.
 
@@ -328,9 +325,13 @@ class EngineProbe:
         'stays_attentive',
         'tells_transitions',
         'has_own_loop',
+        '_class',
+        '_class_steps_as_drawn',
     )
 
     def __init__(self) -> None:
+        self._class: Optional[type] = None  # of the machine when it was looked at last
+        self._class_steps_as_drawn = False
         self.stepped = False
         self.lock_is_held = False
         self.attentive = True
@@ -347,8 +348,8 @@ class EngineProbe:
         self.stepped = False
         self.attentive = True
 
-    def look(self, machine: smach.StateMachine) -> None:
-        """Find out how this engine steps.
+    def look(self, machine: smach.StateMachine, stays_attentive: bool) -> None:
+        """Find out how this engine steps. `stays_attentive`: it is to look closely in any case.
 
         Some engines hold the lock around a step, with a plain lock all do. Others leave it to the
         step.
@@ -358,22 +359,26 @@ class EngineProbe:
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
         cls = type(machine)
-        self.stays_attentive = cls.preempt_requested is not smach.State.preempt_requested
-        self.attentive = self.stays_attentive
+        if cls is not self._class:
+            self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
+        self.stays_attentive = (
+            stays_attentive or cls.preempt_requested is not smach.State.preempt_requested
+        )
         self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
         # nobody but SMACH and this package has a say in how the machine steps
         step = getattr(machine, '_update_once', None)
-        self.has_own_loop = getattr(step, '__func__', None) is getattr(
-            cls, '_update_once', None
-        ) and _steps_as_drawn(cls)
+        self.has_own_loop = self._class_steps_as_drawn and getattr(
+            step, '__func__', None
+        ) is getattr(cls, '_update_once', None)
+
+    def __reduce__(self) -> Tuple[Type['EngineProbe'], Tuple[()]]:
+        """A copied or pickled machine is looked at when it executes."""
+        return EngineProbe, ()
 
 
 def _steps_as_drawn(cls: type) -> bool:
-    known = _STEP_AS_DRAWN.get(cls)
-    if known is None:
-        known = _STEP_AS_DRAWN[cls] = all(
-            each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
-            for each in cls.__mro__
-            if 'execute' in vars(each) or '_update_once' in vars(each)
-        )
-    return known
+    return all(
+        each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+        for each in cls.__mro__
+        if 'execute' in vars(each) or '_update_once' in vars(each)
+    )

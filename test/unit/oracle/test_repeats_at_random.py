@@ -18,7 +18,7 @@ class Chance(smach.State):
 
     def __init__(self, chance, outcomes):
         super().__init__(outcomes=list(outcomes) + ['aborted'])
-        self._chance = chance
+        self._chance = random.Random(chance.random())  # its thread draws from no other's
         self._good = outcomes
 
     def execute(self, ud):
@@ -28,19 +28,22 @@ class Chance(smach.State):
 class AnyAnswer(Expert):
     """Answers all that may be answered, 40 times."""
 
-    def __init__(self, chance):
-        self._chance = chance
+    def __init__(self, seed):
+        self._seed = seed
         self._left = 40
+        self._chances = {}  # by place: two branches may ask at once
 
     def ask(self, question, cancelled, progress):
+        place = '{}: {}/{}'.format(self._seed, question.container_path, question.failed_state)
+        chance = self._chances.setdefault(place, random.Random(place))
         self._left -= 1
-        drawn = self._chance.random()
+        drawn = chance.random()
         if self._left < 0 or drawn < 0.1:
             return None
         if drawn < 0.7:
-            return goto(self._chance.choice(question.choices).state)
+            return goto(chance.choice(question.choices).state)
         if drawn < 0.9:
-            return supersede(self._chance.choice(question.supersede_outcomes).outcome)
+            return supersede(chance.choice(question.supersede_outcomes).outcome)
         return give_up()
 
 
@@ -95,7 +98,7 @@ class Rule:
         self._begun = set()  # guarded states
         self._spent = set()
         self._confirmed = set()
-        self._free_jumps = set()  # containers whose next jump is the author's transition
+        self._free_jumps = set()  # containers whose next event may be the author's transition
         self.held_back = self.repeated = 0
 
     def guard(self, place):
@@ -103,10 +106,11 @@ class Rule:
 
     def follow(self, number, event):
         place = (event.path, event.state)
+        is_free = event.path in self._free_jumps
+        self._free_jumps.discard(event.path)
         if event.kind is EventKind.STATE_START:
             self._begins(number, place)
         elif event.kind is EventKind.DECISION:
-            self._free_jumps.discard(event.path)
             if decided_by(event) is Decider.HELD_BACK:
                 assert self.guard(place)
                 self.held_back += 1
@@ -114,7 +118,7 @@ class Rule:
         elif event.kind in (EventKind.SUPERSEDE, EventKind.GIVE_UP):
             self._spent.discard(place)
             self._free_jumps.add(event.path)
-        elif event.kind is EventKind.JUMP and event.path not in self._free_jumps:
+        elif event.kind is EventKind.JUMP and not is_free:
             self._jumps(event)
 
     def _begins(self, number, place):
@@ -145,26 +149,36 @@ class Rule:
         self._confirmed |= confirmed & self._begun
 
 
+def followed(seed, policy):
+    """Run the machine of a seed, and return the rule, which has followed its events."""
+    chance, states = random.Random(seed), {}
+    machine = Watched(
+        machine_of(chance, 2, '', states),
+        expert=AnyAnswer(seed),
+        settings={
+            'policy': policy,
+            'states': states,
+            'max_recoveries': 2,
+            'escalate': bool(seed % 3),
+            'budget': chance.choice([{}, {'recoveries': 5}, {'questions': 5}]),
+        },
+    )
+    assert machine.run() in OUTCOMES
+    rule = Rule(states)
+    for number, event in enumerate(machine.events, 1):
+        try:
+            rule.follow(number, event)
+        except AssertionError as err:
+            told = '\n'.join(map(str, machine.events[:number]))
+            raise AssertionError('seed {}: {}\n{}'.format(seed, err, told)) from err
+    return rule
+
+
 @pytest.mark.parametrize('policy', ['prose', 'algorithm1'])
 def test_no_guarded_state_is_repeated_unless_confirmed(policy):
     held_back = repeated = 0
     for seed in range(50):
-        chance, states = random.Random(seed), {}
-        machine = Watched(
-            machine_of(chance, 2, '', states),
-            expert=AnyAnswer(chance),
-            settings={
-                'policy': policy,
-                'states': states,
-                'max_recoveries': 2,
-                'escalate': bool(seed % 3),
-                'budget': chance.choice([{}, {'recoveries': 5}, {'questions': 5}]),
-            },
-        )
-        assert machine.run() in OUTCOMES
-        rule = Rule(states)
-        for number, event in enumerate(machine.events, 1):
-            rule.follow(number, event)
+        rule = followed(seed, policy)
         held_back += rule.held_back
         repeated += rule.repeated
     assert held_back > 5 and repeated > 0, 'the machines are such that there is something to see'

@@ -1,6 +1,6 @@
 """Gives the plain states of the Concurrences and Iterators of a wrapped tree their branches."""
 
-from typing import Dict, Optional, cast
+from typing import Dict, List, Optional, Tuple, cast
 
 import smach
 
@@ -14,15 +14,22 @@ from .sites import BranchSite, IteratorSite
 from .upstream import HOOK, ask_no_more, asks_hook, have_asked
 from .wrapper import ContainerWrapper, wrapper_of
 
+Branching = List[Tuple[Labels, smach.Container]]
 
-def adopt_branches(parent: TreeNode) -> None:
-    """Put the branches below a wrapped machine, down to the next machine, under oracles."""
-    for labels, container in list(branching_below(parent.machine)):
+
+def adopt_branches(parent: TreeNode) -> Branching:
+    """Put the branches below a wrapped machine, down to the next machine, under oracles.
+
+    It returns the Concurrences and Iterators, each with the labels that lead to it.
+    """
+    found = list(branching_below(parent.machine))
+    for labels, container in found:
         wrapper = wrapper_of(container)
         if wrapper is None and parent.in_force.nested:
             wrapper = _new_wrapper(parent, labels, container)
         if wrapper is not None:
             _take_notice(wrapper, parent, labels)
+    return found
 
 
 def release_branches(machine: object) -> None:

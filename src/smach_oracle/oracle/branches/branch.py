@@ -87,7 +87,7 @@ class Branch(smach.Container):
         self._execution_number += 1
         # the same for all items
         self._is_watched = bool(
-            node.in_force.limits_autonomy() or node.tree.resumed.concerns(node) or runs_around(node)
+            node.in_force.limits_autonomy or node.tree.resumed.concerns(node) or runs_around(node)
         )
         self._find_record()
 
@@ -146,7 +146,7 @@ class Branch(smach.Container):
             if (
                 self._preempt_requested
                 or control.is_set
-                or early_end.is_near
+                or early_end.is_near()
                 or execution.departure is not None
                 or smach.is_shutdown()
             ):
@@ -188,11 +188,11 @@ class Branch(smach.Container):
                 smach.logwarn(
                     '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
                 )
-                return outcome_of_early_end(node, None)
+                return outcome_of_early_end(node)
             outcome = node.tree.resumed.take_outcome(node) if end is None else None
             if outcome is None:
-                outcome = outcome_of_early_end(node, self._step_to_end(end))
-            return outcome
+                outcome = self._step_to_end(end)
+            return outcome_of_early_end(node) if outcome is None else outcome
         except smach.InvalidUserCodeError as err:
             error = raised = err
         except BaseException as err:

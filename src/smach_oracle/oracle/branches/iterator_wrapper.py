@@ -11,7 +11,7 @@ from ..machine.snapshots import restore, take_snapshot
 from ..machine.tree_node import TreeNode, node_of
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
-from ..smach_private import Labels, data_of, items_of, states_of
+from ..smach_private import Labels, data_of, items_of, mark_on, states_of
 from .wrapper import ContainerWrapper, wrapper_of
 
 
@@ -111,7 +111,8 @@ class IteratorWrapper(ContainerWrapper):
     def begin_item(self) -> None:
         """Note that an item begins."""
         data: Mapping[str, Any] = data_of(self.container.userdata)
-        for node in self.nodes():
+        for branch in self.branches.values():
+            node: TreeNode = mark_on(branch)
             record = node.records.by_label.get(node.site.label)
             unfinished = None if record is None else node.tree.resumed.unfinished(record)
             if unfinished is not None and unfinished.snapshot is not None:

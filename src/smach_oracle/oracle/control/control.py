@@ -9,7 +9,7 @@ import math
 import threading
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
+from typing import Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 from ..scope.clock import Clock, Flag
 from ..scope.scope import Reason, Scope
@@ -76,6 +76,14 @@ class Engine(Protocol):
 
     attentive: bool
     stays_attentive: bool  # whatever the operator wants
+
+
+class HasKey(Protocol):
+    """A container (`TreeNode`)."""
+
+    @property
+    def key(self) -> str:
+        """The path by which jumps of it are asked for."""
 
 
 class Jump(NamedTuple):
@@ -146,27 +154,26 @@ class Control:
 
     def attend(self, engine: Engine) -> None:
         """Wake this machine from now on, and at once where something is set."""
-        with self._lock:
-            self._engines[id(engine)] = engine
-            engine.attentive = self.is_set or engine.stays_attentive
+        self._engines[id(engine)] = engine
+        self.calm(engine)
 
-    def leave(self, engine: Engine, key: Callable[[], str]) -> Optional[Jump]:
-        """Forget a machine whose execution is over, and return the jump that it has not made.
-
-        `key`: tells that of its container.
-        """
+    def leave(self, engine: Engine, container: 'HasKey') -> Optional[Jump]:
+        """Forget a machine whose execution is over, and return the jump that it has not made."""
+        self._engines.pop(id(engine), None)
+        if not (self._moving or self._jumps):
+            return None
         with self._lock:
-            self._engines.pop(id(engine), None)
-            if not (self._moving or self._jumps):
-                return None
-            path = key()
-            self.arrived(path)
-            return self.take_jump(path)
+            self.arrived(container.key)
+            return self.take_jump(container.key)
 
     def calm(self, engine: Engine) -> None:
-        """Let a machine take the short way again, where nothing is set."""
-        with self._lock:
-            engine.attentive = self.is_set or engine.stays_attentive
+        """Let a machine take the short way again, where nothing is set.
+
+        No lock is needed in this order: who sets something sets `is_set` before it wakes engines.
+        """
+        engine.attentive = engine.stays_attentive
+        if self.is_set:
+            engine.attentive = True
 
     def hold_before(
         self,

@@ -14,6 +14,7 @@ from typing import Iterator, Optional, Tuple
 
 import smach
 
+from ..branches.adopting import Branching
 from ..branches.wrapper import wrapper_of
 from ..checkpoint.resuming import forget_resumed
 from ..control.control import HeldPlace, Hold, LetGo
@@ -268,7 +269,7 @@ class ItemGate:
     def __call__(self, userdata: object, active: object, *args: object) -> None:
         """Wait before the next item."""
         node = self.node
-        if not (node.tree.control.is_set or node.in_force.limits_autonomy()):
+        if not (node.tree.control.is_set or node.in_force.limits_autonomy):
             return
         label = next(iter(self._container.get_children()), '')
         relative = '/'.join(filter(None, (node.relative_path,) + self._below))
@@ -280,12 +281,12 @@ class ItemGate:
         return Reason.PREEMPTED if self._container.preempt_requested() else None
 
 
-def place_gates(node: TreeNode) -> None:
+def place_gates(node: TreeNode, branching: Branching) -> None:
     """Place a gate in each Iterator of a container whose items have no boundary themselves; once.
 
     Machines have one, and states under an oracle of their own.
     """
-    for below, container in branching_below(node.machine):
+    for below, container in branching:
         wrapper = wrapper_of(container)
         callbacks = transition_callbacks(container)
         if (

@@ -74,14 +74,14 @@ def stop_left_behind(node: TreeNode) -> Stop:
 def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
     """End the container. A preempt that its last state has serviced is serviced."""
     machine = node.machine
-    last = current_state_of(machine)
-    if (
-        has_preempt_flag(machine)
-        and last is not None
-        and not last.preempt_requested()
-        and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
-    ):
-        machine.service_preempt()
+    if has_preempt_flag(machine):
+        last = current_state_of(machine)
+        if (
+            last is not None
+            and not last.preempt_requested()
+            and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
+        ):
+            machine.service_preempt()
     set_current_label(machine, None)
     if node.site.is_container:
         smach.loginfo(
@@ -104,16 +104,22 @@ def end_plainly(
         drawn = transitions_of(machine)[label][outcome]
     except (KeyError, TypeError):  # seen for the first time, or no outcome at all
         return None
+    ending = edge.leads_to
     if (
         error is not None
         or edge.message
         or drawn is not edge.drawn
-        or edge.leads_to in states_of(machine)
+        or ending in states_of(machine)
+        # a stop, an operator or a departure may have a say, and an early end of the trial
         or has_preempt_flag(machine)
-        or node.ends_specially()
+        or node.engine.attentive
+        or node.execution.departure is not None
+        or node.tree.early_end.is_near()
+        or smach.is_shutdown()
     ):
         return None
     edge.count += 1
     node.records.history.visited(edge.visit, record.has_preconditions)
-    node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=edge.leads_to)
-    return terminate(node, label, outcome, edge.leads_to)
+    if node.events.observers:
+        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=ending)
+    return terminate(node, label, outcome, ending)

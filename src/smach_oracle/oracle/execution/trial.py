@@ -4,8 +4,7 @@ Also what one execution of any container begins and ends.
 """
 
 import time
-from types import TracebackType
-from typing import Callable, Dict, List, Optional, Type
+from typing import Callable, Dict, List, Optional
 
 import smach
 from smach_oracle.forking import in_child
@@ -33,27 +32,20 @@ _running: List[TreeNode] = []  # top nodes of the trials of this process
 
 
 class ContainerRun(Execution):
-    """One execution of a container by its engine, within this context.
+    """One execution of a container by its engine: a trial where no container above it runs.
 
-    Where no container above it runs, it is a trial. It is a context, and no function around the
-    engine's `execute`, for containers that lie in each other take its frames many times.
+    It is no function around the engine's `execute`, for containers that lie in each other take its
+    frames many times.
 
-    `outcome`: with which it ends.
+    `outcome`, `error`: with which it ends.
     """
 
-    __slots__ = ('outcome', '_new_trial_id', '_is_executed', '_is_trial', '_store')
+    outcome: Optional[str] = None
+    error: Optional[BaseException] = None
+    _is_executed = _is_trial = False
+    _store: Optional[TrialStore] = None
 
-    def __init__(self, node: TreeNode, new_trial_id: Callable[[], str]) -> None:
-        super().__init__(node)
-        self._new_trial_id = new_trial_id
-        self._is_executed = self._is_trial = False
-        self._store: Optional[TrialStore] = None
-        self.outcome: Optional[str] = None
-
-    def __enter__(self) -> 'ContainerRun':
-        return self
-
-    def begins(self) -> bool:
+    def begins(self, new_trial_id: Callable[[], str]) -> bool:
         """Begin. Return whether the engine is to execute the machine."""
         node = self._node
         is_top = not node.has_running_ancestor()
@@ -63,8 +55,8 @@ class ContainerRun(Execution):
             smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
             return False
         if is_top:
-            self._begin_trial()
-        else:
+            self._begin_trial(new_trial_id)
+        elif node.tree.is_resumed:
             self.outcome = node.tree.resumed.take_outcome(node)
             if self.outcome is not None:
                 return False
@@ -72,7 +64,7 @@ class ContainerRun(Execution):
         self.begin()
         return True
 
-    def _begin_trial(self) -> None:
+    def _begin_trial(self, new_trial_id: Callable[[], str]) -> None:
         node = self._node
         adopt(node.machine)
         nodes = list(nodes_of(node.machine))
@@ -83,7 +75,7 @@ class ContainerRun(Execution):
         store = self._store = open_store(node)
         resumed = None if store is None else store.to_resume()
         node.tree.early_end.begin_trial(is_stored=store is not None)
-        node.tree.begin_trial(self._new_trial_id() if resumed is None else resumed.trial.trial_id)
+        node.tree.begin_trial(new_trial_id() if resumed is None else resumed.trial.trial_id)
         for each in nodes:
             # one that still runs was abandoned in an earlier trial, and is left there
             if not each.machine.is_running():
@@ -110,24 +102,20 @@ class ContainerRun(Execution):
         self._is_trial = True
         _running.append(node)
 
-    def __exit__(
-        self,
-        kind: Optional[Type[BaseException]],
-        error: Optional[BaseException],
-        trace: Optional[TracebackType],
-    ) -> None:
-        node = self._node
+    def is_over(self) -> None:
+        """End, with what is noted."""
+        node, error, self.error = self._node, self.error, None  # which refers to the caller's frame
         try:
             if self._is_executed:
                 self.end(self.outcome, error)
         finally:
             if self._is_trial:
                 _running.remove(node)
-                if not node.tree.is_parents:
+                if not node.tree.is_parents():
                     _end_trial(node, self.outcome, error, self._store)
                 self._store = None
-            else:
-                self.outcome = outcome_of_early_end(node, self.outcome)
+            elif self.outcome is None:
+                self.outcome = outcome_of_early_end(node)
 
 
 def _end_trial(

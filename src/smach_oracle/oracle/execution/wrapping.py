@@ -85,7 +85,6 @@ def bring_up_to_date(node: TreeNode) -> None:
     :raises SettingsError: where the settings do not fit them.
     """
     sync_oracle(node)
-    place_gates(node)
     states = len(states_of(node.machine))
     if node.in_force.is_unchecked(states):
         if node.parent is None:
@@ -147,7 +146,7 @@ def adopt(machine: smach.StateMachine) -> None:
     :raises SettingsError: for a machine whose class cannot be extended.
     """
     parent = marked_node(machine)
-    adopt_branches(parent)
+    place_gates(parent, adopt_branches(parent))
     for below, child in machines_below(machine):
         node = node_of(child)
         if node is None:
@@ -191,10 +190,13 @@ def sync_oracle(node: TreeNode) -> None:
     states = states_of(machine)
     if not node.tree.recover or not states:
         return
-    label = node.settings.oracle_label
+    label = node.in_force.of_machine.oracle_label
     meta = states.get(label)
     outcomes = machine.get_registered_outcomes()
-    if isinstance(meta, OracleState) and meta.leads_on(machine, label, outcomes):
+    transitions = transitions_of(machine)
+    if isinstance(meta, OracleState) and meta.leads_on(
+        tuple(states), outcomes, transitions.get(label)
+    ):
         return
     if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:
         raise SettingsError(
@@ -207,14 +209,13 @@ def sync_oracle(node: TreeNode) -> None:
     if meta is None:
         meta = OracleState()
         remappings_of(machine)[label] = {}
-    transitions = transitions_of(machine)
     if set(transitions.get(label, ())) != set(states).union(outcomes).difference((label,)):
         transitions[label] = meta.lead_to(
             tuple(node.labels())
             + tuple(name for name in sorted(outcomes, key=str) if name not in states)
         )
     states[label] = meta
-    meta.note_led(machine, label, outcomes)
+    meta.note_led(tuple(states), outcomes, transitions[label])
 
 
 def remove_oracle(node: TreeNode) -> None:

@@ -36,6 +36,17 @@ class ContainerSettings:
         self.failing = self.rule.failing
         self.deep_copy_keys = settings.deep_copy_keys
         self.userdata = settings.userdata or self.policy.userdata  # after a jump
+        self._note_given()
+
+    def give_with_add(self, label: str, given: Dict[str, Any]) -> None:
+        """Put settings of a state into force that were given with `add()`."""
+        self.given_with_add[label] = given
+        self._note_given()
+
+    def _note_given(self) -> None:
+        # whether a state may not simply be entered, and whether one may be guarded
+        self.limits_autonomy = self._sets('autonomy', RUN)
+        self.guards_states = self._sets('on_retry', ALLOW)
 
     def wrap_with(
         self,
@@ -56,21 +67,12 @@ class ContainerSettings:
         """Note that they are."""
         self._checked_states = states
 
-    def guards_states(self) -> bool:
-        """Whether a state may be guarded: whether `on_retry` is set, for all or for one."""
-        return self._sets('on_retry', ALLOW)
-
-    def limits_autonomy(self) -> bool:
-        """Whether a state may not simply be entered: whether `autonomy` is set for all or one."""
-        return self._sets('autonomy', RUN)
-
     def _sets(self, key: str, usual: str) -> bool:
-        if getattr(self.of_machine.defaults, key) != usual:
-            return True
-        if not (self.of_machine.states or self.given_with_add):
-            return False
+        """Whether a setting of states is not as usual, for all or for one."""
         given = [*self.of_machine.states.values(), *self.given_with_add.values()]
-        return any(each.get(key, usual) != usual for each in given)
+        return getattr(self.of_machine.defaults, key) != usual or any(
+            each.get(key, usual) != usual for each in given
+        )
 
     def of_state(self, path: str, label: str) -> StateSettings:
         """Return the settings of a state of the container at `path`, relative to the top machine.
@@ -151,7 +153,7 @@ class ContainerRecords:
         self.streaks.end_execution()
         for record in self.by_label.values():
             record.snapshot = None
-            if record.way_down or record.entered_by_oracle:
+            if record.special:
                 record.forget_entry()
 
     # -- a stop that was obeyed

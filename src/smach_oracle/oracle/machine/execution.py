@@ -38,7 +38,7 @@ class Execution:
         'departure',
         'unrecovered',
         'starts_in',
-        '_starts_below',
+        'starts_below',
         '_is_preempt_told',
     )
 
@@ -52,7 +52,7 @@ class Execution:
         self.departure: Optional[DeparturePort] = None
         self.unrecovered = False
         self.starts_in = ''  # '': its initial state
-        self._starts_below: Dict[int, str] = {}  # by the id of a node in the present state
+        self.starts_below: Dict[int, str] = {}  # by the id of a node in the present state
         self._is_preempt_told = False
 
     # -- what is around it
@@ -62,8 +62,8 @@ class Execution:
 
         Return whether it still may.
         """
-        self.runs_around = runs = runs_around(self._node)
-        for run in runs:
+        self.runs_around = runs_around(self._node)
+        for run in self.runs_around:
             run.tell(self._node.engine)
         return not self.is_left_behind()
 
@@ -72,7 +72,7 @@ class Execution:
 
         It executes inside a state that was abandoned, or its trial has ended early.
         """
-        if self._node.tree.scope.told is not None:
+        if self._node.tree.scope.cancelled is not None:  # it lies in no other scope
             return True
         around = self.runs_around
         return bool(around) and any(run.told is not None for run in around)
@@ -95,14 +95,21 @@ class Execution:
     def begin(self) -> None:
         """Be the present execution of the container from now on."""
         node = self._node
-        node.execute_as(self)
-        node.begin_execution()
+        node.begin_execution(self)
         self.starts_in = node.start_from_above(take=True)
-        entry = node.tree.resumed.entry_of(node)
-        begins_in = self.starts_in if entry is None else entry.label
         if node.events.observers:
+            entry = node.tree.resumed.entry_of(node)
+            begins_in = self.starts_in if entry is None else entry.label
             state = begins_in or initial_label_of(node.machine)
             node.emit(EventKind.CONTAINER_START, state=state)
+
+    def is_led(self) -> bool:
+        """Whether it begins elsewhere than in its initial state."""
+        node = self._node
+        return bool(self.starts_in or node.tree.is_resumed) and (
+            self.starts_in in states_of(node.machine)
+            or node.tree.resumed.entry_of(node) is not None
+        )
 
     def end(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
         """Be over, with an outcome or an error, or with neither."""
@@ -112,7 +119,7 @@ class Execution:
             set_executing(node.machine, False)
             if ends_program(error):
                 node.tree.early_end.of_program = error
-        dropped = node.tree.control.leave(node.engine, lambda: node.key)
+        dropped = node.tree.control.leave(node.engine, node)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
         if node.events.observers and node.site.is_container:
@@ -139,11 +146,11 @@ class Execution:
 
     def start_below(self, places: Iterable[Tuple['TreeNode', str]]) -> None:
         """Have containers in the present state begin in these states, each once. None: no more."""
-        self._starts_below = {id(node): label for node, label in places}
+        self.starts_below = {id(node): label for node, label in places}
 
     def start_of(self, node: 'TreeNode', take: bool) -> str:
         """Return the state in which a container below is to begin, '' where nobody says so."""
-        starts = self._starts_below
+        starts = self.starts_below
         return starts.pop(id(node), '') if take else starts.get(id(node), '')
 
     # -- how it goes on

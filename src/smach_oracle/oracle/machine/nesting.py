@@ -75,15 +75,15 @@ def machines_below(
     It looks through Concurrences and Iterators, but not into the machines that it finds. It yields
     the branches of those, too, with the labels of the Concurrence or Iterator.
     """
-    wrapper = wrapper_of(container)
+    # a machine has none, and is what is asked most often
+    wrapper = None if isinstance(container, smach.StateMachine) else wrapper_of(container)
     if wrapper is not None:
         yield from ((below, each) for each in [*wrapper.branches.values()])
-    for label, state in list(children_of(container).items()):
-        path = below + (label,)
+    for label, state in _containers_of(container):
         if isinstance(state, smach.StateMachine):
-            yield path, state
-        elif isinstance(state, smach.Container):
-            yield from machines_below(state, path)
+            yield below + (label,), state
+        else:
+            yield from machines_below(state, below + (label,))
 
 
 def branching_below(
@@ -93,9 +93,9 @@ def branching_below(
 
     It looks through them, but not into machines.
     """
-    for label, state in list(children_of(container).items()):
-        path = below + (label,)
-        if isinstance(state, smach.Container) and not isinstance(state, smach.StateMachine):
+    for label, state in _containers_of(container):
+        if not isinstance(state, smach.StateMachine):
+            path = below + (label,)
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
                 yield path, state
             yield from branching_below(state, path)
@@ -130,6 +130,15 @@ def children_of(container: object) -> Mapping[str, smach.State]:
     if isinstance(container, smach.StateMachine):
         return states_of(container)
     return container.get_children() if isinstance(container, smach.Container) else {}
+
+
+def _containers_of(container: object) -> List[Tuple[str, smach.Container]]:
+    """Return those of its states that are containers, by label."""
+    return [
+        (label, state)
+        for label, state in children_of(container).items()
+        if isinstance(state, smach.Container)
+    ]
 
 
 def paths_below(container: object, above: Labels = ()) -> Iterator[str]:

@@ -172,7 +172,7 @@ class Oracle:
     @property
     def is_parents(self) -> bool:
         """Whether this is a child process of the program in which the machine has its oracle."""
-        return self._node.tree.is_parents
+        return self._node.tree.is_parents()
 
     @property
     def events(self) -> EventSource:

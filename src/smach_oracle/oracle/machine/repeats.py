@@ -25,10 +25,11 @@ class _Done(NamedTuple):
 
 def begin_watching(tree: Tree, nodes: Sequence[TreeNode]) -> None:
     """Begin a trial: number the visits where a state of the tree is guarded."""
-    tree.numbers_visits = tree.recover and any(each.in_force.guards_states() for each in nodes)
+    tree.numbers_visits = tree.recover and any(each.in_force.guards_states for each in nodes)
     for each in nodes:
+        is_special = each.is_special()
         for record in each.records.by_label.values():
-            record.be_special(each.is_special())
+            record.be_special(is_special)
 
 
 def note_visit(node: TreeNode, record: StateRecord) -> str:

@@ -91,7 +91,7 @@ class ResumedTrial:
 
     def take_outcome(self, node: 'TreeNode') -> Optional[str]:
         """Return the outcome of one that was over, once, None for any other."""
-        return self._outcomes.pop(node, None) if self._outcomes else None
+        return self._outcomes.pop(node, None)
 
     def ask_before_next(
         self, nodes: Iterable['TreeNode'], why: str, passes: Iterable[StateRecord]

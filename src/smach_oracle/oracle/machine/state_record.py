@@ -214,7 +214,8 @@ class StateRecord:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self._tried = '', 0
-        self.forget_entry()  # of a trial that ended before the visit
+        if self.special:
+            self.forget_entry()  # of a trial that ended before the visit
         self._visits_before = self._visits + self._by_edges()
 
     @property

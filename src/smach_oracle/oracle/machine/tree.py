@@ -116,7 +116,6 @@ class Tree:
         self.departures_lock = threading.Lock()
         self._lock = threading.Lock()
 
-    @property
     def is_parents(self) -> bool:
         """Whether this is a child process of the program to which the tree belongs."""
         return self.process != os.getpid() and is_child()

@@ -155,9 +155,11 @@ class TreeNode:
         """
         above = self.parent
         while above is not None:
-            start = is_executing(above.machine) and above.execution.start_of(self, take)
-            if start:
-                return start
+            execution = above.execution
+            if execution.starts_below and is_executing(above.machine):
+                start = execution.start_of(self, take)
+                if start:
+                    return start
             above = above.parent
         return ''
 
@@ -167,18 +169,6 @@ class TreeNode:
         It executes inside a state that was abandoned, or its trial has ended early.
         """
         return self.execution.is_left_behind()
-
-    def ends_specially(self) -> bool:
-        """Whether an execution that comes to its end now may not just end with its outcome.
-
-        A stop, an operator or a departure may have a say, and an early end of the trial.
-        """
-        return bool(
-            self.engine.attentive
-            or self.execution.departure is not None
-            or self.tree.early_end.is_near
-            or smach.is_shutdown()
-        )
 
     def why_left_behind(self) -> str:
         """Say why, where it is left behind."""
@@ -306,17 +296,14 @@ class TreeNode:
         self.tree.resumed.forget(self)
         self.records.begin_trial()
 
-    def execute_as(self, execution: Execution) -> None:
-        """Have this as the present execution."""
+    def begin_execution(self, execution: Execution) -> None:
+        """Have this as the present execution, and forget what belongs to the one before."""
         self.execution = execution
-
-    def begin_execution(self) -> None:
-        """Forget what belongs to one execution of the container."""
         if self.trial_id != self.tree.trial_id:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
         self.engine.begin_execution()
-        entry = self.tree.resumed.entry_of(self)
+        entry = self.tree.resumed.entry_of(self) if self.tree.is_resumed else None
         if entry is not None:
             entry.take_over_records(self)
 
@@ -324,12 +311,11 @@ class TreeNode:
         """Begin an execution as the one that is there already."""
         self.execution.renew()
         self.records.end_execution()
-        self.begin_execution()
+        self.begin_execution(self.execution)
 
     def begin_stepping(self) -> None:
         """Find out at the first state of an execution what the engine is like."""
-        self.engine.look(self.machine)
-        self.engine.stays_attentive |= self.in_force.limits_autonomy()
+        self.engine.look(self.machine, self.in_force.limits_autonomy)
         self.tree.control.attend(self.engine)
         self.abandoned = self.tree.workers.abandoned
 
@@ -359,5 +345,5 @@ class TreeNode:
         twin.records = self.records.twin()
         twin.in_force = copy.copy(self.in_force)
         twin.in_force.given_with_add = dict(self.in_force.given_with_add)
-        twin.engine = copy.copy(self.engine)
+        twin.engine = EngineProbe()
         return twin

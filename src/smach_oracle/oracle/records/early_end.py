@@ -44,7 +44,6 @@ class EarlyEnd:
             with self._lock:
                 self._asking -= 1
 
-    @property
     def is_near(self) -> bool:
         """Whether it has come, or may come at a shutdown, since a question is open."""
         return self._asking > 0 or self.why is not None

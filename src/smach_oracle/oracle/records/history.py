@@ -37,6 +37,10 @@ class _CountedVisits(Deque[Visit]):
         super().append(visit)
         self.added += 1
 
+    def clear(self) -> None:
+        super().clear()
+        self.added = 0
+
 
 # state of the latest visit without preconditions, those of the latest successes, two streaks
 Told = Tuple[Optional[str], Optional[str], Optional[str], _Streak, _Streak]
@@ -71,8 +75,6 @@ class History:
         that goes on failing gets a new goal for its steps back, from the new chain.
         """
         self.visits.clear()
-        if isinstance(self.visits, _CountedVisits):
-            self.visits.added = 0
         self.unconditioned = self.succeeded = self.succeeded_other = None
         if self._streak.anchored:
             self._streak = self._streak._replace(anchor=None, anchored=False)

@@ -20,7 +20,7 @@ from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
 from ..records.events import EventKind, FailureKind
 from ..scope.scope import standing_still
-from ..smach_private import Labels, Transitions, remapping_of, states_of, transitions_of
+from ..smach_private import Labels, Transitions, remapping_of
 from .deciding import decide_on_level
 from .falling_back import fall_back, fallback_in_words
 from .inquiry import Inquiry
@@ -317,20 +317,19 @@ class OracleState(smach.State):
         self._outcomes = set(labels)
         return {label: label for label in labels}
 
-    def note_led(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> None:
-        """Note for what of the container, where it is `label`, it leads to all that there is."""
-        transitions = transitions_of(machine)[label]
-        self._led = tuple(states_of(machine)), outcomes, transitions, len(transitions)
+    def note_led(self, states: Labels, outcomes: Labels, drawn: Transitions) -> None:
+        """Note the states and outcomes of the container to all of which these transitions lead."""
+        self._led = states, outcomes, drawn, len(drawn)
 
-    def leads_on(self, machine: smach.StateMachine, label: str, outcomes: Labels) -> bool:
+    def leads_on(self, states: Labels, outcomes: Labels, drawn: Optional[Transitions]) -> bool:
         """Whether nothing of that has changed since."""
-        states, ends, drawn, count = self._led
+        led_states, led_outcomes, led_drawn, count = self._led
         return (
             drawn is not None
-            and transitions_of(machine).get(label) is drawn
+            and drawn is led_drawn
             and len(drawn) == count
-            and ends == outcomes
-            and states == tuple(states_of(machine))
+            and led_outcomes == outcomes
+            and led_states == states
         )
 
     def begin(self, recovery: Recovery) -> None:

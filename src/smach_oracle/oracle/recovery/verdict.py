@@ -210,11 +210,10 @@ def leaving_outcome(node: TreeNode, failure: Optional[Failure] = None) -> str:
     return failing_outcome(node) or outcomes[0]
 
 
-def outcome_of_early_end(node: TreeNode, outcome: Optional[str]) -> Optional[str]:
+def outcome_of_early_end(node: TreeNode) -> Optional[str]:
     """Return an outcome for a Concurrence or an Iterator where its trial has ended early.
 
     It wants one, and nobody goes by it.
     """
-    if outcome is not None or node.tree.early_end.why is None or not node.runs_in_branch:
-        return outcome
-    return leaving_outcome(node)
+    is_wanted = node.tree.early_end.why is not None and node.runs_in_branch
+    return leaving_outcome(node) if is_wanted else None
