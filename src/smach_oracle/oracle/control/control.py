@@ -79,7 +79,7 @@ class Engine(Protocol):
 
 
 class HasKey(Protocol):
-    """A container (`TreeNode`)."""
+    """A container that executes."""
 
     @property
     def key(self) -> str:
