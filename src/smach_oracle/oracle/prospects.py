@@ -6,14 +6,17 @@ import smach
 
 from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
+from .decision.ways import WayKind
 from .machine.nesting import nodes_of
+from .machine.places import TreePlace
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
+from .recovery.menu import levels_at_rest, name_of, state_around
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
-from .smach_private import initial_label_of, states_of
+from .smach_private import initial_label_of, states_of, transitions_of
 
 Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
 
@@ -28,7 +31,11 @@ class OutcomeProspect(NamedTuple):
 
 
 class StateProspect(NamedTuple):
-    """One state. `actions`: what the policy may do on its failure, by class of its rate."""
+    """One state. `actions`: what the policy may do on its failure, by class of its rate.
+
+    `before`: the states that may have run before it, the nearest first. A step back may run them
+    again. `kinds`: of the ways on its menu, nothing where the policy goes by none.
+    """
 
     label: str
     state: smach.State
@@ -36,6 +43,8 @@ class StateProspect(NamedTuple):
     outcomes: Tuple[OutcomeProspect, ...]
     actions: Actions
     offers: Tuple[InterfaceOffer, ...]
+    before: Tuple[str, ...] = ()
+    kinds: Tuple[WayKind, ...] = ()
 
 
 class ContainerProspect(NamedTuple):
@@ -159,7 +168,48 @@ def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
         ),
         tuple(_actions(node.in_force.policy, settings, decides)),
         node.settings.offers_for(node.relative_path, label),
+        tuple(_before(node, label)),
+        tuple(_kinds(node, label)),
     )
+
+
+def _before(node: TreeNode, label: str) -> Iterator[str]:
+    """Yield the states from which the author's transitions lead to a state, the nearest first.
+
+    Those of the containers around it come last, where a step back may go there.
+    """
+    crosses = node.in_force.policy.goes_by_ways or node.settings.step_back_across
+    for level in levels_at_rest(node) if crosses else (node,):
+        label = label if level is node else state_around(level, node)
+        for each in _leading_to(level, label):
+            yield name_of(TreePlace(level, each), node)
+
+
+def _leading_to(node: TreeNode, label: str) -> List[str]:
+    found = {label: None}
+    waiting = [label]
+    while waiting:
+        goal = waiting.pop(0)
+        for each in node.labels():
+            if each not in found and goal in transitions_of(node.machine)[each].values():
+                found[each] = None
+                waiting.append(each)
+    return list(found)[1:]
+
+
+def _kinds(node: TreeNode, label: str) -> Iterator[WayKind]:
+    """Yield the kinds of ways that may be on the menu of a state."""
+    if not node.in_force.policy.goes_by_ways:
+        return
+    yield WayKind.AGAIN
+    yield WayKind.WAIT
+    if node.settings_of(label).preconditions:
+        yield WayKind.PREPARE
+    if any(_before(node, label)):
+        yield WayKind.STEP_BACK
+        yield WayKind.START
+        if len(levels_at_rest(node)) > 1:
+            yield WayKind.TOP
 
 
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:

@@ -11,6 +11,7 @@ CHANGED_DEFAULTS = {
     ".failing_outcomes: it was ['aborted', 'failed', 'failure', 'error'], it is None": (
         'failing_outcomes:'
     ),
+    ".userdata: it was 'restore', it is None": 'userdata:',
     '.escalate: it was True, it is False': 'escalate:',
     '.most_questions: it was 12, it is 6': 'most_questions:',
 }

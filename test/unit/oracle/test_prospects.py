@@ -139,3 +139,19 @@ def test_branches_are_told_with_where_their_outcomes_lead():
     )
     assert not outcome(states['LEFT'], 'aborted').author_recovers
     assert outcome(states['RIGHT'], 'aborted').author_recovers, 'the map has foreseen it'
+
+
+def test_a_step_back_may_run_what_leads_to_a_state_the_nearest_first():
+    states = told({})
+    assert states['PLACE'].before == ('PICK', 'HOME', 'HELP')
+    assert states['PUT'].before == states['PUT'].kinds == ()
+    across = told({'step_back_across': True})
+    assert across['PUT'].before == ('/PICK', '/HOME', '/HELP')
+
+
+def test_the_menu_of_a_state_is_told_before_anything_runs():
+    settings = {'policy': 'escalating', 'states': {'PLACE': {'preconditions': ['HOME']}}}
+    kinds = {label: [kind.value for kind in state.kinds] for label, state in told(settings).items()}
+    assert kinds['PLACE'] == ['again', 'wait', 'prepare', 'step_back', 'start']
+    assert kinds['PUT'] == ['again', 'wait', 'step_back', 'start', 'top']
+    assert told(settings)['PUT'].before == ('/PICK', '/HOME', '/HELP')

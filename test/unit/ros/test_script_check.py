@@ -144,6 +144,21 @@ def test_the_report_names_ends_that_say_neither_success_nor_failure_and_what_set
     assert code == 0 and 'other ends' not in report, errors
 
 
+def test_the_report_has_the_menu_and_what_a_step_back_may_run_again(check):
+    code, report, errors = check(
+        "machine('HOME', 'LOOK', 'PICK').execute()",
+        'policy: escalating\nstates: {PICK: {max_recoveries: 2}}\n',
+    )
+    assert code == 0, errors
+    told = ' '.join(report.split())
+    assert 'may run again LOOK, HOME' in told
+    assert (
+        'the cheapest of: again, after 10 s or 60 s, from 1, 2, 4... states back, from the start; '
+        'after 4 in a row: ask'
+    ) in told
+    assert 'after max_recoveries (2), which cuts its 4 off: ask' in told
+
+
 def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(check):
     code, report, _ = check("""
         first, second = machine('A', 'B'), machine('C')

@@ -163,7 +163,7 @@ class Branch(smach.Container):
             return outcome
         except (SystemExit, KeyboardInterrupt) as err:
             self._oracle.tree.early_end.of_program = err
-            self._oracle.records.end_execution()
+            self._oracle.records.drop_snapshots()
             self._rest()
             raise
         finally:

@@ -285,7 +285,7 @@ class Checkpointer:
             yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind in _CLOSES and self._top.tree.early_end.why is None:
             yield Fact(node.key, ASKED, None)
-        else:
+        elif not _is_on_its_way(node):
             outcome = node.site.ended_by(node, event)
             if outcome is not None:
                 yield fact_of(node.key, AT, [outcome, ENDED])
@@ -424,3 +424,16 @@ def _begins_line(node: TreeNode) -> str:
 def must_stop(node: TreeNode) -> bool:
     """Whether nobody may wait any longer."""
     return not node.execution.scope.reasons.isdisjoint((Reason.PREEMPTED, Reason.SHUTDOWN))
+
+
+def _is_on_its_way(node: TreeNode) -> bool:
+    """Whether a container is left by a way that is decided again after a crash.
+
+    Until the machine is where that leads, the state that has failed is where it stands.
+    """
+    departure = None if node.parent is None else node.parent.execution.departure
+    return (
+        departure is not None
+        and departure.is_decided_again
+        and departure.failed_path.startswith(node.path + '/')
+    )

@@ -123,7 +123,6 @@ class EntryPoint:
             node.records.history.take_over(
                 stored.visits, stored.visits_of_execution, stored.history, node.has
             )
-        node.records.streaks.take_over(stored.streaks)
 
     def enter(self, node: TreeNode) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
@@ -195,6 +194,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
                 record.go_on(told['counts'], told['longest_s'])
         if stored.history:
             node.records.history.take_over((), 0, stored.history, node.has)
+        node.records.streaks.take_over(stored.streaks)
     latest = take_over_marks(nodes, resumption.marks, resumption.is_in_doubt)
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)

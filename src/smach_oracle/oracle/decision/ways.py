@@ -9,6 +9,7 @@ from enum import Enum
 from typing import NamedTuple, Tuple
 
 KEEP, RESTORE = 'keep', 'restore'
+WAITS_S = (10.0, 60.0)  # before the failed state is entered again
 _FROM = 'from '
 
 

@@ -84,6 +84,8 @@ class Applying:
 
     def _jump(self, jump: JumpTo) -> None:
         node, way = self._node, jump.jump_path
+        if jump.chosen is not None:
+            jump.chosen.note()
         if jump.restarts:  # with the userdata of the start in all containers
             start_over(node, way.first_label)
             userdata, missing = 'start', None

@@ -32,6 +32,7 @@ class Departure:
         self.verdict = verdict
         self.arrives_at = arrives_at
         self.failed_path = failed_path
+        self.is_decided_again = isinstance(verdict, JumpTo) and verdict.chosen is not None
         self._repeated = (
             set(repeated_on(verdict.jump_path)) if isinstance(verdict, JumpTo) else set()
         )

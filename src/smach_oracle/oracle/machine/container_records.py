@@ -147,10 +147,9 @@ class ContainerRecords:
         for record in self.by_label.values():
             record.begin_trial()
 
-    def end_execution(self) -> None:
+    def drop_snapshots(self) -> None:
         """Let go of the userdata that snapshots refer to, and of entries that never came."""
         self.take_up_work()
-        self.streaks.end_execution()
         for record in self.by_label.values():
             record.snapshot = None
             if record.special:

@@ -14,7 +14,14 @@ if TYPE_CHECKING:
 
 
 class DeparturePort(Protocol):
-    """A verdict that leaves containers for a level above (`execution.departure`)."""
+    """A verdict that leaves containers for a level above (`execution.departure`).
+
+    `failed_path`: that of the failed state. `is_decided_again`: after a crash on the way a policy
+    comes to it again.
+    """
+
+    failed_path: str
+    is_decided_again: bool
 
     @property
     def arrives_at(self) -> 'TreeNode':
@@ -122,11 +129,12 @@ class Execution:
         dropped = node.tree.control.leave(node.engine, node)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
+        node.records.streaks.end_execution()
         if node.events.observers and node.site.is_container:
             why = why_no_outcome(outcome, error)
             node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
         self.runs_around = ()
-        node.records.end_execution()
+        node.records.drop_snapshots()
 
     def begin_branch(self, has_ended: bool) -> bool:
         """Begin as that of a branch, which its Concurrence or Iterator may execute several times.

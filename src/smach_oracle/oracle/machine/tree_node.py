@@ -310,7 +310,7 @@ class TreeNode:
     def begin_once_more(self) -> None:
         """Begin an execution as the one that is there already."""
         self.execution.renew()
-        self.records.end_execution()
+        self.records.drop_snapshots()
         self.begin_execution(self.execution)
 
     def begin_stepping(self) -> None:

@@ -16,8 +16,8 @@ class OpenStreak:
     """A streak that goes on.
 
     `successes`: of the state in all. `began_s`: on the trial's clock. `visited`: the states before
-    the first failure, by name, the latest first. `leaves`: whether its latest way has left the
-    container.
+    the first failure, by name, the latest first. `leaves`: whether the way that is gone now leaves
+    the container.
     """
 
     def __init__(self, successes: int, began_s: float, visited: Iterable[str]) -> None:
@@ -28,11 +28,10 @@ class OpenStreak:
         self.attempts = 0
         self.leaves = False
 
-    def note(self, way: str, leaves: bool) -> None:
-        """Note that a way is gone. `leaves`: the container, which ends by it."""
+    def note(self, way: str) -> None:
+        """Note that a way was gone."""
         self.tried.append(way)
         self.attempts += 1
-        self.leaves = leaves
 
     def so_far(self, now_s: float) -> StreakSoFar:
         """Return what was done. `now_s`: on the trial's clock."""
@@ -63,8 +62,6 @@ class Streaks:
         """End all, but where a way has ended the execution."""
         if self._open:
             self._open = {label: each for label, each in self._open.items() if each.leaves}
-            for each in self._open.values():
-                each.leaves = False
 
     def begin_trial(self) -> None:
         """Forget everything."""

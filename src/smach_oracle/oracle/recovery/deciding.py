@@ -4,7 +4,7 @@ from typing import Callable, Optional, Tuple
 
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes, going_would_repeat
-from ..decision.ways import Way, WayKind
+from ..decision.ways import StreakSoFar, Way, WayKind
 from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
 from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.repeats import has_visited
@@ -99,7 +99,8 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
         for way, path in menu_of(node, record, streak.visited)
     }
     while True:
-        so_far = streak.so_far(budget.time.now())
+        # after a crash a state is entered again, whatever its streak says: it has not failed
+        so_far = streak.so_far(budget.time.now()) if recovery.failure.is_counted else StreakSoFar()
         recovery.menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
         situation = situation._replace(past=past, menu=recovery.menu)
         recovery.order = policy.order(situation)
@@ -110,12 +111,13 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
             break
         if recovery.stopped():
             return Decider.POLICY, recovery.facts(Action.ASK)
-        streak.note(way.key, False)
+        streak.note(way.key)
     spent = budget.take_recovery()
     if spent:
         recovery.order = ()
         return Decider.BUDGET, recovery.facts(Action.ASK, blocked=spent)
     recovery.jump_path = paths[way]
+    streak.leaves = bool(recovery.jump_path.left_containers)
     action = Action.REVISIT if way.enters_again else Action.STEP_BACK
     target = _named(recovery, recovery.jump_path)
     facts = recovery.facts(action, target=target, wait_s=way.wait_s)

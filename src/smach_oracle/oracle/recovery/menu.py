@@ -7,7 +7,7 @@ from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import smach
 
-from ..decision.ways import Way, WayKind
+from ..decision.ways import WAITS_S, Way, WayKind
 from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace, is_direct, levels_above, place_named
@@ -16,7 +16,6 @@ from ..machine.tree_node import TreeNode, node_of
 from ..records.visits import VisitResult
 from ..smach_private import initial_label_of, states_of
 
-WAITS_S = (10.0, 60.0)  # before the failed state is entered again
 _MOST_VISITED = 64  # states, to which a step back may lead
 
 
@@ -33,12 +32,16 @@ def levels_of(node: TreeNode) -> List[TreeNode]:
     It ends where a Concurrence or an Iterator lies between: what runs in the other branches, and
     what is done of the items, is not given up for one failure.
     """
-    levels, child = [node], node
-    for above in levels_above(node):
-        if not is_direct(child):
-            break
-        levels.append(above)
-        child = above
+    running = [node, *levels_above(node)]
+    return [level for level in levels_at_rest(node) if any(level is each for each in running)]
+
+
+def levels_at_rest(node: TreeNode) -> List[TreeNode]:
+    """Return those that they would be, whatever runs."""
+    levels = [node]
+    while is_direct(node) and node.parent is not None:
+        node = node.parent
+        levels.append(node)
     return levels
 
 
@@ -57,12 +60,12 @@ def visited_before(node: TreeNode, label: str) -> Tuple[str, ...]:
             if visit.state != own and level.has(visit.state)
         )
         if level is not node:
-            labels.pop(_state_around(level, node), None)
+            labels.pop(state_around(level, node), None)
         found.extend(name_of(TreePlace(level, each), node) for each in labels)
     return tuple(found[:_MOST_VISITED])
 
 
-def _state_around(level: TreeNode, node: TreeNode) -> str:
+def state_around(level: TreeNode, node: TreeNode) -> str:
     """Return the state of a container in which the one below it lies."""
     while node.parent is not level and node.parent is not None:
         node = node.parent

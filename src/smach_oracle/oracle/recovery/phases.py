@@ -150,10 +150,7 @@ def _follow_policy(recovery: Recovery, facts: DecisionFacts) -> Verdict:
 def _wait_and_jump(recovery: Recovery, wait_s: float, jump: JumpTo) -> Verdict:
     if wait_s and not recovery.has_waited(wait_s):
         return recovery.end_early()
-    verdict = recovery.when_well(jump)
-    if isinstance(verdict, JumpTo) and verdict.chosen is not None:
-        verdict.chosen.note(bool(verdict.jump_path.left_containers))
-    return verdict
+    return recovery.when_well(jump)
 
 
 # -- the levels above

@@ -153,8 +153,10 @@ class Recovery:
 
     @property
     def chosen(self) -> Optional[ChosenWay]:
-        """Return the way that it has decided for, None where there is no menu."""
-        return ChosenWay(self.node, self.record, self.order[0].key) if self.order else None
+        """Return the way that it has decided for, None where no streak is to know of it."""
+        if not self.order or not self.failure.is_counted:
+            return None
+        return ChosenWay(self.node, self.record, self.order[0].key)
 
     # -- waits
 

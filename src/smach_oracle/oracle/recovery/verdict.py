@@ -10,14 +10,13 @@ from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 import smach
 
 from ..machine.jump_path import JumpPath
-from ..machine.places import levels_above
 from ..machine.site import Route, route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.streaks import OpenStreak
 from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
-from ..smach_private import current_label_of, states_of
+from ..smach_private import states_of
 from .failure import Failure
 
 
@@ -37,18 +36,18 @@ class ChosenWay(NamedTuple):
     record: StateRecord
     key: str
 
-    def note(self, leaves: bool) -> None:
-        """Note that it is gone now, also in the streaks of the states around.
-
-        `leaves`: the container, which ends by it.
-        """
+    def note(self) -> None:
+        """Note that it is gone now, also in the streaks of the states around."""
         streak = streak_of(self.node, self.record)
         if streak is not None:
-            streak.note(self.key, leaves)
-        for level in levels_above(self.node):
-            around = streak_of(level, level.record(str(current_label_of(level.machine))))
+            streak.note(self.key)
+            streak.leaves = False
+        below = self.node
+        while below.parent is not None:
+            around = streak_of(below.parent, below.parent.record(below.labels_from_parent[0]))
             if around is not None:
                 around.attempts += 1
+            below = below.parent
 
 
 def streak_of(node: TreeNode, record: StateRecord) -> Optional[OpenStreak]:

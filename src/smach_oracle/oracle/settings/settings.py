@@ -134,13 +134,6 @@ class Settings:
         'the target was last entered; `keep`: as it is; unset: as is usual for the policy, '
         '`keep` under `escalating`, else `restore`',
     )
-    cost: Prices = setting(
-        Prices(),
-        values.checked_prices,
-        'what a policy that [goes by ways](ways.md#what-a-way-costs) reckons with, in minutes of '
-        'the robot: `{robot_minute: 1, expert_minute: 5, lost_trial: 60, harm: 30}`, or some of '
-        'these',
-    )
     deep_copy_keys: Tuple[str, ...] = setting(
         (),
         values.words,
@@ -279,6 +272,13 @@ class Settings:
         values.words,
         'states that the trial that goes on may [repeat](survive.md#what-is-not-repeated) once, '
         'whatever `on_retry` says. Give it on the command line, as `--repeat`, rather than here',
+    )
+    cost: Prices = setting(
+        Prices(),
+        values.checked_prices,
+        'what a policy that [goes by ways](ways.md#what-a-way-costs) reckons with, in minutes of '
+        'the robot: `{robot_minute: 1, expert_minute: 5, lost_trial: 60, harm: 30}`, or some of '
+        'these',
     )
 
     @classmethod

@@ -7,7 +7,8 @@ from typing import Any, Iterator, List, Sequence, Tuple
 
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import POLICIES, Action
+from smach_oracle.oracle.decision.policy import POLICIES, Action, Escalating
+from smach_oracle.oracle.decision.ways import WAITS_S, WayKind
 from smach_oracle.oracle.prospects import (
     ContainerProspect,
     OutcomeProspect,
@@ -24,6 +25,14 @@ _IN_WORDS = {
     Action.RESTART: 'start over',
     Action.ASK: 'ask',
     Action.GIVE_UP: 'give up',
+}
+_WAYS = {
+    WayKind.AGAIN: 'again',
+    WayKind.WAIT: 'after {}'.format(' or '.join('{:g} s'.format(each) for each in WAITS_S)),
+    WayKind.PREPARE: 'after its preconditions',
+    WayKind.STEP_BACK: 'from 1, 2, 4... states back',
+    WayKind.START: 'from the start',
+    WayKind.TOP: 'from the start of the top machine',
 }
 # told by lines of their own
 _TOLD = ('preconditions', 'time_limit_s')
@@ -75,6 +84,8 @@ def _heading(container: ContainerProspect) -> List[str]:
             else container.initial
         )
     )
+    if POLICIES[settings.policy].goes_by_ways:
+        back = 'each way once, and then a person (doc/ways.md)'
     lines += _entry('policy', '{}; {}'.format(_policy(settings), back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
@@ -139,6 +150,8 @@ def _state(container: ContainerProspect, state: StateProspect, usual: str) -> It
         return
     settings, actions = state.settings, _actions(container, state)
     yield from _entry('on a failure', actions if actions != usual else '', 4)
+    if Action.STEP_BACK in {action for _, some in state.actions for action in some}:
+        yield from _entry('may run again', ', '.join(state.before), 4)
     yield from _entry('preconditions', ', '.join(spec.name for spec in settings.preconditions), 4)
     if settings.time_limit_s is not None:
         yield from _entry('time limit', '{:g} s'.format(settings.time_limit_s), 4)
@@ -207,6 +220,8 @@ def _actions(container: ContainerProspect, state: StateProspect) -> str:
     every = {actions for _, actions in state.actions}
     if every in ({(Action.ASK,)}, {(Action.GIVE_UP,)}):
         return _IN_WORDS[every.pop()[0]]
+    if state.kinds:
+        return _menu(container, state)
     last = 'ask' if POLICIES[container.settings.policy].asks else 'give up'
     if len(every) == 1:
         return '{}; after {} recoveries: {}'.format(
@@ -222,6 +237,18 @@ def _actions(container: ContainerProspect, state: StateProspect) -> str:
         for failure_class, actions in state.actions
     )
     return '{}; after {} recoveries: {}'.format(told, settings.max_recoveries, last)
+
+
+def _menu(container: ContainerProspect, state: StateProspect) -> str:
+    """Say which ways a policy may go that goes by ways, and how many of them."""
+    most, allowed = Escalating.most_of_streak, state.settings.max_recoveries
+    told = 'the cheapest of: {}; after {}'.format(
+        ', '.join(_WAYS[kind] for kind in state.kinds),
+        'max_recoveries ({}), which cuts its {} off'.format(allowed, most)
+        if allowed < most
+        else '{} in a row: ask'.format(most),
+    )
+    return told if allowed >= most else told + ': ask'
 
 
 def _either(actions: Sequence[Action]) -> str:

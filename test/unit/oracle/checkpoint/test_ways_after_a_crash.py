@@ -1,0 +1,57 @@
+"""Killed as it tries one way after the other, a machine goes on with those that are left."""
+
+import pytest
+from killed_machines import KilledMachine, Noted
+from killed_trees import make
+
+import smach
+from smach_oracle.oracle.recovery import menu
+
+FAILURES = 4  # of PICK, in all processes together
+
+
+class FailingAtFirst(Noted):
+    """Fails the first times that it comes to its end, in whichever process."""
+
+    def execute(self, userdata):
+        super().execute(userdata)
+        return 'aborted' if self._diary.count('ends')[self._name] <= FAILURES else 'succeeded'
+
+
+def fetch(diary, points):
+    """HOME, and LOOK and PICK in a machine. The second way waits no time."""
+    menu.WAITS_S = (0.001,)  # of this process alone
+    inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+    with inner:
+        smach.StateMachine.add('LOOK', Noted('LOOK', diary, points), {'succeeded': 'PICK'})
+        smach.StateMachine.add('PICK', FailingAtFirst('PICK', diary, points))
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('HOME', Noted('HOME', diary, points), {'succeeded': 'GET'})
+        smach.StateMachine.add('GET', inner)
+    return machine
+
+
+def killed_at(folder, point, **settings):
+    killed = KilledMachine(make(folder), fetch, policy='escalating', **settings)
+    return killed, killed.run(kill_at=point)
+
+
+@pytest.mark.parametrize('userdata', ['keep', 'restore'])
+def test_no_way_is_gone_twice_wherever_it_is_killed(tmp_path, userdata):
+    whole, told = killed_at(tmp_path / 'whole', 0, userdata=userdata)
+    assert told['outcome'] == 'succeeded'
+    usual = whole.diary.count('begins')
+    assert usual == {'HOME': 2, 'LOOK': 3, 'PICK': 5}
+    for point in range(1 + (userdata == 'keep'), told['points'], 2):
+        killed, nothing = killed_at(tmp_path / 'killed', point, userdata=userdata)
+        assert nothing is None
+        rest = killed.run()
+        assert rest.get('outcome') == 'succeeded', (point, rest)
+        begun = killed.diary.count('begins')
+        # one state was in doubt, and is entered again for that
+        assert sum(begun.values()) <= sum(usual.values()) + 1, (point, begun)
+        assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
+        if userdata == 'restore':  # what was in doubt has not come to its end
+            assert rest['done'] == told['done'], point
