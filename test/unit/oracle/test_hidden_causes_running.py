@@ -454,4 +454,4 @@ def test_the_script_is_wrapped_as_it_is():
         assert type(bed.machine) is smach.StateMachine
     with Bed(chain_of('LOOK', 'PICK'), causes, chosen('ask')) as bed:
         assert isinstance(bed.machine, smach.StateMachine)
-        assert bed.machine.settings.userdata == 'restore' and bed.machine.expert is bed.person
+        assert bed.machine.settings.userdata is None and bed.machine.expert is bed.person

@@ -50,6 +50,12 @@ def test_it_tries_the_cheapest_way_first_then_dearer_ones_and_then_asks():
     assert machine.visits() == list('ABCDEEEDECDE')
     assert oracle_of(machine.machine).waiting.waited == [(10.0, 'waiting')]
     assert '4 attempts have not helped' in expert.questions[0].reason
+    assert expert.questions[0].tried == (
+        'trying it again',
+        'trying it again after 10 s',
+        'going back to D',
+        'going back to C',
+    )
 
 
 def test_the_menu_goes_back_one_two_four_and_to_the_start():

@@ -56,6 +56,16 @@ class Way(NamedTuple):
         return self.kind in (WayKind.AGAIN, WayKind.WAIT, WayKind.PREPARE)
 
 
+def way_in_words(key: str) -> str:
+    """Return what was done by a way, for people. `key`: that of the way."""
+    if key.startswith(_FROM):
+        return 'going back to ' + key[len(_FROM) :]
+    return {
+        WayKind.AGAIN.value: 'trying it again',
+        WayKind.PREPARE.value: 'trying it again after its preconditions',
+    }.get(key, 'trying it again after ' + key[len(WayKind.WAIT.value) + 1 :])
+
+
 class StreakSoFar(NamedTuple):
     """What was done in a streak. `tried`: the keys of its ways, in order.
 

@@ -224,11 +224,11 @@ def ask_expert(recovery: Recovery) -> Optional[Verdict]:
 
 def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
     node, budget = recovery.node, recovery.budget
-    node.records.streaks.end(recovery.record.label)
     deadline_s, recovery.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
     with standing_still(node.execution.runs_around), early_end.asking():
         answer = Inquiry(recovery, expert, deadline_s).run()
+    node.records.streaks.end(recovery.record.label)
     question_id = recovery.question_id
     if recovery.stopped():
         if early_end.end_at_shutdown():

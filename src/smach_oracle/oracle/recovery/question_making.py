@@ -13,6 +13,7 @@ from ..asking.question import (
     Question,
     StateChoice,
 )
+from ..decision.ways import way_in_words
 from ..identity import truth_of
 from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..machine.places import levels_above, place_named, places_of
@@ -24,6 +25,7 @@ from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..smach_private import data_of, remapping_of, states_of
 from .falling_back import fallback_in_words
 from .recovery import Recovery
+from .verdict import streak_of
 
 
 def make_question(recovery: Recovery, deadline_s: float) -> Question:
@@ -48,7 +50,7 @@ def make_question(recovery: Recovery, deadline_s: float) -> Question:
         continuous=recovery.occasion.continuous,
         recoveries=record.recoveries,
         reason=recovery.cause,
-        tried=tuple(recovery.tried),
+        tried=(*_ways_tried(recovery), *recovery.tried),
         history=node.records.history.latest(),
         choices=tuple(_state_choices(recovery)),
         supersede_outcomes=node.site.choices(node, record.label),
@@ -66,6 +68,13 @@ def make_question(recovery: Recovery, deadline_s: float) -> Question:
             for outcome in _outcomes_of(level)
         ),
     )
+
+
+def _ways_tried(recovery: Recovery) -> Iterator[str]:
+    """Yield what was done about the failures before this one, of the same streak."""
+    streak = streak_of(recovery.node, recovery.record)
+    if streak is not None:
+        yield from map(way_in_words, streak.tried)
 
 
 def targets_of(recovery: Recovery) -> Mapping[Target, str]:
