@@ -126,6 +126,7 @@ def _end_trial(
 ) -> None:
     node.tree.control.end_trial()
     node.tree.workers.end_idle_threads()
+    node.tree.alarms.rest()
     why = _trial_end(node, outcome, error)
     if why is TrialEnd.OUTCOME:
         node.tree.budget.end()

@@ -1,4 +1,8 @@
-"""Calls functions when they are due, in one daemon thread that lives while one of them waits."""
+"""Calls functions when they are due, in one daemon thread.
+
+It begins with the first of them. Without any it ends once it would have called one, or at `rest`.
+Most are forgotten soon, and the next one comes soon: to wake the thread for each would cost more.
+"""
 
 import threading
 from typing import Callable, Dict, Optional
@@ -19,6 +23,7 @@ class AlarmClock:
         self._lock = threading.Lock()
         self._bell = Bell()
         self._due_s: Dict[Ring, float] = {}
+        self._wakes_s = 0.0  # when its thread looks again
         self._thread: Optional[threading.Thread] = None
 
     def ring_in(self, seconds: float, ring: Ring) -> None:
@@ -27,20 +32,26 @@ class AlarmClock:
         The log says what it raises.
         """
         with self._lock:
-            self._due_s[ring] = self._clock.now() + seconds
+            due_s = self._due_s[ring] = self._clock.now() + seconds
             if self._thread is None:
                 self._thread = threading.Thread(
                     target=self._run, name='smach_oracle alarm clock', daemon=True
                 )
+                self._wakes_s = due_s
                 self._thread.start()
-            else:
+            elif due_s < self._wakes_s:
                 self._bell.ring()
 
     def forget(self, ring: Ring) -> None:
         """Do not call it any more, where it has not been called yet."""
         with self._lock:
             self._due_s.pop(ring, None)
-            self._bell.ring()
+
+    def rest(self) -> None:
+        """End the thread if nothing waits."""
+        with self._lock:
+            if not self._due_s:
+                self._bell.ring()
 
     def _run(self) -> None:
         while True:
@@ -51,6 +62,7 @@ class AlarmClock:
                     return
                 ring = min(self._due_s, key=lambda each: self._due_s[each])
                 left_s = self._due_s[ring] - self._clock.now()
+                self._wakes_s = self._due_s[ring]
                 if left_s <= 0:
                     del self._due_s[ring]
             if left_s <= 0:
