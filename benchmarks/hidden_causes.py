@@ -35,7 +35,7 @@ from hidden_causes.search import best_order
 BEST = 'best'
 POLICIES = (
     'bare', 'retry', 'step_back', 'restart', 'ladder', 'prose', 'algorithm1', 'random',
-    'always_ask', 'shuffled',
+    'always_ask', 'shuffled', 'escalating', 'any_way',
 )  # fmt: skip
 FOR_JUDGING = 1000  # seeds from here on
 COLUMNS = (

@@ -42,7 +42,8 @@ _smach_oracle_words() {
 --rates-file --record --record-topic --repeat --resume --resume-map --version
 --without-oracle -h' ;;
     'oracle_run --policy')
-      echo 'algorithm1 always_ask escalating ladder prose random restart retry step_back' ;;
+      echo 'algorithm1 always_ask any_way escalating ladder prose random restart retry
+step_back' ;;
     'oracle_state')
       echo '--help --version -h accept drop edit goto list log moments show' ;;
     'oracle_state accept')
@@ -83,15 +84,15 @@ _smach_oracle_words() {
     'run_trials --estimator')
       echo 'exponential window' ;;
     'run_trials --policy')
-      echo 'configured algorithm1 always_ask escalating ladder prose random restart retry
-step_back' ;;
+      echo 'configured algorithm1 always_ask any_way escalating ladder prose random restart
+retry step_back' ;;
     'run_trials --protocol')
       echo 'main persistence memory continuous all' ;;
     'run_trials --task')
       echo 'drink_retrieval pick_and_place' ;;
     'run_trials --variants')
-      echo 'both with without bare default algorithm1 always_ask escalating ladder prose
-random restart retry step_back' ;;
+      echo 'both with without bare default algorithm1 always_ask any_way escalating ladder
+prose random restart retry step_back' ;;
     'same_trials')
       echo '--help --version -h' ;;
     'scripted_expert')
@@ -101,6 +102,7 @@ random restart retry step_back' ;;
     'what_if')
       echo '--help --high-from --json --memory --moderate-from --policy --prior --version -h' ;;
     'what_if --policy')
-      echo 'algorithm1 always_ask escalating ladder prose random restart retry step_back' ;;
+      echo 'algorithm1 always_ask any_way escalating ladder prose random restart retry
+step_back' ;;
   esac
 }

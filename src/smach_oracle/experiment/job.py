@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
+from smach_oracle.oracle.decision.policy import POLICIES
 
 from .estimate import JobWork
 from .lab import LAB_FILE, write_lab
@@ -125,8 +126,9 @@ class ExperimentJob:
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))
-        if settings.get('policy') == 'random':  # trial by trial, also after an interruption
-            settings['policy'] = {'name': 'random', 'seed': self._seed + self._next}
+        name = settings.get('policy')
+        if name in POLICIES and POLICIES[name].draws:  # by the trial, also after an interruption
+            settings['policy'] = {'name': name, 'seed': self._seed + self._next}
         given: Dict[str, Any] = {}
         if self._plan.lasting is not None:
             given['lasting'] = self._plan.lasting

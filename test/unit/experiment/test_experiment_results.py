@@ -325,13 +325,14 @@ def test_a_lost_trial_of_a_world_that_goes_on_has_its_hour(tmp_path):
     assert read_rows(tmp_path / 'other' / RESULTS_FILE)[0].hour == 1.0
 
 
-def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path):
-    (variant,) = plan('--variants', 'random').variants
-    JobResults(tmp_path, 'pick_and_place', 'random', 0, FIRST_SEED).add(
+@pytest.mark.parametrize('name', ['random', 'any_way'])
+def test_what_is_drawn_is_that_of_the_trial_also_after_an_interruption(tmp_path, name):
+    (variant,) = plan('--variants', name).variants
+    JobResults(tmp_path, 'pick_and_place', name, 0, FIRST_SEED).add(
         [trial(0)], {}, tmp_path / 'none'
     )
-    job = ExperimentJob(plan('--variants', 'random'), variant, 0, tmp_path, 300.0)
-    assert json.loads(job._arguments()['oracle'])['policy'] == {'name': 'random', 'seed': 101}
+    job = ExperimentJob(plan('--variants', name), variant, 0, tmp_path, 300.0)
+    assert json.loads(job._arguments()['oracle'])['policy'] == {'name': name, 'seed': 101}
 
 
 def test_variants_are_chosen_by_their_names():

@@ -17,6 +17,7 @@ from machines import (
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.decision import policy as policy_module
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policy import (
     POLICIES,
@@ -31,7 +32,7 @@ from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.settings.settings import Settings
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
-BASELINES = sorted(set(POLICIES) - {'algorithm1', 'prose', 'escalating'})
+BASELINES = sorted(policy.name for policy in policy_module.BASELINES)
 NEVER_ASK = ('restart', 'retry', 'step_back')
 FAILS = ['aborted'] * 20
 

@@ -206,6 +206,10 @@ def _times(count: int, one: str, many: str) -> str:
     return '1 ' + one if count == 1 else '{} {}'.format(count, many)
 
 
+def _draws(seed: int, past: Past) -> random.Random:
+    return random.Random('{} {}'.format(seed + past.trial, past.place))
+
+
 class Baseline(Policy):
     """The methods that all baselines have in common."""
 
@@ -310,8 +314,7 @@ class Random(Baseline):
 
     def decide(self, situation: Situation) -> Action:
         """Return an action that is drawn at random."""
-        past = situation.past
-        drawn = random.Random('{} {}'.format(self.seed + past.trial, past.place)).random()
+        drawn = _draws(self.seed, situation.past).random()
         return self.actions[int(drawn * len(self.actions))]
 
     def may_do(self, situation: Situation) -> Tuple[Action, ...]:
@@ -422,7 +425,7 @@ class Escalating(Policy):
             return ()
         menu, limit = situation.menu, self.price_of_asking(situation)
         priced = [(self.cost(way, situation), way) for way in self._left(menu)]
-        priced.sort(key=lambda each: each[0])
+        priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
         return tuple(way for cost, way in priced if cost < limit)
 
     def _left(self, menu: Menu) -> List[Way]:
@@ -452,9 +455,28 @@ class Escalating(Policy):
         return 'no way is left that costs less than to ask'
 
 
+class AnyWay(Escalating):
+    """Goes the ways that `escalating` would go, in an order that is drawn: its control.
+
+    Each order is as likely. It depends on what a draw of `random` depends on, and on nothing else.
+    """
+
+    name = 'any_way'
+    draws = True
+    parameters: Mapping[str, float] = {'seed': 0}
+
+    def __init__(self, seed: float = 0) -> None:
+        self.seed = int(seed)
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the ways that are open, untried and pay, in the order that is drawn."""
+        ways = super().order(situation)
+        return tuple(_draws(self.seed, situation.past).sample(ways, len(ways)))
+
+
 BASELINES: Tuple[Policy, ...] = (Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())
 POLICIES: Dict[str, Policy] = {
-    policy.name: policy for policy in (Algorithm1(), Prose(), Escalating(), *BASELINES)
+    policy.name: policy for policy in (Algorithm1(), Prose(), Escalating(), AnyWay(), *BASELINES)
 }
 NO_PARAMETERS: Mapping[str, float] = {}
 

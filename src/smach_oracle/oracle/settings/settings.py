@@ -132,7 +132,7 @@ class Settings:
         values.optional(values.choice(('restore', 'keep'))),
         'the userdata [after a jump](executive.md#userdata-on-a-jump): `restore`: as it was when '
         'the target was last entered; `keep`: as it is; unset: as is usual for the policy, '
-        '`keep` under `escalating`, else `restore`',
+        '`keep` under `escalating` and `any_way`, else `restore`',
     )
     deep_copy_keys: Tuple[str, ...] = setting(
         (),
