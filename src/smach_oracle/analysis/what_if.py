@@ -25,7 +25,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from .bag_events import BagError, SkippedBag
 from .reading import plain, report_error, report_skipped, write_json
 from .replaying.checks import beginnings, that_count
-from .replaying.replay import NOT_KNOWN, STAYS, Replay, conditioned, policy_of
+from .replaying.replay import NOT_KNOWN, STAYS, Replay, Tried, conditioned, policy_of
 from .trials import load_replicates, summarise
 
 SAME = 'same'
@@ -42,6 +42,7 @@ class TriedSettings(NamedTuple):
     trials: int
     other_trials: int  # in which at least one decision is known to be another
     programs: int = 1  # found that began with nothing learned
+    without_menu: int = 0  # decisions of a policy that goes by ways, where no menu is recorded
 
 
 def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
@@ -79,7 +80,7 @@ class Recorded:
 def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
     """Put the decisions of one replicate to an oracle of other settings."""
     counts = dict.fromkeys((*OUTCOMES, GIVES_UP), 0)
-    other_trials = 0
+    other_trials = without_menu = 0
     for number, trial in enumerate(recorded.trials):
         if number in recorded.beginnings:
             other = recorded.replay(settings)
@@ -87,21 +88,29 @@ def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
         for event in that_count(trial):
             tried = other.take(event)
             if tried is not None:
-                outcome = _outcome(event.outcome, tried)
+                outcome = _outcome(event, tried)
                 counts[outcome] += 1
+                without_menu += tried.lacks_menu
                 another = another or outcome not in (SAME, NOT_KNOWN)
         other_trials += another
     return TriedSettings(
-        dict(settings), counts, len(recorded.trials), other_trials, len(recorded.beginnings)
+        dict(settings),
+        counts,
+        len(recorded.trials),
+        other_trials,
+        len(recorded.beginnings),
+        without_menu,
     )
 
 
-def _outcome(recorded: str, tried: str) -> str:
-    if tried in (recorded, NOT_KNOWN):
-        return SAME if tried == recorded else tried
-    if tried in STAYS:
-        return 'would ask' if tried == Action.ASK.value else GIVES_UP
-    return 'would recover' if recorded in STAYS else 'recovers otherwise'
+def _outcome(recorded: Event, tried: Tried) -> str:
+    if tried.action == NOT_KNOWN:
+        return NOT_KNOWN
+    if tried.is_as(recorded):
+        return SAME
+    if tried.action in STAYS:
+        return 'would ask' if tried.action == Action.ASK.value else GIVES_UP
+    return 'would recover' if recorded.outcome in STAYS else 'recovers otherwise'
 
 
 def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
@@ -123,6 +132,13 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
             + ''.join('{:>20}'.format(row.counts[outcome]) for outcome in columns)
             + '   {} of {}'.format(row.other_trials, row.trials)
         )
+    for name, row in zip(names, rows):
+        if row.without_menu:
+            lines.append(
+                '{}: not known for {} decisions, which another policy made without a menu'.format(
+                    name, row.without_menu
+                )
+            )
     if rows[0].programs > 1:
         lines.append(
             'at least {} programs, each of which began with nothing learned'.format(

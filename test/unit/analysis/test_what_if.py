@@ -9,7 +9,8 @@ import pytest
 import smach
 from smach_oracle.analysis import what_if
 from smach_oracle.analysis.bag_events import BagError
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.analysis.replaying import menus, replay
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.ros.recorder import TrialRecorder
@@ -47,6 +48,13 @@ class Hand(Expert):
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='hand')
 
 
+class NoWait:
+    """Takes no time."""
+
+    def wait(self, seconds, what, scope):
+        pass
+
+
 def run(count, seed=1, states=None, back_to='', health=None, stopped=0, **settings):
     """The events of some trials of one learning machine, by trial. PICK stops the first ones."""
     generator = random.Random(seed)
@@ -67,6 +75,7 @@ def run(count, seed=1, states=None, back_to='', health=None, stopped=0, **settin
         health=health,
         settings=dict(KEPT, states=states or {}, **settings),
     )
+    oracle_of(machine).waiting = NoWait()
     events = []
     machine.events.observers.append(events.append)
     pick = machine.get_children()['PICK']
@@ -93,6 +102,8 @@ def compare(trials, settings):
         {'policy': {'name': 'retry', 'times': 1}},
         {'policy': {'name': 'ladder', 'wait_s': 0}},
         {'policy': 'always_ask'},
+        {'policy': 'escalating'},
+        {'policy': 'escalating', 'cost': {'expert_minute': 0, 'robot_minute': 0}},
         {'max_recoveries': 1},
         {'prior': 0.5, 'moderate_from': 0.3, 'high_from': 0.6},
     ],
@@ -367,3 +378,64 @@ def test_the_column_of_those_who_give_up_is_there_where_some_do():
     ]
     assert what_if.GIVES_UP in what_if.format_tried_settings(rows)
     assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1])
+
+
+# -- policies that go by ways
+
+
+def test_a_policy_that_goes_by_ways_chooses_from_the_recorded_menu():
+    recorded = run(60, **{**KEPT, 'policy': 'escalating'})
+    dear = compare(recorded, {'cost.expert_minute': 0.0, 'cost.harm': 9e5})
+    assert dear.counts['would ask'] + dear.counts['recovers otherwise'] > 10
+    assert dear.counts['not known'] == dear.without_menu == 0
+
+
+def test_another_order_of_ways_is_another_decision_also_where_the_action_is_the_same():
+    recorded = run(60, **{**KEPT, 'policy': 'escalating'})
+    taken = [event for trial in recorded for event in trial if event.kind is EventKind.DECISION]
+    event = next(each for each in taken if each.outcome == 'step_back')
+    for key in list(event.data['order']):
+        tried = replay.Tried('step_back', key)
+        assert tried.is_as(event) is (key == event.data['order'][0])
+    assert replay.Tried('step_back').is_as(event)
+
+
+def test_what_it_would_choose_is_not_known_where_no_menu_was_recorded_and_the_table_says_so():
+    recorded = run(60, **KEPT)
+    row = compare(recorded, {'policy': 'escalating'})
+    assert row.counts['not known'] == row.without_menu == sum(row.counts.values()) > 20
+    told = what_if.format_tried_settings([row])
+    assert 'policy escalating: not known for' in told and 'without a menu' in told
+    assert 'without a menu' not in what_if.format_tried_settings([compare(recorded, {})])
+
+
+def test_the_other_policies_know_by_the_menu_which_states_have_preconditions():
+    recorded = run(60, **{**KEPT, 'policy': 'escalating'})
+    counts = compare(recorded, {'policy': 'prose'}).counts
+    # PICK has a precondition, which may not have been run there
+    assert 0 < counts['not known'] < sum(counts.values())
+    assert compare(recorded, {'policy': 'always_ask'}).counts['would ask'] > 20
+
+
+def test_what_the_control_draws_is_not_known_but_that_it_asks():
+    recorded = run(60, **{**KEPT, 'policy': 'any_way'})
+    counts = compare(recorded, {}).counts
+    assert counts['not known'] > 20
+    assert counts['not known'] + counts['same'] == sum(counts.values())
+
+
+@pytest.mark.parametrize(
+    'broken',
+    [{'menu': 5}, {'menu': [{'no': 1}]}, {'streak': None}, {'order': 7}, {'attempts': 'many'}],
+    ids=str,
+)
+def test_a_menu_that_cannot_be_read_is_none(broken):
+    recorded = run(60, **{**KEPT, 'policy': 'escalating'})
+    event = next(e for t in recorded for e in t if e.kind is EventKind.DECISION)
+    assert menus.recorded_menu(event, {}) is not None
+    spoiled = event._replace(data={**event.data, **broken})
+    if 'order' in broken:
+        assert menus.chosen_way(spoiled) == ''
+    else:
+        assert menus.recorded_menu(spoiled, {}) is None
+        assert not menus.offers_preconditions(spoiled)

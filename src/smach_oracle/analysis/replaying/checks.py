@@ -6,7 +6,8 @@ from smach_oracle.oracle.records import facts
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 
 from ..bag_events import BagError
-from .replay import NOT_KNOWN, Replay
+from .menus import chosen_way
+from .replay import NOT_KNOWN, Replay, Tried
 
 _ROUNDING = 1e-9
 
@@ -74,10 +75,13 @@ def _check_rate(own: Replay, event: Event) -> None:
         )
 
 
-def _check_decision(done: str, event: Event) -> None:
-    if done not in (event.outcome, NOT_KNOWN):
+def _check_decision(done: Tried, event: Event) -> None:
+    if done.action != NOT_KNOWN and not done.is_as(event):
         raise BagError(
             '{}: {}: it decided {}, where its own settings say {}'.format(
-                event.trial_id, event.state, event.outcome, done
+                event.trial_id,
+                event.state,
+                ' '.join(filter(None, (event.outcome, chosen_way(event)))),
+                ' '.join(filter(None, (done.action, done.way))),
             )
         )

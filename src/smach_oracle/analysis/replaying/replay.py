@@ -1,6 +1,6 @@
 """Follows recorded trials as an oracle does, and says what it would decide."""
 
-from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Tuple
+from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Set, Tuple
 
 from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, make_estimator
 from smach_oracle.oracle.decision.policy import (
@@ -18,12 +18,31 @@ from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 
+from .menus import chosen_way, offers_preconditions, recorded_menu
+
 ENOUGH_VISITS = 50
 NOT_KNOWN = 'not known'  # what it would decide
 _OUTSIDE_POLICIES = (Decider.MAX_RECOVERIES, Decider.BUDGET, Decider.ON_RETRY, Decider.AUTHOR)
 STAYS = (Action.ASK.value, Action.GIVE_UP.value)
 
 Key = Tuple[str, str]  # path and state
+
+
+class Tried(NamedTuple):
+    """A decision of the oracle that follows.
+
+    `action`: or 'not known'. `way`: of the menu, where the policy goes by ways. `lacks_menu`:
+    nothing is known since the recorded policy has told of no menu.
+    """
+
+    action: str
+    way: str = ''
+    lacks_menu: bool = False
+
+    def is_as(self, event: Event) -> bool:
+        """Whether it is the recorded decision. Ways are compared where both go by ways."""
+        chosen = chosen_way(event)
+        return self.action == event.outcome and (not (self.way and chosen) or self.way == chosen)
 
 
 class _LearnedState:
@@ -56,8 +75,8 @@ class Replay:
         self._running: Set[str] = set()  # paths of containers
         self._go_on: Set[str] = set()  # those that ran when the program was stopped
 
-    def take(self, event: Event) -> Optional[str]:
-        """Follow one event. Return the action at a DECISION ('not known' included), else None."""
+    def take(self, event: Event) -> Optional[Tried]:
+        """Follow one event. Return the decision at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
         elif event.kind == EventKind.RESUMED:
@@ -89,7 +108,7 @@ class Replay:
             state.recoveries = 0
         self._restarts = 0
 
-    def _decided(self, event: Event) -> str:
+    def _decided(self, event: Event) -> Tried:
         """Decide, and note what was done instead."""
         tried = self._decide(event)
         self._state(event).recoveries += event.outcome not in STAYS
@@ -163,16 +182,18 @@ class Replay:
         state = self._state(event)
         state.context, state.interrupted = None, False
 
-    def _decide(self, event: Event) -> str:
+    def _decide(self, event: Event) -> Tried:
         state = self._state(event)
         if decided_by(event) in _OUTSIDE_POLICIES:
-            return (Action.ASK if self._policy.asks else Action.GIVE_UP).value
+            return Tried((Action.ASK if self._policy.asks else Action.GIVE_UP).value)
         failure_class = classify(
             state.estimator.rate, self._settings['moderate_from'], self._settings['high_from']
         )
+        if self._policy.goes_by_ways:
+            return self._by_ways(event, state, failure_class)
         preconditions = self._preconditions(event, state, failure_class)
         if preconditions is None or state.context is None:
-            return NOT_KNOWN
+            return Tried(NOT_KNOWN)
         actions = self._policy.may_do(
             Situation(
                 failure_class,
@@ -181,7 +202,24 @@ class Replay:
                 Past(state.recoveries, self._restarts),
             )
         )
-        return actions[0].value if len(actions) == 1 else NOT_KNOWN  # it would be drawn
+        return Tried(actions[0].value if len(actions) == 1 else NOT_KNOWN)  # it would be drawn
+
+    def _by_ways(self, event: Event, state: _LearnedState, failure_class: FailureClass) -> Tried:
+        """Choose from the recorded menu."""
+        recorded, policy = recorded_menu(event, self._settings), self._policy
+        if recorded is None or state.context is None:
+            return Tried(NOT_KNOWN, lacks_menu=recorded is None)
+        situation = Situation(
+            failure_class,
+            Preconditions.NONE,
+            policy.is_continuous(state.context),
+            recorded.past,
+            recorded.menu,
+        )
+        order = policy.order(situation)
+        if order and policy.draws:
+            return Tried(NOT_KNOWN)
+        return Tried(policy.decide(situation).value, order[0].key if order else '')
 
     def _preconditions(
         self, event: Event, state: _LearnedState, failure_class: FailureClass
@@ -206,7 +244,7 @@ def policy_of(settings: Mapping[str, Any]) -> Policy:
 def conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
     """Return whether states have preconditions, if known: those where some were run do.
 
-    Those where none were run, though they would have been, do not.
+    Those where none were run, though they would have been, do not. A menu tells it, too.
     """
     known: Dict[Key, bool] = {}
     for event in events:
@@ -216,7 +254,9 @@ def conditioned(events: Iterable[Event], policy: Policy) -> Dict[Key, bool]:
         elif (
             event.kind == EventKind.DECISION
             and decided_by(event) is Decider.POLICY
-            and policy.runs_preconditions(FailureClass(event.failure_class))
+            and (
+                policy.goes_by_ways or policy.runs_preconditions(FailureClass(event.failure_class))
+            )
         ):
-            known.setdefault(key, False)
+            known.setdefault(key, offers_preconditions(event))
     return known

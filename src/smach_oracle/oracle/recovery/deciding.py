@@ -101,8 +101,8 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
     while True:
         # after a crash a state is entered again, whatever its streak says: it has not failed
         so_far = streak.so_far(budget.time.now()) if recovery.failure.is_counted else StreakSoFar()
-        recovery.menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
-        situation = situation._replace(past=past, menu=recovery.menu)
+        menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
+        recovery.situation = situation = situation._replace(past=past, menu=menu)
         recovery.order = policy.order(situation)
         if not recovery.order:
             return Decider.POLICY, recovery.facts(Action.ASK, blocked=policy.why(situation))
@@ -110,6 +110,7 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
         if way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
             break
         if recovery.stopped():
+            recovery.order = ()
             return Decider.POLICY, recovery.facts(Action.ASK)
         streak.note(way.key)
     spent = budget.take_recovery()

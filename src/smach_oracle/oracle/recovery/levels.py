@@ -231,14 +231,15 @@ def tell_decision(recovery: Recovery, decided: Decided) -> str:
 
 def _menu_facts(recovery: Recovery) -> Dict[str, object]:
     """Return what is recorded of a menu, and of the order in which the policy would go its ways."""
-    menu = recovery.menu
-    if menu is None:
+    situation = recovery.situation
+    if situation is None:
         return {}
+    menu, past = situation.menu, situation.past
     return {
         'order': [way.key for way in recovery.order],
         'menu': [way._asdict() for way in menu.ways],
         'streak': menu.streak._asdict(),
         'has_expert': menu.has_expert,
-        'attempts': recovery.budget.recoveries,
-        'usual_minutes': recovery.budget.usual_minutes,
+        'attempts': past.attempts,
+        'usual_minutes': past.usual_minutes,
     }

@@ -6,7 +6,7 @@ from typing import Any, Callable, List, Optional, Tuple
 import smach
 
 from ..asking.question import Answer
-from ..decision.policy import Action, Menu
+from ..decision.policy import Action, Situation
 from ..decision.sentence import DecisionFacts, cause_of
 from ..decision.ways import Way
 from ..machine.jump_path import JumpPath
@@ -46,8 +46,9 @@ class Recovery:
     phases run in the machine's thread. `cancel` may be called from any thread.
 
     `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked.
-    `jump_path`: where it has decided to go. `menu`, `order`: of a policy that goes by ways, and the
-    ways as it would go them, the first one now. `decided`: to ask. `cause`: of the decision.
+    `jump_path`: where it has decided to go. `situation`, `order`: that of a policy that goes by
+    ways, and the ways as it would go them, the first one now. `decided`: to ask. `cause`: of the
+    decision.
     `begin_question`: is called before each question. `takes`: whether an answer comes in time, once
     it is here.
     """
@@ -62,7 +63,7 @@ class Recovery:
     reading: Optional[RateReading] = None
     running: Optional[smach.State] = None  # as a precondition
     jump_path: Optional[JumpPath] = None
-    menu: Optional[Menu] = None
+    situation: Optional[Situation] = None
     order: Tuple[Way, ...] = ()
     why_no_answer = ''
 
