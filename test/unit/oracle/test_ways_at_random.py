@@ -199,11 +199,42 @@ def test_the_way_that_takes_less_and_repeats_less_comes_first_whatever_the_price
                 order = policy.order(with_price(situation, name, factor))
                 for index, later in enumerate(order):
                     for first in order[:index]:
-                        if later.enters_again is first.enters_again:
+                        if later.reach == first.reach:
                             assert not (
                                 later.minutes < first.minutes
                                 and len(later.repeats) <= len(first.repeats)
                             )
+
+
+@pytest.mark.parametrize('name', ['robot_minute', 'harm'])
+@pytest.mark.parametrize('seed', range(DRAWS // 10))
+def test_a_dearer_price_puts_no_way_before_one_that_it_makes_less_dear(seed, name):
+    rng, policy = rng_of(seed), Escalating()
+    for _ in range(10):
+        situation = with_menu(a_situation(rng), prices=Prices())
+        free = with_menu(situation, prices=Prices(0.0, 0.0, 0.0, 0.0)._replace(**{name: 1.0}))
+        for factor, dearer in zip(DEARER, DEARER[1:]):
+            before = policy.order(with_price(situation, name, factor))
+            now = policy.order(with_price(situation, name, dearer))
+            for index, later in enumerate(now):
+                for first in now[:index]:
+                    pair = [each for each in before if each in (first, later)]
+                    if pair == [later, first]:  # they have changed places
+                        assert policy.cost(first, free) <= policy.cost(later, free)
+
+
+def test_farther_back_has_the_hope_of_each_doubling_that_was_not_reached():
+    ways = tuple(
+        Way(WayKind.STEP_BACK, str(back), back, minutes=1.0) for back in (1, 2, 3, 4, 5, 8)
+    )
+    assert [way.reach for way in ways] == [1, 2, 3, 3, 4, 4]
+    situation = Situation(FailureClass.LOW, Preconditions.NONE, True, menu=Menu(ways))
+    policy = Escalating()
+    costs = [policy.cost(way, situation) for way in ways]
+    assert costs == pytest.approx([1, 1 / 2, 1 / 3, 1 / 3, 1 / 4, 1 / 4])
+    # after two back in vain, what is nearer has half the hope, and farther back what is new
+    later = with_menu(situation, streak=StreakSoFar(('from 2',), 1))
+    assert [policy.cost(way, later) for way in ways] == pytest.approx([2, 2, 1, 1, 1 / 2, 1 / 2])
 
 
 @pytest.mark.parametrize('name', ['expert_minute', 'lost_trial'])

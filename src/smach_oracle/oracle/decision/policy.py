@@ -211,14 +211,14 @@ def _draws(seed: int, past: Past) -> random.Random:
 
 
 class Baseline(Policy):
-    """The methods that all baselines have in common."""
+    """The methods that all baselines have in common, and those policies that go by ways."""
 
     def is_continuous(self, context: FailureContext) -> bool:
         """Return whether the last failure was of the same state, which has not succeeded since."""
         return context.failing_since
 
     def runs_preconditions(self, failure_class: FailureClass) -> bool:
-        """Return False: a baseline never runs preconditions."""
+        """Return False: it never runs preconditions before it decides."""
         return False
 
     def step_back_target(self, context: FailureContext) -> str:
@@ -357,7 +357,7 @@ class Ladder(Baseline):
 # -- policies that go by ways
 
 
-class Escalating(Policy):
+class Escalating(Baseline):
     """Tries the cheapest way first and then dearer ones, each once in a streak, and then asks.
 
     doc/ways.md says what a way costs, and when it does not pay. Microreboot escalates likewise: it
@@ -375,19 +375,7 @@ class Escalating(Policy):
     harm_chance = 1.0 / 30  # of each state that is entered again
     # what is left of the hope that the state succeeds without any other one
     hope = {FailureClass.LOW: 1.0, FailureClass.MODERATE: 0.5, FailureClass.HIGH: 0.25}
-    hope_after_each = 0.5  # way of the streak that has entered it again
-
-    def is_continuous(self, context: FailureContext) -> bool:
-        """Return whether the last failure was of the same state, which has not succeeded since."""
-        return context.failing_since
-
-    def runs_preconditions(self, failure_class: FailureClass) -> bool:
-        """Return False: they are a way."""
-        return False
-
-    def step_back_target(self, context: FailureContext) -> str:
-        """Return the last successful state before the failed one, as `prose` does."""
-        return context.initial if context.succeeded_before is None else context.succeeded_before
+    hope_after_each = 0.5  # way of the streak
 
     def decide(self, situation: Situation) -> Action:
         """Return the action of the way that comes first."""
@@ -400,15 +388,24 @@ class Escalating(Policy):
         """Return all of its actions: the menu is known only once a state has failed."""
         return Action.REVISIT, Action.STEP_BACK, Action.ASK
 
+    def price(self, way: Way, prices: Prices) -> float:
+        """Return what a way takes, in minutes of the robot."""
+        return prices.robot_minute * way.minutes + prices.harm * self.harm_chance * len(way.repeats)
+
     def cost(self, way: Way, situation: Situation) -> float:
-        """Return what a way costs, in minutes of the robot."""
-        prices = situation.menu.prices
-        harm = prices.harm * self.harm_chance * len(way.repeats)
-        cost = prices.robot_minute * way.minutes + harm
-        if not way.enters_again:
-            return cost
-        entered = situation.menu.streak.times_entered_again
-        return cost / self.hope[situation.failure_class] / self.hope_after_each**entered
+        """Return what a way takes for its hope.
+
+        What is farther back repeats what is nearer, too. The cause may lie as well between one and
+        two states back as between two and four. So a step back has the hope of each doubling that
+        no way of the streak has reached.
+        """
+        menu, price = situation.menu, self.price(way, situation.menu.prices)
+        tried = menu.streak.tried
+        new = way.reach - max((each.reach for each in menu.ways if each.key in tried), default=0)
+        if new > 0:
+            return price / new
+        hope = self.hope[situation.failure_class] if way.enters_again else 1.0
+        return price / (hope * self.hope_after_each ** len(tried))
 
     def price_of_asking(self, situation: Situation) -> float:
         """Return what it costs to ask, or to lose the trial where there is nobody to ask."""
@@ -424,7 +421,11 @@ class Escalating(Policy):
         if self._spent(situation):
             return ()
         menu, limit = situation.menu, self.price_of_asking(situation)
-        priced = [(self.cost(way, situation), way) for way in self._left(menu)]
+        priced = [
+            (self.cost(way, situation), way)
+            for way in self._left(menu)
+            if self.price(way, menu.prices) < limit
+        ]
         priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
         return tuple(way for cost, way in priced if cost < limit)
 

@@ -51,6 +51,14 @@ class Way(NamedTuple):
         return self.kind.value if self.enters_again else _FROM + self.target
 
     @property
+    def reach(self) -> int:
+        """Return how often one state back is doubled until it is as far back: 1, 2, 4 are 1, 2, 3.
+
+        It is 0 where it goes nowhere back.
+        """
+        return (2 * self.back - 1).bit_length() if self.back else 0
+
+    @property
     def enters_again(self) -> bool:
         """Whether it enters the failed state again, and no state before it."""
         return self.kind in (WayKind.AGAIN, WayKind.WAIT, WayKind.PREPARE)
@@ -76,11 +84,6 @@ class StreakSoFar(NamedTuple):
     tried: Tuple[str, ...] = ()
     attempts: int = 0
     minutes: float = 0.0
-
-    @property
-    def times_entered_again(self) -> int:
-        """The number of ways among the tried ones that entered the failed state alone again."""
-        return sum(not key.startswith(_FROM) for key in self.tried)
 
 
 class Prices(NamedTuple):
