@@ -17,7 +17,7 @@ class RecordedMenu(NamedTuple):
 
 
 def recorded_menu(event: Event, settings: Mapping[str, Any]) -> Optional[RecordedMenu]:
-    """Return what a DECISION event tells of its menu, None where it tells of none.
+    """Return the menu that a DECISION event has, None where it has none that can be read.
 
     :param settings: by which the prices go.
     """

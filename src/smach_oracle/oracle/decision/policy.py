@@ -395,9 +395,9 @@ class Escalating(Baseline):
     def cost(self, way: Way, situation: Situation) -> float:
         """Return what a way takes for its hope.
 
-        What is farther back repeats what is nearer, too. The cause may lie as well between one and
-        two states back as between two and four. So a step back has the hope of each doubling that
-        no way of the streak has reached.
+        A longer step back also repeats what a shorter one does. The cause may lie as well between
+        one and two states back as between two and four. So a step back has the hope of each
+        doubling that no way of the streak has reached.
         """
         menu, price = situation.menu, self.price(way, situation.menu.prices)
         tried = menu.streak.tried
