@@ -25,7 +25,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from .bag_events import BagError, SkippedBag
 from .reading import plain, report_error, report_skipped, write_json
 from .replaying.checks import beginnings, that_count
-from .replaying.replay import NOT_KNOWN, STAYS, Replay, Tried, conditioned, policy_of
+from .replaying.replay import NOT_KNOWN, STAYS, Replay, ReplayedDecision, conditioned, policy_of
 from .trials import load_replicates, summarise
 
 SAME = 'same'
@@ -103,7 +103,7 @@ def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
     )
 
 
-def _outcome(recorded: Event, tried: Tried) -> str:
+def _outcome(recorded: Event, tried: ReplayedDecision) -> str:
     if tried.action == NOT_KNOWN:
         return NOT_KNOWN
     if tried.is_as(recorded):

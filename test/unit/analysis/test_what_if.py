@@ -395,9 +395,9 @@ def test_another_order_of_ways_is_another_decision_also_where_the_action_is_the_
     taken = [event for trial in recorded for event in trial if event.kind is EventKind.DECISION]
     event = next(each for each in taken if each.outcome == 'step_back')
     for key in list(event.data['order']):
-        tried = replay.Tried('step_back', key)
+        tried = replay.ReplayedDecision('step_back', key)
         assert tried.is_as(event) is (key == event.data['order'][0])
-    assert replay.Tried('step_back').is_as(event)
+    assert replay.ReplayedDecision('step_back').is_as(event)
 
 
 def test_what_it_would_choose_is_not_known_where_no_menu_was_recorded_and_the_table_says_so():

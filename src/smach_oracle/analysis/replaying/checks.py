@@ -7,7 +7,7 @@ from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 
 from ..bag_events import BagError
 from .menus import chosen_way
-from .replay import NOT_KNOWN, Replay, Tried
+from .replay import NOT_KNOWN, Replay, ReplayedDecision
 
 _ROUNDING = 1e-9
 
@@ -75,7 +75,7 @@ def _check_rate(own: Replay, event: Event) -> None:
         )
 
 
-def _check_decision(done: Tried, event: Event) -> None:
+def _check_decision(done: ReplayedDecision, event: Event) -> None:
     if done.action != NOT_KNOWN and not done.is_as(event):
         raise BagError(
             '{}: {}: it decided {}, where its own settings say {}'.format(

@@ -28,7 +28,7 @@ STAYS = (Action.ASK.value, Action.GIVE_UP.value)
 Key = Tuple[str, str]  # path and state
 
 
-class Tried(NamedTuple):
+class ReplayedDecision(NamedTuple):
     """A decision of the oracle that follows.
 
     `action`: or 'not known'. `way`: of the menu, where the policy goes by ways. `lacks_menu`:
@@ -75,7 +75,7 @@ class Replay:
         self._running: Set[str] = set()  # paths of containers
         self._go_on: Set[str] = set()  # those that ran when the program was stopped
 
-    def take(self, event: Event) -> Optional[Tried]:
+    def take(self, event: Event) -> Optional[ReplayedDecision]:
         """Follow one event. Return the decision at a DECISION ('not known' included), else None."""
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
@@ -108,7 +108,7 @@ class Replay:
             state.recoveries = 0
         self._restarts = 0
 
-    def _decided(self, event: Event) -> Tried:
+    def _decided(self, event: Event) -> ReplayedDecision:
         """Decide, and note what was done instead."""
         tried = self._decide(event)
         self._state(event).recoveries += event.outcome not in STAYS
@@ -182,10 +182,10 @@ class Replay:
         state = self._state(event)
         state.context, state.interrupted = None, False
 
-    def _decide(self, event: Event) -> Tried:
+    def _decide(self, event: Event) -> ReplayedDecision:
         state = self._state(event)
         if decided_by(event) in _OUTSIDE_POLICIES:
-            return Tried((Action.ASK if self._policy.asks else Action.GIVE_UP).value)
+            return ReplayedDecision((Action.ASK if self._policy.asks else Action.GIVE_UP).value)
         failure_class = classify(
             state.estimator.rate, self._settings['moderate_from'], self._settings['high_from']
         )
@@ -193,7 +193,7 @@ class Replay:
             return self._by_ways(event, state, failure_class)
         preconditions = self._preconditions(event, state, failure_class)
         if preconditions is None or state.context is None:
-            return Tried(NOT_KNOWN)
+            return ReplayedDecision(NOT_KNOWN)
         actions = self._policy.may_do(
             Situation(
                 failure_class,
@@ -202,13 +202,17 @@ class Replay:
                 Past(state.recoveries, self._restarts),
             )
         )
-        return Tried(actions[0].value if len(actions) == 1 else NOT_KNOWN)  # it would be drawn
+        return ReplayedDecision(
+            actions[0].value if len(actions) == 1 else NOT_KNOWN
+        )  # it would be drawn
 
-    def _by_ways(self, event: Event, state: _LearnedState, failure_class: FailureClass) -> Tried:
+    def _by_ways(
+        self, event: Event, state: _LearnedState, failure_class: FailureClass
+    ) -> ReplayedDecision:
         """Choose from the recorded menu."""
         recorded, policy = recorded_menu(event, self._settings), self._policy
         if recorded is None or state.context is None:
-            return Tried(NOT_KNOWN, lacks_menu=recorded is None)
+            return ReplayedDecision(NOT_KNOWN, lacks_menu=recorded is None)
         situation = Situation(
             failure_class,
             Preconditions.NONE,
@@ -218,8 +222,8 @@ class Replay:
         )
         order = policy.order(situation)
         if order and policy.draws:
-            return Tried(NOT_KNOWN)
-        return Tried(policy.decide(situation).value, order[0].key if order else '')
+            return ReplayedDecision(NOT_KNOWN)
+        return ReplayedDecision(policy.decide(situation).value, order[0].key if order else '')
 
     def _preconditions(
         self, event: Event, state: _LearnedState, failure_class: FailureClass
