@@ -14,8 +14,9 @@ from hidden_causes.world import Condition, Disturbance, Work
 from hidden_worlds import EXACT, causes_of, chain_of
 
 import smach
+from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import Action, Past, Preconditions, Situation
+from smach_oracle.oracle.decision.policy import POLICIES, Action, Past, Preconditions, Situation
 from smach_oracle.oracle.records.events import EventKind
 
 POSE = Condition('pose', {'LOOK': 1.0}, is_goal=False)
@@ -436,6 +437,18 @@ def test_the_same_seed_gives_the_same_trials_whatever_the_jobs():
             again = two.run(arm, range(8), 6)
             assert [ran.trials for ran in first] == [ran.trials for ran in again], arm
             assert [ran.seed for ran in again] == list(range(8))
+
+
+@pytest.mark.parametrize('name', ['escalating', 'any_way'])
+def test_a_policy_that_goes_by_ways_has_its_menu_and_its_own_userdata(name):
+    told = []
+    with bed_of(Arm(name).policy(3), [POSE, PICKED], ['pose'], ['pose']) as bed:
+        oracle_of(bed.machine).events.observers.append(told.append)
+        trial = bed.trial(0)
+    assert trial.ended == TRUE and 0 < trial.attempts <= 4
+    jumps = [event.data['userdata'] for event in told if event.kind is EventKind.JUMP]
+    assert jumps and set(jumps) == {POLICIES[name].userdata}
+    assert all(event.data['menu'] for event in bed.events)
 
 
 def test_policies_meet_the_same_first_failure():
