@@ -76,7 +76,7 @@ def main() -> int:
             if name == BEST:
                 name = search(runner, arguments, prices)
             began_s = time.monotonic()
-            found[name] = runner.run(name, seeds, arguments.trials)
+            found[name] = runner.run(name, seeds, arguments.trials, {'cost': prices._asdict()})
             show(name, summarise(trials_of(found[name]), prices), found[name], began_s)
     show_differences(found, prices)
     show_other_prices(found, prices)

@@ -451,6 +451,15 @@ def test_a_policy_that_goes_by_ways_has_its_menu_and_its_own_userdata(name):
     assert all(event.data['menu'] for event in bed.events)
 
 
+def test_a_policy_that_goes_by_ways_goes_by_the_prices_of_the_command():
+    def attempts(**prices):
+        with Runner(1) as runner:
+            ran = runner.run('escalating', [3], 10, {'cost': {**Prices()._asdict(), **prices}})
+        return sum(trial.attempts for trial in ran[0].trials)
+
+    assert attempts(robot_minute=0, expert_minute=0) == 0 < attempts()
+
+
 def test_policies_meet_the_same_first_failure():
     def failing(arm):
         return [trial.is_failing for seed in range(15) for trial in run_machine(seed, Arm(arm), 1)]

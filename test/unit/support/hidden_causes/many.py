@@ -5,12 +5,12 @@ import contextlib
 import multiprocessing
 import threading
 import time
-from typing import Iterable, List, NamedTuple, Optional, Tuple
+from typing import Any, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 
 import smach
 
 from .orders import Arm
-from .running import Trial, run_machine
+from .running import NO_SETTINGS, Trial, run_machine
 
 
 class Ran(NamedTuple):
@@ -35,9 +35,15 @@ class Runner(contextlib.ExitStack):
                 )
             )
 
-    def run(self, arm: str, seeds: Iterable[int], trials: int) -> List[Ran]:
+    def run(
+        self,
+        arm: str,
+        seeds: Iterable[int],
+        trials: int,
+        settings: Mapping[str, Any] = NO_SETTINGS,
+    ) -> List[Ran]:
         """Run the machines of these seeds under a policy, and return them in that order."""
-        work = [(arm, seed, trials) for seed in seeds]
+        work = [(arm, seed, trials, settings) for seed in seeds]
         if self._pool is None:
             return [run_one(each) for each in work]
         return list(self._pool.map(run_one, work))
@@ -53,8 +59,9 @@ def be_quiet() -> None:
     threading.excepthook = silent
 
 
-def run_one(work: Tuple[str, int, int]) -> Ran:
-    """Run one machine: the policy by name, its seed, and the number of trials."""
-    arm, seed, trials = work
+def run_one(work: Tuple[str, int, int, Mapping[str, Any]]) -> Ran:
+    """Run one machine: the policy by name, its seed, the number of trials, and settings."""
+    arm, seed, trials, settings = work
     begin_s = time.process_time()
-    return Ran(seed, run_machine(seed, Arm(arm), trials), time.process_time() - begin_s)
+    ran = run_machine(seed, Arm(arm), trials, settings=settings)
+    return Ran(seed, ran, time.process_time() - begin_s)

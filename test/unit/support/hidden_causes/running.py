@@ -55,10 +55,16 @@ class Trial(NamedTuple):
         return self.questions > 0 or self.is_lost
 
 
-def run_machine(seed: int, arm: Arm, trials: int, mix: Mix = MIX) -> Tuple[Trial, ...]:
+def run_machine(
+    seed: int,
+    arm: Arm,
+    trials: int,
+    mix: Mix = MIX,
+    settings: Mapping[str, Any] = NO_SETTINGS,
+) -> Tuple[Trial, ...]:
     """Run the machine of a seed under a policy, one trial after the other."""
     box = draw(seed)
-    with Bed(box, draw_causes(seed, box, mix), arm.policy(seed), mix) as bed:
+    with Bed(box, draw_causes(seed, box, mix), arm.policy(seed), mix, settings) as bed:
         return tuple(bed.trial(number) for number in range(trials))
 
 
