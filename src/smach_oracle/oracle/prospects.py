@@ -214,7 +214,7 @@ def _kinds(node: TreeNode, label: str) -> Iterator[WayKind]:
 
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
     route = route_of(node.machine, label, outcome)
-    kind = failure_kind(outcome, route, settings.failure_outcomes, node.in_force.failing)
+    kind = failure_kind(outcome, route, settings, node.in_force.failing)
     return OutcomeProspect(
         outcome,
         node.site.in_words(route, outcome),

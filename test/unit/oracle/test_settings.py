@@ -267,6 +267,7 @@ def test_a_key_that_is_not_known_is_answered_with_all_that_are():
         'max_recoveries',
         'failing_outcomes',
         'failure_outcomes',
+        'intended_outcomes',
         'author_recoveries',
         'userdata',
         'cost',

@@ -153,7 +153,7 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     kind = failure_kind(
         outcome,
         route_of(parent.machine, label, outcome),
-        parent.settings_of(label).failure_outcomes,
+        parent.settings_of(label),
         parent.in_force.failing,
     )
     return kind is not FailureKind.NOT_A_FAILURE

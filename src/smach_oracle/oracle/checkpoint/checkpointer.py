@@ -15,7 +15,7 @@ from ..machine.nesting import Wrapper, nodes_of, wrappers_around, wrappers_in
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
-from ..records.facts import JUMPED_TO
+from ..records.facts import JUMPED_TO, TAKEN_UP
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
 from ..smach_private import data_of, states_of
@@ -277,6 +277,9 @@ class Checkpointer:
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (node.has(event.target)):
             yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
+        elif kind is EventKind.TRANSITION and TAKEN_UP in (event.data or {}):
+            failed, *told = (event.data or {})[TAKEN_UP]
+            yield fact_of(node.key, AT, [failed, FAILED, *told])
         elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
             yield fact_of(
                 node.key, AT, [label, FAILED, event.failure_kind, event.outcome, event.text]

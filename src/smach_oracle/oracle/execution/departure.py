@@ -13,9 +13,9 @@ from smach_common.foreign import repr_of
 from ..branches.iterator_wrapper import IteratorWrapper
 from ..branches.wrapper import wrapper_of
 from ..machine.jump_path import repeated_on, why_closed_on
-from ..machine.nesting import machines_below
+from ..machine.nesting import nodes_in
 from ..machine.places import levels_above, links_to
-from ..machine.tree_node import TreeNode, node_of
+from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..records.visits import VisitResult
 from ..recovery.failure import Failure
@@ -205,9 +205,7 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     state = states_of(node.machine)[failure.state]
     if not isinstance(state, smach.Container):
         return False
-    is_machine = isinstance(state, smach.StateMachine)
-    below = [state] if is_machine else [machine for _, machine in machines_below(state)]
-    nodes = [each for each in map(node_of, below) if each is not None]
+    nodes = nodes_in(state)
     settled = failure.kind is not FailureKind.TIME_LIMIT and any(
         each.execution.unrecovered for each in nodes
     )

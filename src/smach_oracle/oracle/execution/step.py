@@ -10,6 +10,7 @@ import smach
 from smach_common.foreign import repr_of
 
 from ..asking.question import AnswerKind
+from ..decision.failure_rate import FailureClass
 from ..decision.policy import FailureContext
 from ..machine.execution import ends_program
 from ..machine.oracle import save_rates
@@ -20,9 +21,10 @@ from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import Overrun, recall_preempts
 from ..records.events import EventKind, FailureKind
-from ..records.facts import LEFT, UNCOUNTED
+from ..records.facts import LEFT, TAKEN_UP, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
+from ..recovery.announced import Announced, announced_by
 from ..recovery.failure import (
     Failure,
     judge,
@@ -60,6 +62,19 @@ from .wrapping import sync_oracle
 
 Facts = Mapping[str, object]
 NO_FACTS: Facts = {}
+OWN_LOOP = (
+    'keeps failing: its author leads it from {} to {}, and back again. The oracle leaves that to '
+    'its author. `author_recoveries: override` has the oracle recover'
+)
+
+
+def _facts_of(occasion: Occasion, label: str) -> Facts:
+    """Return further fields of the event with which a state gives way to the oracle."""
+    failure = occasion.failure
+    if failure.state == label:
+        return NO_FACTS if occasion.lower_verdict is None else LEFT
+    told = [failure.state, int(failure.kind), failure.outcome, failure.text]
+    return {'text': 'reports a failure of ' + failure.state, 'data': {TAKEN_UP: told}}
 
 
 class Step:
@@ -111,10 +126,14 @@ class Step:
             note_end_under_preempt(
                 node, record.label, outcome if isinstance(judged, Route) else None
             )
+        announced = None if stopping else announced_by(node, record, outcome, judged)
+        if announced is not None:
+            return self._announced(outcome, announced)
         if isinstance(judged, Route):
             result = visit_result(outcome, stopping)
             node.records.visit_ended(record, outcome, result)
-            return self._advance(outcome, judged, learn=result is VisitResult.SUCCESS)
+            learn = result is VisitResult.SUCCESS and not self._may_fail(outcome, judged)
+            return self._advance(outcome, judged, learn)
         stopping = stopping or winds_down(node)
         if judged.is_held_back:
             return self._held_back(judged, stopping)
@@ -262,6 +281,8 @@ class Step:
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
             node.site.tell_item_passed_over(node, failure.state, failure.outcome)
+            if node.tree.recover:
+                self._tell_own_loop(failure)
             return self._end(failure, natural_ending(node, failure))
         if is_settled(node, failure):
             ending = natural_ending(node, failure)
@@ -275,15 +296,44 @@ class Step:
             return occasions.often_unwell(failure, context, continuous, why_unwell)
         return occasions.failed(failure, context, continuous)
 
+    def _announced(self, outcome: str, announced: Announced) -> Union[Occasion, Stop]:
+        """Recover from an earlier failure, which is counted. This state only reports it."""
+        node, failure, context = self._node, announced.failure, announced.context
+        node.records.visit_ended(self._record, outcome, VisitResult.SUCCESS)
+        if not node.tree.recover:
+            return self._advance(outcome, announced.route)
+        continuous = node.in_force.policy.is_continuous(context)
+        return occasions.announced(
+            failure, context, continuous, by=outcome, visits_since=announced.visits_since
+        )
+
     def _context(self) -> FailureContext:
         """Return what the visits so far say about a failure of the state."""
         return failure_context(self._node, self._record)
+
+    def _may_fail(self, outcome: str, route: Route) -> bool:
+        """Whether the same outcome may be, or report, a failure another time."""
+        failing = self._node.in_force.failing
+        return outcome in failing or (not route.is_state and route.target in failing)
 
     def _author_recovers(self, failure: Failure) -> bool:
         node = self._node
         return failure.route is not None and node.site.foresees(
             node, failure.outcome, failure.route, failure.kind, self._record.settings
         )
+
+    def _tell_own_loop(self, failure: Failure) -> None:
+        """Say, once in a trial, that the state keeps failing on the way that its author drew."""
+        node, record = self._node, self._record
+        if record.failure_class is not FailureClass.HIGH:
+            return
+        if node.records.history.keeps_failing(record.label):
+            target = failure.route.target if failure.route is not None else ''
+            node.warn_once(
+                'own loop',
+                OWN_LOOP.format(failure.outcome, target),
+                record.label,
+            )
 
     # -- without the oracle
 
@@ -343,8 +393,11 @@ class Step:
         node, machine = self._node, self._machine
         meta = self._enter_oracle(occasion)
         lock = lock_of(machine)
+        record = node.record(
+            occasion.failure.state
+        )  # an earlier one, which this state has reported
         try:
-            meta.begin(Recovery(node, self._record, occasion))
+            meta.begin(Recovery(node, record, occasion))
             if has_preempt_flag(machine):
                 meta.request_preempt()  # it came from a callback on the way here
             lock.release()
@@ -353,14 +406,14 @@ class Step:
                 verdict = self._in_time(occasion, meta.take_verdict())
             finally:
                 lock.acquire()
-            return Applying(node, self._record, occasion, meta).apply(verdict)
+            return Applying(node, record, occasion, meta).apply(verdict)
         except BaseException:
             be_back(node, self._record.label)
             raise
 
     def _enter_oracle(self, occasion: Occasion) -> OracleState:
         node, record, meta_label = self._node, self._record, self._node.settings.oracle_label
-        occasions.log_occasion(occasion, '{}/{}'.format(node.path, record.label))
+        occasions.log_occasion(occasion, '{}/{}'.format(node.path, occasion.failure.state))
         sync_oracle(node)
         if occasion.is_told:
             record.left_by(occasion.what, meta_label)
@@ -370,7 +423,7 @@ class Step:
                 state=record.label,
                 outcome=occasion.outcome,
                 target=meta_label,
-                **(NO_FACTS if occasion.lower_verdict is None else LEFT),
+                **_facts_of(occasion, record.label),
             )
         # sync_oracle refuses any other state of this name
         meta = cast(OracleState, states_of(self._machine)[meta_label])

@@ -231,9 +231,16 @@ class ContainerRecords:
         """Count a way out of the meta state."""
         self.oracle_edges[target] = self.oracle_edges.get(target, 0) + 1
 
-    def failure_context(self, record: StateRecord, initial: str) -> FailureContext:
-        """Return what the visits say about a failure of a state. It changes nothing."""
-        return self.history.failure_context(record.label, initial, record.totals[0])
+    def failure_context(
+        self, record: StateRecord, initial: str, is_counted: bool = False
+    ) -> FailureContext:
+        """Return what the visits say about a failure of a state. It changes nothing.
+
+        `is_counted`: it is among them.
+        """
+        history = self.history
+        context = history.context_since if is_counted else history.failure_context
+        return context(record.label, initial, record.totals[0])
 
     def note_failure(self, record: StateRecord) -> None:
         """Note in the history that a state has failed, before its visit is added."""

@@ -86,6 +86,15 @@ def machines_below(
             yield from machines_below(state, below + (label,))
 
 
+def nodes_in(state: smach.State) -> List[TreeNode]:
+    """Return the outermost wrapped machines of a state, which may be one itself."""
+    if isinstance(state, smach.StateMachine):
+        machines = [state]
+    else:
+        machines = [machine for _, machine in machines_below(state)]
+    return [node for node in map(node_of, machines) if node is not None]
+
+
 def branching_below(
     container: object, below: Labels = ()
 ) -> Iterator[Tuple[Labels, smach.Container]]:

@@ -86,13 +86,17 @@ def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
             yield each
 
 
-def failure_context(node: TreeNode, record: StateRecord) -> FailureContext:
+def failure_context(
+    node: TreeNode, record: StateRecord, is_counted: bool = False
+) -> FailureContext:
     """Return what the visits so far say about a failure of a state of a container.
+
+    `is_counted`: it is among them.
 
     With `step_back_across` its initial state is that before the container, in the levels above,
     where there is one.
     """
-    context = node.records.failure_context(record, initial_label_of(node.machine))
+    context = node.records.failure_context(record, initial_label_of(node.machine), is_counted)
     before = _state_before(node) if node.settings.step_back_across else ''
     return context._replace(initial=before) if before else context
 

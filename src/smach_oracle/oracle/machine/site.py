@@ -40,31 +40,45 @@ def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
 
 
 def failure_kind(
-    outcome: str, route: Route, listed: Tuple[str, ...], failing: FailingNames
+    outcome: str, route: Route, settings: StateSettings, failing: FailingNames
 ) -> FailureKind:
     """Classify a registered outcome, without regard to who recovers from it."""
-    if outcome in listed:
+    if route.target and outcome in settings.intended_outcomes:
+        return FailureKind.NOT_A_FAILURE
+    if outcome in settings.failure_outcomes:
         return FailureKind.FAILING_OUTCOME
     if route.is_state:
         return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
     if not route.target:
         return FailureKind.UNREGISTERED_OUTCOME
     if route.target in failing:
-        return FailureKind.FELL_THROUGH
+        excused = failing.excuse(outcome)
+        return FailureKind.NOT_A_FAILURE if excused else FailureKind.FELL_THROUGH
     return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
 
 
-def author_recovers(
-    outcome: str, route: Route, kind: FailureKind, listed: Tuple[str, ...], author_recoveries: str
-) -> bool:
+def author_recovers(outcome: str, route: Route, kind: FailureKind, settings: StateSettings) -> bool:
     """Whether the author's own transition from this failing outcome stays.
 
     It does where it leads to another state, or, for an outcome that only sounds like a failure, to
     a container outcome that does not.
     """
-    if author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
+    if settings.author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
         return False
-    return route.is_state or outcome not in listed
+    return route.is_state or outcome not in settings.failure_outcomes
+
+
+def goes_unnoticed(node: 'TreeNode', route: Route) -> bool:
+    """Whether a failure that ends a container has no outcome there by which others notice it.
+
+    So its author was not able to say more of it, and the oracle recovers from it.
+    """
+    failing = node.in_force.failing
+    return (
+        failing.by_name
+        and not route.is_state
+        and not any(each in failing for each in node.machine.get_registered_outcomes())
+    )
 
 
 class Site:
@@ -109,9 +123,8 @@ class Site:
         settings: StateSettings,
     ) -> bool:
         """Whether the author has said what is to happen at this failing outcome of a state."""
-        return author_recovers(
-            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
-        )
+        recovers = author_recovers(outcome, route, kind, settings)
+        return recovers and not goes_unnoticed(node, route)
 
     def in_words(self, route: Route, outcome: str) -> Route:
         """Return where an outcome leads, for people."""

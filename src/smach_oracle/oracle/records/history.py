@@ -9,6 +9,7 @@ come in, so no walk over the chain is ever needed.
 """
 
 from collections import deque
+from itertools import islice
 from typing import Callable, Deque, Iterable, NamedTuple, Optional, Tuple
 
 from ..decision.policy import FailureContext
@@ -122,6 +123,19 @@ class History:
             self.unconditioned,
             self.succeeded_before(state, successes),
         )
+
+    def context_since(self, state: str, initial: str, successes: int) -> FailureContext:
+        """Return what the visits said about the latest failure of `state`, which is noted."""
+        streak = self._before if self._streak.state == state else self._streak
+        return self.failure_context(state, initial, successes)._replace(
+            failed_last=streak.state == state,
+            failing_since=streak.state == state and streak.successes == successes,
+        )
+
+    def keeps_failing(self, state: str) -> bool:
+        """Whether `state` has failed more than once since it succeeded."""
+        results = (visit.result for visit in reversed(self.visits) if visit.state == state)
+        return [*islice(results, 2)] == [VisitResult.FAILURE] * 2
 
     def failing_since(self, state: str, successes: int) -> bool:
         """Whether, besides, `state` has not succeeded since.

@@ -90,7 +90,11 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
     successes = record.totals[0]
     streak = streak_of(node, record) or node.records.streaks.begin(
         record.label,
-        OpenStreak(successes, budget.time.now(), visited_before(node, record.label)),
+        OpenStreak(
+            successes,
+            budget.time.now(),
+            visited_before(node, record.label, recovery.occasion.visits_since),
+        ),
     )
     has_expert = node.tree.expert is not None and not budget.why_no_question()
     past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)

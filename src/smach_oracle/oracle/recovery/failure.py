@@ -12,7 +12,7 @@ import smach
 from smach_common.foreign import error_text, repr_of
 
 from ..asking.question import names
-from ..machine.nesting import items_under_way
+from ..machine.nesting import items_under_way, nodes_in
 from ..machine.resumed import Unfinished
 from ..machine.site import Route, failure_kind, route_of
 from ..machine.state_record import RateReading, StateRecord
@@ -148,8 +148,10 @@ def _judge(
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast(str, outcome)
     route = route_of(machine, label, outcome)
-    kind = failure_kind(outcome, route, record.settings.failure_outcomes, node.in_force.failing)
+    kind = failure_kind(outcome, route, record.settings, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:
+        return route
+    if route.target and _ended_as_intended(state):
         return route
     if route.target:
         return Failure(label, kind, outcome, _description(node, label, state), route)
@@ -159,6 +161,24 @@ def _judge(
     )
     unbound = _once(partial(smach.InvalidTransitionError, text))
     return Failure(label, kind, outcome, text, route, unbound)
+
+
+def _ended_as_intended(state: smach.State) -> bool:
+    """Whether a container in a state has ended by an outcome that its author means so."""
+    for node in nodes_in(state) if isinstance(state, smach.Container) else ():
+        for visit in list(node.records.history.visits)[-1:]:
+            within = states_of(node.machine).get(visit.state)
+            if (
+                visit.result is VisitResult.SUCCESS
+                and within is not None
+                and not route_of(node.machine, visit.state, visit.outcome).is_state
+                and (
+                    visit.outcome in node.settings_of(visit.state).intended_outcomes
+                    or _ended_as_intended(within)
+                )
+            ):
+                return True
+    return False
 
 
 def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:

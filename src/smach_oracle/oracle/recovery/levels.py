@@ -9,7 +9,7 @@ from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.jump_path import jump_path_to
 from ..machine.places import TreePlace, failure_context, is_direct, levels_above
-from ..machine.site import Route, author_recovers, failure_kind, route_of
+from ..machine.site import Route, author_recovers, failure_kind, goes_unnoticed, route_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY, Decider
@@ -78,10 +78,7 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
         route, kind = _judged_above(above, label, outcome)
         if kind is FailureKind.NOT_A_FAILURE or not route.target:
             return None
-        settings = above.settings_of(label)
-        if author_recovers(
-            outcome, route, kind, settings.failure_outcomes, settings.author_recoveries
-        ):
+        if author_recovers(outcome, route, kind, above.settings_of(label)):
             return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
         if route.is_state:  # `author_recoveries: override`
             return None
@@ -89,12 +86,24 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
     return None
 
 
+def unnoticed(node: TreeNode, failure: Failure) -> Optional[Foreseen]:
+    """Return that a failure is one only as its container has no failing outcome, None otherwise."""
+    route, settings = failure.route, node.settings_of(failure.state)
+    if (
+        route is None
+        or not author_recovers(failure.outcome, route, failure.kind, settings)
+        or not goes_unnoticed(node, route)
+    ):
+        return None
+    return Foreseen(
+        'its author ends {} with {} there'.format(node.path, route.target),
+    )
+
+
 def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, FailureKind]:
     """Return where the end of a container leads on the level above, and what it is there."""
     route = route_of(above.machine, label, outcome)
-    return route, failure_kind(
-        outcome, route, above.settings_of(label).failure_outcomes, above.in_force.failing
-    )
+    return route, failure_kind(outcome, route, above.settings_of(label), above.in_force.failing)
 
 
 def _failure_above(

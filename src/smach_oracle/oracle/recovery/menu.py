@@ -45,15 +45,17 @@ def levels_at_rest(node: TreeNode) -> List[TreeNode]:
     return levels
 
 
-def visited_before(node: TreeNode, label: str) -> Tuple[str, ...]:
+def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
     """Return the other states that were visited before a state, the latest first, by name.
 
-    Those of the containers above come last. Each is there once.
+    Those of the containers above come last. Each is there once. `since`: visits after its failure.
     """
     found: List[str] = []
     for level in levels_of(node):
         own = label if level is node else ''
         visits = list(level.records.history.visits)
+        if level is node and since:
+            del visits[-since:]
         labels = dict.fromkeys(
             visit.state
             for visit in reversed(visits)

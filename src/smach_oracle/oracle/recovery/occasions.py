@@ -58,6 +58,7 @@ class Occasion(NamedTuple):
     keeps: bool = False  # without an answer the trial is kept for the next start
     answer: Optional[Answer] = None  # given while the state still ran
     lower_verdict: Optional[LowerVerdict] = None
+    visits_since: int = 0  # since the state has failed
 
 
 def failed(failure: Failure, context: FailureContext, continuous: bool = False) -> Occasion:
@@ -70,6 +71,14 @@ def failed(failure: Failure, context: FailureContext, continuous: bool = False) 
         superseding=Superseding.TAKES_BACK if failure.is_counted else Superseding.COUNTS,
         continuous=continuous,
     )
+
+
+def announced(
+    failure: Failure, context: FailureContext, continuous: bool, by: str, visits_since: int
+) -> Occasion:
+    """A state has failed before, and its author's way was kept. `by`: an outcome reports it."""
+    occasion = failed(failure, context, continuous)
+    return occasion._replace(outcome=by, what=by, visits_since=visits_since)
 
 
 def interrupted(

@@ -31,6 +31,7 @@ from .levels import (
     levels_that_may_decide,
     runs_as_precondition,
     tell_decision,
+    unnoticed,
 )
 from .occasions import FirstStep, LowerVerdict
 from .recovery import Recovery
@@ -182,6 +183,11 @@ def escalate(recovery: Recovery) -> Optional[Verdict]:
 
 
 def _why_nobody_is_asked(recovery: Recovery) -> Optional[Foreseen]:
+    """Return why a person is not asked about the failure, or None where one is."""
+    return _left_to_others(recovery) or unnoticed(recovery.node, recovery.failure)
+
+
+def _left_to_others(recovery: Recovery) -> Optional[Foreseen]:
     """Return why the end of the container is left to a level above, or None where it is not."""
     node = recovery.node
     if runs_as_precondition(node):
@@ -195,8 +201,8 @@ def _why_nobody_is_asked(recovery: Recovery) -> Optional[Foreseen]:
 
 
 def _why_left_to_others(recovery: Recovery) -> str:
-    nobody = _why_nobody_is_asked(recovery)
-    return nobody.text if nobody is not None else ''
+    others = _left_to_others(recovery)
+    return others.text if others is not None else ''
 
 
 def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:

@@ -202,9 +202,8 @@ def _judge(
         raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
     outcome, failing = cast(str, outcome), node.in_force.failing
     if label:
-        listed = node.settings_of(label).failure_outcomes
         route = route_of(node.machine, label, outcome)
-        failed = failure_kind(outcome, route, listed, failing) not in (
+        failed = failure_kind(outcome, route, node.settings_of(label), failing) not in (
             FailureKind.NOT_A_FAILURE,
             FailureKind.UNREGISTERED_OUTCOME,
         )

@@ -29,7 +29,8 @@ def is_preempted(outcome: object) -> bool:
 class FailingNames:
     """Tells whether an outcome names a failure, by its own words or by those that a user has given.
 
-    `first`: names that come first where a container has several such outcomes.
+    `by_name`: whether their own words count. `first`: names that come first where a container has
+    several such outcomes.
 
     >>> by_name = FailingNames()
     >>> [name in by_name for name in ('graspFailed', 'LOST_LINE', 'timed_out', 'not_completed')]
@@ -49,6 +50,7 @@ class FailingNames:
 
     def __init__(self, words: Optional[Iterable[str]] = None) -> None:
         """`words`: those that a user has given. None means that the names' own words count."""
+        self.by_name = words is None
         self.first = FORMER_FAILING_OUTCOMES if words is None else tuple(words)
         self._names_failure: Callable[[str], bool] = (
             _sounds_failing if words is None else _ends_with(self.first)
@@ -64,6 +66,10 @@ class FailingNames:
             if len(self._known) < _MOST_KNOWN:
                 self._known[outcome] = known
         return known
+
+    def excuse(self, outcome: str) -> bool:
+        """Whether an outcome is no failure of its state although it ends the container in one."""
+        return self.by_name and (is_preempted(outcome) or sounds_like_success(outcome))
 
 
 def sounds_like_success(outcome: str) -> bool:

@@ -96,6 +96,12 @@ class StateSettings:
         '`states` only',
         names_objects=True,
     )
+    intended_outcomes: Tuple[str, ...] = setting(
+        (),
+        values.words,
+        'outcomes of states that are [meant so](executive.md#what-is-a-failure): never a failure, '
+        'wherever they lead',
+    )
 
 
 @dataclass(frozen=True)

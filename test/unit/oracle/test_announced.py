@@ -1,0 +1,388 @@
+"""Failures that a later state only tells of, and failures of which no end of a container tells."""
+
+import pytest
+from machines import FakeExpert, Scripted, Watched, give_up, goto, supersede
+
+import smach
+from smach_oracle.oracle.records.events import EventKind, FailureKind
+
+BAD = ('ok', 'failed')
+
+
+def made(states, outcomes=('done', 'failed')):
+    """A machine of (label, state, transitions)."""
+    machine = smach.StateMachine(outcomes=list(outcomes))
+    with machine:
+        for label, state, transitions in states:
+            smach.StateMachine.add(label, state, transitions)
+    return machine
+
+
+def reporting(work, report=None, between=(), **wrap):
+    """WORK fails, its author leads to REPORT, and that ends in `failed`."""
+    report = report or Scripted(outcomes=('said',))
+    says = report.otherwise
+    first = between[0][0] if between else 'REPORT'
+    return Watched(
+        made(
+            [
+                ('LOOK', Scripted(outcomes=('seen',)), {'seen': 'WORK'}),
+                ('WORK', work, {'ok': 'done', 'failed': first}),
+                *between,
+                ('REPORT', report, {says: 'failed'}),
+            ]
+        ),
+        **wrap,
+    )
+
+
+def told(machine, *kinds):
+    return [(event.kind.name, event.state) for event in machine.of(*kinds)]
+
+
+def test_the_oracle_recovers_from_the_failure_that_a_state_tells_of():
+    machine = reporting(Scripted('failed', outcomes=BAD))
+    assert machine.run() == 'done'
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT', 'WORK']
+    assert told(machine, EventKind.FAILURE, EventKind.DECISION, EventKind.JUMP) == [
+        ('FAILURE', 'WORK'),
+        ('DECISION', 'WORK'),
+        ('JUMP', 'WORK'),
+    ]
+    assert (machine.rate('WORK').failures, machine.rate('WORK').recoveries) == (1, 1)
+    assert (machine.rate('REPORT').failures, machine.rate('REPORT').successes) == (0, 1)
+
+
+@pytest.mark.parametrize('says', ['said', 'succeeded', 'done', 'low'])
+def test_whatever_the_state_says_that_tells_of_it(says):
+    machine = reporting(Scripted('failed', outcomes=BAD), Scripted(outcomes=(says,)))
+    assert machine.run() == 'done'
+    assert machine.rate('REPORT').failures == 0
+
+
+def test_the_state_that_tells_of_it_may_come_later():
+    between = [
+        ('STOW', Scripted(outcomes=('stowed',)), {'stowed': 'CALL'}),
+        ('CALL', Scripted(outcomes=('called',)), {'called': 'REPORT'}),
+    ]
+    machine = reporting(Scripted('failed', outcomes=BAD), between=between)
+    assert machine.run() == 'done'
+    assert machine.visits() == ['LOOK', 'WORK', 'STOW', 'CALL', 'REPORT', 'WORK']
+
+
+def test_a_second_trial_finds_it_again_on_the_short_way():
+    work = Scripted('failed', 'ok', 'failed', 'ok', 'failed', 'ok', outcomes=BAD)
+    machine = reporting(work)
+    assert [machine.run() for _ in range(3)] == ['done'] * 3
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT', 'WORK'] * 3
+
+
+def test_a_failure_that_keeps_coming_is_continuous_and_leads_further_back():
+    machine = reporting(Scripted('failed', 'failed', outcomes=BAD), settings={'memory': 100})
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('revisit', 'WORK'), ('step_back', 'LOOK')]
+    assert [event.continuous for event in machine.of(EventKind.FAILURE)] == [False, True]
+    assert [event.continuous for event in machine.of(EventKind.DECISION)] == [False, True]
+
+
+def test_a_step_back_of_the_listing_leads_to_what_was_before_the_failed_state():
+    machine = reporting(Scripted('failed', outcomes=BAD), settings={'policy': 'algorithm1'})
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('step_back', 'LOOK')]
+
+
+def test_a_way_back_leads_to_what_was_before_the_failed_state():
+    machine = reporting(Scripted(*['failed'] * 3, outcomes=BAD), settings={'policy': 'escalating'})
+    assert machine.run() == 'done'
+    assert not [event for event in machine.of(EventKind.JUMP) if event.target == 'REPORT']
+
+
+def test_the_question_is_about_the_failed_state():
+    expert = FakeExpert(goto('WORK'))
+    machine = reporting(
+        Scripted('failed', outcomes=BAD), expert=expert, settings={'max_recoveries': 0}
+    )
+    assert machine.run() == 'done'
+    (question,) = expert.questions
+    assert (question.failed_state, question.outcome) == ('WORK', 'failed')
+    assert question.failure_kind is FailureKind.FAILING_OUTCOME
+    assert question.text == 'REPORT has ended with said since, which leads to failed'
+    assert {choice.outcome for choice in question.supersede_outcomes} == set(BAD)
+
+
+def test_an_expert_who_did_the_work_supersedes_the_failed_state():
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        expert=FakeExpert(supersede('ok')),
+        settings={'max_recoveries': 0},
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT']
+    assert machine.rate('WORK').failures == 0, 'it is taken back'
+
+
+def test_without_a_way_the_machine_ends_as_its_author_drew():
+    for expert in (FakeExpert(give_up()), None):
+        machine = reporting(
+            Scripted('failed', outcomes=BAD), expert=expert, settings={'max_recoveries': 0}
+        )
+        assert machine.run() == 'failed'
+        assert machine.visits() == ['LOOK', 'WORK', 'REPORT']
+
+
+def test_a_state_that_has_succeeded_since_has_overcome_its_failure():
+    check = Scripted('low', outcomes=('fine', 'low'))
+    machine = Watched(
+        made(
+            [
+                ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'CHECK', 'failed': 'RESET'}),
+                ('RESET', Scripted(outcomes=('ready',)), {'ready': 'WORK'}),
+                ('CHECK', check, {'fine': 'done', 'low': 'failed'}),
+            ]
+        )
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['WORK', 'RESET', 'WORK', 'CHECK', 'CHECK']
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'WORK'), ('FAILURE', 'CHECK')]
+
+
+def test_of_several_it_is_the_latest():
+    first, second = Scripted('failed', outcomes=BAD), Scripted('failed', outcomes=BAD)
+    machine = Watched(
+        made(
+            [
+                ('A', first, {'ok': 'B', 'failed': 'B'}),
+                ('B', second, {'ok': 'done', 'failed': 'REPORT'}),
+                ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+            ]
+        )
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['A', 'B', 'REPORT', 'B']
+
+
+def test_a_failure_that_was_taken_up_is_not_taken_up_for_another():
+    """LOOK ends the machine after a step back. WORK has not failed again by then."""
+    look = Scripted('seen', 'none', 'seen', outcomes=('seen', 'none'))
+    machine = Watched(
+        made(
+            [
+                ('LOOK', look, {'seen': 'WORK', 'none': 'failed'}),
+                ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'REPORT'}),
+                ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+            ]
+        ),
+        settings={'policy': 'algorithm1'},
+    )
+    assert machine.run() == 'done'
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'WORK'), ('FAILURE', 'LOOK')]
+    assert machine.rate('LOOK').failures == 1
+
+
+def test_an_execution_of_the_container_before_does_not_count():
+    work = Scripted('failed', 'ok', outcomes=BAD)
+    machine = Watched(
+        made(
+            [
+                ('WORK', work, {'ok': 'CHECK', 'failed': 'done'}),
+                ('CHECK', Scripted('low', outcomes=('fine', 'low')), {'low': 'failed'}),
+            ],
+            outcomes=('done', 'fine', 'failed'),
+        )
+    )
+    assert (machine.run(), machine.run()) == ('done', 'fine')
+    assert told(machine, EventKind.FAILURE)[-1] == ('FAILURE', 'CHECK')
+
+
+def test_without_a_failure_before_it_is_the_states_own():
+    machine = Watched(
+        made([('CHECK', Scripted('low', outcomes=('ok', 'low')), {'ok': 'done', 'low': 'failed'})])
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['CHECK', 'CHECK']
+
+
+@pytest.mark.parametrize('outcome', ['preempted', 'succeeded', 'success', 'completed'])
+def test_a_success_or_a_preempt_is_none_wherever_it_leads(outcome):
+    machine = Watched(
+        made(
+            [
+                (
+                    'NAV',
+                    Scripted(outcome, outcomes=('ok', outcome)),
+                    {'ok': 'done', outcome: 'failed'},
+                )
+            ]
+        )
+    )
+    assert machine.run() == 'failed'
+    assert machine.visits() == ['NAV']
+    assert not machine.of(EventKind.FAILURE)
+
+
+def test_words_of_a_user_are_followed_to_the_letter():
+    machine = Watched(
+        made(
+            [
+                (
+                    'NAV',
+                    Scripted('succeeded', outcomes=('ok', 'succeeded')),
+                    {'ok': 'done', 'succeeded': 'failed'},
+                )
+            ]
+        ),
+        settings={'failing_outcomes': ['failed']},
+    )
+    assert machine.run() == 'done'
+
+
+def test_where_the_oracle_only_observes_no_other_state_is_blamed():
+    machine = reporting(Scripted('failed', outcomes=BAD), recover=False)
+    assert machine.run() == 'failed'
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'WORK')]
+    assert machine.rate('REPORT').successes == 1
+
+
+# -- a container without a failing end
+
+
+def ending_neutrally(work, settings=None, outcomes=('END',), **wrap):
+    return Watched(
+        made([('PICK', work, {'ok': 'END', 'failed': 'END'})], outcomes), settings=settings, **wrap
+    )
+
+
+def test_a_failing_outcome_that_ends_a_container_without_one_is_recovered_from():
+    machine = ending_neutrally(Scripted('failed', outcomes=BAD))
+    assert machine.run() == 'END'
+    assert machine.visits() == ['PICK', 'PICK']
+    assert machine.decisions() == [('revisit', 'PICK')]
+
+
+def test_nobody_is_asked_about_it():
+    expert = FakeExpert(*[goto('PICK')] * 9)
+    machine = ending_neutrally(Scripted(*['failed'] * 99, outcomes=BAD), expert=expert)
+    assert machine.run() == 'END'
+    assert len(machine.visits()) > 1
+    assert not expert.questions
+    assert not machine.of(EventKind.QUERY_OPENED)
+
+
+@pytest.mark.parametrize(
+    'more, outcomes',
+    [
+        ({}, ('END', 'aborted')),  # the author could have said it
+        ({'failing_outcomes': ['failed']}, ('END',)),
+        ({'states': {'PICK': {'intended_outcomes': ['failed']}}}, ('END',)),
+    ],
+)
+def test_it_is_the_authors_where_the_container_has_one_or_where_the_user_says_so(more, outcomes):
+    machine = ending_neutrally(Scripted('failed', outcomes=BAD), more, outcomes)
+    assert machine.run() == 'END'
+    assert machine.visits() == ['PICK']
+
+
+def test_where_the_author_is_overridden_a_person_is_asked():
+    expert = FakeExpert(goto('PICK'))
+    machine = ending_neutrally(
+        Scripted('failed', outcomes=BAD),
+        {'author_recoveries': 'override', 'max_recoveries': 0},
+        expert=expert,
+    )
+    assert machine.run() == 'END'
+    assert len(expert.questions) == 1
+
+
+def test_a_nested_container_without_a_failing_end_recovers_within():
+    inner = made(
+        [('PICK', Scripted('failed', outcomes=BAD), {'ok': 'END', 'failed': 'END'})], ['END']
+    )
+    machine = Watched(made([('ARM', inner, {'END': 'done'})]))
+    assert machine.run() == 'done'
+    assert told(machine, EventKind.JUMP) == [('JUMP', 'PICK')]
+
+
+# -- what its author means
+
+
+def test_an_intended_outcome_is_never_a_failure_wherever_it_leads():
+    for leads_to in ('failed', 'done', 'STOP'):
+        machine = Watched(
+            made(
+                [
+                    (
+                        'BATTERY',
+                        Scripted('low', outcomes=('ok', 'low')),
+                        {'ok': 'done', 'low': leads_to},
+                    ),
+                    (
+                        'STOP',
+                        Scripted(),
+                        {'ok': 'done', 'aborted': 'failed', 'preempted': 'failed'},
+                    ),
+                ]
+            ),
+            settings={
+                'failure_outcomes': ['low'],
+                'states': {'BATTERY': {'intended_outcomes': ['low']}},
+            },
+        )
+        machine.run()
+        assert machine.visits().count('BATTERY') == 1
+        assert not machine.of(EventKind.FAILURE)
+        assert machine.rate('BATTERY').successes == 1
+
+
+def test_a_container_that_ends_by_an_intended_outcome_has_not_failed():
+    battery = Scripted('low', 'low', 'aborted', outcomes=('ok', 'low', 'aborted'))
+    inner = made(
+        [('BATTERY', battery, {'ok': 'done', 'low': 'aborted'})], outcomes=('done', 'aborted')
+    )
+    middle = made([('ARM', inner, {'aborted': 'aborted'})], outcomes=('done', 'aborted'))
+    machine = Watched(
+        made([('ROBOT', middle, {'aborted': 'failed'})]),
+        settings={'states': {'BATTERY': {'intended_outcomes': ['low']}}},
+    )
+    assert (machine.run(), machine.run()) == ('failed', 'failed')
+    assert not machine.of(EventKind.FAILURE)
+    assert machine.run() == 'done', 'another end in the same outcome is a failure'
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'BATTERY')]
+
+
+# -- a loop of the author's own
+
+
+def looping(script, settings=None):
+    return Watched(
+        made([('WAIT', Scripted(*script, outcomes=BAD), {'ok': 'done', 'failed': 'WAIT'})]),
+        settings=settings,
+    )
+
+
+def test_a_state_that_keeps_failing_on_its_authors_way_is_told_once_in_a_trial():
+    machine = looping((['failed'] * 30 + ['ok']) * 2)
+    assert (machine.run(), machine.run()) == ('done', 'done')
+    warnings = [event.text for event in machine.of(EventKind.WARNING)]
+    assert len(warnings) == 2
+    assert warnings[0].startswith('keeps failing: its author leads it from failed to WAIT')
+    assert len(machine.visits()) == 62
+    assert not machine.of(EventKind.DECISION)
+
+
+def test_one_failure_of_a_class_that_is_high_already_is_no_loop():
+    machine = looping(['failed', 'ok'], {'prior': 0.9})
+    machine.run()
+    assert not machine.of(EventKind.WARNING)
+
+
+def test_a_loop_over_several_states_is_told_of():
+    machine = Watched(
+        made(
+            [
+                ('A', Scripted(*['failed'] * 20, outcomes=BAD), {'ok': 'done', 'failed': 'B'}),
+                ('B', Scripted(*['failed'] * 20, outcomes=BAD), {'ok': 'A', 'failed': 'A'}),
+            ]
+        )
+    )
+    machine.run()
+    assert {event.state for event in machine.of(EventKind.WARNING)} == {'A', 'B'}
