@@ -1,4 +1,4 @@
-"""Failures that a later state only tells of, and failures of which no end of a container tells."""
+"""Failures that a later state reports, and failures that no end of a container shows."""
 
 import pytest
 from machines import FakeExpert, Scripted, Watched, give_up, goto, supersede
@@ -40,7 +40,7 @@ def told(machine, *kinds):
     return [(event.kind.name, event.state) for event in machine.of(*kinds)]
 
 
-def test_the_oracle_recovers_from_the_failure_that_a_state_tells_of():
+def test_the_oracle_recovers_from_the_failure_that_a_state_reports():
     machine = reporting(Scripted('failed', outcomes=BAD))
     assert machine.run() == 'done'
     assert machine.visits() == ['LOOK', 'WORK', 'REPORT', 'WORK']
@@ -54,13 +54,13 @@ def test_the_oracle_recovers_from_the_failure_that_a_state_tells_of():
 
 
 @pytest.mark.parametrize('says', ['said', 'succeeded', 'done', 'low'])
-def test_whatever_the_state_says_that_tells_of_it(says):
+def test_whatever_the_reporting_state_says(says):
     machine = reporting(Scripted('failed', outcomes=BAD), Scripted(outcomes=(says,)))
     assert machine.run() == 'done'
     assert machine.rate('REPORT').failures == 0
 
 
-def test_the_state_that_tells_of_it_may_come_later():
+def test_the_state_that_reports_it_may_come_later():
     between = [
         ('STOW', Scripted(outcomes=('stowed',)), {'stowed': 'CALL'}),
         ('CALL', Scripted(outcomes=('called',)), {'called': 'REPORT'}),
@@ -236,6 +236,72 @@ def test_words_of_a_user_are_followed_to_the_letter():
     assert machine.run() == 'done'
 
 
+def test_a_failure_is_not_taken_up_where_an_oracle_below_has_given_up():
+    call = Scripted('aborted', outcomes=('said', 'aborted'))
+    inner = made([('CALL', call, {})], outcomes=('said', 'aborted'))
+    machine = Watched(
+        made(
+            [
+                ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'REPORT'}),
+                ('REPORT', inner, {'said': 'failed', 'aborted': 'failed'}),
+            ]
+        ),
+        expert=FakeExpert(give_up('said')),
+        settings={'max_recoveries': 0},
+    )
+    assert machine.run() == 'failed'
+    assert machine.visits().count('WORK') == 1
+    assert told(machine, EventKind.DECISION) == [('DECISION', 'CALL')]
+
+
+@pytest.mark.parametrize('policy', ['prose', 'algorithm1'])
+def test_another_failure_meanwhile_does_not_change_where_a_step_back_leads(policy):
+    stow = Scripted('failed', outcomes=('stowed', 'failed'))
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        between=[('STOW', stow, {'stowed': 'REPORT', 'failed': 'STOW'})],
+        settings={'policy': policy},
+        preconditions={'WORK': [lambda ud: policy != 'prose']},
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('step_back', 'LOOK')]
+
+
+def test_a_failure_about_which_the_oracle_has_decided_is_not_taken_up_again():
+    """WORK raises the second time, and an expert sends the machine to REPORT."""
+    work = Scripted('failed', RuntimeError('jammed'), outcomes=BAD)
+    retry = ('RETRY', Scripted(outcomes=('again',)), {'again': 'WORK'})
+    report = Scripted('low', outcomes=('said', 'low'))
+    machine = Watched(
+        made(
+            [
+                ('WORK', work, {'ok': 'done', 'failed': 'RETRY'}),
+                retry,
+                ('REPORT', report, {'said': 'done', 'low': 'failed'}),
+            ]
+        ),
+        expert=FakeExpert(goto('REPORT')),
+        settings={'states': {'WORK': {'max_recoveries': 0}}},
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['WORK', 'RETRY', 'WORK', 'REPORT', 'REPORT']
+
+
+def test_a_superseded_state_is_the_latest_one_before_the_next():
+    states = [
+        ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'PLACE', 'failed': 'REPORT'}),
+        ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+        ('PLACE', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'failed'}),
+    ]
+    machine = Watched(
+        made(states),
+        expert=FakeExpert(supersede('ok')),
+        settings={'policy': 'algorithm1', 'states': {'WORK': {'max_recoveries': 0}}},
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('ask', ''), ('step_back', 'WORK')]
+
+
 def test_where_the_oracle_only_observes_no_other_state_is_blamed():
     machine = reporting(Scripted('failed', outcomes=BAD), recover=False)
     assert machine.run() == 'failed'
@@ -302,6 +368,15 @@ def test_a_nested_container_without_a_failing_end_recovers_within():
     assert told(machine, EventKind.JUMP) == [('JUMP', 'PICK')]
 
 
+def test_what_its_end_leads_to_may_be_a_failure_above_of_which_a_person_is_asked():
+    pick = Scripted(*['failed'] * 99, outcomes=BAD)
+    inner = made([('PICK', pick, {'ok': 'END', 'failed': 'END'})], ['END'])
+    expert = FakeExpert(give_up())
+    machine = Watched(made([('ARM', inner, {'END': 'failed'})]), expert=expert)
+    assert machine.run() == 'failed'
+    assert [question.failed_state for question in expert.questions] == ['ARM']
+
+
 # -- what its author means
 
 
@@ -349,6 +424,25 @@ def test_a_container_that_ends_by_an_intended_outcome_has_not_failed():
     assert told(machine, EventKind.FAILURE) == [('FAILURE', 'BATTERY')]
 
 
+def test_a_container_that_ends_once_as_intended_fails_the_next_time():
+    battery = Scripted('low', 'ok', outcomes=('ok', 'low'))
+    engine = Scripted(outcomes=('worn',))
+    inner = made(
+        [('BATTERY', battery, {'ok': 'ENGINE'}), ('ENGINE', engine, {'worn': 'low'})], ['low']
+    )
+    machine = Watched(
+        made([('ARM', inner, {'low': 'done'})]),
+        settings={
+            'states': {
+                'BATTERY': {'intended_outcomes': ['low']},
+                'ARM': {'failure_outcomes': ['low'], 'max_recoveries': 0},
+            }
+        },
+    )
+    assert (machine.run(), machine.run()) == ('done', 'done')
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'ARM')]
+
+
 # -- a loop of the author's own
 
 
@@ -375,7 +469,7 @@ def test_one_failure_of_a_class_that_is_high_already_is_no_loop():
     assert not machine.of(EventKind.WARNING)
 
 
-def test_a_loop_over_several_states_is_told_of():
+def test_a_loop_over_several_states_is_reported():
     machine = Watched(
         made(
             [

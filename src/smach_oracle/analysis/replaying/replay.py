@@ -160,7 +160,8 @@ class Replay:
             self._visited(event, VisitResult.SUPERSEDED)
             return
         state.estimator.take_back_failure()
-        self._history(event).supersede(event.state, event.outcome)
+        is_conditioned = self._conditioned.get((event.path, event.state), False)
+        self._history(event).supersede(event.state, event.outcome, is_conditioned)
 
     def _left(self, event: Event) -> None:
         state = self._state(event)

@@ -10,6 +10,7 @@ from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..records.events import EventKind
 from ..records.visits import VisitResult
+from ..recovery.levels import unnoticed
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.verdict import (
@@ -75,12 +76,12 @@ class Applying:
         node, record = self._node, self._record
         if self._occasion.superseding is Superseding.TAKES_BACK:
             record.take_back_failure()
-            node.records.history.supersede(record.label, outcome)
+            node.records.history.supersede(record.label, outcome, record.has_preconditions)
         elif self._occasion.superseding is Superseding.COUNTS:
             node.records.visit_ended(record, outcome, VisitResult.SUPERSEDED)
             note_superseded(node, record.label)
         else:
-            node.records.history.count_superseded(record.label, outcome)
+            node.records.history.count_superseded(record.label, outcome, record.has_preconditions)
 
     def _jump(self, jump: JumpTo) -> None:
         node, way = self._node, jump.jump_path
@@ -127,7 +128,7 @@ class Applying:
     def _give_up(self, verdict: GiveUp) -> Optional[str]:
         ending, text, node = verdict.ending, verdict.text, self._node
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
-        if ending.state is None:
+        if ending.state is None and unnoticed(node, self._occasion.failure) is None:
             node.execution.give_up()
         node.emit(
             EventKind.GIVE_UP,

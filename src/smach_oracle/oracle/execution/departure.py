@@ -13,7 +13,7 @@ from smach_common.foreign import repr_of
 from ..branches.iterator_wrapper import IteratorWrapper
 from ..branches.wrapper import wrapper_of
 from ..machine.jump_path import repeated_on, why_closed_on
-from ..machine.nesting import nodes_in
+from ..machine.nesting import gave_up_in, nodes_in
 from ..machine.places import levels_above, links_to
 from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
@@ -203,12 +203,8 @@ def is_settled(node: TreeNode, failure: Failure) -> bool:
     overrun of the state is a failure of its own.
     """
     state = states_of(node.machine)[failure.state]
-    if not isinstance(state, smach.Container):
+    if not gave_up_in(state):
         return False
-    nodes = nodes_in(state)
-    settled = failure.kind is not FailureKind.TIME_LIMIT and any(
-        each.execution.unrecovered for each in nodes
-    )
-    for each in nodes:
+    for each in nodes_in(state):
         each.execution.forget_unrecovered()
-    return settled
+    return failure.kind is not FailureKind.TIME_LIMIT

@@ -314,7 +314,11 @@ class Step:
     def _may_fail(self, outcome: str, route: Route) -> bool:
         """Whether the same outcome may be, or report, a failure another time."""
         failing = self._node.in_force.failing
-        return outcome in failing or (not route.is_state and route.target in failing)
+        return (
+            outcome in failing
+            or outcome in self._record.settings.failure_outcomes
+            or (not route.is_state and route.target in failing)
+        )
 
     def _author_recovers(self, failure: Failure) -> bool:
         node = self._node

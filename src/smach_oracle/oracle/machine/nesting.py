@@ -95,6 +95,13 @@ def nodes_in(state: smach.State) -> List[TreeNode]:
     return [node for node in map(node_of, machines) if node is not None]
 
 
+def gave_up_in(state: smach.State) -> bool:
+    """Whether the oracle of a container in a state, or of the state itself, has given up."""
+    return isinstance(state, smach.Container) and any(
+        node.execution.unrecovered for node in nodes_in(state)
+    )
+
+
 def branching_below(
     container: object, below: Labels = ()
 ) -> Iterator[Tuple[Labels, smach.Container]]:

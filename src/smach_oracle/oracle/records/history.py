@@ -165,21 +165,23 @@ class History:
         self._before = self._streak
         self._streak = _Streak(state, successes, anchor, True)
 
-    def supersede(self, state: str, outcome: str) -> None:
-        """Count the latest visit, a failure of `state`, as neither: an expert did its work."""
-        self._streak = self._before
-        self.count_superseded(state, outcome)
+    def supersede(self, state: str, outcome: str, has_preconditions: bool) -> None:
+        """Count the latest failure of `state` as neither: an expert did its work."""
+        if self._streak.state == state:
+            self._streak = self._before
+        self.count_superseded(state, outcome, has_preconditions)
 
-    def count_superseded(self, state: str, outcome: str) -> None:
+    def count_superseded(self, state: str, outcome: str, has_preconditions: bool) -> None:
         """Count the latest visit, that of `state`, as one whose work an expert did.
 
-        Where the program was stopped after the visit, the chain may not have it. It is added then.
+        If another one is the latest, it is added. So it is where a later state has reported the
+        failure, and where the program was stopped after the visit.
         """
         visit = Visit(state, outcome, VisitResult.SUPERSEDED)
         if self.visits and self.visits[-1].state == state:
             self.visits[-1] = visit
         else:
-            self.visits.append(visit)
+            self.visited(visit, has_preconditions)
 
     def told(self) -> Told:
         """Return all but the visits as plain data, for `take_over`."""

@@ -6,6 +6,7 @@ WORK fails, its author leads to REPORT, and REPORT leads to `failed`. The failur
 from typing import NamedTuple, Optional, Set, Tuple, Union
 
 from ..decision.policy import FailureContext
+from ..machine.nesting import gave_up_in
 from ..machine.places import failure_context
 from ..machine.site import Route, failure_kind, route_of
 from ..machine.state_record import StateRecord
@@ -13,6 +14,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import FailureKind
 from ..records.visits import Visit, VisitResult
 from ..settings.failing_outcomes import is_preempted
+from ..smach_private import states_of
 from .failure import Failure
 from .stop import winds_down
 
@@ -36,16 +38,13 @@ def announced_by(
     :param judged: the end of the state by itself. Its visit is not added yet.
     """
     route = _to_failing_end(node, record, outcome, judged)
-    if route is None or winds_down(node):
+    if route is None or winds_down(node) or gave_up_in(states_of(node.machine)[record.label]):
         return None
     visits = node.records.history.latest()
     place = _latest_kept(node, record.label, visits)
     if place is None:
         return None
     failed = node.record(visits[place].state)
-    context = failure_context(node, failed, is_counted=True)
-    before = (node.record(each.state) for each in reversed(visits[:place]))
-    unconditioned = next((each.label for each in before if not each.has_preconditions), None)
     text = '{} has ended with {} since, which leads to {}'
     failure = Failure(
         failed.label,
@@ -54,8 +53,24 @@ def announced_by(
         text.format(record.label, outcome, route.target),
         route,
     )
-    context = context._replace(unconditioned=unconditioned)
+    context = _context(node, failed, visits[:place])
     return Announced(failure, route, context, len(visits) - place)
+
+
+def _context(node: TreeNode, failed: StateRecord, before: Tuple[Visit, ...]) -> FailureContext:
+    """Return what the visits before the failure, which is counted, say about it."""
+    context = failure_context(node, failed, is_counted=True)
+    states = (node.record(visit.state) for visit in reversed(before) if node.has(visit.state))
+    unconditioned = next((each.label for each in states if not each.has_preconditions), None)
+    context = context._replace(unconditioned=unconditioned)
+    if node.records.history.failing_since(failed.label, failed.totals[0]):
+        return context
+    succeeded = (
+        visit.state
+        for visit in reversed(before)
+        if visit.result is VisitResult.SUCCESS and visit.state != failed.label
+    )
+    return context._replace(succeeded_before=next(succeeded, None))
 
 
 def _to_failing_end(
@@ -76,23 +91,19 @@ def _to_failing_end(
 
 
 def _latest_kept(node: TreeNode, told_by: str, visits: Tuple[Visit, ...]) -> Optional[int]:
-    """Return the number of the visit. A state that has succeeded since has overcome its failure."""
-    overcome: Set[str] = set()
+    """Return the number of the visit, which is the latest one of its state."""
+    later: Set[str] = set()
     for number in reversed(range(len(visits))):
         visit = visits[number]
-        if not node.has(visit.state):
+        if not node.has(visit.state) or visit.result is VisitResult.PREEMPTED:
             continue
         route = route_of(node.machine, visit.state, visit.outcome)
-        if visit.result in (VisitResult.SUCCESS, VisitResult.SUPERSEDED):
-            if not route.is_state and visit.state != told_by:
-                return None  # it has reported what was before, and the oracle has gone on
-            overcome.add(visit.state)
-        elif (
-            visit.result is VisitResult.FAILURE
-            and visit.state not in overcome
-            and _is_kept(node, visit, route)
-        ):
+        has_failed = visit.result is VisitResult.FAILURE
+        if not has_failed and not route.is_state and visit.state != told_by:
+            return None  # it has reported what was before, and the oracle has gone on
+        if has_failed and visit.state not in later and _is_kept(node, visit, route):
             return number if visit.state != told_by else None
+        later.add(visit.state)
     return None
 
 

@@ -87,7 +87,10 @@ def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen
 
 
 def unnoticed(node: TreeNode, failure: Failure) -> Optional[Foreseen]:
-    """Return that a failure is one only as its container has no failing outcome, None otherwise."""
+    """Return that a failure is one only as its container has no failing outcome, None otherwise.
+
+    Nobody is asked about it, and a level above is free to recover from what it leads to.
+    """
     route, settings = failure.route, node.settings_of(failure.state)
     if (
         route is None
@@ -95,9 +98,7 @@ def unnoticed(node: TreeNode, failure: Failure) -> Optional[Foreseen]:
         or not goes_unnoticed(node, route)
     ):
         return None
-    return Foreseen(
-        'its author ends {} with {} there'.format(node.path, route.target),
-    )
+    return Foreseen('its author ends {} with {} there'.format(node.path, route.target))
 
 
 def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, FailureKind]:

@@ -1,4 +1,4 @@
-"""A failure that a later state tells of, where the program is stopped meanwhile."""
+"""A failure that a later state reports, where the program is stopped meanwhile."""
 
 from killed_machines import KilledMachine, Noted
 from killed_trees import ENDS, make, points_of

@@ -20,6 +20,7 @@ from .plan import (
 )
 
 BAD = ('aborted', 'grasp_failed', 'odd')
+SUCCESS = 'succeeded'
 
 
 class Shape(NamedTuple):
@@ -56,6 +57,7 @@ class _Drawing:
         self._trouble = chance.choice((0.15, 0.3, 0.5, 0.7))
         self._preempts = shape.preempts and chance.random() < 0.3
         self._left = chance.choice((6, 10, 20))  # leafs
+        self._reports = random.Random('reports ' + seed).random() < 0.25
         self._guards = shape.guarded and random.Random('guards ' + seed).random() < 0.35
 
     def plan(self) -> TreePlan:
@@ -136,10 +138,20 @@ class _Drawing:
             overruns,
         )
 
+    def _that_succeeds(self, leaf: Leaf) -> Leaf:
+        """Some have an outcome that is a success by its name, too."""
+        if self._apart(leaf.label).random() < 0.8:
+            return leaf
+        return leaf._replace(outcomes=(*leaf.outcomes, SUCCESS))
+
+    def _apart(self, label: str) -> random.Random:
+        """A chance that leaves the rest of the tree as it is."""
+        return random.Random('succeeds {} {}'.format(self._seed, label))
+
     def _child(self, depth: int, beside: bool) -> Node:
         drawn = self._chance.random()
         if depth <= 0 or self._left <= 0 or drawn < 0.5:
-            return self._leaf(beside)
+            return self._that_succeeds(self._leaf(beside))
         if drawn < 0.6 and self._may_be_beside(beside):
             return self._beside(depth - 1)
         if drawn < 0.7 and self._shape.iterated:
@@ -166,6 +178,8 @@ class _Drawing:
             child.label: self._transitions(child, labels, index, outcomes)
             for index, child in enumerate(children)
         }
+        if self._reports and len(children) > 1 and 'aborted' in outcomes:
+            self._lead_to_a_report(children, transitions)
         return Machine(
             label,
             outcomes,
@@ -175,6 +189,20 @@ class _Drawing:
             self._some_keys(),
             is_sequence=chance.random() < 0.2,
         )
+
+    def _lead_to_a_report(
+        self, children: Tuple[Node, ...], transitions: Dict[str, Dict[str, str]]
+    ) -> None:
+        """The author leads failures to the last state, which ends the machine in a failure."""
+        *others, last = children
+        chance = self._apart(last.label + ' reports')
+        for child in others:
+            for outcome in child.outcomes:
+                if outcome in BAD and chance.random() < 0.6:
+                    transitions[child.label][outcome] = last.label
+        for outcome in last.outcomes:
+            if outcome in ('ok', 'odd', 'again', SUCCESS) and chance.random() < 0.6:
+                transitions[last.label][outcome] = 'aborted'
 
     def _remapping(self) -> Dict[str, str]:
         if self._chance.random() < 0.7:
@@ -187,6 +215,10 @@ class _Drawing:
         following = labels[index + 1] if index + 1 < len(labels) else 'ok'
         drawn = {'ok': following}
         for outcome in child.outcomes[1:]:
+            if outcome == SUCCESS:
+                ends = [name for name in outcomes if name != 'preempted']
+                drawn[outcome] = self._apart(child.label + ' leads').choice(ends + labels[index:])
+                continue
             target = self._target(outcome, labels, index, outcomes)
             if target is not None:
                 drawn[outcome] = target
@@ -272,11 +304,12 @@ class _Drawing:
             listed = tuple(
                 name
                 for name in child.outcomes
-                if name not in ('ok', 'preempted') and chance.random() < 0.1
+                if name not in ('ok', 'preempted', SUCCESS) and chance.random() < 0.1
             )
             states[path, child.label] = StateSettings(
                 self._checks(node, index),
                 listed,
+                self._intended(path, child),
                 prior=chance.choice((0.2, 0.5, 0.8)) if chance.random() < 0.15 else None,
                 max_recoveries=limit,
                 author_recoveries=(
@@ -285,6 +318,12 @@ class _Drawing:
                 memory=chance.choice((1, 3)) if chance.random() < 0.1 else None,
                 on_retry=self._on_retry(path, node),
             )
+
+    def _intended(self, path: str, child: Node) -> Tuple[str, ...]:
+        """Outcomes that are meant so, drawn by a chance of their own."""
+        chance = random.Random('intended {} {}/{}'.format(self._seed, path, child.label))
+        bad = [name for name in child.outcomes if name in BAD + ('again',)]
+        return (chance.choice(bad),) if bad and chance.random() < 0.05 else ()
 
     def _on_retry(self, path: str, node: Node) -> str:
         is_beside = isinstance(node, Beside) or '/C' in path

@@ -19,6 +19,10 @@ class Failed(NamedTuple):
     way: Optional[Way]  # of the author
     ending: Optional[Way]  # None: it raises
     was_left: bool = False  # by a jump that cannot be gone on with
+    told_by: str = ''  # a later state, which has reported it
+    told_with: str = ''  # the outcome of that
+    continuous: bool = False
+    back_to: str = ''  # where a step back goes, as it was when the state had failed
 
 
 class Goal(NamedTuple):

@@ -110,6 +110,7 @@ class IteratorPart(Part):
             self._at_item = dict(self.userdata)
             outcome = yield from child.execute(View(self.userdata, {}))
             self.settled = child.settled
+            self.ended_as_meant = child.ended_as_meant
             loops = outcome in self.plan.loop_outcomes
             self._is_finished = loops and outcome != 'preempted' and not self.flag
             if self.flag or not loops:

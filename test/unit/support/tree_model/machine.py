@@ -8,7 +8,7 @@ from .parts import OVERRUN, Jumping, Part, Raised, View
 from .plan import Machine
 from .recovering import Recovering
 from .scheduling import Course
-from .words import failing_outcome_of, sounds_like_failure
+from .words import failing_outcome_of, sounds_like_failure, sounds_like_success
 
 
 class MachinePart(Part, Recovering):
@@ -40,6 +40,7 @@ class MachinePart(Part, Recovering):
         """Run to the end; returns the outcome."""
         view.copy_to(self.keys, self.userdata)
         self.settled = False
+        self.ended_as_meant = False
         self._natural = None
         self._preempted = None
         self.work = None
@@ -98,6 +99,7 @@ class MachinePart(Part, Recovering):
     def _visit(self, label: str) -> Course:
         """Execute one state; returns where the machine goes."""
         child = self.current = self.child(label)
+        self.ended_as_meant = False
         if self.flag:
             self._heed_preempt()
         if label in (self.work or ()):
@@ -122,6 +124,8 @@ class MachinePart(Part, Recovering):
 
     def _ended(self, label: str, outcome: Any, raised: bool) -> Course:
         failed = self.failure_of(label, outcome, raised)
+        if self._is_meant(label, outcome):
+            failed = None
         if (
             self.flag
             and self.run.top.flag
@@ -129,11 +133,17 @@ class MachinePart(Part, Recovering):
             and (failed or outcome == 'preempted' or not self.child(label).flag)
         ):
             self.work = set(self.snapshots)
+        reported = self._reported(label, outcome, failed)
+        if reported is not None:
+            self.memory.ended(label, SUCCESS)
+            self.memory.reports(label)
+            return (yield from self._recover_from(reported, reported.continuous))
         if failed is None:
             is_success = not self.flag and outcome != 'preempted'
             self.memory.ended(label, SUCCESS if is_success else PREEMPTED)
             way = self.way_of(label, outcome)
             self.tell('TRANSITION', label, outcome, way.target)
+            self.ended_as_meant = is_success and self._is_meant(label, outcome)
             return way
         if self._winds_down():
             self.memory.ended(label, PREEMPTED)
@@ -159,10 +169,14 @@ class MachinePart(Part, Recovering):
         continuous = memory.is_continuous(self.run.plan.policy, label)
         self.count_failure(failed, continuous)
         if self.author_recovers(failed):
+            memory.keep_failure(self.run.plan.policy, label, failed.outcome, continuous)
             return self.end_naturally(failed)
         if self.child(label).settled:
             self.settled = failed.ending is None or not failed.ending.is_state
             return self.end_naturally(failed)
+        return (yield from self._recover_from(failed, continuous))
+
+    def _recover_from(self, failed: Failed, continuous: bool) -> Course:
         self._natural = failed.ending
         way = yield from self.recover(failed, continuous)
         self._natural = None
@@ -209,16 +223,64 @@ class MachinePart(Part, Recovering):
         return kind and Failed(label, kind, outcome, way, way if way.target else None)
 
     def _kind_of(self, label: str, outcome: str, way: Way) -> Optional[str]:
+        if way.target and outcome in self.settings_of(label).intended_outcomes:
+            return None
         if outcome in self.settings_of(label).failure_outcomes:
             return 'FAILING_OUTCOME'
         if way.target and not way.is_state and sounds_like_failure(way.target):
-            return 'FELL_THROUGH'
+            is_good = outcome == 'preempted' or sounds_like_success(outcome)
+            return None if is_good else 'FELL_THROUGH'
         if not way.target:
             return 'UNREGISTERED_OUTCOME'
         return 'FAILING_OUTCOME' if sounds_like_failure(outcome) else None
 
+    def _is_meant(self, label: str, outcome: Any) -> bool:
+        """Whether a state has ended as its author means it, or a container has by such a state."""
+        if outcome not in self.child(label).plan.outcomes or not self.way_of(label, outcome).target:
+            return False
+        intended = self.settings_of(label).intended_outcomes
+        return outcome in intended or self.child(label).ended_as_meant
+
+    def _reported(self, label: str, outcome: Any, failed: Optional[Failed]) -> Optional[Failed]:
+        """The earlier failure of another state that the end of this one reports."""
+        if self._winds_down() or self.child(label).settled or self._is_meant(label, outcome):
+            return None
+        if failed is not None and failed.kind != 'FELL_THROUGH':
+            return None
+        way = self.way_of(label, outcome)
+        if way.is_state or not sounds_like_failure(way.target):
+            return None
+        if outcome == 'preempted' or sounds_like_failure(outcome):
+            return None
+        kept = self.memory.reported_by(label)
+        if kept is None:
+            return None
+        return Failed(
+            kept.label,
+            'FAILING_OUTCOME',
+            kept.outcome,
+            way,
+            way,
+            told_by=label,
+            told_with=outcome,
+            back_to=kept.back_to,
+            continuous=kept.continuous,
+        )
+
     def author_recovers(self, failed: Failed) -> bool:
         """Whether the author's own transition stays."""
+        return self.author_drew(failed) and not self.is_unnoticed(failed)
+
+    def is_unnoticed(self, failed: Failed) -> bool:
+        """Whether it ends this container, which has no outcome by which a failure shows."""
+        return (
+            failed.way is not None
+            and not failed.way.is_state
+            and failing_outcome_of(self.plan.outcomes) is None
+        )
+
+    def author_drew(self, failed: Failed) -> bool:
+        """Whether the author has drawn where a failure leads, and the user leaves it to him."""
         own = self.settings_of(failed.label).author_recoveries
         if (own or self.run.plan.author_recoveries) == 'override':
             return False

@@ -2,7 +2,7 @@
 
 import copy
 from fractions import Fraction
-from typing import Any, Dict, List, NamedTuple, Optional
+from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 from .plan import TreePlan
 from .words import class_of
@@ -15,6 +15,16 @@ class Visit(NamedTuple):
 
     label: str
     result: str
+
+
+class Kept(NamedTuple):
+    """A failure after which the author's own way was kept."""
+
+    label: str
+    outcome: str
+    continuous: bool
+    back_to: str  # where a step back would have gone
+    told_by: Tuple[str, ...] = ()  # states that have reported it, from whom the oracle went on
 
 
 class Results:
@@ -78,6 +88,7 @@ class Remembered:
     def begin_execution(self) -> None:
         """Forget the chain of visits."""
         self.chain: List[Visit] = []
+        self._kept: List[Kept] = []
         self._goal = None
 
     # -- visits
@@ -88,12 +99,15 @@ class Remembered:
         self.chain.append(visit)
         self._since.append(visit)
         self.visits_of[label] = self.visits_of.get(label, 0) + 1
+        if result in (SUCCESS, SUPERSEDED):
+            self._overcome(label)
         if result == SUCCESS:
             self._results[label].learn(False)
 
     def fails(self, label: str) -> None:
         """Count a failure, before its visit is added."""
         self._keep_goal(label)
+        self._overcome(label)
         self._failures.append(label)
         self._results[label].learn(True)
         self.ended(label, FAILURE)
@@ -101,9 +115,37 @@ class Remembered:
     def supersede(self, label: str) -> None:
         """Take the latest failure, of this state, back out."""
         self._results[label].take_back()
-        self._failures.pop()
+        latest = max(place for place, failed in enumerate(self._failures) if failed == label)
+        del self._failures[latest]
+        self._overcome(label)
         for visits in (self.chain, self._since):
-            visits[-1] = Visit(label, SUPERSEDED)
+            latest = max(place for place, visit in enumerate(visits) if visit.label == label)
+            visits[latest] = Visit(label, SUPERSEDED)
+            if latest + 1 < len(visits):  # a later state has reported it
+                visits.append(Visit(label, SUPERSEDED))
+
+    # -- failures that a later state may report
+
+    def keep_failure(self, policy: str, label: str, outcome: str, continuous: bool) -> None:
+        """The failure that was counted last has gone its author's way."""
+        self._kept.append(Kept(label, outcome, continuous, self.step_back_target(policy, label)))
+
+    def _overcome(self, label: str) -> None:
+        self._kept = [kept for kept in self._kept if kept.label != label]
+
+    def reported_by(self, label: str) -> Optional[Kept]:
+        """The latest such failure, where this state reports one of another state."""
+        if not self._kept or self._kept[-1].label == label:
+            return None
+        latest = self._kept[-1]
+        if any(teller != label for teller in latest.told_by):
+            return None
+        is_latest = self._failures[-1] == latest.label
+        return latest._replace(continuous=latest.continuous and is_latest)
+
+    def reports(self, label: str) -> None:
+        """The oracle goes on from what this state has reported."""
+        self._kept = [kept._replace(told_by=(*kept.told_by, label)) for kept in self._kept]
 
     def keep(self) -> Any:
         """All of it, for `put_back`."""

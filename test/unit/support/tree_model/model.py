@@ -187,7 +187,7 @@ class Model:
         failed = level.failure_of(inner.label, outcome, False)
         if failed is None:
             return False
-        if level.author_recovers(failed):
+        if level.author_drew(failed):
             return True
         way = failed.way
         return (

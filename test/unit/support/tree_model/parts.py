@@ -72,6 +72,7 @@ class Part:
         self.parent = parent
         self.flag = False  # a preempt is requested
         self.settled = False  # its failure
+        self.ended_as_meant = False  # by a state whose author means it so
         self.left_with = ''  # where a jump leaves it
         self.keys: Tuple[str, ...] = getattr(plan, 'keys', ())
 
@@ -171,6 +172,7 @@ class ConcurrencePart(Part):
             for child in self._children:
                 child.flag = False
         self.settled = any(child.settled for child in self._children)
+        self.ended_as_meant = any(child.ended_as_meant for child in self._children)
         goal = self.goal
         if self._error is not None:
             self.flag = self.flag and self.run.is_upstream  # whose requests outlive an error

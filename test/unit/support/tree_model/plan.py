@@ -81,6 +81,7 @@ class StateSettings(NamedTuple):
 
     preconditions: Tuple[Check, ...] = ()
     failure_outcomes: Tuple[str, ...] = ()
+    intended_outcomes: Tuple[str, ...] = ()
     prior: Optional[float] = None
     max_recoveries: Optional[int] = None
     author_recoveries: Optional[str] = None

@@ -30,10 +30,15 @@ class Recovering:
 
     def recover(self: Any, failed: Failed, continuous: bool) -> Course:
         """Recover from a failure that was counted; returns where the machine goes."""
-        self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
+        if failed.told_by:
+            self.tell('TRANSITION', failed.told_by, failed.told_with, ORACLE)
+        else:
+            self.tell('TRANSITION', failed.label, failed.outcome, ORACLE)
         if failed.kind == 'HELD_BACK':
             yield Turn('{}/{}'.format(self.path, failed.label))
-        decision = yield from self.decide(failed.label, continuous, failed.kind == 'HELD_BACK')
+        decision = yield from self.decide(
+            failed.label, continuous, failed.kind == 'HELD_BACK', failed.back_to
+        )
         if self.flag:
             return self._preempted_ending(failed)
         self._tell_decision(failed.label, decision)
@@ -44,6 +49,11 @@ class Recovering:
     def _preempted_ending(self: Any, failed: Failed) -> Way:
         """A preempt has ended the recovery."""
         self.flag = False
+        self.child(failed.label).recall_preempts()  # it was asked of the oracle, not of the state
+        if 'preempted' in self.child(failed.label).plan.outcomes:
+            drawn = self.way_of(failed.label, 'preempted')
+            if drawn.target:
+                return drawn
         if 'preempted' in self.plan.outcomes:
             return Way('preempted', False)
         if failed.ending is None:
@@ -78,7 +88,9 @@ class Recovering:
     def _tell_decision(self: Any, label: str, decision: Decision) -> None:
         self.tell('DECISION', label, decision.action, decision.target, decision.by)
 
-    def decide(self: Any, label: str, continuous: bool, held_back: bool = False) -> Course:
+    def decide(
+        self: Any, label: str, continuous: bool, held_back: bool = False, back_to: str = ''
+    ) -> Course:
         """What the oracle decides about a failure of its state that was counted."""
         if held_back:
             return Decision('ask', '', 'held_back')
@@ -105,7 +117,7 @@ class Recovering:
         action = action.replace(' ', '_')
         target = {'revisit': label, 'ask': ''}.get(action)
         if target is None:
-            target = self.memory.step_back_target(self.run.plan.policy, label)
+            target = back_to or self.memory.step_back_target(self.run.plan.policy, label)
         if target and self.run.repeats.repeated_by(self, target):
             action, target, by = 'ask', '', 'on_retry'
         elif target and self.run.is_spent('recoveries'):
@@ -155,6 +167,8 @@ class Recovering:
     # -- where it asks
 
     def _ask(self: Any, failed: Failed, decision: Decision) -> Course:
+        if self.author_drew(failed) and self.is_unnoticed(failed):
+            return self.leave_to_author(failed)
         is_held_back = failed.kind == 'HELD_BACK'
         if (
             not is_held_back
@@ -256,6 +270,11 @@ class Recovering:
         if reply.path in ('', self.path):
             return self.give_up(failed, Way(reply.name, False) if reply.name else failed.ending)
         raise self.run.depart(self, Goal(self.run.machine(reply.path), gives_up=reply.name))
+
+    def leave_to_author(self: Any, failed: Failed) -> Way:
+        """End as the author has drawn it, as if there were no oracle: nothing is settled."""
+        self.tell('GIVE_UP', failed.label, failed.ending.target, '')
+        return failed.ending
 
     def give_up(self: Any, failed: Failed, ending: Optional[Way]) -> Way:
         """End as settled, or go the author's way."""

@@ -3,19 +3,28 @@
 import re
 from fractions import Fraction
 from pathlib import Path
-from typing import Dict, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 PAGE = Path(__file__).resolve().parents[4] / 'doc' / 'policies.md'
-FAILING = ('aborted', 'failed', 'failure', 'error')
+FAILING = ('aborted', 'failed', 'failure', 'error', 'abort', 'fail', 'unreachable', 'lost')
+SUCCEEDING = ('succeeded', 'success', 'successful', 'completed')
 MODERATE_FROM, HIGH_FROM = Fraction('0.4'), Fraction('0.75')
 
 
 def sounds_like_failure(outcome: str) -> bool:
-    """Named like a failure: in any case, whole or after `_`, `-` or a change to a capital."""
-    if outcome.lower() == 'preempted':
-        return False
-    parts = re.split(r'[_-]|(?<=[a-z0-9])(?=[A-Z])', outcome)
-    return parts[-1].lower() in FAILING
+    """Named like a failure: its first word is, or its last. The names drawn negate nothing."""
+    words = _words(outcome)
+    return words[0] in FAILING or words[-1] in FAILING
+
+
+def sounds_like_success(outcome: str) -> bool:
+    """Named like a success: its last word is."""
+    return _words(outcome)[-1] in SUCCEEDING
+
+
+def _words(outcome: str) -> List[str]:
+    """In small letters. A word begins after `_` or `-`, and with a capital."""
+    return [word.lower() for word in re.split(r'[_-]|(?<=[a-z0-9])(?=[A-Z])', outcome)]
 
 
 def failing_outcome_of(outcomes: Tuple[str, ...]) -> Optional[str]:
