@@ -12,11 +12,11 @@ from .machine.places import TreePlace
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
-from .recovery.menu import levels_at_rest, name_of, state_around
+from .recovery.menu import leading_to, levels_at_rest, name_of, state_around
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
-from .smach_private import initial_label_of, states_of, transitions_of
+from .smach_private import initial_label_of, states_of
 
 Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
 
@@ -181,20 +181,8 @@ def _before(node: TreeNode, label: str) -> Iterator[str]:
     crosses = node.in_force.policy.goes_by_ways or node.settings.step_back_across
     for level in levels_at_rest(node) if crosses else (node,):
         label = label if level is node else state_around(level, node)
-        for each in _leading_to(level, label):
+        for each in leading_to(level, label):
             yield name_of(TreePlace(level, each), node)
-
-
-def _leading_to(node: TreeNode, label: str) -> List[str]:
-    found = {label: None}
-    waiting = [label]
-    while waiting:
-        goal = waiting.pop(0)
-        for each in node.labels():
-            if each not in found and goal in transitions_of(node.machine)[each].values():
-                found[each] = None
-                waiting.append(each)
-    return list(found)[1:]
 
 
 def _kinds(node: TreeNode, label: str) -> Iterator[WayKind]:

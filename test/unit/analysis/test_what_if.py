@@ -386,7 +386,7 @@ def test_the_column_of_those_who_give_up_is_there_where_some_do():
 def test_a_policy_that_goes_by_ways_chooses_from_the_recorded_menu():
     recorded = run(60, **{**KEPT, 'policy': 'escalating'})
     dear = compare(recorded, {'cost.expert_minute': 0.0, 'cost.harm': 9e5})
-    assert dear.counts['would ask'] + dear.counts['recovers otherwise'] > 10
+    assert dear.counts['would ask'] + dear.counts['recovers otherwise'] > 5
     assert dear.counts['not known'] == dear.without_menu == 0
 
 

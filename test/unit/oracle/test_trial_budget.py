@@ -4,6 +4,7 @@ import copy
 import threading
 
 import pytest
+from fake_clock import FakeClock
 from guarded_machines import chain, deciders, sentences
 from machines import FakeExpert, Scripted, Watched, give_up, goto, waits
 
@@ -13,6 +14,7 @@ from smach_oracle.oracle.machine.trial_budget import TrialBudget
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import Decider
 from smach_oracle.oracle.recovery import inquiry
+from smach_oracle.oracle.scope.clock import Clock
 from smach_oracle.oracle.settings.checks import Budget
 from smach_oracle.oracle.settings.settings import Settings
 
@@ -311,3 +313,27 @@ def test_what_is_spent_does_not_travel_with_a_copy():
     machine.run()
     assert machine.machine._oracle.tree.budget.why_no_recovery()
     assert not copy.deepcopy(machine.machine)._oracle.tree.budget.why_no_recovery()
+
+
+def test_the_time_of_work_stands_still_while_a_person_is_asked():
+    clock = FakeClock()
+    budget = TrialBudget(clock)
+    budget.begin(Budget())
+    clock.advance(60)
+    with budget.work_time.paused():
+        clock.advance(3600)
+    clock.advance(60)
+    budget.end()
+    assert (budget.work_time.now(), budget.usual_minutes) == (120.0, 2.0)
+    assert budget.time.now() == 3720.0
+
+
+def test_of_several_threads_none_takes_more_than_a_policy_makes_do_with():
+    budget = TrialBudget(Clock())
+    budget.begin(Budget())
+    assert [budget.take_recovery(2) for _ in range(3)] == [
+        '',
+        '',
+        "the trial's 2 attempts are spent",
+    ]
+    assert budget.recoveries == 2

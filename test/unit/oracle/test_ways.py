@@ -257,8 +257,10 @@ def test_preconditions_are_a_way_and_where_they_are_not_met_the_next_one_is_gone
         expert=FakeExpert(supersede('ok')),
     )
     assert machine.run() == 'done'
-    assert len(asked) == 1
-    assert 'prepare' not in orders(machine)
+    assert len(asked) > 1, 'it may hold the next time'
+    taken = orders(machine)
+    assert 'prepare' not in taken and len(taken) == 5 and taken[-1] is None
+    assert '0x' not in machine.of(EventKind.DECISION)[1].text
 
 
 def test_a_guarded_state_is_not_entered_again_by_itself():
@@ -291,3 +293,53 @@ def test_a_streak_that_takes_longer_than_three_usual_trials_is_asked_about():
     )
     assert policy.why(situation) == 'its attempts take longer than 3 trials'
     assert policy.order(situation._replace(past=Past(usual_minutes=None)))
+
+
+def test_a_step_back_leads_to_no_state_from_which_the_machine_would_not_come_back():
+    """HOME goes to X and Y, or to Z. Y has failed and was left for HOME, which went to Z then."""
+    ways = Scripted('ok', 'other', outcomes=('ok', 'other', 'aborted'))
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('HOME', ways, {'ok': 'X', 'other': 'Z'})
+        smach.StateMachine.add('X', Scripted(), {'ok': 'Y'})
+        smach.StateMachine.add('Y', Scripted(*FAILS[:3]), {'ok': 'done'})
+        smach.StateMachine.add('Z', Scripted(*FAILS[:2]), {'ok': 'done'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    machine.run()
+    of_z = [each for each in machine.of(EventKind.DECISION) if each.state == 'Z']
+    assert of_z
+    for event in of_z:
+        assert {way['target'] for way in event.data['menu']} == {'Z', 'HOME'}
+
+
+@pytest.mark.parametrize('is_blocked', [True, False])
+def test_a_way_out_is_blocked_by_what_is_drawn_behind_the_containers_that_it_leaves_alone(
+    is_blocked,
+):
+    """INNER ends aborted; MID goes on from there, or ends itself, and TOP goes on from MID."""
+    inner = smach.StateMachine(outcomes=ENDS)
+    with inner:
+        smach.StateMachine.add('GRASP', Scripted('aborted'), {'ok': 'done'})
+    mid = smach.StateMachine(outcomes=ENDS)
+    with mid:
+        smach.StateMachine.add('LOOK', Scripted(), {'ok': 'GET'})
+        drawn = {'aborted': 'CLEAN'} if is_blocked else {}
+        smach.StateMachine.add('GET', inner, {'done': 'done', **drawn})
+        smach.StateMachine.add('CLEAN', Scripted(), {'ok': 'done'})
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('HOME', Scripted(), {'ok': 'MID'})
+        smach.StateMachine.add('MID', mid, {'done': 'done', 'aborted': 'HELP'})
+        smach.StateMachine.add('HELP', Scripted(), {'ok': 'done'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    menu = menu_at(machine)
+    assert bool(menu['/MID/LOOK']['blocked']) is is_blocked
+    assert menu['/HOME']['blocked'], 'that would leave MID, behind which there is HELP'
+
+
+def test_a_high_rate_is_no_reason_to_ask_where_a_level_above_may_decide():
+    machine = nested(Scripted(*FAILS), escalate=True, high_from=0.05, moderate_from=0.05)
+    machine.run()
+    taken = [(each.path, each.outcome) for each in machine.of(EventKind.DECISION)]
+    assert any(path.count('/') == 0 for path, _ in taken), taken

@@ -148,6 +148,10 @@ class Checkpointer:
             pending += self._facts_of(node).begin_execution()
         if event.kind is node.site.begins_by:
             self._entered.setdefault(_begins_line(node), []).append(node)
+        if event.kind is EventKind.JUMP:  # the way may have left the container of its streak
+            pending += (
+                fact for each in self._nodes.values() for fact in self._facts_of(each).streaks()
+            )
         if event.kind is EventKind.CONTAINER_END:
             pending += self._collected(node, all_keys=True)
             pending += self._around(node)

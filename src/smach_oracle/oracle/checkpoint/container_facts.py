@@ -61,9 +61,7 @@ class ContainerFacts:
         history = self._node.records.history
         yield from self._new_visits(history)
         yield from self._if_new(HISTORY, history.told())
-        streaks = self._node.records.streaks.told()
-        if streaks or STREAKS in self._stored:  # else there is none, as under most policies
-            yield from self._if_new(STREAKS, streaks)
+        yield from self.streaks()
         for label in labels:
             record = self._node.records.by_label.get(label)
             if record is not None:
@@ -75,6 +73,12 @@ class ContainerFacts:
                     'shared': record.shared,
                 }
                 yield from self._if_new(STATE + label, told)
+
+    def streaks(self) -> Iterator[Fact]:
+        """Yield what is new of the ways that were gone."""
+        streaks = self._node.records.streaks.told()
+        if streaks or STREAKS in self._stored:  # else there is none, as under most policies
+            yield from self._if_new(STREAKS, streaks)
 
     def all_states(self) -> Iterator[Fact]:
         """Yield what is new of every state."""

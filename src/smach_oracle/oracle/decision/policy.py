@@ -98,6 +98,7 @@ class Policy:
     name = ''
     asks = True
     goes_by_ways = False
+    most_of_trial: Optional[int] = None  # decisions of its own, that lead to a state
     userdata = RESTORE
     restarts = False  # whether it may start the script over
     draws = False
@@ -368,7 +369,7 @@ class Escalating(Baseline):
     goes_by_ways = True
     userdata = KEEP
     most_of_streak = 4  # ways
-    most_of_trial = 8  # ways, of all states
+    most_of_trial = 8
     most_trials = 3.0  # so many times an usual trial a streak may take
     asking_minutes = 5.0  # of the robot, until a question is answered
     expert_minutes = 2.0  # of the person who answers it

@@ -14,6 +14,7 @@ from ..recovery.levels import unnoticed
 from ..recovery.occasions import FirstStep, Occasion, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.verdict import (
+    ChosenWay,
     GiveUp,
     JumpTo,
     Preempted,
@@ -94,12 +95,14 @@ class Applying:
             entry = prepare_entry(way, jump.written, 'jumping')
             userdata, missing = entry.userdata, entry.missing
         self._note_entry(way.first_label)
-        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, self._across(way))
+        told = self._told_of(way, jump.chosen)
+        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, told)
 
-    def _across(self, way: JumpPath) -> Mapping[str, str]:
-        """Return what is told of a jump that crosses containers."""
+    def _told_of(self, way: JumpPath, chosen: Optional[ChosenWay]) -> Mapping[str, str]:
+        """Return what is told of a jump by a way of the menu, or across containers."""
         lower = self._occasion.lower_verdict
         return {
+            **({} if chosen is None else {'way': chosen.key}),
             **({} if lower is None else {'from': lower.failed_path}),
             **({'to': way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
         }

@@ -1,9 +1,10 @@
 """Counts what is left of a trial's budget, for all containers of a tree."""
 
+import contextlib
 import threading
 from collections import deque
 from statistics import median
-from typing import Deque, List, Optional, Sequence, Tuple
+from typing import Deque, Iterator, List, Optional, Sequence, Tuple
 
 from ..scope.clock import Clock, PausableClock
 from ..settings.checks import Budget
@@ -22,6 +23,8 @@ class TrialBudget:
     def __init__(self, clock: Clock) -> None:
         self._lock = threading.Lock()
         self.time = PausableClock(clock)
+        # without the time in which a person is asked, and in which the robot is not well
+        self.work_time = PausableClock(clock)
         self._usual_s: Deque[float] = deque(maxlen=_TRIALS)  # of earlier trials
         self.begin(Budget())
 
@@ -31,10 +34,17 @@ class TrialBudget:
             self._limits = limits
             self._recoveries = self._questions = 0
             self.time.begin()
+            self.work_time.begin()
+
+    @contextlib.contextmanager
+    def paused(self) -> Iterator[None]:
+        """Let all its time stand still."""
+        with self.time.paused(), self.work_time.paused():
+            yield
 
     def end(self) -> None:
         """Note how long a trial took that has ended by itself."""
-        self._usual_s.append(self.time.now())
+        self._usual_s.append(self.work_time.now())
 
     @property
     def usual_minutes(self) -> Optional[float]:
@@ -58,6 +68,7 @@ class TrialBudget:
             with self._lock:
                 self._recoveries, self._questions = int(spent[0]), int(spent[1])
                 self.time.begin(self.time.now() + spent[2])
+                self.work_time.begin(self.time.now())
 
     def why_over(self) -> str:
         """Say that the minutes are over."""
@@ -90,10 +101,12 @@ class TrialBudget:
         """Say that the recoveries are spent."""
         return _spent(self._limits.recoveries, self._recoveries, 'recovery', 'recoveries')
 
-    def take_recovery(self) -> str:
-        """Spend one recovery, or say that all are spent."""
+    def take_recovery(self, most: Optional[int] = None) -> str:
+        """Spend one recovery, or say that all are spent, or `most`, of which a policy makes do."""
         with self._lock:
             why_not = self.why_no_recovery()
+            if most is not None and self._recoveries >= most:
+                why_not = why_not or "the trial's {} attempts are spent".format(most)
             self._recoveries += not why_not
             return why_not
 

@@ -8,6 +8,7 @@ from ..decision.ways import StreakSoFar, Way, WayKind
 from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
 from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.repeats import has_visited
+from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.streaks import OpenStreak
@@ -19,13 +20,16 @@ from .preconditions import why_not_met
 from .recovery import Decided, Recovery
 from .verdict import streak_of
 
+# says why a level above is not to be disturbed by this failure, '' where it may be. It looks at the
+# containers up to below the given one, None: at all
+WhyNotAbove = Callable[[Optional[TreeNode]], str]
 
-def decide_on_level(recovery: Recovery, why_not_above: Callable[[], str]) -> Decided:
+
+def decide_on_level(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     """Run the preconditions that the policy wants, and say what it does.
 
     `recovery.jump_path` is the way to the place where it goes then, None where it goes nowhere.
 
-    :param why_not_above: says why no level above is to be disturbed by this failure.
     """
     decider, facts = _ask_at_once(recovery) or _follow_policy(recovery, why_not_above)
     if facts.action is Action.ASK and not recovery.node.in_force.policy.asks:
@@ -49,7 +53,7 @@ def _ask_at_once(recovery: Recovery) -> Optional[Decided]:
     return None
 
 
-def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Decided:
+def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     node, record, policy = recovery.node, recovery.record, recovery.node.in_force.policy
     reading = recovery.reading = record.read_rate()
     drawn = '{}/{} {}'.format(node.path, record.label, record.visits) if policy.draws else ''
@@ -69,7 +73,7 @@ def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Deci
     if way is None:
         blocked = 'there is no state {!r} to go back to'.format(name)
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=blocked)
-    why_not = why_not_above() if action is Action.RESTART else ''
+    why_not = why_not_above(None) if action is Action.RESTART else ''
     decider, why_not = (Decider.AUTHOR, why_not) if why_not else _what_prevents(recovery, way)
     if why_not:
         return decider, recovery.facts(Action.ASK, blocked=why_not)
@@ -79,7 +83,7 @@ def _follow_policy(recovery: Recovery, why_not_above: Callable[[], str]) -> Deci
     return decider, facts
 
 
-def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[], str]) -> Decided:
+def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove) -> Decided:
     """Choose the first way of the policy's order, whose preconditions are met."""
     node, record, policy, budget = (
         recovery.node,
@@ -92,20 +96,24 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
         record.label,
         OpenStreak(
             successes,
-            budget.time.now(),
+            budget.work_time.now(),
             visited_before(node, record.label, recovery.occasion.visits_since),
         ),
     )
     has_expert = node.tree.expert is not None and not budget.why_no_question()
-    past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)
     paths = {
         way._replace(blocked=_why_blocked(recovery, way, path, why_not_above)): path
         for way, path in menu_of(node, record, streak.visited)
     }
     while True:
         # after a crash a state is entered again, whatever its streak says: it has not failed
-        so_far = streak.so_far(budget.time.now()) if recovery.failure.is_counted else StreakSoFar()
+        so_far = (
+            streak.so_far(budget.work_time.now()) if recovery.failure.is_counted else StreakSoFar()
+        )
         menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
+        past = situation.past._replace(
+            attempts=budget.recoveries, usual_minutes=budget.usual_minutes
+        )
         recovery.situation = situation = situation._replace(past=past, menu=menu)
         recovery.order = policy.order(situation)
         if not recovery.order:
@@ -116,11 +124,12 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
         if recovery.stopped():
             recovery.order = ()
             return Decider.POLICY, recovery.facts(Action.ASK)
-        streak.note(way.key)
-    spent = budget.take_recovery()
-    if spent:
+        paths[way._replace(blocked=recovery.not_met + ' did not help')] = paths.pop(way)
+    spent = budget.take_recovery(policy.most_of_trial)
+    if spent:  # by others meanwhile
         recovery.order = ()
-        return Decider.BUDGET, recovery.facts(Action.ASK, blocked=spent)
+        decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
+        return decider, recovery.facts(Action.ASK, blocked=spent)
     recovery.jump_path = paths[way]
     streak.leaves = bool(recovery.jump_path.left_containers)
     action = Action.REVISIT if way.enters_again else Action.STEP_BACK
@@ -130,15 +139,15 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: Callable[[]
     return Decider.POLICY, facts
 
 
-def _why_blocked(
-    recovery: Recovery, way: Way, path: JumpPath, why_not_above: Callable[[], str]
-) -> str:
+def _why_blocked(recovery: Recovery, way: Way, path: JumpPath, why_not_above: WhyNotAbove) -> str:
     """Say why a way of the menu is not open, '' where it is."""
     return (
-        (why_not_above() if path.left_containers else '')
+        (why_not_above(path.meeting_node) if path.left_containers else '')
         or why_repeats_on(recovery, path)
-        or closed_in_words(path, _named(recovery, path))
-        or (_function_that_runs(recovery) if way.kind is WayKind.PREPARE else '')
+        # a wait is for what still runs
+        or (way.kind is not WayKind.WAIT and closed_in_words(path, _named(recovery, path)))
+        or (way.kind is WayKind.PREPARE and _function_that_runs(recovery))
+        or ''
     )
 
 

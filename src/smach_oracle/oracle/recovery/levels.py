@@ -57,14 +57,16 @@ def _is_item_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     )
 
 
-def foreseen_above(node: TreeNode, ending: ContainerEnding) -> Optional[Foreseen]:
+def foreseen_above(
+    node: TreeNode, ending: ContainerEnding, below: Optional[TreeNode] = None
+) -> Optional[Foreseen]:
     """Return what the author has drawn after the end of a container, None where that is nothing.
 
     It may be one of any level above: a failing outcome falls through from one to the next. Where a
     Concurrence lies between, nobody knows before it has ended.
     """
     outcome = ending.outcome
-    while outcome is not None and node.parent is not None:
+    while outcome is not None and node.parent is not None and node is not below:
         above = node.parent
         if above is not next(levels_above(node), None):
             return None
@@ -147,7 +149,9 @@ def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNod
     None where the failure is to be asked about at once.
     """
     found: List[TreeNode] = []
-    if decider is not Decider.POLICY or recovery.record.failure_class is FailureClass.HIGH:
+    goes_by_ways = recovery.node.in_force.policy.goes_by_ways
+    is_high = recovery.record.failure_class is FailureClass.HIGH
+    if decider is not Decider.POLICY or (is_high and not goes_by_ways):
         return found
     child = recovery.node
     for above in levels_above(child):
@@ -194,7 +198,7 @@ def _decide_above(
     above = Recovery(level, record, failed(failure, context, continuous), recovery)
     reading = record.read_rate()
     record.learn(True)
-    decided = decide_on_level(above, lambda: _foreseen_behind(level, failure))
+    decided = decide_on_level(above, lambda below: _foreseen_behind(level, failure, below))
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
@@ -216,8 +220,8 @@ def _decide_above(
     return jump, facts.wait_s
 
 
-def _foreseen_behind(level: TreeNode, failure: Failure) -> str:
-    foreseen = foreseen_above(level, natural_ending(level, failure))
+def _foreseen_behind(level: TreeNode, failure: Failure, below: Optional[TreeNode]) -> str:
+    foreseen = foreseen_above(level, natural_ending(level, failure), below)
     return foreseen.text if foreseen is not None else ''
 
 

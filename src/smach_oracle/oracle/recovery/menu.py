@@ -3,6 +3,7 @@
 The same function makes the ways that a policy chooses from and what a person is told of a place.
 """
 
+from collections import deque
 from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import smach
@@ -14,7 +15,7 @@ from ..machine.places import TreePlace, is_direct, levels_above, place_named
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
 from ..records.visits import VisitResult
-from ..smach_private import initial_label_of, states_of
+from ..smach_private import initial_label_of, states_of, transitions_of
 
 _MOST_VISITED = 64  # states, to which a step back may lead
 
@@ -46,25 +47,35 @@ def levels_at_rest(node: TreeNode) -> List[TreeNode]:
 
 
 def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
-    """Return the other states that were visited before a state, the latest first, by name.
+    """Return the states that were visited before a state, the latest first, by name.
 
-    Those of the containers above come last. Each is there once. `since`: visits after its failure.
+    They are those from which its author's transitions lead to it: from others the machine would
+    not come back. Those of the containers above come last. Each is there once.
+
+    :param since: number of visits after its failure.
     """
     found: List[str] = []
     for level in levels_of(node):
-        own = label if level is node else ''
+        leading = set(leading_to(level, label if level is node else state_around(level, node)))
         visits = list(level.records.history.visits)
         if level is node and since:
             del visits[-since:]
-        labels = dict.fromkeys(
-            visit.state
-            for visit in reversed(visits)
-            if visit.state != own and level.has(visit.state)
-        )
-        if level is not node:
-            labels.pop(state_around(level, node), None)
+        labels = dict.fromkeys(each.state for each in reversed(visits) if each.state in leading)
         found.extend(name_of(TreePlace(level, each), node) for each in labels)
     return tuple(found[:_MOST_VISITED])
+
+
+def leading_to(node: TreeNode, label: str) -> List[str]:
+    """Return the states from which the author's transitions lead to a state, the nearest first."""
+    found = {label: None}
+    waiting = deque(found)
+    while waiting:
+        goal = waiting.popleft()
+        for each in node.labels():
+            if each not in found and goal in transitions_of(node.machine)[each].values():
+                found[each] = None
+                waiting.append(each)
+    return list(found)[1:]
 
 
 def state_around(level: TreeNode, node: TreeNode) -> str:
@@ -100,16 +111,26 @@ def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iter
     for kind, name, place in _goals(node, here, visited):
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
-            passed = visited[: visited.index(name) + 1] if name in visited else visited
-            done = tuple(each for one in passed for each in _done_at(node, one))
+            passed = _passed(node, visited, name, place)
+            entered = [each for one in passed for each in _entered_at(node, one)]
             back = way._replace(
                 kind=kind,
                 target=name,
                 back=len(passed),
-                minutes=visit_min * (1 + len(done)),
-                repeats=done,
+                userdata=jump_path.meeting_node.in_force.userdata,
+                minutes=visit_min * (1 + len(entered)),
+                repeats=tuple(each for each, has_succeeded in entered if has_succeeded),
             )
             yield OpenWay(back, jump_path)
+
+
+def _passed(node: TreeNode, visited: Sequence[str], name: str, place: TreePlace) -> Sequence[str]:
+    """Return the states that are entered from a place on, up to the failed one."""
+    if name in visited:
+        return visited[: visited.index(name) + 1]
+    if place.node is not node:
+        return (*visited, name)
+    return (*(each for each in visited if node.has(each)), name)
 
 
 def _goals(
@@ -133,28 +154,28 @@ def _goals(
             yield kind, name, place
 
 
-def _done_at(node: TreeNode, name: str) -> Iterator[str]:
+def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
     place = place_named(node, name)
     if place is not None:
-        yield from _done_in(place, name)
+        yield from _entered_in(place, name)
 
 
-def _done_in(place: TreePlace, name: str) -> Iterator[str]:
-    """Yield a state if it has succeeded last, or what has succeeded in it if it is a machine."""
-    visits = list(place.node.records.history.visits)
-    last = next((each.result for each in reversed(visits) if each.state == place.label), None)
-    if last is not VisitResult.SUCCESS:
-        return
+def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
+    """Yield a state, or what was visited in it if it is a machine, and whether it has succeeded."""
     state = states_of(place.node.machine)[place.label]
     below = node_of(state) if isinstance(state, smach.StateMachine) else None
-    inner = [] if below is None else list(_done_below(below, name))
-    yield from inner or [name]
+    inner = [] if below is None else list(_entered_below(below, name))
+    visits = list(place.node.records.history.visits)
+    has_succeeded = any(
+        each.state == place.label and each.result is VisitResult.SUCCESS for each in visits
+    )
+    yield from inner or [(name, has_succeeded)]
 
 
-def _done_below(node: TreeNode, name: str) -> Iterator[str]:
+def _entered_below(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
     for label in dict.fromkeys(visit.state for visit in list(node.records.history.visits)):
         if node.has(label):
-            yield from _done_in(TreePlace(node, label), '{}/{}'.format(name, label))
+            yield from _entered_in(TreePlace(node, label), '{}/{}'.format(name, label))
 
 
 def _minutes_of_visit(node: TreeNode) -> float:
@@ -164,4 +185,4 @@ def _minutes_of_visit(node: TreeNode) -> float:
         for each in nodes_of(node.top().machine)
         for record in each.records.by_label.values()
     )
-    return node.tree.budget.time.now() / 60.0 / max(1, visits)
+    return node.tree.budget.work_time.now() / 60.0 / max(1, visits)

@@ -52,7 +52,7 @@ def wait_until_let_go(node: TreeNode, hold: Hold, scope: Scope) -> Union[LetGo, 
     let_go = None
     try:
         _tell_begin(node, hold)
-        with standing_still(node.execution.runs_around), node.tree.budget.time.paused():
+        with standing_still(node.execution.runs_around), node.tree.budget.paused():
             let_go = control.wait(hold, scope)
             return let_go
     finally:

@@ -18,6 +18,7 @@ from ..machine.health_watch import FAILED
 from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
 from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
+from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..scope.scope import standing_still
 from ..smach_private import Labels, Transitions, remapping_of
@@ -122,7 +123,7 @@ def decide(recovery: Recovery) -> Optional[Verdict]:
         return None
     if recovery.budget.why_over():
         return recovery.end_unaided()
-    decided = decide_on_level(recovery, lambda: _why_left_to_others(recovery))
+    decided = decide_on_level(recovery, lambda below: _why_left_to_others(recovery, below))
     if recovery.is_over():
         return recovery.end_early()
     _, facts = decided
@@ -187,21 +188,24 @@ def _why_nobody_is_asked(recovery: Recovery) -> Optional[Foreseen]:
     return _left_to_others(recovery) or unnoticed(recovery.node, recovery.failure)
 
 
-def _left_to_others(recovery: Recovery) -> Optional[Foreseen]:
-    """Return why the end of the container is left to a level above, or None where it is not."""
+def _left_to_others(recovery: Recovery, below: Optional[TreeNode] = None) -> Optional[Foreseen]:
+    """Return why the end of the container is left to a level above, or None where it is not.
+
+    :param below: the containers below this one alone are looked at. None: all.
+    """
     node = recovery.node
     if runs_as_precondition(node):
         return Foreseen('it runs as a precondition')
     if recovery.failure.is_held_back:  # no other oracle can confirm that it is repeated
         return None
-    foreseen = foreseen_above(node, recovery.natural_ending())
+    foreseen = foreseen_above(node, recovery.natural_ending(), below)
     return foreseen and foreseen._replace(
         text='its author goes on from there ({})'.format(foreseen.text)
     )
 
 
-def _why_left_to_others(recovery: Recovery) -> str:
-    others = _left_to_others(recovery)
+def _why_left_to_others(recovery: Recovery, below: Optional[TreeNode]) -> str:
+    others = _left_to_others(recovery, below)
     return others.text if others is not None else ''
 
 
@@ -232,7 +236,8 @@ def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
     node, budget = recovery.node, recovery.budget
     deadline_s, recovery.ends_budget = budget.within(node.settings.deadline_s)
     early_end = node.tree.early_end
-    with standing_still(node.execution.runs_around), early_end.asking():
+    around = node.execution.runs_around
+    with standing_still(around), early_end.asking(), budget.work_time.paused():
         answer = Inquiry(recovery, expert, deadline_s).run()
     node.records.streaks.end(recovery.record.label)
     question_id = recovery.question_id

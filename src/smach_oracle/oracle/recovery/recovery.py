@@ -179,7 +179,7 @@ class Recovery:
     def wait_until_well(self, what: str, why: str) -> bool:
         """Wait until the robot is well. Return False where something has ended the recovery."""
         node = self.node
-        with standing_still(node.execution.runs_around):
+        with standing_still(node.execution.runs_around), self.budget.work_time.paused():
             is_well = node.tree.health.wait_until_well(
                 node, self.record.label, what, why, self._in_time()
             )
