@@ -50,8 +50,8 @@ def rates_in(folder):
         for path in folder.rglob('rates.json')
     }
     for each in found.values():
-        rules = each.pop('failure_rules', {})
-        assert set(map(tuple, rules.values())) <= {FORMER_FAILING_OUTCOMES}
+        for rule in each.pop('failure_rules', {}).values():
+            assert rule == {'failing_outcomes': list(FORMER_FAILING_OUTCOMES)}
     return found
 
 
