@@ -149,10 +149,13 @@ def children_of(container: object) -> Mapping[str, smach.State]:
 
 
 def _containers_of(container: object) -> List[Tuple[str, smach.Container]]:
-    """Return those of its states that are containers, by label."""
+    """Return those of its states that are containers, by label.
+
+    Another thread may add states meanwhile. To make a list of all is one step to it.
+    """
     return [
         (label, state)
-        for label, state in children_of(container).items()
+        for label, state in list(children_of(container).items())
         if isinstance(state, smach.Container)
     ]
 

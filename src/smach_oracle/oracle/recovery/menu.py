@@ -67,12 +67,12 @@ def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...
 
 def leading_to(node: TreeNode, label: str) -> List[str]:
     """Return the states from which the author's transitions lead to a state, the nearest first."""
-    found = {label: None}
+    found, drawn = {label: None}, transitions_of(node.machine)
     waiting = deque(found)
     while waiting:
         goal = waiting.popleft()
         for each in node.labels():
-            if each not in found and goal in transitions_of(node.machine)[each].values():
+            if each not in found and goal in drawn.get(each, {}).values():
                 found[each] = None
                 waiting.append(each)
     return list(found)[1:]
