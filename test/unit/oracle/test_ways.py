@@ -343,3 +343,63 @@ def test_a_high_rate_is_no_reason_to_ask_where_a_level_above_may_decide():
     machine.run()
     taken = [(each.path, each.outcome) for each in machine.of(EventKind.DECISION)]
     assert any(path.count('/') == 0 for path, _ in taken), taken
+
+
+def test_a_step_back_in_a_loop_does_not_leave_the_round():
+    """NEXT, PICK, PLACE, MORE, and again from NEXT. PICK fails in the second round."""
+    more = Scripted('more', 'ok', outcomes=('more', 'ok', 'aborted'))
+    pick = Scripted('ok', *FAILS[:2], 'ok')
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('NEXT', Scripted(), {'ok': 'PICK'})
+        smach.StateMachine.add('PICK', pick, {'ok': 'PLACE'})
+        smach.StateMachine.add('PLACE', Scripted(), {'ok': 'MORE'})
+        smach.StateMachine.add('MORE', more, {'more': 'NEXT', 'ok': 'done'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    assert {way['target'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {
+        'PICK',
+        'NEXT',
+    }
+    assert machine.visits()[-3:] == ['PICK', 'PLACE', 'MORE']
+
+
+def test_a_state_that_may_end_the_loop_is_on_no_menu_of_a_later_round():
+    following = Scripted('ok', 'ok', 'over', outcomes=('ok', 'over', 'aborted'))
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('NEXT', following, {'ok': 'LOOK', 'over': 'done'})
+        smach.StateMachine.add('LOOK', Scripted(), {'ok': 'PICK'})
+        smach.StateMachine.add('PICK', Scripted('ok', *FAILS[:2], 'ok'), {'ok': 'NEXT'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    assert {way['target'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {
+        'PICK',
+        'LOOK',
+    }
+
+
+def test_a_list_that_was_appended_to_in_place_is_restored_only_if_it_is_copied():
+    def put(ud):
+        ud.placed.append('cup')
+        return 'ok'
+
+    def tidy(ud):
+        return 'ok' if len(machine.visits()) > 5 else 'aborted'
+
+    for given, left in (
+        ({}, ['cup', 'cup']),
+        ({'userdata': 'restore'}, ['cup', 'cup']),
+        ({'userdata': 'restore', 'deep_copy_keys': ['placed']}, ['cup']),
+    ):
+        top = smach.StateMachine(outcomes=['ok', 'aborted'])
+        top.userdata.placed = []
+        keys = {'input_keys': ['placed'], 'output_keys': ['placed']}
+        with top:
+            smach.StateMachine.add(
+                'PUT', smach.CBState(put, outcomes=['ok'], **keys), {'ok': 'TIDY'}
+            )
+            smach.StateMachine.add('TIDY', smach.CBState(tidy, outcomes=['ok', 'aborted'], **keys))
+        machine = at_once(Watched(top, settings={'policy': 'escalating', **given}))
+        assert machine.run() == 'ok' and 'from PUT' in orders(machine)
+        assert top.userdata.placed == left, given

@@ -355,8 +355,7 @@ class Checkpointer:
     def _spent(self) -> Iterator[Fact]:
         """Yield what has changed of what is spent, the time of the budget in whole seconds."""
         spent = self._top.tree.spent()
-        recoveries, questions, time_s = spent['budget']
-        spent['budget'] = [recoveries, questions, int(time_s)]
+        spent['budget'] = list(map(int, spent['budget']))
         for name, plain in spent.items():
             if self._spent_stored.get(name) != plain:
                 self._spent_stored[name] = plain

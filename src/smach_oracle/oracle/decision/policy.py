@@ -98,7 +98,9 @@ class Policy:
     name = ''
     asks = True
     goes_by_ways = False
-    most_of_trial: Optional[int] = None  # decisions of its own, that lead to a state
+    # decisions of its own that lead to a state, of a streak and of a trial. None: it has no menu
+    most_of_streak: Optional[int] = None
+    most_of_trial: Optional[int] = None
     userdata = RESTORE
     restarts = False  # whether it may start the script over
     draws = False
@@ -359,10 +361,10 @@ class Ladder(Baseline):
 
 
 class Escalating(Baseline):
-    """Tries the cheapest way first and then dearer ones, each once in a streak, and then asks.
+    """Tries the way first that costs least for its hope, each once in a streak, and then asks.
 
-    doc/ways.md says what a way costs, and when it does not pay. Microreboot escalates likewise: it
-    starts the smallest part again first (Candea et al., OSDI 2004).
+    doc/ways.md says what a way costs, and when it does not pay. Microreboot escalates, too: it
+    starts the smallest part again first, and then larger ones (Candea et al., OSDI 2004).
     """
 
     name = 'escalating'
@@ -370,7 +372,7 @@ class Escalating(Baseline):
     userdata = KEEP
     most_of_streak = 4  # ways
     most_of_trial = 8
-    most_trials = 3.0  # so many times an usual trial a streak may take
+    most_trials = 3.0  # so many times a usual trial a streak may take
     asking_minutes = 5.0  # of the robot, until a question is answered
     expert_minutes = 2.0  # of the person who answers it
     harm_chance = 1.0 / 30  # of each state that is entered again

@@ -123,15 +123,13 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     named: List[Tuple[str, str, str, UnfitKind]] = []
     if verb == 'give_up':
         named.append(('on_no_answer', '**', target, UnfitKind.CHECKED))
-    named += [
-        ('failure_outcomes', '**', each, UnfitKind.GENERAL)
-        for each in settings.defaults.failure_outcomes
-    ]
-    named += [
-        ('states.{}.failure_outcomes'.format(name), name, each, UnfitKind.CHECKED)
-        for name, given in settings.states.items()
-        for each in cast(Tuple[str, ...], given.get('failure_outcomes', ()))
-    ]
+    for key in ('failure_outcomes', 'intended_outcomes'):
+        named += [(key, '**', each, UnfitKind.GENERAL) for each in getattr(settings.defaults, key)]
+        named += [
+            ('states.{}.{}'.format(name, key), name, each, UnfitKind.CHECKED)
+            for name, given in settings.states.items()
+            for each in cast(Tuple[str, ...], given.get(key, ()))
+        ]
     for key, name, outcome, kind in named:
         known = _outcomes_of(top, name)
         if known and outcome not in known:

@@ -58,9 +58,14 @@ class TrialBudget:
         return self._recoveries
 
     def spent(self) -> List[float]:
-        """Return the recoveries, the questions and the seconds spent."""
+        """Return the recoveries, the questions, the seconds spent, and those of work."""
         with self._lock:
-            return [self._recoveries, self._questions, self.time.now()]
+            return [
+                self._recoveries,
+                self._questions,
+                self.time.now(),
+                self.work_time.now(),
+            ]
 
     def go_on(self, spent: Optional[Sequence[float]]) -> None:
         """Go on after `begin` with what was spent before. None means nothing."""
@@ -68,7 +73,8 @@ class TrialBudget:
             with self._lock:
                 self._recoveries, self._questions = int(spent[0]), int(spent[1])
                 self.time.begin(self.time.now() + spent[2])
-                self.work_time.begin(self.time.now())
+                # a store of an earlier version has no time of work
+                self.work_time.begin(spent[3] if len(spent) > 3 else self.time.now())
 
     def why_over(self) -> str:
         """Say that the minutes are over."""

@@ -1,10 +1,7 @@
-"""Makes the menu of a failure: the ways on, from where the machine stands.
-
-The same function makes the ways that a policy chooses from and what a person is told of a place.
-"""
+"""Makes the menu of a failure: the ways on, from where the machine stands."""
 
 from collections import deque
-from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Collection, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -12,9 +9,11 @@ from ..decision.ways import WAITS_S, Way, WayKind
 from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace, is_direct, levels_above, place_named
+from ..machine.site import route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
-from ..records.visits import VisitResult
+from ..records.visits import Visit, VisitResult
+from ..settings.failing_outcomes import is_preempted
 from ..smach_private import initial_label_of, states_of, transitions_of
 
 _MOST_VISITED = 64  # states, to which a step back may lead
@@ -49,20 +48,59 @@ def levels_at_rest(node: TreeNode) -> List[TreeNode]:
 def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
     """Return the states that were visited before a state, the latest first, by name.
 
-    They are those from which its author's transitions lead to it: from others the machine would
-    not come back. Those of the containers above come last. Each is there once.
+    They are those from which its author's transitions lead to it. Where it has succeeded before,
+    they are those since, from which the machine cannot end well without it: what is farther back
+    is of an earlier round, and what may end the rounds is not asked twice about one. Those of the
+    containers above come last. Each is there once.
 
     :param since: number of visits after its failure.
     """
     found: List[str] = []
     for level in levels_of(node):
-        leading = set(leading_to(level, label if level is node else state_around(level, node)))
+        goal = label if level is node else state_around(level, node)
+        leading = set(leading_to(level, goal))
         visits = list(level.records.history.visits)
         if level is node and since:
             del visits[-since:]
+        rounds = [number for number, visit in enumerate(visits, 1) if _has_succeeded(visit, goal)]
+        if rounds:
+            del visits[: rounds[-1]]
+            leading -= _ending_without(level, goal)
         labels = dict.fromkeys(each.state for each in reversed(visits) if each.state in leading)
         found.extend(name_of(TreePlace(level, each), node) for each in labels)
     return tuple(found[:_MOST_VISITED])
+
+
+def _has_succeeded(visit: Visit, label: str) -> bool:
+    return visit.state == label and visit.result in (VisitResult.SUCCESS, VisitResult.SUPERSEDED)
+
+
+def _ending_without(node: TreeNode, label: str) -> Set[str]:
+    """Return the states from which the container may end well without a visit of a state."""
+    ending: Set[str] = set()
+    while True:
+        more = {
+            each
+            for each in node.labels()
+            if each != label and each not in ending and _may_lead_to(node, each, ending)
+        }
+        if not more:
+            return ending
+        ending |= more
+
+
+def _may_lead_to(node: TreeNode, label: str, goals: Collection[str]) -> bool:
+    """Whether an outcome of a state leads to one of some states, or to an end that is good."""
+    for outcome in dict(transitions_of(node.machine).get(label, {})):
+        route = route_of(node.machine, label, outcome)
+        if route.is_state:
+            if route.target in goals:
+                return True
+        elif route.target and not (
+            route.target in node.in_force.failing or is_preempted(route.target)
+        ):
+            return True
+    return False
 
 
 def leading_to(node: TreeNode, label: str) -> List[str]:
@@ -111,7 +149,7 @@ def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iter
     for kind, name, place in _goals(node, here, visited):
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
-            passed = _passed(node, visited, name, place)
+            passed = visited[: visited.index(name) + 1]
             entered = [each for one in passed for each in _entered_at(node, one)]
             back = way._replace(
                 kind=kind,
@@ -122,15 +160,6 @@ def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iter
                 repeats=tuple(each for each, has_succeeded in entered if has_succeeded),
             )
             yield OpenWay(back, jump_path)
-
-
-def _passed(node: TreeNode, visited: Sequence[str], name: str, place: TreePlace) -> Sequence[str]:
-    """Return the states that are entered from a place on, up to the failed one."""
-    if name in visited:
-        return visited[: visited.index(name) + 1]
-    if place.node is not node:
-        return (*visited, name)
-    return (*(each for each in visited if node.has(each)), name)
 
 
 def _goals(
@@ -146,7 +175,8 @@ def _goals(
         back *= 2
     for kind, level in ((WayKind.START, node), (WayKind.TOP, top)):
         start = TreePlace(level, initial_label_of(level.machine))
-        goals.append((kind, name_of(start, node), start))
+        if name_of(start, node) in visited:
+            goals.append((kind, name_of(start, node), start))
     met = {label}
     for kind, name, place in goals:
         if name not in met and place is not None and place.node.has(place.label):

@@ -7,7 +7,7 @@ from typing import Any, Iterator, List, Sequence, Tuple
 
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import POLICIES, Action, Escalating
+from smach_oracle.oracle.decision.policy import POLICIES, Action
 from smach_oracle.oracle.decision.ways import WAITS_S, WayKind
 from smach_oracle.oracle.prospects import (
     ContainerProspect,
@@ -85,7 +85,7 @@ def _heading(container: ContainerProspect) -> List[str]:
         )
     )
     if POLICIES[settings.policy].goes_by_ways:
-        back = 'each way once, and then a person (doc/ways.md)'
+        back = 'some ways, each once, and then a person (doc/ways.md)'
     lines += _entry('policy', '{}; {}'.format(_policy(settings), back), 2)
     lines += _entry('not repeated', _not_repeated(container), 2)
     lines += _entry('asking', _asking(settings), 2)
@@ -241,14 +241,16 @@ def _actions(container: ContainerProspect, state: StateProspect) -> str:
 
 def _menu(container: ContainerProspect, state: StateProspect) -> str:
     """Say which ways a policy may go that goes by ways, and how many of them."""
-    most, allowed = Escalating.most_of_streak, state.settings.max_recoveries
-    told = 'the cheapest of: {}; after {}'.format(
+    policy, allowed = POLICIES[container.settings.policy], state.settings.max_recoveries
+    most, of_trial = policy.most_of_streak, policy.most_of_trial
+    told = '{} of: {}; after {} in a row'.format(
+        'each once' if policy.draws else 'the cheapest first',
         ', '.join(_WAYS[kind] for kind in state.kinds),
-        'max_recoveries ({}), which cuts its {} off'.format(allowed, most)
-        if allowed < most
-        else '{} in a row: ask'.format(most),
+        most,
     )
-    return told if allowed >= most else told + ': ask'
+    if most is not None and allowed < most:
+        told += ' (max_recoveries cuts them to {})'.format(allowed)
+    return told + ', {} in a trial, or where none costs less than to ask: ask'.format(of_trial)
 
 
 def _either(actions: Sequence[Action]) -> str:
