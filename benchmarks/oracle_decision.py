@@ -26,7 +26,7 @@ GROWTH_LIMIT = 1.5
 # steps. That is missed: a precondition has a thread of its own since, which is 450 of them. The
 # limit is what is reached on a busy machine, 1830, and a fifth.
 AIM, LIMIT = 1200.0, 2200.0
-LIMIT_BY_WAYS = 4000.0  # of a policy that goes by ways, which makes a menu: 3080 on a busy machine
+LIMIT_BY_WAYS = 4300.0  # of a policy that goes by ways, which makes a menu: 3560 on a busy machine
 ROUNDS = 15
 MACHINES = 4  # with many visits: one that meets a busy moment is no measure
 FAILURES = 300
@@ -96,7 +96,9 @@ def main() -> int:
     silence()
     print('engine: {}'.format(smach.__file__))
     is_missed = False
-    for policy in sorted(set(POLICIES).difference(each.name for each in BASELINES)):
+    # one that draws its ways may wait, in real time
+    left_out = {*BASELINES, *(each for each in POLICIES.values() if each.draws)}
+    for policy in sorted(set(POLICIES).difference(each.name for each in left_out)):
         rounds = [(bare_step_s(20000), min(machine_after(10, policy)[1])) for _ in range(ROUNDS)]
         bare, few = (min(column) for column in zip(*rounds))
         many = min(min(machine_after(args.visits, policy)[1]) for _ in range(MACHINES))
