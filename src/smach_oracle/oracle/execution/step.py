@@ -333,11 +333,7 @@ class Step:
             return
         if node.records.history.keeps_failing(record.label):
             target = failure.route.target if failure.route is not None else ''
-            node.warn_once(
-                'own loop',
-                OWN_LOOP.format(failure.outcome, target),
-                record.label,
-            )
+            node.warn_once('own loop', OWN_LOOP.format(failure.outcome, target), record.label)
 
     # -- without the oracle
 
@@ -397,9 +393,7 @@ class Step:
         node, machine = self._node, self._machine
         meta = self._enter_oracle(occasion)
         lock = lock_of(machine)
-        record = node.record(
-            occasion.failure.state
-        )  # an earlier one, which this state has reported
+        record = node.record(occasion.failure.state)  # or an earlier one, which this one reports
         try:
             meta.begin(Recovery(node, record, occasion))
             if has_preempt_flag(machine):

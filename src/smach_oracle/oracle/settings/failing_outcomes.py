@@ -13,7 +13,7 @@ _FAILURES = frozenset(
     FORMER_FAILING_OUTCOMES + ('fail', 'abort', 'timeout', 'timedout', 'unreachable', 'lost')
 )
 _SUCCESSES = frozenset(('succeeded', 'successful', 'success', 'completed'))
-_NEGATIONS = frozenset(('no', 'not', 'non', 'never', 'without'))
+NEGATIONS = frozenset(('no', 'not', 'non', 'never', 'without'))
 # what follows the word where a failure is over, or was provided for: failed_over, error_cleared
 _SETTLED = frozenset(
     ('over', 'safe', 'free', 'cleared', 'handled', 'recovered', 'resolved', 'fixed', 'ok')
@@ -75,17 +75,17 @@ class FailingNames:
 def sounds_like_success(outcome: str) -> bool:
     """Whether an outcome is called a success: that is no failure wherever its author leads it."""
     words = words_of(outcome)
-    return bool(words) and words[-1] in _SUCCESSES and not _NEGATIONS.intersection(words)
+    return bool(words) and words[-1] in _SUCCESSES and not NEGATIONS.intersection(words)
 
 
 def _sounds_failing(outcome: str) -> bool:
     words = words_of(outcome)
-    if not words or words == ['pre', 'empted']:
+    if not words:
         return False
     if 'unsuccessful' in words or 'unsucceeded' in words:
         return True
-    if _NEGATIONS.intersection(words):
-        return words[-1] in _SUCCESSES and words[-2] in _NEGATIONS
+    if NEGATIONS.intersection(words):
+        return words[-1] in _SUCCESSES and words[-2] in NEGATIONS
     return words[-1] in _FAILURES or (words[0] in _FAILURES and words[-1] not in _SETTLED)
 
 

@@ -9,6 +9,7 @@ from typing import Iterable, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .failing_outcomes import (
     FORMER_FAILING_OUTCOMES,
+    NEGATIONS,
     FailingNames,
     is_preempted,
     sounds_like_success,
@@ -24,7 +25,7 @@ _BY_NAME, _LISTED = 'by_name', 'failing_outcomes'
 # states have `finished` or `done` next to `failed`. `ok` says it in plain English. Words that only
 # say that it is over (end, exit, quit, stop) are left out, and so are those of single projects.
 _WELL = frozenset(('complete', 'done', 'finished', 'ok', 'okay', 'successfully'))
-_NOT_SO = frozenset(('no', 'not', 'non', 'never', 'without', 'almost', 'partly', 'partially'))
+_NOT_SO = NEGATIONS.union(('almost', 'partly', 'partially'))
 
 
 class EndMeaning(Enum):
