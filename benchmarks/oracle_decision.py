@@ -19,7 +19,7 @@ from quiet import silence
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.decision.policy import BASELINES, POLICIES
+from smach_oracle.oracle.decision.policies import BASELINES, POLICIES
 
 GROWTH_LIMIT = 1.5
 # in bare steps. Wanted are 75 us where the first executive took 62 us: 1.2 times its 1000 bare

@@ -17,7 +17,8 @@ import itertools
 import sys
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
-from smach_oracle.oracle.decision.policy import POLICIES, Action
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.paths import path_of

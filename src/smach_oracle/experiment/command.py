@@ -15,7 +15,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis import bag_statistics
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
-from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.checks import number, whole
 from smach_oracle.oracle.settings.paths import path_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Optional
 
 from smach_oracle.analysis.trials import TrialSummary
-from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.decision.policies import POLICIES
 
 from .estimate import JobWork
 from .lab import LAB_FILE, write_lab

@@ -2,7 +2,7 @@
 
 from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.decision.policies import POLICIES
 
 from .freeze import BLOCKS
 from .plan import BARE, DEFAULT, TASKS, ExperimentPlan, Variant, named_variants

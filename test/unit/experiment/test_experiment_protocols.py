@@ -16,7 +16,7 @@ from smach_oracle.experiment.plan import ExperimentError
 from smach_oracle.experiment.progress import PoolProgress
 from smach_oracle.experiment.protocols import ALL, COMPARED, MEMORIES, ProtocolChoice, parts_of
 from smach_oracle.experiment.stop_signals import StopRequested
-from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.decision.policies import POLICIES
 
 TASKS = ('pick_and_place', 'drink_retrieval')
 

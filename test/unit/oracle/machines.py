@@ -55,6 +55,18 @@ class FakeExpert(Expert):
         return self._interface(offer, question, cancelled, progress) if self._interface else None
 
 
+class FakeWaiting:
+    """Notes what was waited for, and calls a function then."""
+
+    def __init__(self, then=lambda: None):
+        self.waited = []
+        self._then = then
+
+    def wait(self, seconds, what, scope):
+        self.waited.append((seconds, what))
+        self._then()
+
+
 class FakeHealth:
     """A fake of what knows whether the robot is well; says what a test tells it to."""
 

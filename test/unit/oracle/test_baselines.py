@@ -7,6 +7,7 @@ import threading
 import pytest
 from machines import (
     FakeExpert,
+    FakeWaiting,
     Scripted,
     Watched,
     chain_of,
@@ -17,22 +18,16 @@ from machines import (
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.decision import policy as policy_module
+from smach_oracle.oracle.decision import policies
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import (
-    POLICIES,
-    Action,
-    Past,
-    Preconditions,
-    Situation,
-    policy_named,
-)
+from smach_oracle.oracle.decision.policies import POLICIES, policy_named
+from smach_oracle.oracle.decision.policy import Action, Past, Preconditions, Situation
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.settings.settings import Settings
 
 ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__)))))
-BASELINES = sorted(policy.name for policy in policy_module.BASELINES)
+BASELINES = sorted(policy.name for policy in policies.BASELINES)
 NEVER_ASK = ('restart', 'retry', 'step_back')
 FAILS = ['aborted'] * 20
 
@@ -56,18 +51,6 @@ def table_of_the_page():
 
 
 TABLE = table_of_the_page()
-
-
-class FakeWaiting:
-    """Notes what was waited for, and calls a function then."""
-
-    def __init__(self, then=lambda: None):
-        self.waited = []
-        self._then = then
-
-    def wait(self, seconds, what, scope):
-        self.waited.append((seconds, what))
-        self._then()
 
 
 def failing(policy, *more, fails=FAILS, **settings):

@@ -16,7 +16,8 @@ from hidden_worlds import EXACT, causes_of, chain_of
 import smach
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import POLICIES, Action, Past, Preconditions, Situation
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.decision.policy import Action, Past, Preconditions, Situation
 from smach_oracle.oracle.records.events import EventKind
 
 POSE = Condition('pose', {'LOOK': 1.0}, is_goal=False)

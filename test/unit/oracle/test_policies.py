@@ -13,13 +13,8 @@ from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, w
 
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import (
-    POLICIES,
-    FailureContext,
-    Preconditions,
-    Situation,
-    policy_named,
-)
+from smach_oracle.oracle.decision.policies import POLICIES, policy_named
+from smach_oracle.oracle.decision.policy import FailureContext, Preconditions, Situation
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.history import History
@@ -381,6 +376,7 @@ def test_an_unknown_policy_is_refused_by_name():
     'module',
     [
         'errors',
+        'decision.policies',
         'decision.policy',
         'decision.failure_rate',
         'settings.settings',

@@ -1,13 +1,13 @@
 """The menu of a failure, the streak of ways that were gone, and machines that go them."""
 
 import pytest
-from machines import FakeExpert, Scripted, Watched, goto, supersede, watched
-from test_baselines import FakeWaiting
+from machines import FakeExpert, FakeWaiting, Scripted, Watched, goto, supersede, watched
 
 import smach
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation, policy_named
+from smach_oracle.oracle.decision.policies import policy_named
+from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation
 from smach_oracle.oracle.decision.ways import Prices, StreakSoFar, Way, WayKind
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.settings.settings import Settings

@@ -5,18 +5,10 @@ from typing import Any, List, Tuple
 
 import pytest
 
+from smach_oracle.oracle.decision.by_ways import Escalating
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import (
-    POLICIES,
-    Action,
-    Escalating,
-    Menu,
-    Past,
-    Policy,
-    Preconditions,
-    Situation,
-    policy_named,
-)
+from smach_oracle.oracle.decision.policies import POLICIES, policy_named
+from smach_oracle.oracle.decision.policy import Action, Menu, Past, Policy, Preconditions, Situation
 from smach_oracle.oracle.decision.ways import Prices, StreakSoFar, Way, WayKind
 
 BY_WAYS = sorted(name for name, policy in POLICIES.items() if policy.goes_by_ways)

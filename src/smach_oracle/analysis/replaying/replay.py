@@ -2,7 +2,9 @@
 
 from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Set, Tuple
 
+from smach_oracle.oracle.decision.by_ways import action_of
 from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, make_estimator
+from smach_oracle.oracle.decision.policies import policy_named
 from smach_oracle.oracle.decision.policy import (
     Action,
     FailureContext,
@@ -10,7 +12,6 @@ from smach_oracle.oracle.decision.policy import (
     Policy,
     Preconditions,
     Situation,
-    policy_named,
 )
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by, is_counted
@@ -203,9 +204,9 @@ class Replay:
                 Past(state.recoveries, self._restarts),
             )
         )
-        return ReplayedDecision(
-            actions[0].value if len(actions) == 1 else NOT_KNOWN
-        )  # it would be drawn
+        if len(actions) > 1:  # it would be drawn
+            return ReplayedDecision(NOT_KNOWN)
+        return ReplayedDecision(actions[0].value)
 
     def _by_ways(
         self, event: Event, state: _LearnedState, failure_class: FailureClass
@@ -224,7 +225,7 @@ class Replay:
         order = policy.order(situation)
         if order and policy.draws:
             return ReplayedDecision(NOT_KNOWN)
-        return ReplayedDecision(policy.decide(situation).value, order[0].key if order else '')
+        return ReplayedDecision(action_of(order).value, order[0].key if order else '')
 
     def _preconditions(
         self, event: Event, state: _LearnedState, failure_class: FailureClass

@@ -4,7 +4,8 @@ import copy
 from typing import Any, Dict, Mapping, Optional, Tuple
 
 from ..decision.failure_rate import base_of
-from ..decision.policy import FailureContext, Policy, policy_named
+from ..decision.policies import policy_named
+from ..decision.policy import FailureContext, Policy
 from ..records.history import History
 from ..records.streaks import Streaks
 from ..records.visits import Visit, VisitMarks, VisitResult

@@ -33,7 +33,7 @@ from typing import (
 
 from smach_common.foreign import error_text
 
-from ..decision.policy import POLICIES
+from ..decision.policies import POLICIES
 from ..decision.ways import Prices
 from ..errors import SettingsError
 from ..identity import attribute_of

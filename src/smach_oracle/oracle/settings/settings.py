@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
-from ..decision.policy import POLICIES
+from ..decision.policies import POLICIES
 from ..decision.ways import Prices
 from ..errors import SettingsError
 from . import checks as values
@@ -124,7 +124,7 @@ class Settings:
     policy: str = setting(
         'prose',
         checked_policy,
-        'how it decides ([policies.md](policies.md)): {}; with parameters a mapping with its '
+        'how it decides ([policies.md](policies.md)): {}. With parameters it is a mapping with its '
         '`name`'.format(', '.join(POLICIES)),
     )
     failing_outcomes: Optional[Tuple[str, ...]] = setting(
@@ -136,9 +136,9 @@ class Settings:
     userdata: Optional[str] = setting(
         None,
         values.optional(values.choice(('restore', 'keep'))),
-        'the userdata [after a jump](executive.md#userdata-on-a-jump): `restore`: as it was when '
-        'the target was last entered; `keep`: as it is; unset: as is usual for the policy, '
-        '`keep` under `escalating` and `any_way`, else `restore`',
+        'the userdata [after a jump](executive.md#userdata-on-a-jump). `restore`: as it was when '
+        'the target was last entered. `keep`: as it is. If unset, it is `keep` under `escalating` '
+        'and `any_way`, and else `restore`',
     )
     deep_copy_keys: Tuple[str, ...] = setting(
         (),

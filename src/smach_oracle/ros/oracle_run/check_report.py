@@ -7,7 +7,8 @@ from typing import Any, Iterator, List, Sequence, Tuple
 
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.policy import POLICIES, Action
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.decision.ways import WAITS_S, WayKind
 from smach_oracle.oracle.prospects import (
     ContainerProspect,

@@ -25,7 +25,7 @@ from typing import (
 )
 
 import smach
-from smach_oracle.oracle.decision.policy import POLICIES
+from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
 from smach_oracle.oracle.settings.paths import check_writable, path_of

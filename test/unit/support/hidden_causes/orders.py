@@ -3,7 +3,8 @@
 import random
 from typing import Dict, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.decision.policy import POLICIES, Action, Baseline, Policy, Situation
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.decision.policy import Action, Baseline, Policy, Situation
 
 ASK, GIVE_UP = 'ask', 'give_up'
 WAIT_S = 30.0

@@ -8,7 +8,8 @@ from fake_clock import FakeClock
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.decision.policy import POLICIES, Policy
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.decision.policy import Policy
 from smach_oracle.oracle.machine import tree
 from smach_oracle.oracle.records.events import EventKind
 

@@ -1,0 +1,132 @@
+"""Policies that go by ways: they choose from the menu of a failure, and not by a table. Pure.
+
+doc/ways.md says what is on the menu, what a way costs, and which one is taken.
+"""
+
+from typing import List, Mapping, Sequence, Tuple
+
+from .failure_rate import FailureClass
+from .policy import Action, Baseline, Menu, Situation, draws_of
+from .ways import KEEP, Prices, Way
+
+
+def action_of(order: Sequence[Way]) -> Action:
+    """Return the action of the way that comes first. No way is left: to ask."""
+    if not order:
+        return Action.ASK
+    return Action.REVISIT if order[0].enters_again else Action.STEP_BACK
+
+
+class Escalating(Baseline):
+    """Tries the way first that costs least for its hope, each once in a streak, and then asks.
+
+    doc/ways.md says what a way costs, and when it does not pay. Microreboot escalates, too: it
+    starts the smallest part again first, and then larger ones (Candea et al., OSDI 2004).
+    """
+
+    name = 'escalating'
+    goes_by_ways = True
+    userdata = KEEP
+    most_of_streak = 4  # ways
+    most_of_trial = 8
+    most_trials = 3.0  # so many times a usual trial a streak may take
+    asking_minutes = 5.0  # of the robot, until a question is answered
+    expert_minutes = 2.0  # of the person who answers it
+    harm_chance = 1.0 / 30  # of each state that is entered again
+    # what is left of the hope that the state succeeds without any other one
+    hope = {FailureClass.LOW: 1.0, FailureClass.MODERATE: 0.5, FailureClass.HIGH: 0.25}
+    hope_after_each = 0.5  # way of the streak
+
+    def decide(self, situation: Situation) -> Action:
+        """Return the action of the way that comes first."""
+        return action_of(self.order(situation))
+
+    def may_do(self, situation: Situation) -> Tuple[Action, ...]:
+        """Return all of its actions: the menu is known only once a state has failed."""
+        return Action.REVISIT, Action.STEP_BACK, Action.ASK
+
+    def price(self, way: Way, prices: Prices) -> float:
+        """Return what a way takes, in minutes of the robot."""
+        return prices.robot_minute * way.minutes + prices.harm * self.harm_chance * len(way.repeats)
+
+    def cost(self, way: Way, situation: Situation) -> float:
+        """Return what a way takes for its hope.
+
+        A longer step back also repeats what a shorter one does. The cause may lie as well between
+        one and two states back as between two and four. So a step back has the hope of each
+        doubling that no way of the streak has reached.
+        """
+        menu, price = situation.menu, self.price(way, situation.menu.prices)
+        tried = menu.streak.tried
+        new = way.reach - max((each.reach for each in menu.ways if each.key in tried), default=0)
+        if new > 0:
+            return price / new
+        hope = self.hope[situation.failure_class] if way.enters_again else 1.0
+        return price / (hope * self.hope_after_each ** len(tried))
+
+    def price_of_asking(self, situation: Situation) -> float:
+        """Return what it costs to ask, or to lose the trial where there is nobody to ask."""
+        prices = situation.menu.prices
+        if not situation.menu.has_expert:
+            return prices.lost_trial
+        return (
+            prices.robot_minute * self.asking_minutes + prices.expert_minute * self.expert_minutes
+        )
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the ways that are open, untried and pay, the cheapest first."""
+        if self._spent(situation):
+            return ()
+        menu, limit = situation.menu, self.price_of_asking(situation)
+        priced = [
+            (self.cost(way, situation), way)
+            for way in self._left(menu)
+            if self.price(way, menu.prices) < limit
+        ]
+        priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
+        return tuple(way for cost, way in priced if cost < limit)
+
+    def _left(self, menu: Menu) -> List[Way]:
+        return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
+
+    def _spent(self, situation: Situation) -> str:
+        past, streak = situation.past, situation.menu.streak
+        if streak.attempts >= self.most_of_streak:
+            return '{} attempts have not helped'.format(streak.attempts)
+        if past.attempts >= self.most_of_trial:
+            return "the trial's {} attempts are spent".format(self.most_of_trial)
+        usual = past.usual_minutes
+        if usual is not None and streak.minutes > max(self.most_trials * usual, 1.0):
+            return 'its attempts take longer than {:g} trials'.format(self.most_trials)
+        return ''
+
+    def why(self, situation: Situation) -> str:
+        """Say why it asks."""
+        spent = self._spent(situation)
+        if spent or self.order(situation):
+            return spent
+        left = self._left(situation.menu)
+        if not left:
+            return (
+                'no other way is open' if not situation.menu.streak.tried else 'all ways are tried'
+            )
+        return 'no way is left that costs less than to ask'
+
+
+class AnyWay(Escalating):
+    """Goes the ways that `escalating` would go, in an order that is drawn: its control.
+
+    Each order is as likely. It depends on what a draw of `random` depends on, and on nothing else.
+    """
+
+    name = 'any_way'
+    draws = True
+    parameters: Mapping[str, float] = {'seed': 0}
+
+    def __init__(self, seed: float = 0) -> None:
+        self.seed = int(seed)
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the ways that are open, untried and pay, in the order that is drawn."""
+        ways = super().order(situation)
+        return tuple(draws_of(self.seed, situation.past).sample(ways, len(ways)))
