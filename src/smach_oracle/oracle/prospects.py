@@ -8,11 +8,11 @@ from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .decision.ways import WayKind
 from .machine.nesting import nodes_of
-from .machine.places import TreePlace
+from .machine.places import TreePlace, direct_levels_at_rest, name_of
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
-from .recovery.menu import leading_to, levels_at_rest, name_of, state_around
+from .recovery.menu import leading_to
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
@@ -158,6 +158,7 @@ def _guarded(node: TreeNode) -> Iterator[str]:
 
 def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
     state, settings = states_of(node.machine)[label], node.settings_of(label)
+    before = tuple(_before(node, label))
     return StateProspect(
         label,
         state,
@@ -168,8 +169,8 @@ def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
         ),
         tuple(_actions(node.in_force.policy, settings, decides)),
         node.settings.offers_for(node.relative_path, label),
-        tuple(_before(node, label)),
-        tuple(_kinds(node, label)),
+        before,
+        tuple(_kinds(node, settings, bool(before))),
     )
 
 
@@ -179,24 +180,24 @@ def _before(node: TreeNode, label: str) -> Iterator[str]:
     Those of the containers around it come last, where a step back may go there.
     """
     crosses = node.in_force.policy.goes_by_ways or node.settings.step_back_across
-    for level in levels_at_rest(node) if crosses else (node,):
-        label = label if level is node else state_around(level, node)
-        for each in leading_to(level, label):
+    for level in direct_levels_at_rest(node) if crosses else (node,):
+        for each in leading_to(level, (label,)):
             yield name_of(TreePlace(level, each), node)
+        label = next(iter(level.labels_from_parent), '')  # of the state around, on the next level
 
 
-def _kinds(node: TreeNode, label: str) -> Iterator[WayKind]:
+def _kinds(node: TreeNode, settings: StateSettings, steps_back: bool) -> Iterator[WayKind]:
     """Yield the kinds of ways that may be on the menu of a state."""
     if not node.in_force.policy.goes_by_ways:
         return
     yield WayKind.AGAIN
     yield WayKind.WAIT
-    if node.settings_of(label).preconditions:
+    if settings.preconditions:
         yield WayKind.PREPARE
-    if any(_before(node, label)):
+    if steps_back:
         yield WayKind.STEP_BACK
         yield WayKind.START
-        if len(levels_at_rest(node)) > 1:
+        if len(direct_levels_at_rest(node)) > 1:
             yield WayKind.TOP
 
 

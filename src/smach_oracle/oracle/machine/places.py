@@ -86,6 +86,28 @@ def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
             yield each
 
 
+def direct_levels(node: TreeNode) -> List[TreeNode]:
+    """Return a container and its levels up to a Concurrence or an Iterator, innermost first.
+
+    What runs in the other branches, and what is done of the items, belongs to others.
+    """
+    levels = [node]
+    for above in levels_above(node):
+        if not is_direct(levels[-1]):
+            break
+        levels.append(above)
+    return levels
+
+
+def direct_levels_at_rest(node: TreeNode) -> List[TreeNode]:
+    """Return those that they would be, whatever runs."""
+    levels = [node]
+    while is_direct(node) and node.parent is not None:
+        node = node.parent
+        levels.append(node)
+    return levels
+
+
 def failure_context(
     node: TreeNode, record: StateRecord, is_counted: bool = False
 ) -> FailureContext:
@@ -106,15 +128,12 @@ def _state_before(node: TreeNode) -> str:
 
     It is '' where none has run before, or where a Concurrence or an Iterator lies between.
     """
-    child = node
-    for above in levels_above(node):
-        if not is_direct(child):
-            break
+    levels = direct_levels(node)
+    for child, above in zip(levels, levels[1:]):
         context = above.records.failure_context(above.record(child.labels_from_parent[0]), '')
         name = above.in_force.policy.step_back_target(context)
         if name:
             return name if '/' in name else '{}/{}'.format(above.relative_path, name)
-        child = above
     return ''
 
 
@@ -131,6 +150,16 @@ class TreePlace(NamedTuple):
     def path(self) -> str:
         """Return the path of the container, and the label."""
         return '{}/{}'.format(self.node.path, self.label)
+
+
+def name_of(place: TreePlace, node: TreeNode) -> str:
+    """Return a name of a place by which `place_named` finds it from a container.
+
+    That is its label, or its path where it is in another container.
+    """
+    if place.node is node:
+        return place.label
+    return '/'.join(('', *filter(None, (place.node.relative_path, place.label))))
 
 
 def places_of(node: TreeNode) -> Iterator[TreePlace]:

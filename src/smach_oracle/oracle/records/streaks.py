@@ -15,9 +15,9 @@ Told = Mapping[str, List[Any]]  # plain data by label
 class OpenStreak:
     """A streak that goes on.
 
-    `successes`: of the state in all. `began_s`: on the trial's clock. `visited`: the states before
-    the first failure, by name, the latest first. `leaves`: whether the way that is gone now leaves
-    the container.
+    `successes`: of the state in all. `began_s`: on the trial's clock of work. `visited`: the states
+    before the first failure, by name, the latest first. `leaves`: whether the way that is gone now
+    leaves the container.
     """
 
     def __init__(self, successes: int, began_s: float, visited: Iterable[str]) -> None:
@@ -34,7 +34,7 @@ class OpenStreak:
         self.attempts += 1
 
     def so_far(self, now_s: float) -> StreakSoFar:
-        """Return what was done. `now_s`: on the trial's clock."""
+        """Return what was done. `now_s`: on the same clock."""
         return StreakSoFar(tuple(self.tried), self.attempts, (now_s - self.began_s) / 60.0)
 
 

@@ -1,10 +1,11 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 
-from typing import Callable, Optional, Tuple
+from typing import Callable, Optional, Sequence, Tuple
 
+from ..decision.by_ways import action_of
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes, going_would_repeat
-from ..decision.ways import StreakSoFar, Way, WayKind
+from ..decision.ways import StreakSoFar, WayKind
 from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
 from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.repeats import has_visited
@@ -15,7 +16,7 @@ from ..records.streaks import OpenStreak
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from ..smach_private import initial_label_of
-from .menu import menu_of, visited_before
+from .menu import OpenWay, menu_of, visited_before
 from .preconditions import why_not_met
 from .recovery import Decided, Recovery
 from .verdict import streak_of
@@ -29,7 +30,6 @@ def decide_on_level(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     """Run the preconditions that the policy wants, and say what it does.
 
     `recovery.jump_path` is the way to the place where it goes then, None where it goes nowhere.
-
     """
     decider, facts = _ask_at_once(recovery) or _follow_policy(recovery, why_not_above)
     if facts.action is Action.ASK and not recovery.node.in_force.policy.asks:
@@ -84,63 +84,81 @@ def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
 
 
 def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove) -> Decided:
-    """Choose the first way of the policy's order, whose preconditions are met."""
-    node, record, policy, budget = (
-        recovery.node,
-        recovery.record,
-        recovery.node.in_force.policy,
-        recovery.budget,
-    )
-    successes = record.totals[0]
-    streak = streak_of(node, record) or node.records.streaks.begin(
-        record.label,
-        OpenStreak(
-            successes,
-            budget.work_time.now(),
-            visited_before(node, record.label, recovery.occasion.visits_since),
-        ),
-    )
-    has_expert = node.tree.expert is not None and not budget.why_no_question()
-    paths = {
-        way._replace(blocked=_why_blocked(recovery, way, path, why_not_above)): path
-        for way, path in menu_of(node, record, streak.visited)
-    }
-    while True:
-        # after a crash a state is entered again, whatever its streak says: it has not failed
-        so_far = (
-            streak.so_far(budget.work_time.now()) if recovery.failure.is_counted else StreakSoFar()
-        )
-        menu = Menu(tuple(paths), so_far, node.settings.cost, has_expert)
-        past = situation.past._replace(
-            attempts=budget.recoveries, usual_minutes=budget.usual_minutes
-        )
-        recovery.situation = situation = situation._replace(past=past, menu=menu)
-        recovery.order = policy.order(situation)
-        if not recovery.order:
-            return Decider.POLICY, recovery.facts(Action.ASK, blocked=policy.why(situation))
-        way = recovery.order[0]
-        if way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
-            break
-        if recovery.stopped():
-            recovery.order = ()
-            return Decider.POLICY, recovery.facts(Action.ASK)
-        paths[way._replace(blocked=recovery.not_met + ' did not help')] = paths.pop(way)
+    """Go the first way of the policy's order, or ask where none is left."""
+    record, policy, budget = recovery.record, recovery.node.in_force.policy, recovery.budget
+    streak = _streak(recovery)
+    ways = [
+        each.blocked_by(_why_blocked(recovery, each, why_not_above))
+        for each in menu_of(recovery.node, record, streak.visited)
+    ]
+    chosen = _first_way(recovery, situation, ways, streak)
+    if chosen is None:
+        recovery.order, why = (), policy.why(recovery.situation or situation)
+        return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
     spent = budget.take_recovery(policy.most_of_trial)
     if spent:  # by others meanwhile
         recovery.order = ()
         decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
         return decider, recovery.facts(Action.ASK, blocked=spent)
-    recovery.jump_path = paths[way]
-    streak.leaves = bool(recovery.jump_path.left_containers)
-    action = Action.REVISIT if way.enters_again else Action.STEP_BACK
-    target = _named(recovery, recovery.jump_path)
-    facts = recovery.facts(action, target=target, wait_s=way.wait_s)
-    record.note_tried(goes(facts), successes)
+    recovery.jump_path = chosen.jump_path
+    streak.leaves = bool(chosen.jump_path.left_containers)
+    facts = recovery.facts(
+        action_of(recovery.order),
+        target=_named(recovery, chosen.jump_path),
+        wait_s=chosen.way.wait_s,
+    )
+    record.note_tried(goes(facts), streak.successes)
     return Decider.POLICY, facts
 
 
-def _why_blocked(recovery: Recovery, way: Way, path: JumpPath, why_not_above: WhyNotAbove) -> str:
+def _streak(recovery: Recovery) -> OpenStreak:
+    """Return the streak of the failed state, which begins with this failure if none goes on."""
+    node, record = recovery.node, recovery.record
+    streak = streak_of(node, record)
+    if streak is None:
+        visited = visited_before(node, record.label, recovery.occasion.visits_since)
+        streak = OpenStreak(record.totals[0], recovery.budget.work_time.now(), visited)
+        node.records.streaks.begin(record.label, streak)
+    return streak
+
+
+def _first_way(
+    recovery: Recovery, situation: Situation, ways: Sequence[OpenWay], streak: OpenStreak
+) -> Optional[OpenWay]:
+    """Return the first way of the policy's order whose preconditions, where it has any, are met.
+
+    None means that no way is left, or that the recovery is stopped.
+    """
+    while True:
+        recovery.situation = _with_menu(recovery, situation, ways, streak)
+        recovery.order = recovery.node.in_force.policy.order(recovery.situation)
+        if not recovery.order:
+            return None
+        chosen = next(each for each in ways if each.way == recovery.order[0])
+        if chosen.way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
+            return chosen
+        if recovery.stopped():
+            return None
+        why = recovery.not_met + ' did not help'
+        ways = [each.blocked_by(why) if each is chosen else each for each in ways]
+
+
+def _with_menu(
+    recovery: Recovery, situation: Situation, ways: Sequence[OpenWay], streak: OpenStreak
+) -> Situation:
+    node, budget = recovery.node, recovery.budget
+    so_far = StreakSoFar()
+    if recovery.failure.is_counted:  # else it has not failed, and is entered again after a crash
+        so_far = streak.so_far(budget.work_time.now())
+    has_expert = node.tree.expert is not None and not budget.why_no_question()
+    past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)
+    menu = Menu(tuple(each.way for each in ways), so_far, node.settings.cost, has_expert)
+    return situation._replace(past=past, menu=menu)
+
+
+def _why_blocked(recovery: Recovery, each: OpenWay, why_not_above: WhyNotAbove) -> str:
     """Say why a way of the menu is not open, '' where it is."""
+    way, path = each
     return (
         (why_not_above(path.meeting_node) if path.left_containers else '')
         or why_repeats_on(recovery, path)

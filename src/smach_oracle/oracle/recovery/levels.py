@@ -8,7 +8,7 @@ from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..machine.jump_path import jump_path_to
-from ..machine.places import TreePlace, failure_context, is_direct, levels_above
+from ..machine.places import TreePlace, direct_levels, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, goes_unnoticed, route_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
@@ -64,6 +64,8 @@ def foreseen_above(
 
     It may be one of any level above: a failing outcome falls through from one to the next. Where a
     Concurrence lies between, nobody knows before it has ended.
+
+    :param below: the ends of the containers below this one alone count. None: of all.
     """
     outcome = ending.outcome
     while outcome is not None and node.parent is not None and node is not below:
@@ -153,12 +155,11 @@ def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNod
     is_high = recovery.record.failure_class is FailureClass.HIGH
     if decider is not Decider.POLICY or (is_high and not goes_by_ways):
         return found
-    child = recovery.node
-    for above in levels_above(child):
-        if not child.settings.escalate or not is_direct(child):
+    levels = direct_levels(recovery.node)
+    for child, above in zip(levels, levels[1:]):
+        if not child.settings.escalate:
             break
         found.append(above)
-        child = above
     return found
 
 

@@ -1,14 +1,14 @@
 """Makes the menu of a failure: the ways on, from where the machine stands."""
 
 from collections import deque
-from typing import Collection, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Collection, Iterator, List, NamedTuple, Sequence, Set, Tuple
 
 import smach
 
 from ..decision.ways import WAITS_S, Way, WayKind
 from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.nesting import nodes_of
-from ..machine.places import TreePlace, is_direct, levels_above, place_named
+from ..machine.places import TreePlace, direct_levels, name_of, place_named
 from ..machine.site import route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
@@ -25,24 +25,9 @@ class OpenWay(NamedTuple):
     way: Way
     jump_path: JumpPath
 
-
-def levels_of(node: TreeNode) -> List[TreeNode]:
-    """Return a container and those above it that a way may lead to, the innermost first.
-
-    It ends where a Concurrence or an Iterator lies between: what runs in the other branches, and
-    what is done of the items, is not given up for one failure.
-    """
-    running = [node, *levels_above(node)]
-    return [level for level in levels_at_rest(node) if any(level is each for each in running)]
-
-
-def levels_at_rest(node: TreeNode) -> List[TreeNode]:
-    """Return those that they would be, whatever runs."""
-    levels = [node]
-    while is_direct(node) and node.parent is not None:
-        node = node.parent
-        levels.append(node)
-    return levels
+    def blocked_by(self, why: str) -> 'OpenWay':
+        """Return it with why it is not open, '' where it is."""
+        return self._replace(way=self.way._replace(blocked=why))
 
 
 def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
@@ -56,18 +41,18 @@ def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...
     :param since: number of visits after its failure.
     """
     found: List[str] = []
-    for level in levels_of(node):
-        goal = label if level is node else state_around(level, node)
-        leading = set(leading_to(level, goal))
-        visits = list(level.records.history.visits)
+    for level in direct_levels(node):
+        leading = set(leading_to(level, (label,)))
+        visits = _visits_of(level)
         if level is node and since:
             del visits[-since:]
-        rounds = [number for number, visit in enumerate(visits, 1) if _has_succeeded(visit, goal)]
+        rounds = [number for number, visit in enumerate(visits, 1) if _has_succeeded(visit, label)]
         if rounds:
             del visits[: rounds[-1]]
-            leading -= _ending_without(level, goal)
+            leading -= _ending_without(level, label)
         labels = dict.fromkeys(each.state for each in reversed(visits) if each.state in leading)
         found.extend(name_of(TreePlace(level, each), node) for each in labels)
+        label = next(iter(level.labels_from_parent), '')  # of the state around, on the next level
     return tuple(found[:_MOST_VISITED])
 
 
@@ -77,57 +62,40 @@ def _has_succeeded(visit: Visit, label: str) -> bool:
 
 def _ending_without(node: TreeNode, label: str) -> Set[str]:
     """Return the states from which the container may end well without a visit of a state."""
-    ending: Set[str] = set()
-    while True:
-        more = {
-            each
-            for each in node.labels()
-            if each != label and each not in ending and _may_lead_to(node, each, ending)
-        }
-        if not more:
-            return ending
-        ending |= more
+    last = [each for each in node.labels() if each != label and _may_end_well(node, each)]
+    return {*last, *leading_to(node, last, around=label)}
 
 
-def _may_lead_to(node: TreeNode, label: str, goals: Collection[str]) -> bool:
-    """Whether an outcome of a state leads to one of some states, or to an end that is good."""
-    for outcome in dict(transitions_of(node.machine).get(label, {})):
-        route = route_of(node.machine, label, outcome)
-        if route.is_state:
-            if route.target in goals:
-                return True
-        elif route.target and not (
-            route.target in node.in_force.failing or is_preempted(route.target)
-        ):
-            return True
-    return False
+def _may_end_well(node: TreeNode, label: str) -> bool:
+    """Whether an outcome of a state leads to an end that is no failure and no preempt."""
+    routes = (
+        route_of(node.machine, label, outcome)
+        for outcome in dict(transitions_of(node.machine).get(label, {}))
+    )
+    return any(
+        route.target
+        and not route.is_state
+        and route.target not in node.in_force.failing
+        and not is_preempted(route.target)
+        for route in routes
+    )
 
 
-def leading_to(node: TreeNode, label: str) -> List[str]:
-    """Return the states from which the author's transitions lead to a state, the nearest first."""
-    found, drawn = {label: None}, transitions_of(node.machine)
-    waiting = deque(found)
+def leading_to(node: TreeNode, goals: Collection[str], around: str = '') -> List[str]:
+    """Return the states from which the author's transitions lead to some others, nearest first.
+
+    `around`: the state that they do so without.
+    """
+    drawn = transitions_of(node.machine)
+    found = dict.fromkeys([*goals, around])
+    waiting = deque(goals)
     while waiting:
         goal = waiting.popleft()
         for each in node.labels():
             if each not in found and goal in drawn.get(each, {}).values():
                 found[each] = None
                 waiting.append(each)
-    return list(found)[1:]
-
-
-def state_around(level: TreeNode, node: TreeNode) -> str:
-    """Return the state of a container in which the one below it lies."""
-    while node.parent is not level and node.parent is not None:
-        node = node.parent
-    return node.labels_from_parent[0]
-
-
-def name_of(place: TreePlace, node: TreeNode) -> str:
-    """Return a place by its label, or by its path where it is in another container."""
-    if place.node is node:
-        return place.label
-    return '/'.join(('', *filter(None, (place.node.relative_path, place.label))))
+    return [each for each in found if each not in goals and each != around]
 
 
 def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iterator[OpenWay]:
@@ -166,46 +134,46 @@ def _goals(
     node: TreeNode, label: str, visited: Sequence[str]
 ) -> Iterator[Tuple[WayKind, str, TreePlace]]:
     """Yield where a step back may lead, each place once: 1, 2, 4... states back, to the starts."""
-    top = levels_of(node)[-1]
-    back = 1
-    goals: List[Tuple[WayKind, str, Optional[TreePlace]]] = []
-    while back <= len(visited):
-        name = visited[back - 1]
-        goals.append((WayKind.STEP_BACK, name, place_named(node, name)))
-        back *= 2
-    for kind, level in ((WayKind.START, node), (WayKind.TOP, top)):
-        start = TreePlace(level, initial_label_of(level.machine))
-        if name_of(start, node) in visited:
-            goals.append((kind, name_of(start, node), start))
+    goals = [
+        (WayKind.STEP_BACK, name)
+        for back, name in enumerate(visited, 1)
+        if not back & (back - 1)  # 1, 2, 4...
+    ]
+    for kind, level in ((WayKind.START, node), (WayKind.TOP, direct_levels(node)[-1])):
+        start = name_of(TreePlace(level, initial_label_of(level.machine)), node)
+        if start in visited:
+            goals.append((kind, start))
     met = {label}
-    for kind, name, place in goals:
-        if name not in met and place is not None and place.node.has(place.label):
+    for kind, name in goals:
+        place = place_named(node, name)
+        if name not in met and place is not None:
             met.add(name)
             yield kind, name, place
 
 
 def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
+    """Yield a state, or what was visited in it if it is a machine, and whether it has succeeded."""
     place = place_named(node, name)
-    if place is not None:
-        yield from _entered_in(place, name)
+    return iter(()) if place is None else _entered_in(place, name)
 
 
 def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
-    """Yield a state, or what was visited in it if it is a machine, and whether it has succeeded."""
     state = states_of(place.node.machine)[place.label]
     below = node_of(state) if isinstance(state, smach.StateMachine) else None
-    inner = [] if below is None else list(_entered_below(below, name))
-    visits = list(place.node.records.history.visits)
-    has_succeeded = any(
-        each.state == place.label and each.result is VisitResult.SUCCESS for each in visits
-    )
-    yield from inner or [(name, has_succeeded)]
+    inner = {} if below is None else dict.fromkeys(visit.state for visit in _visits_of(below))
+    if below is None or not any(map(below.has, inner)):
+        yield name, any(_has_ended_well(visit, place.label) for visit in _visits_of(place.node))
+        return
+    for label in filter(below.has, inner):
+        yield from _entered_in(TreePlace(below, label), '{}/{}'.format(name, label))
 
 
-def _entered_below(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
-    for label in dict.fromkeys(visit.state for visit in list(node.records.history.visits)):
-        if node.has(label):
-            yield from _entered_in(TreePlace(node, label), '{}/{}'.format(name, label))
+def _visits_of(node: TreeNode) -> List[Visit]:
+    return list(node.records.history.visits)
+
+
+def _has_ended_well(visit: Visit, label: str) -> bool:
+    return visit.state == label and visit.result is VisitResult.SUCCESS
 
 
 def _minutes_of_visit(node: TreeNode) -> float:
