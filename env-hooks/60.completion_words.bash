@@ -92,7 +92,9 @@ retry step_back' ;;
       echo 'drink_retrieval pick_and_place' ;;
     'run_trials --variants')
       echo 'both with without bare default algorithm1 always_ask any_way escalating ladder
-prose random restart retry step_back' ;;
+prose random restart retry step_back one_line:algorithm1 one_line:always_ask
+one_line:any_way one_line:escalating one_line:ladder one_line:prose
+one_line:random one_line:restart one_line:retry one_line:step_back' ;;
     'same_trials')
       echo '--help --version -h' ;;
     'scripted_expert')

@@ -28,6 +28,7 @@ from .plan import (
     BARE,
     CONFIGURED,
     DEFAULT,
+    ONE_LINE,
     TASKS,
     ExperimentError,
     ExperimentPlan,
@@ -48,7 +49,7 @@ COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
 SHARE, HOURS = number(0.0, 1.0, 'from 0 to 1'), number(0.01, 1000.0, 'from 0.01 to 1000')
 DELAY = number(0.0, LONGEST_DELAY, 'from 0 to {:g}'.format(LONGEST_DELAY))
 BOTH = ('both', 'with', 'without')  # the oracle
-NAMED = (BARE, DEFAULT, *sorted(POLICIES))
+NAMED = (BARE, DEFAULT, *sorted(POLICIES), *(ONE_LINE + name for name in sorted(POLICIES)))
 # Settings of the oracle that override those of the task: option, type, what it is.
 OVERRIDES = (
     ('moderate_from', float, 'failure rate from which a state is MODERATE'),

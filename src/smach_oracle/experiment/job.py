@@ -14,6 +14,7 @@ from smach_oracle.oracle.decision.policies import POLICIES
 from .estimate import JobWork
 from .lab import LAB_FILE, write_lab
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
+from .one_line import write_config
 from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
 from .records import RecordedTrial, ReplicateRecords
 from .results import JobResults
@@ -134,6 +135,8 @@ class ExperimentJob:
             given['lasting'] = self._plan.lasting
         if self._plan.hours is not None:
             given['lab'] = self._records.folder / LAB_FILE
+        if self.variant.one_line:
+            given['config'] = write_config(self._records.folder, self._plan.task)
         return {
             **given,
             'trials': self.trials - self._next,

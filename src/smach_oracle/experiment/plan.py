@@ -20,6 +20,7 @@ TASKS: Dict[str, Tuple[str, int]] = {
 ARMS = 'arms'  # key of the variants in an experiment's file: the older name
 BARE = 'bare'  # name of the variant without the oracle
 DEFAULT = 'default'  # and of that with the oracle as the task has it
+ONE_LINE = 'one_line:'  # before a policy's name: no settings but the robot's own interfaces
 CONFIGURED = 'configured'  # a setting's value that leaves it as the task has it
 PACKAGES = ('pybullet', 'ompl', 'numpy', 'scipy', 'opencv-python-headless', 'example-robot-data')
 
@@ -34,6 +35,14 @@ class Variant(NamedTuple):
     name: str
     recovers: bool
     settings: Mapping[str, Any]  # of the oracle, over those of the task
+    one_line: bool = False  # of the task's settings, only the interfaces are in force
+
+    def as_data(self) -> Dict[str, Any]:
+        """Return it as plain data, as a plan's file has it."""
+        data = dict(self._asdict(), settings=dict(self.settings))
+        if not self.one_line:  # folders of older versions do not have it
+            del data['one_line']
+        return data
 
 
 class ExperimentPlan(NamedTuple):
@@ -65,9 +74,7 @@ class ExperimentPlan(NamedTuple):
         for name in ('lasting', 'hours'):  # folders of older versions have neither
             if data[name] is None:
                 del data[name]
-        data[ARMS] = [
-            dict(variant._asdict(), settings=dict(variant.settings)) for variant in self.variants
-        ]
+        data[ARMS] = [variant.as_data() for variant in self.variants]
         return data
 
 
@@ -97,6 +104,8 @@ def named_variants(
 ) -> Tuple[Variant, ...]:
     """Return variants by name: BARE, DEFAULT, or a policy, each with every memory.
 
+    ONE_LINE may stand before a policy.
+
     :param settings: of every oracle.
     """
     variants: List[Variant] = []
@@ -104,12 +113,16 @@ def named_variants(
         if name == BARE:
             variants.append(Variant(name, False, {}))
             continue
-        policy = {} if name == DEFAULT else {'policy': name}
+        one_line = name.startswith(ONE_LINE)
+        policy = {} if name == DEFAULT else {'policy': name[len(ONE_LINE) :] if one_line else name}
         for memory in memories or [0]:
             given = {**settings, **policy, **({'memory': memory} if memory else {})}
             variants.append(
                 Variant(
-                    '{}_memory_{}'.format(name, memory) if len(memories) > 1 else name, True, given
+                    '{}_memory_{}'.format(name, memory) if len(memories) > 1 else name,
+                    True,
+                    given,
+                    one_line,
                 )
             )
     return tuple(variants)

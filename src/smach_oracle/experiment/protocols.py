@@ -2,12 +2,12 @@
 
 from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.decision.policies import POLICIES
-
 from .freeze import BLOCKS
 from .plan import BARE, DEFAULT, TASKS, ExperimentPlan, Variant, named_variants
 
 COMPARED = (BARE, DEFAULT, 'restart')  # variants with all replicates, and at all shares
+# with one. They are the policies of then: a later one is judged by a protocol of its own
+OTHERS = ('algorithm1', 'always_ask', 'ladder', 'random', 'retry', 'step_back')
 REPLICATES = {'pick_and_place': 3, 'drink_retrieval': 4}
 SWEPT = {'pick_and_place': 100, 'drink_retrieval': 60}  # trials of a point of a sweep
 MEMORIES = (2, 5, 10, 20, 50)
@@ -74,12 +74,6 @@ class ProtocolChoice(NamedTuple):
 
 def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the main table's parts: the compared variants, and the others in one replicate."""
-    # those that go by ways are not in this protocol: they came after it
-    others = [
-        name
-        for name, policy in sorted(POLICIES.items())
-        if name not in COMPARED + ('prose',) and not policy.goes_by_ways
-    ]
     for task in choice.tasks:
         trials = TASKS[task][1]
         yield choice.part(
@@ -90,7 +84,7 @@ def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
             named_variants(choice.variants or COMPARED, {}),
         )
         if not choice.variants:
-            yield choice.part('others', task, trials, 1, named_variants(others, {}))
+            yield choice.part('others', task, trials, 1, named_variants(OTHERS, {}))
 
 
 def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
