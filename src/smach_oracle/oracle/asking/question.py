@@ -36,6 +36,9 @@ class StateChoice(NamedTuple):
     # of a Concurrence, and of what lies in one that is entered for it: the labels of its branches,
     # which all run again
     runs_again: Tuple[str, ...] = ()
+    # of the way of the menu that leads there (`Way`). '', 0: no way of the menu does
+    way: str = ''  # its key
+    minutes: float = 0.0  # that the robot is expected to take until it is where it was
 
 
 class OutcomeChoice(NamedTuple):

@@ -83,12 +83,11 @@ def why_closed_on(way: JumpPath) -> str:
     return ''
 
 
-def closed_in_words(way: JumpPath, name: str) -> str:
+def closed_in_words(way: JumpPath, why: str, name: str) -> str:
     """Say that a place of this name, or one on the way down, is closed, or ''.
 
-    It is a clause.
+    It is a clause. `why`: as `why_closed_on` has it.
     """
-    why = why_closed_on(way)
     # of what lies on the way down it names the path
     return '{} {}'.format(name, why) if why and not why.startswith(way.meeting_node.path) else why
 

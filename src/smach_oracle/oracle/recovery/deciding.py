@@ -1,29 +1,33 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 
-from typing import Callable, Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 from ..decision.by_ways import action_of
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
-from ..decision.sentence import goes, going_would_repeat
+from ..decision.sentence import goes
 from ..decision.ways import StreakSoFar, WayKind
-from ..machine.jump_path import JumpPath, closed_in_words, jump_path_to, repeated_on
+from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.places import TreePlace, levels_above, place_named
-from ..machine.repeats import has_visited
-from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.streaks import OpenStreak
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from ..smach_private import initial_label_of
-from .menu import OpenWay, menu_of, visited_before
+from .options import (
+    OpenWay,
+    WhyNotAbove,
+    function_that_runs,
+    named,
+    option_on,
+    visited_on,
+    ways_on,
+    why_closed,
+    why_repeats,
+)
 from .preconditions import why_not_met
 from .recovery import Decided, Recovery
 from .verdict import streak_of
-
-# says why a level above is not to be disturbed by this failure, '' where it may be. It looks at the
-# containers up to below the given one, None: at all
-WhyNotAbove = Callable[[Optional[TreeNode]], str]
 
 
 def decide_on_level(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
@@ -49,7 +53,9 @@ def _ask_at_once(recovery: Recovery) -> Optional[Decided]:
         return Decider.BUDGET, recovery.facts(ask, blocked=spent)
     if settings.on_retry != ALLOW:
         here = JumpPath((), recovery.node, (TreePlace(recovery.node, record.label),))
-        return Decider.ON_RETRY, recovery.facts(ask, blocked=why_repeats_on(recovery, here))
+        return Decider.ON_RETRY, recovery.facts(
+            ask, blocked=why_repeats(recovery, option_on(recovery, here))
+        )
     return None
 
 
@@ -78,7 +84,7 @@ def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     if why_not:
         return decider, recovery.facts(Action.ASK, blocked=why_not)
     recovery.jump_path = way
-    facts = recovery.facts(action, target=_named(recovery, way), wait_s=policy.wait_s(situation))
+    facts = recovery.facts(action, target=named(recovery, way), wait_s=policy.wait_s(situation))
     record.note_tried(goes(facts), reading.successes)
     return decider, facts
 
@@ -87,11 +93,7 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     """Go the first way of the policy's order, or ask where none is left."""
     record, policy, budget = recovery.record, recovery.node.in_force.policy, recovery.budget
     streak = _streak(recovery)
-    ways = [
-        each.blocked_by(_why_blocked(recovery, each, why_not_above))
-        for each in menu_of(recovery.node, record, streak.visited)
-    ]
-    chosen = _first_way(recovery, situation, ways, streak)
+    chosen = _first_way(recovery, situation, ways_on(recovery, why_not_above), streak)
     if chosen is None:
         recovery.order, why = (), policy.why(recovery.situation or situation)
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
@@ -100,11 +102,11 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
         recovery.order = ()
         decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
         return decider, recovery.facts(Action.ASK, blocked=spent)
-    recovery.jump_path = chosen.jump_path
-    streak.leaves = bool(chosen.jump_path.left_containers)
+    recovery.jump_path = chosen.option.jump_path
+    streak.leaves = bool(chosen.option.jump_path.left_containers)
     facts = recovery.facts(
         action_of(recovery.order),
-        target=_named(recovery, chosen.jump_path),
+        target=named(recovery, chosen.option.jump_path),
         wait_s=chosen.way.wait_s,
     )
     record.note_tried(goes(facts), streak.successes)
@@ -116,8 +118,8 @@ def _streak(recovery: Recovery) -> OpenStreak:
     node, record = recovery.node, recovery.record
     streak = streak_of(node, record)
     if streak is None:
-        visited = visited_before(node, record.label, recovery.occasion.visits_since)
-        streak = OpenStreak(record.totals[0], recovery.budget.work_time.now(), visited)
+        now_s = recovery.budget.work_time.now()
+        streak = OpenStreak(record.totals[0], now_s, visited_on(recovery))
         node.records.streaks.begin(record.label, streak)
     return streak
 
@@ -156,19 +158,6 @@ def _with_menu(
     return situation._replace(past=past, menu=menu)
 
 
-def _why_blocked(recovery: Recovery, each: OpenWay, why_not_above: WhyNotAbove) -> str:
-    """Say why a way of the menu is not open, '' where it is."""
-    way, path = each
-    return (
-        (why_not_above(path.meeting_node) if path.left_containers else '')
-        or why_repeats_on(recovery, path)
-        # a wait is for what still runs
-        or (way.kind is not WayKind.WAIT and closed_in_words(path, _named(recovery, path)))
-        or (way.kind is WayKind.PREPARE and _function_that_runs(recovery))
-        or ''
-    )
-
-
 def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePlace]]:
     """Return where a decision leads, by name and as a place.
 
@@ -185,46 +174,17 @@ def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePla
     return name, place_named(node, name)
 
 
-def _named(recovery: Recovery, way: JumpPath) -> str:
-    """Return the label of a place, or its path where it is in another container."""
-    place = way.entered_places[-1]
-    return place.label if place.node is recovery.node else place.path
-
-
 def _what_prevents(recovery: Recovery, way: JumpPath) -> Tuple[Decider, str]:
     """Spend a recovery on going to a place, or return what prevents it, and why."""
-    reason = why_repeats_on(recovery, way)
+    option = option_on(recovery, way)
+    reason = why_repeats(recovery, option)
     if reason:
         return Decider.ON_RETRY, reason
-    reason = closed_in_words(way, _named(recovery, way)) or _function_that_runs(recovery)
+    reason = why_closed(recovery, option) or function_that_runs(recovery)
     if reason:
         return Decider.POLICY, reason
     spent = recovery.budget.take_recovery()
     return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
-
-
-def why_repeats_on(recovery: Recovery, way: JumpPath) -> str:
-    """Say what would be repeated if the machine went to a place by itself, or '' if nothing."""
-    repeated, place = repeated_on(way), way.entered_places[-1]
-    if not repeated:
-        return ''
-    target = _named(recovery, way)
-    if not has_visited(place.node, place.label):
-        return 'this trial has not been in {}, and going there may repeat {}'.format(
-            target, ', '.join(repeated)
-        )
-    return going_would_repeat(recovery.record.label, target, repeated)
-
-
-def _function_that_runs(recovery: Recovery) -> str:
-    """Return which function among the preconditions was left behind and runs, '' for none."""
-    workers = recovery.node.tree.workers
-    for spec in recovery.record.settings.preconditions if workers.abandoned else ():
-        for name, function in spec.functions():
-            blocked = workers.blocked(function)
-            if blocked:
-                return '{} {}'.format(name, blocked)
-    return ''
 
 
 # -- preconditions

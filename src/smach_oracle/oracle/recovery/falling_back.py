@@ -3,9 +3,9 @@
 from typing import Optional
 
 from ..asking.question import names
-from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
+from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.places import place_named
-from .deciding import why_repeats_on
+from .options import option_on, why_repeats
 from .recovery import Recovery
 from .verdict import Verdict
 
@@ -79,4 +79,5 @@ def _why_not(recovery: Recovery, way: Optional[JumpPath]) -> str:
     if way is None:
         return 'no such state; there are ' + names(recovery.node.labels())
     over = 'the trial is over then' if recovery.ends_budget else budget.why_over()
-    return why_closed_on(way) or why_repeats_on(recovery, way) or over or budget.why_no_recovery()
+    option = option_on(recovery, way)
+    return option.closed or why_repeats(recovery, option) or over or budget.why_no_recovery()

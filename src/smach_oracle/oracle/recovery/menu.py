@@ -1,7 +1,7 @@
 """Makes the menu of a failure: the ways on, from where the machine stands."""
 
 from collections import deque
-from typing import Collection, Iterator, List, NamedTuple, Sequence, Set, Tuple
+from typing import Collection, Iterator, List, Sequence, Set, Tuple
 
 import smach
 
@@ -17,17 +17,6 @@ from ..settings.failing_outcomes import is_preempted
 from ..smach_private import initial_label_of, states_of, transitions_of
 
 _MOST_VISITED = 64  # states, to which a step back may lead
-
-
-class OpenWay(NamedTuple):
-    """A way, and the path of its jump."""
-
-    way: Way
-    jump_path: JumpPath
-
-    def blocked_by(self, why: str) -> 'OpenWay':
-        """Return it with why it is not open, '' where it is."""
-        return self._replace(way=self.way._replace(blocked=why))
 
 
 def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
@@ -98,22 +87,24 @@ def leading_to(node: TreeNode, goals: Collection[str], around: str = '') -> List
     return [each for each in found if each not in goals and each != around]
 
 
-def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iterator[OpenWay]:
-    """Yield the ways on from a failure of a state. None of them is blocked yet.
+def menu_of(
+    node: TreeNode, record: StateRecord, visited: Sequence[str]
+) -> Iterator[Tuple[Way, JumpPath]]:
+    """Yield the ways on from a failure of a state, and their jumps. None is blocked yet.
 
     `visited`: the states before it, as `visited_before` returns them.
     """
     visit_min, here = _minutes_of_visit(node), record.label
     way = Way(WayKind.AGAIN, here, userdata=node.in_force.userdata, minutes=visit_min)
     again = JumpPath((), node, (TreePlace(node, here),))
-    yield OpenWay(way, again)
+    yield way, again
     for wait_s in WAITS_S:
         minutes = visit_min + wait_s / 60.0
-        yield OpenWay(way._replace(kind=WayKind.WAIT, wait_s=wait_s, minutes=minutes), again)
+        yield way._replace(kind=WayKind.WAIT, wait_s=wait_s, minutes=minutes), again
     specs = record.settings.preconditions
     if specs:
         minutes = visit_min * (1 + len(specs))
-        yield OpenWay(way._replace(kind=WayKind.PREPARE, minutes=minutes), again)
+        yield way._replace(kind=WayKind.PREPARE, minutes=minutes), again
     for kind, name, place in _goals(node, here, visited):
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
@@ -127,7 +118,7 @@ def menu_of(node: TreeNode, record: StateRecord, visited: Sequence[str]) -> Iter
                 minutes=visit_min * (1 + len(entered)),
                 repeats=tuple(each for each, has_succeeded in entered if has_succeeded),
             )
-            yield OpenWay(back, jump_path)
+            yield back, jump_path
 
 
 def _goals(

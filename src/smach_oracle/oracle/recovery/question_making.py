@@ -15,8 +15,8 @@ from ..asking.question import (
 )
 from ..decision.ways import way_in_words
 from ..identity import truth_of
-from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
-from ..machine.places import levels_above, place_named, places_of
+from ..machine.jump_path import JumpPath, missing_on
+from ..machine.places import TreePlace, levels_above, place_named
 from ..machine.snapshots import UserdataGate, behind
 from ..machine.tree_node import TreeNode
 from ..records.short_text import shortened
@@ -24,6 +24,7 @@ from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..smach_private import data_of, remapping_of, states_of
 from .falling_back import fallback_in_words
+from .options import choices_on, places_on
 from .recovery import Recovery
 from .verdict import streak_of
 
@@ -79,47 +80,31 @@ def _ways_tried(recovery: Recovery) -> Iterator[str]:
 
 def targets_of(recovery: Recovery) -> Mapping[Target, str]:
     """Return where the machine could go, and why it cannot go there now, '' where it can."""
-    node, targets = recovery.node, {}
-    for way in _jump_paths(node):
-        target = _target(node, way)
-        targets[target] = '' if _waits_on(recovery, target) else why_closed_on(way)
-    return targets
+    return {_target(recovery.node, each.place): each.closed for each in places_on(recovery)}
 
 
-def _waits_on(recovery: Recovery, target: Target) -> bool:
-    """Whether to go there means to wait on: the own name of a state that still runs."""
-    return recovery.failure.still_runs and target == ('', recovery.record.label)
-
-
-def _jump_paths(node: TreeNode) -> Iterator[JumpPath]:
-    """Yield the ways to all places of the tree, its own first, in the order of the states."""
-    for place in places_of(node):
-        way = jump_path_to(node, place)
-        if way is not None:
-            yield way
-
-
-def _target(node: TreeNode, way: JumpPath) -> Target:
-    place = way.entered_places[-1]
+def _target(node: TreeNode, place: TreePlace) -> Target:
     return '' if place.node is node else place.node.path, place.label
 
 
 def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
-    for way in _jump_paths(recovery.node):
-        container, label = target = _target(recovery.node, way)
-        record, waits_on = way.entered_places[-1].node.record(label), _waits_on(recovery, target)
+    for each, way in choices_on(recovery):
+        container, label = _target(recovery.node, each.place)
+        record, jump_path = each.place.node.record(label), each.jump_path
         yield StateChoice(
             label,
             1.0 - record.rate,
             int(record.failure_class),
             record.visits,
-            missing_on(way, () if way.left_containers else written),
+            missing_on(jump_path, () if jump_path.left_containers else written),
             tuple(spec.name for spec in record.settings.preconditions),
-            '' if waits_on else why_closed_on(way),
-            () if waits_on else repeated_on(way),
+            each.closed,
+            each.repeats,
             container,
-            _running_again(way),
+            _running_again(jump_path),
+            '' if way is None else way.key,
+            0.0 if way is None else way.minutes,
         )
 
 
