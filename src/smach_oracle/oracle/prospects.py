@@ -13,6 +13,7 @@ from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
 from .recovery.menu import leading_to
+from .recovery.unguarded import Unguarded
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
@@ -34,7 +35,9 @@ class StateProspect(NamedTuple):
     """One state. `actions`: what the policy may do on its failure, by class of its rate.
 
     `before`: the states that may have run before it, the nearest first. A step back may run them
-    again. `kinds`: of the ways on its menu, nothing where the policy goes by none.
+    again. `not_before`: those that may have, too, but to which no step back leads: behind each of
+    them is a state that is not to be repeated (`on_retry`). `kinds`: of the ways on its menu,
+    nothing where the policy goes by none.
     """
 
     label: str
@@ -45,6 +48,7 @@ class StateProspect(NamedTuple):
     offers: Tuple[InterfaceOffer, ...]
     before: Tuple[str, ...] = ()
     kinds: Tuple[WayKind, ...] = ()
+    not_before: Tuple[str, ...] = ()
 
 
 class ContainerProspect(NamedTuple):
@@ -74,9 +78,10 @@ def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
     nodes = list(nodes_of(machine))
     decides = nodes[0].settings.budget.recoveries != 0  # the budget is that of the top
+    unguarded = Unguarded(nodes[0])
     found: List[ContainerProspect] = []
     for node in nodes:
-        prospect = _container(node, decides)
+        prospect = _container(node, decides, unguarded)
         if prospect.has_branches and found and found[-1].machine is prospect.machine:
             prospect = _joined(found.pop(), prospect)
         found.append(prospect)
@@ -105,11 +110,11 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
     return names[0] if names else None
 
 
-def _container(node: TreeNode, decides: bool) -> ContainerProspect:
+def _container(node: TreeNode, decides: bool, unguarded: Unguarded) -> ContainerProspect:
     machine: Any = node.machine
     initial = initial_label_of(machine) or next(iter(node.labels()), '')
     shown = node.site.shown(node)
-    states = tuple(_state(node, label, decides) for label in node.labels())
+    states = tuple(_state(node, label, decides, unguarded) for label in node.labels())
     return ContainerProspect(
         node.path,
         shown,
@@ -156,9 +161,10 @@ def _guarded(node: TreeNode) -> Iterator[str]:
                 yield '{}/{}'.format(below, label) if below else label
 
 
-def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
+def _state(node: TreeNode, label: str, decides: bool, unguarded: Unguarded) -> StateProspect:
     state, settings = states_of(node.machine)[label], node.settings_of(label)
-    before = tuple(_before(node, label))
+    before = dict(_before(node, label, unguarded))
+    allowed = tuple(name for name, is_allowed in before.items() if is_allowed)
     return StateProspect(
         label,
         state,
@@ -169,24 +175,31 @@ def _state(node: TreeNode, label: str, decides: bool) -> StateProspect:
         ),
         tuple(_actions(node.in_force.policy, settings, decides)),
         node.settings.offers_for(node.relative_path, label),
-        before,
-        tuple(_kinds(node, settings, bool(before))),
+        allowed,
+        tuple(_kinds(node, settings, allowed)),
+        tuple(name for name, is_allowed in before.items() if not is_allowed),
     )
 
 
-def _before(node: TreeNode, label: str) -> Iterator[str]:
+def _before(node: TreeNode, label: str, unguarded: Unguarded) -> Iterator[Tuple[str, bool]]:
     """Yield the states from which the author's transitions lead to a state, the nearest first.
 
-    Those of the containers around it come last, where a step back may go there.
+    Those of the containers around it come last, where a step back may go there. With each comes
+    whether they may do so without a state that is not to be repeated.
     """
     crosses = node.in_force.policy.goes_by_ways or node.settings.step_back_across
+    is_allowed = True
     for level in direct_levels_at_rest(node) if crosses else (node,):
+        is_allowed = is_allowed and level.settings_of(label).on_retry == ALLOW
+        drawn = unguarded.transitions(level) if is_allowed else {}
+        allowed = leading_to(level, (label,), drawn=drawn)
         for each in leading_to(level, (label,)):
-            yield name_of(TreePlace(level, each), node)
+            yield name_of(TreePlace(level, each), node), each in allowed
+        is_allowed = is_allowed and initial_label_of(level.machine) in (label, *allowed)
         label = next(iter(level.labels_from_parent), '')  # of the state around, on the next level
 
 
-def _kinds(node: TreeNode, settings: StateSettings, steps_back: bool) -> Iterator[WayKind]:
+def _kinds(node: TreeNode, settings: StateSettings, before: Sequence[str]) -> Iterator[WayKind]:
     """Yield the kinds of ways that may be on the menu of a state."""
     if not node.in_force.policy.goes_by_ways:
         return
@@ -194,11 +207,13 @@ def _kinds(node: TreeNode, settings: StateSettings, steps_back: bool) -> Iterato
     yield WayKind.WAIT
     if settings.preconditions:
         yield WayKind.PREPARE
-    if steps_back:
+    if before:
         yield WayKind.STEP_BACK
-        yield WayKind.START
-        if len(direct_levels_at_rest(node)) > 1:
-            yield WayKind.TOP
+    levels = direct_levels_at_rest(node)
+    for kind, level in ((WayKind.START, node), (WayKind.TOP, levels[-1])):
+        start = name_of(TreePlace(level, initial_label_of(level.machine)), node)
+        if start in before and (kind is WayKind.START or len(levels) > 1):
+            yield kind
 
 
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:

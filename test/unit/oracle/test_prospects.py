@@ -149,9 +149,75 @@ def test_a_step_back_may_run_what_leads_to_a_state_the_nearest_first():
     assert across['PUT'].before == ('/PICK', '/HOME', '/HELP')
 
 
+def chain(*labels, **drawn):
+    """A machine of these states, one behind the other. `drawn`: other transitions of them."""
+    sm = smach.StateMachine(OUTCOMES)
+    with sm:
+        for label, following in zip(labels, (*labels[1:], 'succeeded')):
+            state = drawn.get(label, Never())
+            further = {} if isinstance(state, smach.State) else state
+            state = Never() if isinstance(state, dict) else state
+            smach.StateMachine.add(label, state, {'succeeded': following, **further})
+    return sm
+
+
+def split(machine, label, guarded, **settings):
+    """What a step back from a state may run again, and what it may not, where some are guarded."""
+    states = {each: {'on_retry': 'confirm'} for each in guarded}
+    wrapped = OracleContainer.wrap(machine, settings={'states': states, **settings}, name='TOP')
+    found = {state.label: state for each in prospects_of(wrapped) for state in each.states}
+    return found[label].before, found[label].not_before
+
+
+def test_a_step_back_does_not_go_to_what_would_repeat_a_guarded_state():
+    assert split(chain('A', 'B', 'C', 'D', 'E'), 'E', ['C']) == (('D',), ('C', 'B', 'A'))
+    assert split(chain('A', 'B', 'C', 'D', 'E'), 'E', []) == (('D', 'C', 'B', 'A'), ())
+    assert split(chain('A', 'B', 'C', 'D', 'E'), 'C', ['E']) == (('B', 'A'), ())
+    assert split(chain('A', 'B', 'C'), 'C', ['C']) == ((), ('B', 'A'))
+
+
+def test_what_leads_around_a_guarded_state_may_run_again():
+    around = chain('A', 'B', 'C', 'D', A={'aborted': 'C'})
+    assert split(around, 'D', ['B']) == (('C', 'A'), ('B',))
+
+
+@pytest.mark.parametrize('inner', ['BRANCH', 'BOTH/BRANCH', 'BOTH'])
+def test_a_guarded_branch_of_a_concurrence_on_the_way_is_repeated_too(inner):
+    both = smach.Concurrence(OUTCOMES, 'succeeded')
+    with both:
+        smach.Concurrence.add('BRANCH', Never())
+        smach.Concurrence.add('OTHER', Never())
+    assert split(chain('A', 'BOTH', 'C', 'D', BOTH=both), 'D', [inner]) == (('C',), ('BOTH', 'A'))
+
+
+def test_a_container_on_the_way_is_repeated_only_if_it_must_come_to_its_guarded_state():
+    through, around = chain('X', 'Y'), chain('X', 'Y', X={'aborted': 'succeeded'})
+    assert split(chain('A', 'GET', 'C', GET=through), 'C', ['Y']) == ((), ('GET', 'A'))
+    assert split(chain('A', 'GET', 'C', GET=around), 'C', ['GET/Y']) == (('GET', 'A'), ())
+
+
+def test_a_guarded_state_of_a_container_keeps_the_places_outside_from_being_gone_to():
+    ways = {'policy': 'escalating'}
+    task = chain('HOME', 'GET', GET=chain('X', 'Y', 'Z'))
+    assert split(task, 'Z', ['Y'], **ways) == ((), ('Y', 'X', '/HOME'))
+    task = chain('HOME', 'GET', GET=chain('X', 'Y', 'Z'))
+    assert split(task, 'Z', ['GET'], **ways) == (('Y', 'X'), ('/HOME',))
+    task = chain('HOME', 'LOOK', 'GET', GET=chain('X', 'Y', 'Z'))
+    assert split(task, 'Z', ['HOME'], **ways) == (('Y', 'X', '/LOOK'), ('/HOME',))
+
+
+def test_a_way_that_on_retry_always_blocks_is_not_on_the_menu_that_is_told():
+    settings = {'policy': 'escalating', 'states': {'PICK': {'on_retry': 'never'}}}
+    kinds = {label: [kind.value for kind in state.kinds] for label, state in told(settings).items()}
+    assert kinds['PUT'] == ['again', 'wait']
+    settings = {'policy': 'escalating', 'states': {'HOME': {'on_retry': 'never'}}}
+    kinds = {label: [kind.value for kind in state.kinds] for label, state in told(settings).items()}
+    assert kinds['PUT'] == ['again', 'wait', 'step_back']
+
+
 def test_the_menu_of_a_state_is_told_before_anything_runs():
     settings = {'policy': 'escalating', 'states': {'PLACE': {'preconditions': ['HOME']}}}
     kinds = {label: [kind.value for kind in state.kinds] for label, state in told(settings).items()}
     assert kinds['PLACE'] == ['again', 'wait', 'prepare', 'step_back', 'start']
-    assert kinds['PUT'] == ['again', 'wait', 'step_back', 'start', 'top']
+    assert kinds['PUT'] == ['again', 'wait', 'step_back', 'top'], 'it is its own start'
     assert told(settings)['PUT'].before == ('/PICK', '/HOME', '/HELP')

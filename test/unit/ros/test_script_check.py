@@ -153,10 +153,24 @@ def test_the_report_has_the_menu_and_what_a_step_back_may_run_again(check):
     told = ' '.join(report.split())
     assert 'may run again LOOK, HOME' in told
     assert (
-        'the cheapest first of: again, after 10 s or 60 s, from 1, 2, 4... states back, from the '
-        'start; after 4 in a row, 8 in a trial, or where none costs less than to ask: ask'
+        'the one first that costs least for its hope, of: again, after 10 s or 60 s, from 1, 2, '
+        '4... states back, from the start; after 4 in a row, 8 in a trial, or where none costs '
+        'less than to ask: ask'
     ) in told
     assert 'after 4 in a row (max_recoveries cuts them to 2), 8 in a trial' in told
+
+
+def test_the_report_says_what_on_retry_leaves_out_of_what_may_run_again(check):
+    code, report, errors = check(
+        "machine('HOME', 'LOOK', 'POUR', 'WIPE').execute()", 'states: {POUR: {on_retry: confirm}}\n'
+    )
+    assert code == 0, errors
+    told = ' '.join(report.split())
+    assert (
+        'may run again nothing; it does not go back to POUR, LOOK, HOME, since that may repeat '
+        'what on_retry protects'
+    ) in told
+    assert told.count('may run again HOME') == 1
 
 
 def test_a_script_with_several_machines_goes_on_and_ends_when_one_comes_again(check):

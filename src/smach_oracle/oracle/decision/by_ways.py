@@ -74,7 +74,7 @@ class Escalating(Baseline):
         )
 
     def order(self, situation: Situation) -> Tuple[Way, ...]:
-        """Return the ways that are open, untried and pay, the cheapest first."""
+        """Return the ways that are open, untried and pay. The first costs least for its hope."""
         if self._spent(situation):
             return ()
         menu, limit = situation.menu, self.price_of_asking(situation)

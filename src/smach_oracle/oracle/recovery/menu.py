@@ -1,7 +1,7 @@
 """Makes the menu of a failure: the ways on, from where the machine stands."""
 
 from collections import deque
-from typing import Collection, Iterator, List, Sequence, Set, Tuple
+from typing import Collection, Iterator, List, Mapping, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -15,6 +15,8 @@ from ..machine.tree_node import TreeNode, node_of
 from ..records.visits import Visit, VisitResult
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import initial_label_of, states_of, transitions_of
+
+Drawn = Mapping[str, Mapping[str, Optional[str]]]  # target by state and outcome
 
 _MOST_VISITED = 64  # states, to which a step back may lead
 
@@ -70,12 +72,14 @@ def _may_end_well(node: TreeNode, label: str) -> bool:
     )
 
 
-def leading_to(node: TreeNode, goals: Collection[str], around: str = '') -> List[str]:
+def leading_to(
+    node: TreeNode, goals: Collection[str], around: str = '', drawn: Optional[Drawn] = None
+) -> List[str]:
     """Return the states from which the author's transitions lead to some others, nearest first.
 
-    `around`: the state that they do so without.
+    `around`: the state that they do so without. `drawn`: the transitions, None: all of them.
     """
-    drawn = transitions_of(node.machine)
+    drawn = transitions_of(node.machine) if drawn is None else drawn
     found = dict.fromkeys([*goals, around])
     waiting = deque(goals)
     while waiting:

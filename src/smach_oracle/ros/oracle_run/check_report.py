@@ -152,12 +152,22 @@ def _state(container: ContainerProspect, state: StateProspect, usual: str) -> It
     settings, actions = state.settings, _actions(container, state)
     yield from _entry('on a failure', actions if actions != usual else '', 4)
     if Action.STEP_BACK in {action for _, some in state.actions for action in some}:
-        yield from _entry('may run again', ', '.join(state.before), 4)
+        yield from _entry('may run again', _before(state), 4)
     yield from _entry('preconditions', ', '.join(spec.name for spec in settings.preconditions), 4)
     if settings.time_limit_s is not None:
         yield from _entry('time limit', '{:g} s'.format(settings.time_limit_s), 4)
     yield from _entry('interfaces', ', '.join(offer.name for offer in state.offers), 4)
     yield from _entry('set', ', '.join(_changed(settings, container.settings.defaults, _TOLD)), 4)
+
+
+def _before(state: StateProspect) -> str:
+    """Say which states a step back may run again, and which ones it does not go to."""
+    told = ', '.join(state.before)
+    if not state.not_before:
+        return told
+    return '{}; it does not go back to {}, since that may repeat what on_retry protects'.format(
+        told or 'nothing', ', '.join(state.not_before)
+    )
 
 
 def _kind(state: smach.State) -> str:
@@ -244,8 +254,8 @@ def _menu(container: ContainerProspect, state: StateProspect) -> str:
     """Say which ways a policy may go that goes by ways, and how many of them."""
     policy, allowed = POLICIES[container.settings.policy], state.settings.max_recoveries
     most, of_trial = policy.most_of_streak, policy.most_of_trial
-    told = '{} of: {}; after {} in a row'.format(
-        'each once' if policy.draws else 'the cheapest first',
+    told = '{}, of: {}; after {} in a row'.format(
+        'each once' if policy.draws else 'the one first that costs least for its hope',
         ', '.join(_WAYS[kind] for kind in state.kinds),
         most,
     )
