@@ -160,6 +160,18 @@ def test_the_report_has_the_menu_and_what_a_step_back_may_run_again(check):
     assert 'after 4 in a row (max_recoveries cuts them to 2), 8 in a trial' in told
 
 
+def test_the_report_warns_of_options_that_a_machine_does_not_get_as_its_program_wraps_it(check):
+    code, report, errors = check("""
+        from smach_oracle.oracle import OracleContainer
+        OracleContainer.wrap(machine('A'), name='OWN').execute()
+        machine('B', 'C').execute()
+    """)
+    assert code == 0, errors
+    told = ' '.join(report.split())
+    assert told.count('not in force') == 1 and '1 warning' in told
+    assert 'Warning: OWN: --config is not in force here' in told
+
+
 def test_the_report_says_what_on_retry_leaves_out_of_what_may_run_again(check):
     code, report, errors = check(
         "machine('HOME', 'LOOK', 'POUR', 'WIPE').execute()", 'states: {POUR: {on_retry: confirm}}\n'

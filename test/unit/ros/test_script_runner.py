@@ -105,6 +105,53 @@ def test_a_failing_machine_recovers_and_one_that_is_only_observed_does_not(run):
     assert run(text, directly=True).stdout == 'aborted\n'
 
 
+WRAPS_ITSELF = """
+    from smach_oracle.ros.container import OracleContainer
+    smach.set_loggers(print, print, print, print)
+    inner, top = machine(), smach.StateMachine(['succeeded', 'aborted', 'preempted'])
+    with top:
+        smach.StateMachine.add('INNER', inner, {'succeeded': 'AGAIN'})
+        smach.StateMachine.add('AGAIN', Turn())
+    OracleContainer.wrap(top, settings={'policy': 'always_ask'}, name='TASK')
+    for _ in range(2):
+        print(top.execute(), top.settings.policy)
+"""
+
+
+@pytest.mark.parametrize(
+    'options, told',
+    [
+        (['--policy', 'retry'], '--policy is not in force'),
+        (['--policy=retry', '--without-oracle'], '--policy and --without-oracle are not in force'),
+        (['--config', 'mine.yaml', '--no-nested'], '--config and --no-nested are not in force'),
+        (['--checkpoint', 'a.db', '--resume=ask'], '--checkpoint and --resume are not in force'),
+    ],
+)
+def test_a_program_that_wraps_its_machine_is_told_once_which_options_are_not_in_force(
+    run, tmp_path, options, told
+):
+    (tmp_path / 'mine.yaml').write_text('policy: retry\n')
+    result = run(WRAPS_ITSELF, options=options)
+    assert result.stdout.count('not in force') == 1, result.stderr
+    assert 'TASK: {}'.format(told) in result.stdout
+    assert result.stdout.count('succeeded always_ask\n') == 2
+
+
+def test_nothing_is_told_where_no_option_is_out_of_force(run, tmp_path):
+    assert 'in force' not in run(WRAPS_ITSELF, options=['--name', 'TASK']).stdout
+    wrapped_here = """
+        smach.set_loggers(print, print, print, print)
+        top = smach.StateMachine(['succeeded', 'aborted', 'preempted'])
+        with top:
+            smach.StateMachine.add('INNER', machine())
+        for _ in range(2):
+            print(top.execute(), top.settings.policy)
+    """
+    result = run(wrapped_here, options=['--policy', 'retry'])
+    assert 'in force' not in result.stdout
+    assert result.stdout.count('succeeded retry\n') == 2
+
+
 def test_without_an_expert_a_machine_ends_as_it_would_have(run):
     assert run('print(machine(*["aborted"] * 99).execute())').stdout == 'aborted\n'
 

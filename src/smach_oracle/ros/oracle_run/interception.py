@@ -8,10 +8,10 @@ an author's override runs once.
 import functools
 import os
 import threading
-from typing import Any, Callable, Iterator, List, Tuple, Type
+from typing import Any, Callable, Iterator, List, Optional, Tuple, Type
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.identity import WeakIdentityMap, own_mark
 
 WrapFunction = Callable[[smach.StateMachine], None]
@@ -27,10 +27,18 @@ class Interception:
 
     :param wrap: swaps the machine's class. An error it raises surfaces from the machine's
         `execute`.
+    :param why_left: says what to warn of where the program has wrapped a machine itself, '' for
+        nothing. That is said once.
     """
 
-    def __init__(self, wrap: WrapFunction) -> None:
+    def __init__(
+        self,
+        wrap: WrapFunction,
+        why_left: Callable[[smach.StateMachine], str] = lambda machine: '',
+    ) -> None:
         self._wrap = wrap
+        self._why_left: Optional[Callable[[smach.StateMachine], str]] = why_left
+        self._wrapped: WeakIdentityMap[smach.StateMachine, bool] = WeakIdentityMap()
         self._process = os.getpid()  # in a child of it machines stay as they are
         self._told_in = self._process
         self._left_bare: WeakIdentityMap[smach.StateMachine, bool] = WeakIdentityMap()
@@ -48,6 +56,8 @@ class Interception:
         :returns: whether it was wrapped just now.
         """
         if isinstance(machine, OracleContainer):
+            if self._why_left is not None and oracle_of(machine).is_top:
+                self._leave(machine)
             return False
         if os.getpid() != self._process:
             if self._told_in != os.getpid():
@@ -60,10 +70,20 @@ class Interception:
             if machine in self._left_bare:
                 return False
             self._wrap(machine)
+            self._wrapped[machine] = True
             for child in machines_inside(machine):
                 if not isinstance(child, OracleContainer):
                     self._left_bare[child] = True
         return isinstance(machine, OracleContainer)
+
+    def _leave(self, machine: smach.StateMachine) -> None:
+        """Warn once where it is the program that has wrapped a machine."""
+        with self._lock:
+            if self._why_left is None or machine in self._wrapped:
+                return
+            text, self._why_left = self._why_left(machine), None
+        if text:
+            smach.logwarn(text)
 
     def _patch(self, cls: Type[smach.StateMachine]) -> None:
         original = cls.execute  # its own, or one that a mix-in brings

@@ -30,6 +30,8 @@ class MachineCheck:
     :param wrap: puts a machine under an oracle as a real run does. A SettingsError is passed on.
     :param settings: those in force, for containers that are no state machines.
     :param tell: takes lines of text for people.
+    :param why_left: says what to warn of where the program has wrapped a machine itself, ''
+        for nothing.
     """
 
     def __init__(
@@ -38,11 +40,13 @@ class MachineCheck:
         settings: Callable[[], Settings],
         tell: Callable[[List[str]], None],
         names: CheckedNames,
+        why_left: Callable[[smach.StateMachine], str],
     ) -> None:
         self._wrap = wrap
         self._settings = settings
         self._tell = tell
         self._names = names
+        self._why_left = why_left
         self._lock = threading.RLock()
         self._seen: List[smach.Container] = []  # the objects themselves, so that no id comes again
         self._told: List[Tuple[str, ...]] = []  # of each machine, except its name
@@ -87,9 +91,12 @@ class MachineCheck:
 
     def _check(self, machine: smach.StateMachine, running: ExitStack) -> None:
         with _heard_warnings() as warnings:
-            if not isinstance(machine, OracleContainer):
+            is_left = isinstance(machine, OracleContainer)
+            if not is_left:
                 self._wrap(machine)
             name = _prepare(cast(OracleContainer, machine), running, self._names.complain)
+            if is_left:
+                warnings.extend(filter(None, [self._why_left(machine)]))
         self._names.note(sorted_preconditions(machine, oracle_of(machine).settings).placed)
         prospects = prospects_of(machine)
         told = _without_name(prospects, name)

@@ -60,7 +60,11 @@ def check_script(args: Sequence[str], notes: Sequence[str]) -> NoReturn:
     refusal = Refusal(ShutdownGuard(_nothing, lambda timeout_s: None), tell)
     wrapper = MachineWrapper(invocation, refusal, lambda machine, is_first: watch.names.complain)
     check = MachineCheck(
-        wrapper.wrap, lambda: read_settings(load(invocation)), watch.tell, watch.names
+        wrapper.wrap,
+        lambda: read_settings(load(invocation)),
+        watch.tell,
+        watch.names,
+        wrapper.why_left,
     )
 
     def reached(container: smach.Container) -> Any:

@@ -25,6 +25,7 @@ from typing import (
 )
 
 import smach
+from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
@@ -49,6 +50,21 @@ OPTIONS_WITH_VALUE = (
     '--record',
     '--record-topic',
     '--checkpoint',
+    '--from',
+    '--resume-map',
+    '--repeat',
+)
+
+
+# those that a machine gets when `oracle_run` wraps it
+_OPTIONS_OF_WRAPPING = (
+    '--config',
+    '--policy',
+    '--rates-file',
+    '--no-nested',
+    '--without-oracle',
+    '--checkpoint',
+    '--resume',
     '--from',
     '--resume-map',
     '--repeat',
@@ -188,6 +204,7 @@ class Invocation(NamedTuple):
     options: attachment.RecordingOptions
     name: str = ''
     only_check: bool = False
+    of_wrapping: Sequence[str] = ()  # the options that a machine gets when it is wrapped
 
 
 def parse(args: Sequence[str]) -> Invocation:
@@ -226,7 +243,12 @@ def parse(args: Sequence[str]) -> Invocation:
         attachment.RecordingOptions(record, tuple(given.record_topic)),
         given.name,
         given.check,
+        [each for each in _OPTIONS_OF_WRAPPING if each in _names_of(line.options)],
     )
+
+
+def _names_of(options: Sequence[str]) -> List[str]:
+    return [word.split('=')[0] for word in options]
 
 
 def _stored(given: argparse.Namespace) -> Dict[str, Any]:
@@ -350,6 +372,19 @@ class MachineWrapper:
         with self._refusal.of_errors():
             self.wrap(machine)
 
+    def why_left(self, machine: smach.StateMachine) -> str:
+        """Say that options are not in force for a machine that its program has wrapped, or ''."""
+        options = self._invocation.of_wrapping
+        if not options:
+            return ''
+        return (
+            '{}: {} not in force here, since the program wraps this machine itself, and gives it '
+            'its settings there'
+        ).format(
+            oracle_of(machine).path,
+            '{} {}'.format(' and '.join(options), 'is' if len(options) == 1 else 'are'),
+        )
+
     def wrap(self, machine: smach.StateMachine) -> None:
         """Swap the machine's class.
 
@@ -460,6 +495,7 @@ def main(args: Optional[Sequence[str]] = None) -> None:
     atexit.register(attachments.close, 1.0)
     refusal = Refusal(guard, tell)
     attachments.refusing, attachments.guard = refusal.of_errors, guard
-    Interception(MachineWrapper(invocation, refusal)).install()
+    wrapper = MachineWrapper(invocation, refusal)
+    Interception(wrapper, wrapper.why_left).install()
     with refusal.decides_exit_code():
         run_script(invocation.script, invocation.script_args)
