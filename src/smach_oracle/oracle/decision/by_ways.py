@@ -7,7 +7,7 @@ from typing import List, Mapping, Sequence, Tuple
 
 from .failure_rate import FailureClass
 from .policy import Action, Baseline, Menu, Situation, draws_of
-from .ways import KEEP, Prices, Way
+from .ways import KEEP, Choice, Prices, Way
 
 
 def action_of(order: Sequence[Way]) -> Action:
@@ -36,6 +36,12 @@ class Escalating(Baseline):
     # what is left of the hope that the state succeeds without any other one
     hope = {FailureClass.LOW: 1.0, FailureClass.MODERATE: 0.5, FailureClass.HIGH: 0.25}
     hope_after_each = 0.5  # way of the streak
+    parameters: Mapping[str, float] = {'explore': 0.0, 'seed': 0}
+
+    def __init__(self, explore: float = 0.0, seed: float = 0) -> None:
+        self.explore = float(explore)
+        self.seed = int(seed)
+        self.draws = self.explore > 0.0
 
     def decide(self, situation: Situation) -> Action:
         """Return the action of the way that comes first."""
@@ -86,6 +92,22 @@ class Escalating(Baseline):
         priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
         return tuple(way for cost, way in priced if cost < limit)
 
+    def choose(self, situation: Situation) -> Choice:
+        """Return the order of the ways, in which the first two may have changed places."""
+        return self._explored(Choice(self.order(situation)), situation)
+
+    def _explored(self, choice: Choice, situation: Situation) -> Choice:
+        """Have the first two ways change places, with the chance `explore`.
+
+        A state that is not to be repeated is not among them: a way that repeats it is not open.
+        """
+        if not self.explore or len(choice.ways) < 2:
+            return choice
+        first, second, *others = choice.ways
+        if draws_of(self.seed, situation.past).random() >= self.explore:
+            return choice._replace(chance=1.0 - self.explore)
+        return Choice((second, first, *others), self.explore)
+
     def _left(self, menu: Menu) -> List[Way]:
         return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
 
@@ -120,11 +142,16 @@ class AnyWay(Escalating):
     """
 
     name = 'any_way'
-    draws = True
     parameters: Mapping[str, float] = {'seed': 0}
 
     def __init__(self, seed: float = 0) -> None:
-        self.seed = int(seed)
+        super().__init__(seed=seed)
+        self.draws = True
+
+    def choose(self, situation: Situation) -> Choice:
+        """Return the drawn order, and the chance of its first way."""
+        ways = self.order(situation)
+        return Choice(ways, 1.0 / max(1, len(ways)))
 
     def order(self, situation: Situation) -> Tuple[Way, ...]:
         """Return the ways that are open, untried and pay, in the order that is drawn."""

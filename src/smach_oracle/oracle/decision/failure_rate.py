@@ -261,7 +261,7 @@ def base_of(learned: Learned) -> Snapshot:
     """Return what `merged` has to know of a snapshot, to tell later what is new since then."""
     return {
         key: learned[key]
-        for key in ('estimator', 'successes', 'failures', 'rate')
+        for key in ('estimator', 'successes', 'failures', 'rate', 'ways_total')
         if key in learned
     }
 

@@ -4,6 +4,7 @@ from typing import Dict, Mapping, Tuple
 
 from ..errors import SettingsError
 from .by_ways import AnyWay, Escalating
+from .learned import Learned
 from .policy import (
     Algorithm1,
     AlwaysAsk,
@@ -18,7 +19,8 @@ from .policy import (
 
 BASELINES: Tuple[Policy, ...] = (Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())
 POLICIES: Dict[str, Policy] = {
-    policy.name: policy for policy in (Algorithm1(), Prose(), Escalating(), AnyWay(), *BASELINES)
+    policy.name: policy
+    for policy in (Algorithm1(), Prose(), Escalating(), Learned(), AnyWay(), *BASELINES)
 }
 NO_PARAMETERS: Mapping[str, float] = {}
 

@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Mapping, NamedTuple, Optional, Tuple
 
 from .failure_rate import FailureClass
-from .ways import RESTORE, Prices, StreakSoFar, Way
+from .ways import RESTORE, Choice, Evidence, Prices, StreakSoFar, Way
 
 
 class Action(str, Enum):
@@ -58,13 +58,14 @@ class Past(NamedTuple):
 class Menu(NamedTuple):
     """What a policy that goes by ways chooses from. `ways`: those of the failure, in any order.
 
-    `has_expert`: somebody can be asked.
+    `has_expert`: somebody can be asked. `evidence`: for a policy that learns.
     """
 
     ways: Tuple[Way, ...] = ()
     streak: StreakSoFar = StreakSoFar()
     prices: Prices = Prices()
     has_expert: bool = True
+    evidence: Evidence = Evidence()
 
 
 class Situation(NamedTuple):
@@ -92,12 +93,14 @@ class Policy:
     `asks`: whether it may ask. A policy that may not ask ends the container where others would ask.
     `draws`: whether it wants to know the place of the failure (`Past.place`). `parameters`: the
     values that may be set, with their defaults. `goes_by_ways`: whether it chooses from the menu
-    (`order`), and not by a table (`decide`). `userdata`: that of its jumps, unless a user sets it.
+    (`choose`), and not by a table (`decide`). `learns`: whether it wants to know what the ways have
+    led to (`Menu.evidence`). `userdata`: that of its jumps, unless a user sets it.
     """
 
     name = ''
     asks = True
     goes_by_ways = False
+    learns = False
     # decisions of its own that lead to a state, of a streak and of a trial. None: it has no menu
     most_of_streak: Optional[int] = None
     most_of_trial: Optional[int] = None
@@ -132,6 +135,13 @@ class Policy:
         For a policy that goes by ways.
         """
         raise NotImplementedError
+
+    def choose(self, situation: Situation) -> Choice:
+        """Return the ways in the order in which it goes them now, and what led to it.
+
+        It is that of `order`, unless another one was drawn.
+        """
+        return Choice(self.order(situation))
 
     def why(self, situation: Situation) -> str:
         """Say why it gives up or asks, as a clause, or '' where its cell says it all."""

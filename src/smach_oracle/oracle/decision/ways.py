@@ -6,10 +6,12 @@ execution of its container, up to its next success. doc/ways.md says what is on 
 """
 
 from enum import Enum
-from typing import NamedTuple, Tuple
+from typing import Mapping, NamedTuple, Optional, Tuple
 
 KEEP, RESTORE = 'keep', 'restore'
 WAITS_S = (10.0, 60.0)  # before the failed state is entered again
+# the places of a way: the first of its streak, a later one, the choice of a person
+PLACES = FIRST, LATER, BY_PERSON = 0, 1, 2
 _FROM = 'from '
 
 
@@ -64,6 +66,11 @@ class Way(NamedTuple):
         return self.kind in (WayKind.AGAIN, WayKind.WAIT, WayKind.PREPARE)
 
 
+def key_of(target: str, here: str) -> str:
+    """Return the key of the way that enters a state. `here`: the failed one."""
+    return WayKind.AGAIN.value if target == here else _FROM + target
+
+
 def way_in_words(key: str) -> str:
     """Return what was done by a way, for people. `key`: that of the way."""
     if key.startswith(_FROM):
@@ -78,12 +85,59 @@ class StreakSoFar(NamedTuple):
     """What was done in a streak. `tried`: the keys of its ways, in order.
 
     `attempts`: the ways that were gone, those of the containers within among them. `minutes`: since
-    its first failure.
+    its first failure. `moved`: one of them came before its turn in the menu's own order.
     """
 
     tried: Tuple[str, ...] = ()
     attempts: int = 0
     minutes: float = 0.0
+    moved: bool = False
+
+
+class WayResult(NamedTuple):
+    """The result of one way from a failure of one state.
+
+    `way`: its key. `kind`: the value of its WayKind. `place`: 0 for the first way of its streak, 1
+    for a later one, 2 for the choice of a person. `failure`: the kind of failure, a
+    `failure_text_key`. `helped`: None is not known. `minutes`: from the failure on, until the
+    state had its next result, or until it was clear that nobody knows. `hoped`: the chance to help
+    for which a policy preferred it to the ways of the menu's own order, None where none did.
+    """
+
+    way: str
+    kind: str
+    place: int
+    failure: str
+    helped: Optional[bool]
+    minutes: float
+    hoped: Optional[float] = None
+
+
+class Evidence(NamedTuple):
+    """What is known of the ways on from the failures of one state.
+
+    `results`: of its ways, oldest first. `failure`: the kind of the present failure, as they have
+    it. `of_kinds`: how often ways of a kind at a place have helped, and how often not, in the
+    whole machine.
+    """
+
+    results: Tuple[WayResult, ...] = ()
+    failure: str = ''
+    of_kinds: Mapping[Tuple[str, int], Tuple[float, float]] = {}
+
+
+class Choice(NamedTuple):
+    """What a policy makes of a menu: the ways in the order in which it would go them.
+
+    It asks where none is left. `chance`: of the first one to be that, where it was drawn. `hoped`:
+    the chance to help for which it has come before its turn in the menu's own order. None: it has
+    not. `remark`: what the log is told once of the state, '' for nothing.
+    """
+
+    ways: Tuple[Way, ...]
+    chance: float = 1.0
+    hoped: Optional[float] = None
+    remark: str = ''
 
 
 class Prices(NamedTuple):

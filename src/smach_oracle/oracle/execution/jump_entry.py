@@ -12,7 +12,7 @@ from ..checkpoint.resuming import forget_resumed
 from ..control.control import Jump
 from ..decision.ways import KEEP, RESTORE
 from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
-from ..machine.nesting import nodes_of
+from ..machine.nesting import nodes_of, settle_ways
 from ..machine.places import TreePlace, place_at
 from ..machine.repeats import leave_for, why_closed
 from ..machine.snapshots import restore
@@ -162,6 +162,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     if way is None or why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
         return False
+    settle_ways(node, None)
     node.record(label).forget_entry()  # it may have been led to, and is not entered
     entry = prepare_entry(way, jump.written, 'sent')
     node.records.take_up_work()

@@ -12,7 +12,7 @@ from smach_oracle.forking import in_child
 from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.execution import Execution, ends_program, why_no_outcome
-from ..machine.nesting import nodes_of
+from ..machine.nesting import nodes_of, settle_ways
 from ..machine.oracle import save_rates
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
@@ -134,6 +134,10 @@ def _end_trial(
         node.machine.service_preempt()
         for state in states_of(node.machine).values():
             recall_preempts(state)
+    is_lost = why is TrialEnd.ERROR or (
+        why is TrialEnd.OUTCOME and outcome in node.in_force.failing
+    )
+    settle_ways(node, False if is_lost else None)
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',

@@ -14,6 +14,9 @@ from ..settings.names import Nested, Strictness
 from ..settings.settings import ALLOW, RUN, Settings, StateSettings
 from .state_record import FastEdge, StateRecord
 
+# whether a way to it has helped a state whose visit ended so. Nobody knows of the others
+_HELPED = {VisitResult.SUCCESS: True, VisitResult.FAILURE: False}
+
 
 class ContainerSettings:
     """The settings of one container.
@@ -208,6 +211,7 @@ class ContainerRecords:
         """
         if result is VisitResult.SUCCESS:
             record.learn(False)
+        record.settle_way(_HELPED.get(result))
         record.visit_ended()
         self.history.visited(Visit(record.label, outcome, result), record.has_preconditions)
 

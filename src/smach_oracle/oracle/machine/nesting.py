@@ -17,6 +17,7 @@ import smach
 
 from ..identity import own_mark
 from ..smach_private import Labels, states_of
+from .state_record import StateRecord
 from .tree_node import TreeNode, marked_node, node_of
 
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
@@ -210,3 +211,15 @@ def nodes_of(machine: smach.StateMachine) -> Iterator[TreeNode]:
     """Yield the node of a container and those of all wrapped containers below it, each once."""
     for container in containers_in(machine):
         yield marked_node(container)
+
+
+def records_of(node: TreeNode) -> Iterator[StateRecord]:
+    """Yield the records of all states of the tree in which a container lies."""
+    for each in nodes_of(node.top().machine):
+        yield from list(each.records.by_label.values())
+
+
+def settle_ways(node: TreeNode, helped: Optional[bool]) -> None:
+    """Note the result of all ways that are gone in a tree. None: nobody knows it."""
+    for record in records_of(node):
+        record.settle_way(helped)

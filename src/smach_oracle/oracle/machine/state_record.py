@@ -1,7 +1,7 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
 import threading
-from typing import TYPE_CHECKING, Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..decision.failure_rate import (
     Estimator,
@@ -12,6 +12,7 @@ from ..decision.failure_rate import (
     merged,
 )
 from ..records.visits import Visit
+from ..records.way_results import WayLog, WayResult, merged_ways
 from ..settings.settings import StateSettings
 
 if TYPE_CHECKING:
@@ -79,6 +80,7 @@ class StateRecord:
         self._learned = 0  # successes by way of edges that the estimator knows
         # what of it the rates file has, as `base_of` tells it
         self.shared: Dict[str, object] = {}
+        self._ways = WayLog()
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
         self._visits = 0  # not counted by an FastEdge
@@ -154,7 +156,7 @@ class StateRecord:
     def learned(self) -> Dict[str, object]:
         """Return what was learned as plain data."""
         with self._lock:
-            return self._up_to_date().snapshot()
+            return {**self._up_to_date().snapshot(), **self._ways.told()}
 
     def merged_with(self, theirs: Mapping[str, object]) -> Dict[str, object]:
         """Return what others have learned, with what was learned here since it was last shared.
@@ -162,16 +164,20 @@ class StateRecord:
         :raises ValueError: where theirs cannot be read.
         """
         with self._lock:
-            return merged(self._up_to_date().snapshot(), self.shared, theirs, self.settings.memory)
+            return self._merged(self.shared, theirs)
+
+    def _merged(
+        self, base: Mapping[str, object], theirs: Mapping[str, object]
+    ) -> Dict[str, object]:
+        own = self.learned()
+        rates = merged(own, base, theirs, self.settings.memory)
+        return {**rates, **merged_ways(own, base, theirs)}
 
     def share(self, before: Mapping[str, object], written: Mapping[str, object]) -> None:
         """Have what is shared now. `before`: what was learned here when it was merged."""
         with self._lock:
-            estimator = self._up_to_date()
             if before != written:
-                estimator.restore(
-                    merged(estimator.snapshot(), base_of(before), written, self.settings.memory)
-                )
+                self.restore(self._merged(base_of(before), written))
             self.shared = base_of(written)
 
     @property
@@ -214,6 +220,7 @@ class StateRecord:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self._tried = '', 0
+        self.settle_way(None)
         if self.special:
             self.forget_entry()  # of a trial that ended before the visit
         self._visits_before = self._visits + self._by_edges()
@@ -226,6 +233,30 @@ class StateRecord:
     def note_tried(self, what: str, successes: int) -> None:
         """Note what the oracle does after a failure. `successes`: in all, before it."""
         self._tried = what, successes
+
+    def go_way(self, gone: WayResult, minutes: Callable[[], float]) -> None:
+        """Note that a way on from its failure is gone. See `WayLog.go`.
+
+        The next visit takes no short way, so that its result is noted.
+        """
+        with self._lock:
+            self._ways.go(gone, minutes)
+        self.retire_edges()
+
+    def settle_way(self, helped: Optional[bool]) -> None:
+        """Note the result of the way that is gone, where one is. None: nobody knows it."""
+        with self._lock:
+            self._ways.settle(helped)
+
+    def ways_so_far(self) -> Tuple[WayResult, ...]:
+        """Return the results of the ways on from its failures, the latest ones, oldest first."""
+        with self._lock:
+            return tuple(self._ways.results)
+
+    def failure_key(self, kind: int, outcome: str, text: str) -> str:
+        """Return the name of a kind of its failures. See `WayLog.failure_key`."""
+        with self._lock:
+            return self._ways.failure_key(kind, outcome, text)
 
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""
@@ -243,12 +274,13 @@ class StateRecord:
         return counts
 
     def restore(self, learned: Mapping[str, object]) -> None:
-        """Take over a snapshot of an estimator.
+        """Take over what was learned.
 
         :raises ValueError: where it cannot be read.
         """
         with self._lock:
             self._up_to_date().restore(learned)
+            self._ways.take_over(learned)
 
     def _by_edges(self) -> int:
         count = self._retired
@@ -259,6 +291,8 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way."""
         state: Dict[str, object] = {**vars(self), 'snapshot': None, 'view': None, 'way_down': ()}
+        ways = state['_ways'] = WayLog()
+        ways.take_over(self._ways.told())
         del state['_lock']
         return state
 

@@ -17,7 +17,7 @@ class OpenStreak:
 
     `successes`: of the state in all. `began_s`: on the trial's clock of work. `visited`: the states
     before the first failure, by name, the latest first. `leaves`: whether the way that is gone now
-    leaves the container.
+    leaves the container. `moved`: whether a way was gone out of the menu's own order.
     """
 
     def __init__(self, successes: int, began_s: float, visited: Iterable[str]) -> None:
@@ -27,15 +27,18 @@ class OpenStreak:
         self.tried: List[str] = []
         self.attempts = 0
         self.leaves = False
+        self.moved = False
 
-    def note(self, way: str) -> None:
-        """Note that a way was gone."""
+    def note(self, way: str, moved: bool = False) -> None:
+        """Note that a way was gone. `moved`: out of the menu's own order."""
         self.tried.append(way)
         self.attempts += 1
+        self.moved = self.moved or moved
 
     def so_far(self, now_s: float) -> StreakSoFar:
         """Return what was done. `now_s`: on the same clock."""
-        return StreakSoFar(tuple(self.tried), self.attempts, (now_s - self.began_s) / 60.0)
+        minutes = (now_s - self.began_s) / 60.0
+        return StreakSoFar(tuple(self.tried), self.attempts, minutes, self.moved)
 
 
 class Streaks:
@@ -70,7 +73,14 @@ class Streaks:
     def told(self) -> Told:
         """Return them as plain data, for `take_over`."""
         return {
-            label: [each.successes, each.began_s, list(each.visited), each.tried, each.attempts]
+            label: [
+                each.successes,
+                each.began_s,
+                list(each.visited),
+                each.tried,
+                each.attempts,
+                each.moved,
+            ]
             for label, each in self._open.items()
         }
 
@@ -81,9 +91,11 @@ class Streaks:
         """
         taken = {}
         try:
-            for label, (successes, began_s, visited, tried, attempts) in told.items():
+            # earlier versions did not tell whether a way was moved
+            for label, (successes, began_s, visited, tried, attempts, *moved) in told.items():
                 streak = OpenStreak(int(successes), float(began_s), map(str, visited))
                 streak.tried, streak.attempts = list(map(str, tried)), int(attempts)
+                streak.moved = any(moved)
                 taken[label] = streak
         except (AttributeError, TypeError, ValueError) as err:
             raise ValueError('cannot be read as streaks: {}'.format(err)) from err

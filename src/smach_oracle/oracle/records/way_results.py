@@ -6,33 +6,20 @@ a shutdown or the act of a person.
 """
 
 import re
-from typing import NamedTuple, Optional
+from collections import deque
+from typing import Any, Callable, Deque, Dict, List, Mapping, Optional, Tuple
 
+from ..decision.ways import PLACES, WayResult
 from .events import FailureKind
 from .short_text import shortened
 
-FIRST, LATER, BY_PERSON = 0, 1, 2  # the places of a way
+MOST_RESULTS = 120  # that are kept of a state, the latest ones
+MOST_FAILURES = 8  # kinds of failure with a text of their own, among these
+WAYS, WAYS_TOTAL = 'ways', 'ways_total'  # keys of what was learned of a state
 
 _LONGEST = 120
 _LONGEST_READ = 2000
 _NUMBER = re.compile(r'(?:(?<!\w)[-+])?(?:0x[0-9a-f]+|\d+(?:\.\d+)?(?:e[-+]?\d+)?)', re.IGNORECASE)
-
-
-class WayResult(NamedTuple):
-    """The result of one way from a failure of one state.
-
-    `way`: its key. `kind`: the value of its WayKind. `place`: 0 for the first way of its streak, 1
-    for a later one, 2 for the choice of a person. `failure`: the kind of failure, a
-    `failure_text_key`. `helped`: None is not known. `minutes`: from the failure on, until the
-    state had its next result, or until it was clear that nobody knows.
-    """
-
-    way: str
-    kind: str
-    place: int
-    failure: str
-    helped: Optional[bool]
-    minutes: float
 
 
 def failure_text_key(kind: int, outcome: str, text: str) -> str:
@@ -47,3 +34,116 @@ def failure_text_key(kind: int, outcome: str, text: str) -> str:
     words = [names.get(kind, str(kind)), outcome]
     plain = ' '.join(_NUMBER.sub('#', shortened(text, _LONGEST_READ)).split())
     return shortened(': '.join(filter(None, (' '.join(filter(None, words)), plain))), _LONGEST)
+
+
+def plain_failure_key(key: str) -> str:
+    """Return the name of a kind of failure without its text."""
+    return key.partition(':')[0]
+
+
+class WayLog:
+    """The results of the ways on from one state, and the way that is gone now.
+
+    `total`: how many results there were in all.
+    """
+
+    def __init__(self) -> None:
+        self.results: Deque[WayResult] = deque(maxlen=MOST_RESULTS)
+        self.total = 0
+        self._gone: Optional[WayResult] = None
+        self._minutes: Callable[[], float] = float
+
+    def failure_key(self, kind: int, outcome: str, text: str) -> str:
+        """Return the name of a kind of failure. It has no text where enough others have one."""
+        key = failure_text_key(kind, outcome, text)
+        known = {each.failure for each in self.results if ':' in each.failure}
+        return key if key in known or len(known) < MOST_FAILURES else plain_failure_key(key)
+
+    def go(self, gone: WayResult, minutes: Callable[[], float]) -> None:
+        """Note that a way is gone from now on. `minutes`: since it was chosen, later on."""
+        self.settle(None)
+        self._gone, self._minutes = gone, minutes
+
+    def settle(self, helped: Optional[bool]) -> None:
+        """Note the result of the way that is gone, where one is. None: nobody knows it."""
+        if self._gone is not None:
+            result = self._gone._replace(helped=helped, minutes=round(self._minutes(), 3))
+            self._gone, self._minutes = None, float
+            self.results.append(result)
+            self.total += 1
+
+    def told(self) -> Dict[str, Any]:
+        """Return the results as plain data, nothing where there is none. See `results_in`."""
+        return told_of(self.results, self.total) if self.results else {}
+
+    def take_over(self, learned: Mapping[str, Any]) -> None:
+        """Go on with the results that are among what was learned of a state.
+
+        :raises ValueError: where they cannot be read.
+        """
+        results, total = results_in(learned)
+        self.results = deque(results, MOST_RESULTS)
+        self.total = total
+
+
+def told_of(results: Deque[WayResult], total: int) -> Dict[str, Any]:
+    """Return results as plain data: each way and kind of failure by its place in a list."""
+    ways: Dict[Tuple[str, str], int] = {}
+    failures: Dict[str, int] = {}
+    rows: List[List[Any]] = []
+    for each in results:
+        way = ways.setdefault((each.way, each.kind), len(ways))
+        failure = failures.setdefault(each.failure, len(failures))
+        row = [way, each.place, failure, each.helped, each.minutes]
+        rows.append(row if each.hoped is None else [*row, each.hoped])
+    ways_told = {'names': list(map(list, ways)), 'failures': list(failures), 'results': rows}
+    return {WAYS: ways_told, WAYS_TOTAL: total}
+
+
+def results_in(learned: Mapping[str, Any]) -> Tuple[List[WayResult], int]:
+    """Return the results that are among what was learned of a state, and how many there were.
+
+    :raises ValueError: where they cannot be read.
+    """
+    if WAYS not in learned:
+        return [], 0
+    try:
+        told, total = learned[WAYS], int(learned[WAYS_TOTAL])
+        names, failures = told['names'], list(map(str, told['failures']))
+        results = [_result(row, names, failures) for row in told['results']][-MOST_RESULTS:]
+    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as err:
+        raise ValueError('{}: cannot be read as results of ways: {}'.format(WAYS, err)) from err
+    return results, max(total, len(results))
+
+
+def _result(row: List[Any], names: List[List[str]], failures: List[str]) -> WayResult:
+    way, place, failure, helped, minutes, *hoped = row
+    key, kind = names[way]
+    if helped not in (True, False, None) or place not in PLACES:
+        raise ValueError('{!r} is no result'.format(row))
+    return WayResult(
+        str(key),
+        str(kind),
+        int(place),
+        failures[failure],
+        None if helped is None else bool(helped),
+        float(minutes),
+        float(hoped[0]) if hoped else None,
+    )
+
+
+def merged_ways(
+    own: Mapping[str, Any], base: Mapping[str, Any], theirs: Mapping[str, Any]
+) -> Dict[str, Any]:
+    """Return the results of others, and behind them what is new of our own since `base`.
+
+    Where others have none, a program of an earlier version may have dropped them: ours stay.
+
+    :raises ValueError: where they cannot be read.
+    """
+    if WAYS not in theirs:
+        return {key: own[key] for key in (WAYS, WAYS_TOTAL) if key in own}
+    (ours, total), (others, other_total) = results_in(own), results_in(theirs)
+    new = max(0, total - int(base.get(WAYS_TOTAL, 0)))
+    results = deque([*others, *ours[len(ours) - min(new, len(ours)) :]], MOST_RESULTS)
+    return told_of(results, other_total + new) if results else {}

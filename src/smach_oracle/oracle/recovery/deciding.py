@@ -1,12 +1,13 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 
-from typing import Optional, Sequence, Tuple
+from typing import Dict, Optional, Sequence, Tuple
 
 from ..decision.by_ways import action_of
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes
-from ..decision.ways import StreakSoFar, WayKind
+from ..decision.ways import Evidence, StreakSoFar, WayKind
 from ..machine.jump_path import JumpPath, jump_path_to
+from ..machine.nesting import records_of
 from ..machine.places import TreePlace, levels_above, place_named
 from ..records.events import EventKind
 from ..records.facts import Decider
@@ -95,17 +96,17 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     streak = _streak(recovery)
     chosen = _first_way(recovery, situation, ways_on(recovery, why_not_above), streak)
     if chosen is None:
-        recovery.order, why = (), policy.why(recovery.situation or situation)
+        recovery.choice, why = None, policy.why(recovery.situation or situation)
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
     spent = budget.take_recovery(policy.most_of_trial)
     if spent:  # by others meanwhile
-        recovery.order = ()
+        recovery.choice = None
         decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
         return decider, recovery.facts(Action.ASK, blocked=spent)
     recovery.jump_path = chosen.option.jump_path
     streak.leaves = bool(chosen.option.jump_path.left_containers)
     facts = recovery.facts(
-        action_of(recovery.order),
+        action_of((chosen.way,)),
         target=named(recovery, chosen.option.jump_path),
         wait_s=chosen.way.wait_s,
     )
@@ -133,10 +134,12 @@ def _first_way(
     """
     while True:
         recovery.situation = _with_menu(recovery, situation, ways, streak)
-        recovery.order = recovery.node.in_force.policy.order(recovery.situation)
-        if not recovery.order:
+        choice = recovery.choice = recovery.node.in_force.policy.choose(recovery.situation)
+        if choice.remark:
+            recovery.node.warn_once('ways', choice.remark, recovery.record.label)
+        if not choice.ways:
             return None
-        chosen = next(each for each in ways if each.way == recovery.order[0])
+        chosen = next(each for each in ways if each.way == choice.ways[0])
         if chosen.way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
             return chosen
         if recovery.stopped():
@@ -154,8 +157,21 @@ def _with_menu(
         so_far = streak.so_far(budget.work_time.now())
     has_expert = node.tree.expert is not None and not budget.why_no_question()
     past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)
-    menu = Menu(tuple(each.way for each in ways), so_far, node.settings.cost, has_expert)
+    evidence = _evidence(recovery) if node.in_force.policy.learns else Evidence()
+    menu = Menu(tuple(each.way for each in ways), so_far, node.settings.cost, has_expert, evidence)
     return situation._replace(past=past, menu=menu)
+
+
+def _evidence(recovery: Recovery) -> Evidence:
+    """Return what the ways on from failures of the state, and of all states, have led to."""
+    of_kinds: Dict[Tuple[str, int], Tuple[float, float]] = {}
+    for record in records_of(recovery.node):
+        for each in record.ways_so_far():
+            if each.helped is not None:
+                kind = each.kind, each.place
+                helped, not_helped = of_kinds.get(kind, (0.0, 0.0))
+                of_kinds[kind] = helped + each.helped, not_helped + (not each.helped)
+    return Evidence(recovery.record.ways_so_far(), recovery.failure_key, of_kinds)
 
 
 def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePlace]]:

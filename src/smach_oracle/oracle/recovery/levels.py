@@ -7,6 +7,7 @@ import smach
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
+from ..decision.ways import Choice
 from ..machine.jump_path import jump_path_to
 from ..machine.places import TreePlace, direct_levels, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, goes_unnoticed, route_of
@@ -249,9 +250,11 @@ def _menu_facts(recovery: Recovery) -> Dict[str, object]:
     situation = recovery.situation
     if situation is None:
         return {}
-    menu, past = situation.menu, situation.past
+    menu, past, choice = situation.menu, situation.past, recovery.choice or Choice(())
     return {
-        'order': [way.key for way in recovery.order],
+        'order': [way.key for way in choice.ways],
+        'chance': choice.chance,
+        **({} if choice.hoped is None else {'hoped': choice.hoped}),
         'menu': [way._asdict() for way in menu.ways],
         'streak': menu.streak._asdict(),
         'has_expert': menu.has_expert,

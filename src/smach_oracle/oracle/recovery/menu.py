@@ -7,7 +7,7 @@ import smach
 
 from ..decision.ways import WAITS_S, Way, WayKind
 from ..machine.jump_path import JumpPath, jump_path_to
-from ..machine.nesting import nodes_of
+from ..machine.nesting import records_of
 from ..machine.places import TreePlace, direct_levels, name_of, place_named
 from ..machine.site import route_of
 from ..machine.state_record import StateRecord
@@ -173,9 +173,5 @@ def _has_ended_well(visit: Visit, label: str) -> bool:
 
 def _minutes_of_visit(node: TreeNode) -> float:
     """Return how long a visit has taken in this trial, on average."""
-    visits = sum(
-        record.visits
-        for each in nodes_of(node.top().machine)
-        for record in each.records.by_label.values()
-    )
+    visits = sum(record.visits for record in records_of(node))
     return node.tree.budget.work_time.now() / 60.0 / max(1, visits)

@@ -8,7 +8,7 @@ import smach
 from ..asking.question import Answer
 from ..decision.policy import Action, Situation
 from ..decision.sentence import DecisionFacts, cause_of
-from ..decision.ways import Way
+from ..decision.ways import FIRST, LATER, Choice, WayResult
 from ..machine.jump_path import JumpPath
 from ..machine.snapshots import WriteWatch
 from ..machine.state_record import RateReading, StateRecord
@@ -46,8 +46,8 @@ class Recovery:
     phases run in the machine's thread. `cancel` may be called from any thread.
 
     `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked.
-    `jump_path`: where it has decided to go. `situation`, `order`: that of a policy that goes by
-    ways, and the ways as it would go them, the first one now. `decided`: to ask. `cause`: of the
+    `jump_path`: where it has decided to go. `situation`, `choice`: that of a policy that goes
+    by ways, and the ways as it would go them, the first one now. `decided`: to ask. `cause`: of the
     decision.
     `begin_question`: is called before each question. `takes`: whether an answer comes in time, once
     it is here.
@@ -64,7 +64,7 @@ class Recovery:
     running: Optional[smach.State] = None  # as a precondition
     jump_path: Optional[JumpPath] = None
     situation: Optional[Situation] = None
-    order: Tuple[Way, ...] = ()
+    choice: Optional[Choice] = None
     why_no_answer = ''
 
     def __init__(
@@ -155,9 +155,20 @@ class Recovery:
     @property
     def chosen(self) -> Optional[ChosenWay]:
         """Return the way that it has decided for, None where no streak is to know of it."""
-        if not self.order or not self.failure.is_counted:
+        if self.choice is None or not self.choice.ways or not self.failure.is_counted:
             return None
-        return ChosenWay(self.node, self.record, self.order[0].key)
+        way, streak = self.choice.ways[0], self.situation.menu.streak if self.situation else None
+        place = LATER if streak is not None and streak.tried else FIRST
+        gone = WayResult(
+            way.key, way.kind.value, place, self.failure_key, None, 0.0, self.choice.hoped
+        )
+        return ChosenWay(self.node, self.record, gone, self.budget.work_time.now())
+
+    @property
+    def failure_key(self) -> str:
+        """Return the name of this kind of failure, as the results of ways have it."""
+        failure = self.failure
+        return self.record.failure_key(failure.kind, failure.outcome, failure.text)
 
     # -- waits
 

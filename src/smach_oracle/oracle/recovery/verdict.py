@@ -9,6 +9,7 @@ from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 
 import smach
 
+from ..decision.ways import WayResult
 from ..machine.jump_path import JumpPath
 from ..machine.site import Route, route_of
 from ..machine.state_record import StateRecord
@@ -30,17 +31,22 @@ class ContainerEnding(NamedTuple):
 
 
 class ChosenWay(NamedTuple):
-    """A way of the menu that a policy has chosen. `key`: the name by which its streak knows it."""
+    """A way of the menu that a policy has chosen. `gone`: it, without a result yet.
+
+    `since_s`: when it was chosen, on the trial's clock of work.
+    """
 
     node: TreeNode
     record: StateRecord
-    key: str
+    gone: WayResult
+    since_s: float
 
     def note(self) -> None:
         """Note that it is gone now, also in the streaks of the states around."""
+        self.go()
         streak = streak_of(self.node, self.record)
         if streak is not None:
-            streak.note(self.key)
+            streak.note(self.gone.way, self.gone.hoped is not None)
             streak.leaves = False
         below = self.node
         while below.parent is not None:
@@ -48,6 +54,13 @@ class ChosenWay(NamedTuple):
             if around is not None:
                 around.attempts += 1
             below = below.parent
+
+    def go(self) -> None:
+        """Note that it is gone now, outside every streak."""
+        self.record.go_way(self.gone, self._minutes)
+
+    def _minutes(self) -> float:
+        return (self.node.tree.budget.work_time.now() - self.since_s) / 60.0
 
 
 def streak_of(node: TreeNode, record: StateRecord) -> Optional[OpenStreak]:

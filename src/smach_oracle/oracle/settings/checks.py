@@ -340,6 +340,7 @@ _CHECKS: Dict[str, Check[float]] = {
     'tries': _TIMES,
     'steps_back': _TIMES,
     'seed': whole(0, 'a whole number from 0'),
+    'explore': number(0, 1, 'a chance from 0 to 1'),
     'wait_s': number(0, _MOST_S, 'seconds from 0 to {:g}'.format(_MOST_S)),
 }
 _NAMED = choice(sorted(POLICIES))
