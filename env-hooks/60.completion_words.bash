@@ -42,8 +42,8 @@ _smach_oracle_words() {
 --rates-file --record --record-topic --repeat --resume --resume-map --version
 --without-oracle -h' ;;
     'oracle_run --policy')
-      echo 'algorithm1 always_ask any_way escalating ladder prose random restart retry
-step_back' ;;
+      echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
+retry step_back' ;;
     'oracle_state')
       echo '--help --version -h accept drop edit goto list log moments show' ;;
     'oracle_state accept')
@@ -84,17 +84,18 @@ step_back' ;;
     'run_trials --estimator')
       echo 'exponential window' ;;
     'run_trials --policy')
-      echo 'configured algorithm1 always_ask any_way escalating ladder prose random restart
-retry step_back' ;;
+      echo 'configured algorithm1 always_ask any_way escalating ladder learned prose random
+restart retry step_back' ;;
     'run_trials --protocol')
       echo 'main persistence memory continuous all' ;;
     'run_trials --task')
       echo 'drink_retrieval pick_and_place' ;;
     'run_trials --variants')
       echo 'both with without bare default algorithm1 always_ask any_way escalating ladder
-prose random restart retry step_back one_line:algorithm1 one_line:always_ask
-one_line:any_way one_line:escalating one_line:ladder one_line:prose
-one_line:random one_line:restart one_line:retry one_line:step_back' ;;
+learned prose random restart retry step_back one_line:algorithm1
+one_line:always_ask one_line:any_way one_line:escalating one_line:ladder
+one_line:learned one_line:prose one_line:random one_line:restart one_line:retry
+one_line:step_back' ;;
     'same_trials')
       echo '--help --version -h' ;;
     'scripted_expert')
@@ -104,7 +105,7 @@ one_line:random one_line:restart one_line:retry one_line:step_back' ;;
     'what_if')
       echo '--help --high-from --json --memory --moderate-from --policy --prior --version -h' ;;
     'what_if --policy')
-      echo 'algorithm1 always_ask any_way escalating ladder prose random restart retry
-step_back' ;;
+      echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
+retry step_back' ;;
   esac
 }

@@ -14,7 +14,7 @@ from smach_oracle.oracle.asking import question
 from smach_oracle.oracle.decision import failure_rate, policy
 from smach_oracle.oracle.execution import wrapping
 from smach_oracle.oracle.machine import oracle
-from smach_oracle.oracle.records import events
+from smach_oracle.oracle.records import events, way_results
 from smach_oracle.oracle.settings import failing_outcomes, failure_rule
 
 FINDER = doctest.DocTestFinder()
@@ -34,6 +34,7 @@ SHOWN = [
     failure_rate.FailureRate,
     failure_rate.ExponentialFailureRate,
     failure_rule.FailureRule,
+    way_results.failure_text_key,
     smach_oracle.testing.Bench,
     smach_oracle.testing.expert,
     smach_oracle.testing.faults,

@@ -90,8 +90,8 @@ def spent(situation: Situation) -> bool:
     return situation.menu.streak.attempts >= 4 or situation.past.attempts >= 8 or late
 
 
-def test_both_policies_that_go_by_ways_are_held_to_this():
-    assert BY_WAYS == ['any_way', 'escalating']
+def test_all_policies_that_go_by_ways_are_held_to_this():
+    assert BY_WAYS == ['any_way', 'escalating', 'learned']
 
 
 @pytest.mark.parametrize('seed', range(DRAWS // 10))

@@ -7,7 +7,7 @@ from typing import List, Mapping, Sequence, Tuple
 
 from .failure_rate import FailureClass
 from .policy import Action, Baseline, Menu, Situation, draws_of
-from .ways import KEEP, Choice, Prices, Way
+from .ways import KEEP, ChosenOrder, Prices, Way
 
 
 def action_of(order: Sequence[Way]) -> Action:
@@ -92,11 +92,11 @@ class Escalating(Baseline):
         priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
         return tuple(way for cost, way in priced if cost < limit)
 
-    def choose(self, situation: Situation) -> Choice:
+    def choose(self, situation: Situation) -> ChosenOrder:
         """Return the order of the ways, in which the first two may have changed places."""
-        return self._explored(Choice(self.order(situation)), situation)
+        return self._explored(ChosenOrder(self.order(situation)), situation)
 
-    def _explored(self, choice: Choice, situation: Situation) -> Choice:
+    def _explored(self, choice: ChosenOrder, situation: Situation) -> ChosenOrder:
         """Have the first two ways change places, with the chance `explore`.
 
         A state that is not to be repeated is not among them: a way that repeats it is not open.
@@ -106,7 +106,7 @@ class Escalating(Baseline):
         first, second, *others = choice.ways
         if draws_of(self.seed, situation.past).random() >= self.explore:
             return choice._replace(chance=1.0 - self.explore)
-        return Choice((second, first, *others), self.explore)
+        return ChosenOrder((second, first, *others), self.explore)
 
     def _left(self, menu: Menu) -> List[Way]:
         return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
@@ -148,10 +148,10 @@ class AnyWay(Escalating):
         super().__init__(seed=seed)
         self.draws = True
 
-    def choose(self, situation: Situation) -> Choice:
+    def choose(self, situation: Situation) -> ChosenOrder:
         """Return the drawn order, and the chance of its first way."""
         ways = self.order(situation)
-        return Choice(ways, 1.0 / max(1, len(ways)))
+        return ChosenOrder(ways, 1.0 / max(1, len(ways)))
 
     def order(self, situation: Situation) -> Tuple[Way, ...]:
         """Return the ways that are open, untried and pay, in the order that is drawn."""

@@ -1,6 +1,6 @@
 """The order of ways, learned from what they have led to. Pure.
 
-doc/learned.md says what is counted, and when a way is moved to the front.
+doc/ways.md says what is counted, and when a way is moved to the front.
 """
 
 import math
@@ -9,7 +9,7 @@ from typing import Dict, List, NamedTuple, Sequence, Tuple
 
 from .by_ways import Escalating
 from .policy import Situation
-from .ways import BY_PERSON, FIRST, LATER, Choice, Evidence, Way, WayResult
+from .ways import BY_PERSON, FIRST, LATER, ChosenOrder, Evidence, Way, WayResult
 
 HALF_LIFE = 30.0  # streaks of the state, after which a result counts half
 PRIOR = 0.35  # chance to help of a way of which nothing is known
@@ -110,7 +110,7 @@ class Learned(Escalating):
     """Goes the ways of `escalating`, with one way before its turn where that has helped.
 
     It moves at most one way of a streak, and only where it is cheaper with a chance of 0.9 by at
-    least five results. doc/learned.md says how it counts.
+    least five results. doc/ways.md says how it counts.
     """
 
     name = 'learned'
@@ -120,12 +120,12 @@ class Learned(Escalating):
         """Return the ways that are open, untried and pay, in the order that was learned."""
         return self._learned(situation).ways
 
-    def choose(self, situation: Situation) -> Choice:
+    def choose(self, situation: Situation) -> ChosenOrder:
         """Return that order, and what it hopes for where a way has come before its turn."""
         return self._explored(self._learned(situation), situation)
 
-    def _learned(self, situation: Situation) -> Choice:
-        usual = Choice(super().order(situation))
+    def _learned(self, situation: Situation) -> ChosenOrder:
+        usual = ChosenOrder(self._usual(situation))
         results = situation.menu.evidence.results
         if len(usual.ways) < 2 or len(results) < FEWEST or situation.menu.streak.moved:
             return usual
@@ -134,7 +134,22 @@ class Learned(Escalating):
             return usual._replace(remark=remark)
         return self._moved(usual, situation)
 
-    def _moved(self, usual: Choice, situation: Situation) -> Choice:
+    def _usual(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the order of the menu, in which a way that was moved is still to come."""
+        streak = situation.menu.streak
+        if not streak.moved:
+            return super().order(situation)
+        tried = tuple(each for each in streak.tried if each != streak.moved)
+        before = streak._replace(tried=tried, attempts=streak.attempts - 1)
+        past = situation.past._replace(attempts=situation.past.attempts - 1)
+        ways = super().order(
+            situation._replace(menu=situation.menu._replace(streak=before), past=past)
+        )
+        if not ways or ways[0].key == streak.moved:  # now was its turn
+            return super().order(situation)
+        return tuple(way for way in ways if way.key != streak.moved)
+
+    def _moved(self, usual: ChosenOrder, situation: Situation) -> ChosenOrder:
         """Return the order with the way in front that is surely cheaper there, where one is."""
         sequence, evidence = self._sequence(situation), situation.menu.evidence
         estimates = Estimates(evidence, sequence[0])
@@ -148,7 +163,7 @@ class Learned(Escalating):
         for gain, way in gains:
             if gain.expected() > 0.0 and gain.is_certain():
                 ways = (way, *(each for each in usual.ways if each.key != way.key))
-                return Choice(ways, hoped=round(gain.chance.mean, 3))
+                return ChosenOrder(ways, hoped=round(gain.chance.mean, 3))
         return usual
 
     def _sequence(self, situation: Situation) -> List[Way]:

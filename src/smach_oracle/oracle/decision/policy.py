@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Mapping, NamedTuple, Optional, Tuple
 
 from .failure_rate import FailureClass
-from .ways import RESTORE, Choice, Evidence, Prices, StreakSoFar, Way
+from .ways import RESTORE, ChosenOrder, Evidence, Prices, StreakSoFar, Way
 
 
 class Action(str, Enum):
@@ -136,12 +136,12 @@ class Policy:
         """
         raise NotImplementedError
 
-    def choose(self, situation: Situation) -> Choice:
+    def choose(self, situation: Situation) -> ChosenOrder:
         """Return the ways in the order in which it goes them now, and what led to it.
 
         It is that of `order`, unless another one was drawn.
         """
-        return Choice(self.order(situation))
+        return ChosenOrder(self.order(situation))
 
     def why(self, situation: Situation) -> str:
         """Say why it gives up or asks, as a clause, or '' where its cell says it all."""

@@ -85,13 +85,14 @@ class StreakSoFar(NamedTuple):
     """What was done in a streak. `tried`: the keys of its ways, in order.
 
     `attempts`: the ways that were gone, those of the containers within among them. `minutes`: since
-    its first failure. `moved`: one of them came before its turn in the menu's own order.
+    its first failure. `moved`: the one that came before its turn in the menu's
+    own order, '' for none.
     """
 
     tried: Tuple[str, ...] = ()
     attempts: int = 0
     minutes: float = 0.0
-    moved: bool = False
+    moved: str = ''
 
 
 class WayResult(NamedTuple):
@@ -126,7 +127,7 @@ class Evidence(NamedTuple):
     of_kinds: Mapping[Tuple[str, int], Tuple[float, float]] = {}
 
 
-class Choice(NamedTuple):
+class ChosenOrder(NamedTuple):
     """What a policy makes of a menu: the ways in the order in which it would go them.
 
     It asks where none is left. `chance`: of the first one to be that, where it was drawn. `hoped`:

@@ -17,7 +17,8 @@ class OpenStreak:
 
     `successes`: of the state in all. `began_s`: on the trial's clock of work. `visited`: the states
     before the first failure, by name, the latest first. `leaves`: whether the way that is gone now
-    leaves the container. `moved`: whether a way was gone out of the menu's own order.
+    leaves the container. `moved`: the way that has come before its turn in the menu's own
+    order, '' for none.
     """
 
     def __init__(self, successes: int, began_s: float, visited: Iterable[str]) -> None:
@@ -27,13 +28,13 @@ class OpenStreak:
         self.tried: List[str] = []
         self.attempts = 0
         self.leaves = False
-        self.moved = False
+        self.moved = ''
 
     def note(self, way: str, moved: bool = False) -> None:
-        """Note that a way was gone. `moved`: out of the menu's own order."""
+        """Note that a way was gone. `moved`: before its turn in the menu's own order."""
         self.tried.append(way)
         self.attempts += 1
-        self.moved = self.moved or moved
+        self.moved = way if moved else self.moved
 
     def so_far(self, now_s: float) -> StreakSoFar:
         """Return what was done. `now_s`: on the same clock."""
@@ -91,11 +92,11 @@ class Streaks:
         """
         taken = {}
         try:
-            # earlier versions did not tell whether a way was moved
+            # earlier versions did not move ways
             for label, (successes, began_s, visited, tried, attempts, *moved) in told.items():
                 streak = OpenStreak(int(successes), float(began_s), map(str, visited))
                 streak.tried, streak.attempts = list(map(str, tried)), int(attempts)
-                streak.moved = any(moved)
+                streak.moved = str(moved[0]) if moved else ''
                 taken[label] = streak
         except (AttributeError, TypeError, ValueError) as err:
             raise ValueError('cannot be read as streaks: {}'.format(err)) from err

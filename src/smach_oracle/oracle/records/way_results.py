@@ -96,7 +96,11 @@ def told_of(results: Deque[WayResult], total: int) -> Dict[str, Any]:
         failure = failures.setdefault(each.failure, len(failures))
         row = [way, each.place, failure, each.helped, each.minutes]
         rows.append(row if each.hoped is None else [*row, each.hoped])
-    ways_told = {'names': list(map(list, ways)), 'failures': list(failures), 'results': rows}
+    ways_told = {
+        'names': [list(each) for each in ways],
+        'failures': list(failures),
+        'results': rows,
+    }
     return {WAYS: ways_told, WAYS_TOTAL: total}
 
 

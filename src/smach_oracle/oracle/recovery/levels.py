@@ -7,7 +7,7 @@ import smach
 from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
-from ..decision.ways import Choice
+from ..decision.ways import ChosenOrder
 from ..machine.jump_path import jump_path_to
 from ..machine.places import TreePlace, direct_levels, failure_context, is_direct, levels_above
 from ..machine.site import Route, author_recovers, failure_kind, goes_unnoticed, route_of
@@ -250,7 +250,7 @@ def _menu_facts(recovery: Recovery) -> Dict[str, object]:
     situation = recovery.situation
     if situation is None:
         return {}
-    menu, past, choice = situation.menu, situation.past, recovery.choice or Choice(())
+    menu, past, choice = situation.menu, situation.past, recovery.choice or ChosenOrder(())
     return {
         'order': [way.key for way in choice.ways],
         'chance': choice.chance,

@@ -8,7 +8,7 @@ import smach
 from ..asking.question import Answer
 from ..decision.policy import Action, Situation
 from ..decision.sentence import DecisionFacts, cause_of
-from ..decision.ways import FIRST, LATER, Choice, WayResult
+from ..decision.ways import FIRST, LATER, ChosenOrder, WayResult
 from ..machine.jump_path import JumpPath
 from ..machine.snapshots import WriteWatch
 from ..machine.state_record import RateReading, StateRecord
@@ -64,7 +64,7 @@ class Recovery:
     running: Optional[smach.State] = None  # as a precondition
     jump_path: Optional[JumpPath] = None
     situation: Optional[Situation] = None
-    choice: Optional[Choice] = None
+    choice: Optional[ChosenOrder] = None
     why_no_answer = ''
 
     def __init__(

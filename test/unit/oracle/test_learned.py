@@ -1,0 +1,258 @@
+"""The policy `learned`: the order of ways, by what they have led to."""
+
+import random
+from typing import List, Sequence, Set
+
+import pytest
+from machines import FakeWaiting, Scripted, watched
+
+from smach_oracle.oracle import oracle_of
+from smach_oracle.oracle.decision.by_ways import Escalating
+from smach_oracle.oracle.decision.failure_rate import FailureClass
+from smach_oracle.oracle.decision.learned import Estimates, Learned
+from smach_oracle.oracle.decision.policies import policy_named
+from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation
+from smach_oracle.oracle.decision.ways import (
+    FIRST,
+    LATER,
+    Evidence,
+    Prices,
+    StreakSoFar,
+    Way,
+    WayKind,
+    WayResult,
+)
+from smach_oracle.oracle.records.events import EventKind
+
+AGAIN = Way(WayKind.AGAIN, 'HERE', minutes=1.0)
+BACK = Way(WayKind.STEP_BACK, 'LOOK', 1, minutes=2.0, repeats=('LOOK',))
+FAR = Way(WayKind.STEP_BACK, 'HOME', 2, minutes=4.0, repeats=('HOME', 'LOOK'))
+FAILURE = 'failing_outcome aborted'
+
+
+def result(way: Way, place: int, helped, **more) -> WayResult:
+    return WayResult(way.key, way.kind.value, place, FAILURE, helped, way.minutes)._replace(**more)
+
+
+def vain_then_back(times: int) -> List[WayResult]:
+    """So many streaks in which to enter the state again was in vain, and a step back helped."""
+    return [result(AGAIN, FIRST, False), result(BACK, LATER, True)] * times
+
+
+def situation(results: Sequence[WayResult], ways=(AGAIN, BACK, FAR), tried=(), moved=''):
+    evidence = Evidence(tuple(results), FAILURE)
+    streak = StreakSoFar(tuple(tried), len(tried), 0.0, moved)
+    menu = Menu(tuple(ways), streak, Prices(), True, evidence)
+    return Situation(FailureClass.LOW, Preconditions.NONE, False, Past(), menu)
+
+
+def keys(order: Sequence[Way]) -> List[str]:
+    return [way.key for way in order]
+
+
+# -- the order
+
+
+def test_it_begins_with_the_order_of_the_menu():
+    assert Learned().order(situation([])) == Escalating().order(situation([]))
+
+
+def test_what_has_surely_helped_comes_before_its_turn():
+    choice = Learned().choose(situation(vain_then_back(6)))
+    assert keys(choice.ways)[0] == BACK.key and choice.hoped > 0.7
+    assert keys(choice.ways)[1:] == [
+        key for key in keys(Escalating().order(situation([]))) if key != BACK.key
+    ]
+
+
+def test_four_results_are_too_few():
+    assert Learned().choose(situation(vain_then_back(4))).hoped is None
+
+
+def test_a_way_that_helps_as_often_as_a_cheaper_one_stays_behind_it():
+    even = [result(AGAIN, FIRST, True)] * 5 + vain_then_back(5)
+    assert Learned().choose(situation(even)).hoped is None
+
+
+def test_one_way_of_a_streak_is_moved():
+    later = situation(vain_then_back(6), tried=[BACK.key], moved=BACK.key)
+    choice = Learned().choose(later)
+    assert choice.hoped is None and keys(choice.ways)[0] == AGAIN.key
+
+
+def test_results_of_other_kinds_of_failure_count_less():
+    others = [each._replace(failure='another') for each in vain_then_back(6)]
+    same, other = (
+        Estimates(Evidence(tuple(each), FAILURE), AGAIN).chance(BACK, LATER)
+        for each in (vain_then_back(6), others)
+    )
+    assert other.mean < same.mean and sum(other) < sum(same)
+
+
+def test_old_results_count_less():
+    old = vain_then_back(6)
+    new = [result(AGAIN, FIRST, True)] * 60
+    fresh, aged = (
+        Estimates(Evidence(tuple(each), FAILURE), AGAIN).chance(BACK, LATER)
+        for each in (old, old + new)
+    )
+    assert sum(aged) < sum(fresh) and aged.mean < fresh.mean
+
+
+def test_unknown_results_count_their_time_alone():
+    slow = [result(BACK, LATER, None, minutes=9.0)] * 6
+    estimates = Estimates(Evidence(tuple(slow), FAILURE), AGAIN)
+    assert not estimates.results.get(BACK.key) and estimates.minutes(BACK) > 7.0
+    assert (
+        estimates.chance(BACK, LATER).mean == Estimates(Evidence(), AGAIN).chance(BACK, LATER).mean
+    )
+
+
+def test_choices_of_a_person_move_nothing():
+    asked = [result(AGAIN, FIRST, False), result(BACK, 2, True)] * 9
+    assert Learned().choose(situation(asked)).hoped is None
+
+
+def test_the_first_place_follows_from_the_later_one():
+    # of ten failures to enter the state again cures six, and the step back all that are left
+    results = [result(AGAIN, FIRST, True)] * 6 + vain_then_back(4)
+    estimates = Estimates(Evidence(tuple(results), FAILURE), AGAIN)
+    later, first = (estimates.chance(BACK, place).mean for place in (LATER, FIRST))
+    assert first < later
+    assert estimates.chance(AGAIN, LATER).mean < estimates.chance(AGAIN, FIRST).mean
+
+
+def test_where_moved_ways_disappoint_it_goes_back_and_says_so():
+    moved = [result(BACK, FIRST, False, hoped=0.9)] * 5
+    choice = Learned().choose(situation(vain_then_back(20) + moved))
+    assert choice.hoped is None and 'helped 0 of 5 times, and 4.5 were expected' in choice.remark
+
+
+# -- never dearer than by one attempt
+
+
+def gone_until_cured(policy, cures: Set[str], results, ways) -> List[str]:
+    """The ways of one streak, until one of these helps."""
+    tried: List[str] = []
+    moved = ''
+    while True:
+        choice = policy.choose(situation(results, ways, tried, moved))
+        if not choice.ways:
+            return tried + ['ask']
+        tried.append(choice.ways[0].key)
+        if choice.hoped is not None:
+            moved = tried[-1]
+        if tried[-1] in cures:
+            return tried
+
+
+def drawn_ways(rng: random.Random) -> List[Way]:
+    back = [
+        Way(WayKind.STEP_BACK, 'S{}'.format(number), number, minutes=rng.uniform(0.1, 4.0))
+        for number in (1, 2, 4, 8)
+    ]
+    wait = Way(WayKind.WAIT, 'HERE', wait_s=10.0, minutes=rng.uniform(0.2, 3.0))
+    return [AGAIN, wait, *back[: rng.randint(1, 4)]]
+
+
+@pytest.mark.parametrize('seed', range(60))
+def test_a_streak_has_at_most_one_attempt_more_and_asks_no_earlier(seed):
+    rng = random.Random(seed)
+    ways = drawn_ways(rng)
+    favourite = rng.choice(ways[1:])
+    results = []
+    for _ in range(rng.randint(5, 30)):
+        results.append(result(AGAIN, FIRST, rng.random() < 0.2))
+        results.append(result(favourite, LATER, rng.random() < 0.9))
+        results.append(result(rng.choice(ways), LATER, rng.random() < 0.3))
+    for cures in [set(), *({way.key} for way in ways)]:
+        usual = gone_until_cured(Escalating(), cures, results, ways)
+        learned = gone_until_cured(Learned(), cures, results, ways)
+        assert len(learned) <= len(usual) + 1
+        assert (learned[-1] == 'ask') == (usual[-1] == 'ask')
+        assert len(set(learned)) == len(learned)
+
+
+# -- exploring
+
+
+def test_exploring_swaps_the_first_two_ways_with_its_chance():
+    usual = Escalating().order(situation([]))
+    found = {'as usual': 0, 'swapped': 0}
+    policy = policy_named('escalating', {'explore': 0.1, 'seed': 4})
+    assert policy.draws
+    for trial in range(1000):
+        choice = policy.choose(situation([])._replace(past=Past(trial=trial, place='TASK/HERE 1')))
+        swapped = choice.ways[0] == usual[1]
+        found['swapped' if swapped else 'as usual'] += 1
+        assert choice.chance == pytest.approx(0.1 if swapped else 0.9)
+        assert sorted(keys(choice.ways)) == sorted(keys(usual))
+        assert choice.ways[2:] == usual[2:]
+    assert 70 < found['swapped'] < 130
+
+
+def test_without_exploring_nothing_is_drawn():
+    assert not Escalating().draws and Escalating().choose(situation([])).chance == 1.0
+
+
+def test_the_control_tells_the_chance_of_its_choice():
+    choice = policy_named('any_way').choose(situation([]))
+    assert choice.chance == pytest.approx(1.0 / len(choice.ways))
+
+
+# -- in machines
+
+
+class HelpedByB(Scripted):
+    """Fails until B was executed twice since its last success."""
+
+    def __init__(self, b: Scripted) -> None:
+        super().__init__()
+        self._b = b
+        self._done = 0
+
+    def execute(self, ud):
+        if self._b.runs - self._done < 2:
+            return 'aborted'
+        self._done = self._b.runs
+        return 'ok'
+
+
+def learning(policy='learned', **wrap):
+    b = Scripted()
+    # to enter a state again costs next to nothing here, so the price of harm is left out, and a
+    # failure rate makes it no dearer
+    own = {'policy': policy, 'max_recoveries': 50, 'cost': {'harm': 0}, 'moderate_from': 1}
+    settings = {**own, 'high_from': 1, **wrap.pop('settings', {})}
+    machine = watched(Scripted(), b, HelpedByB(b), settings=settings, **wrap)
+    oracle_of(machine.machine).waiting = FakeWaiting()
+    return machine
+
+
+def first_ways(machine, trials: int) -> List[str]:
+    found = []
+    for _ in range(trials):
+        machine.events.clear()
+        assert machine.run() == 'done'
+        found.append(machine.of(EventKind.DECISION)[0].data['order'][0])
+    return found
+
+
+def test_a_machine_learns_to_step_back_at_once():
+    machine = learning()
+    found = first_ways(machine, 12)
+    assert found[0] == 'again' and found[-1].startswith('from ')
+    last = machine.of(EventKind.DECISION)[0].data
+    assert last['hoped'] > 0.7 and last['chance'] == 1.0
+
+
+def test_what_was_learned_stays_in_the_rates_file(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    first_ways(learning(settings=settings), 12)
+    assert first_ways(learning(settings=settings), 1)[0].startswith('from ')
+
+
+def test_escalating_notes_the_results_that_learned_goes_by(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    first_ways(learning('escalating', settings=settings), 12)
+    assert first_ways(learning(settings=settings), 1)[0].startswith('from ')

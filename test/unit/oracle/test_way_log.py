@@ -1,0 +1,207 @@
+"""What the ways on from failures have led to: noted as a machine runs, kept beside its rates."""
+
+import json
+
+import pytest
+from machines import FakeExpert, FakeWaiting, Scripted, Watched, give_up, goto, supersede, watched
+
+import smach
+from smach_oracle.oracle import oracle_of
+from smach_oracle.oracle.decision.ways import BY_PERSON, FIRST, LATER, WayResult
+from smach_oracle.oracle.machine.nesting import marked_node
+from smach_oracle.oracle.machine.state_record import StateRecord
+from smach_oracle.oracle.records.way_results import (
+    MOST_FAILURES,
+    MOST_RESULTS,
+    WayLog,
+    merged_ways,
+    plain_failure_key,
+)
+from smach_oracle.oracle.settings.settings import StateSettings
+
+ENDS = ['done', 'aborted', 'preempted']
+
+
+def machine_of(*states, expert=None, **settings):
+    machine = watched(
+        *states,
+        settings={'policy': 'escalating', 'max_recoveries': 50, **settings},
+        expert=expert,
+    )
+    oracle_of(machine.machine).waiting = FakeWaiting()
+    return machine
+
+
+def noted(machine, label):
+    """(way, place, helped) of each result."""
+    record = marked_node(machine.machine).record(label)
+    return [(each.way, each.place, each.helped) for each in record.ways_so_far()]
+
+
+# -- a machine that runs
+
+
+def test_a_way_has_helped_once_the_state_succeeds_and_not_where_it_fails_again():
+    machine = machine_of(Scripted(), Scripted('aborted', 'aborted', 'ok'))
+    assert machine.run() == 'done'
+    assert noted(machine, 'B') == [('again', FIRST, False), ('wait 10 s', LATER, True)]
+
+
+def test_the_next_success_takes_no_short_way_past_the_log():
+    machine = machine_of(Scripted(), Scripted('ok', 'ok', 'ok', 'aborted', 'ok', 'ok'))
+    for _ in range(5):
+        assert machine.run() == 'done'
+    assert noted(machine, 'B') == [('again', FIRST, True)]
+
+
+def test_failures_of_other_states_meanwhile_say_nothing_of_it():
+    machine = machine_of(
+        Scripted(), Scripted('ok', 'aborted'), Scripted('aborted', 'aborted', 'aborted')
+    )
+    assert machine.run() == 'done'
+    # C went back over B, which failed itself on the way and was entered again
+    assert noted(machine, 'B') == [('again', FIRST, True)]
+    assert noted(machine, 'C')[-1] == ('from A', LATER, True)
+
+
+def test_nothing_is_known_where_a_person_has_acted_meanwhile():
+    expert = FakeExpert(supersede('ok'))
+    states = Scripted(), Scripted('ok', *['aborted'] * 9), Scripted('aborted', 'ok')
+    machine = machine_of(*states, expert=expert)
+    assert machine.run() == 'done'
+    assert noted(machine, 'C') == [('again', FIRST, True)]
+    assert [helped for _, _, helped in noted(machine, 'B')] == []
+
+
+def test_a_way_back_over_a_state_that_a_person_has_superseded_is_not_known():
+    expert = FakeExpert(supersede('ok'))
+    b = Scripted('ok', *['aborted'] * 9)
+    machine = machine_of(Scripted(), b, Scripted(*['aborted'] * 3), expert=expert)
+    assert machine.run() == 'done'
+    assert noted(machine, 'C')[-1] == ('from A', LATER, None)
+
+
+def test_the_choice_of_a_person_is_noted_as_such():
+    expert = FakeExpert(goto('A'))
+    machine = machine_of(
+        Scripted(), Scripted(*['aborted'] * 4), expert=expert, cost={'lost_trial': 60}
+    )
+    assert machine.run() == 'done'
+    assert noted(machine, 'B')[-1] == ('from A', BY_PERSON, True)
+
+
+def test_a_trial_that_is_lost_first_says_that_the_way_has_not_helped():
+    a = Scripted('ok', 'stop', outcomes=('ok', 'stop'))
+    b = Scripted(*['aborted'] * 3)
+    machine = smach.StateMachine(outcomes=[*ENDS, 'failed'])
+    with machine:
+        smach.StateMachine.add('A', a, {'ok': 'B', 'stop': 'failed'})
+        smach.StateMachine.add('B', b, {'ok': 'done', 'aborted': 'aborted'})
+    watch = Watched(
+        machine,
+        settings={'policy': 'escalating', 'intended_outcomes': ['stop'], 'max_recoveries': 50},
+    )
+    oracle_of(watch.machine).waiting = FakeWaiting()
+    assert watch.run() == 'failed'
+    assert noted(watch, 'B')[-1] == ('from A', LATER, False)
+
+
+def test_a_trial_that_a_person_gives_up_says_nothing_of_the_last_way():
+    expert = FakeExpert(give_up())
+    machine = machine_of(Scripted(), Scripted(*['aborted'] * 9), expert=expert)
+    assert machine.run() == 'aborted'
+    assert [helped for _, _, helped in noted(machine, 'B')] == [False] * 3
+
+
+def test_other_policies_note_nothing():
+    machine = machine_of(Scripted(), Scripted('aborted'), policy='prose')
+    assert machine.run() == 'done'
+    assert noted(machine, 'B') == []
+    assert 'ways' not in marked_node(machine.machine).record('B').learned()
+
+
+# -- kept
+
+
+def test_machines_that_share_a_rates_file_share_the_results(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    one, other = (machine_of(Scripted(), Scripted('aborted'), **settings) for _ in range(2))
+    assert one.run() == 'done' and other.run() == 'done'
+    assert len(noted(other, 'B')) == 2
+    told = json.loads((tmp_path / 'rates.json').read_text())['containers']['']['B']
+    assert told['ways_total'] == 2 and len(told['ways']['results']) == 2
+
+
+@pytest.mark.parametrize(
+    'damage',
+    [
+        7,
+        {'names': [['again', 'again']], 'failures': [], 'results': [[0, 0, 0, True, 1.0]]},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 9, 0, True, 1.0]]},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 0, 0, 'yes', 1.0]]},
+    ],
+)
+def test_damaged_results_leave_the_state_with_its_prior_and_are_warned_of(tmp_path, damage):
+    path = tmp_path / 'rates.json'
+    machine = machine_of(Scripted(), Scripted('aborted'), rates_file=str(path))
+    assert machine.run() == 'done'
+    content = json.loads(path.read_text())
+    content['containers']['']['B']['ways'] = damage
+    path.write_text(json.dumps(content))
+    warned = []
+    smach.set_loggers(lambda text: None, warned.append, lambda text: None, lambda text: None)
+    again = machine_of(Scripted(), Scripted('aborted'), rates_file=str(path))
+    assert again.run() == 'done'
+    assert any("'B' of" in text and 'results of ways' in text for text in warned)
+
+
+def a_result(number=0, failure='failing_outcome aborted', **more):
+    return WayResult('again', 'again', FIRST, failure, None, 0.0)._replace(**more)
+
+
+def filled(count, log=None):
+    log = log or WayLog()
+    for number in range(count):
+        log.go(a_result(), lambda number=number: float(number))
+        log.settle(True)
+    return log
+
+
+def test_the_latest_results_are_kept():
+    log = filled(MOST_RESULTS + 7)
+    assert len(log.results) == MOST_RESULTS and log.total == MOST_RESULTS + 7
+    assert log.results[-1].minutes == MOST_RESULTS + 6
+    again = WayLog()
+    again.take_over(json.loads(json.dumps(log.told())))
+    assert again.results == log.results and again.total == log.total
+
+
+def test_what_is_new_since_the_last_share_comes_behind_the_others():
+    own, theirs = filled(5), filled(3)
+    base = {'ways_total': 4}
+    merged = merged_ways(own.told(), base, theirs.told())
+    assert merged['ways_total'] == 4
+    assert [row[4] for row in merged['ways']['results']] == [0.0, 1.0, 2.0, 4.0]
+
+
+def test_results_that_a_program_of_an_earlier_version_has_dropped_stay():
+    own = filled(5)
+    assert merged_ways(own.told(), {'ways_total': 5}, {'successes': 3}) == own.told()
+
+
+def test_a_state_has_so_many_kinds_of_failure_with_a_text():
+    log = WayLog()
+    for number in range(MOST_FAILURES + 3):
+        key = log.failure_key(1, 'aborted', 'part ' + 'abcdefghijklm'[number])
+        log.go(a_result(failure=key), float)
+        log.settle(None)
+    kinds = {each.failure for each in log.results}
+    assert len(kinds) == MOST_FAILURES + 1
+    assert plain_failure_key('failing_outcome aborted: part a') in kinds
+    assert log.failure_key(1, 'aborted', 'part a') == 'failing_outcome aborted: part a'
+
+
+def test_records_of_earlier_versions_are_read():
+    record = StateRecord('A', StateSettings())
+    record.restore({'estimator': 'window', 'successes': 2, 'failures': 1, 'window': [1, 0, 0]})
+    assert record.ways_so_far() == () and 'ways' not in record.learned()
