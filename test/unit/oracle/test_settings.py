@@ -55,8 +55,8 @@ def test_the_defaults_are_those_of_the_design():
             {'policy': 'guess'},
             'policy',
             'guess',
-            'algorithm1, always_ask, any_way, escalating, ladder, learned, prose, random, restart, retry, '
-            'step_back',
+            'algorithm1, always_ask, any_way, escalating, ladder, learned, prose, random, restart, '
+            'retry, step_back',
         ),
         ({'memory': 0}, 'memory', 0, 'whole number'),
         ({'memory': 2.5}, 'memory', 2.5, 'whole number'),
