@@ -9,7 +9,8 @@ a small world of conditions (test/unit/support/hidden_causes, doc/hidden_causes.
 script under `OracleContainer.wrap`, with a policy and no other setting, executed by the real
 executive in simulated time. The policies are those of the executive by name, such as ladder or
 ladder:wait_s=30. Beside them are bare (no oracle), order:WAY,... (retry, wait, step_back, restart,
-ask, give_up), shuffled (the same ways in an order that is drawn for each trial), and best: the
+ask, give_up), shuffled (the same ways in an order that is drawn for each trial), shuffled_labels
+(learned, from results that have changed places), and best: the
 order that costs least on other machines of the same mix, those of --best-seed. The same seeds give
 the same figures, whatever --jobs. Seeds below 1000 are for trying. Those from 1000 on are kept for
 judging policies that are settled.
@@ -35,8 +36,10 @@ from hidden_causes.search import best_order
 BEST = 'best'
 POLICIES = (
     'bare', 'retry', 'step_back', 'restart', 'ladder', 'prose', 'algorithm1', 'random',
-    'always_ask', 'shuffled', 'escalating', 'any_way',
+    'always_ask', 'shuffled', 'escalating', 'any_way', 'learned', 'shuffled_labels',
 )  # fmt: skip
+ORDER_OF = 'escalating'
+LEARNS = ('learned', 'shuffled_labels')  # each changes that order
 FOR_JUDGING = 1000  # seeds from here on
 COLUMNS = (
     ('failing', 'failing', '{:.1%}'),
@@ -79,6 +82,7 @@ def main() -> int:
             found[name] = runner.run(name, seeds, arguments.trials, {'cost': prices._asdict()})
             show(name, summarise(trials_of(found[name]), prices), found[name], began_s)
     show_differences(found, prices)
+    show_more_attempts(found)
     show_other_prices(found, prices)
     if arguments.report:
         write_report(found, prices, arguments.report)
@@ -197,6 +201,28 @@ def show_differences(found: Dict[str, List[Ran]], prices: Prices) -> None:
         if name != first:
             more, error = difference(trials_of(machines), trials_of(found[first]), prices)
             print('{:26}{:>11.2f}{:>11.2f}'.format(name, more, error))
+
+
+def show_more_attempts(found: Dict[str, List[Ran]]) -> None:
+    """Show on how many machines a policy that learns had more than one attempt a streak more.
+
+    More, that is, than the policy whose order it changes.
+    """
+    if ORDER_OF not in found:
+        return
+    for name in filter(LEARNS.__contains__, found):
+        more = [
+            ran.seed
+            for ran, usual in zip(found[name], found[ORDER_OF])
+            if sum(each.attempts for each in ran.trials)
+            > sum(each.attempts + each.streaks for each in usual.trials)
+        ]
+        told = ', '.join(map(str, more)) or 'none'
+        print(
+            '\n{}: machines with more than one attempt a streak more than {}: {}'.format(
+                name, ORDER_OF, told
+            )
+        )
 
 
 def show_other_prices(found: Dict[str, List[Ran]], prices: Prices) -> None:

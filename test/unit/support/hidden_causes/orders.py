@@ -3,8 +3,10 @@
 import random
 from typing import Dict, Optional, Sequence, Tuple
 
+from smach_oracle.oracle.decision.learned import Learned
 from smach_oracle.oracle.decision.policies import POLICIES
-from smach_oracle.oracle.decision.policy import Action, Baseline, Policy, Situation
+from smach_oracle.oracle.decision.policy import Action, Baseline, Policy, Situation, draws_of
+from smach_oracle.oracle.decision.ways import ChosenOrder, Way
 
 ASK, GIVE_UP = 'ask', 'give_up'
 WAIT_S = 30.0
@@ -69,11 +71,43 @@ class Shuffled(Ordered):
         return ways
 
 
+class ShuffledLabels(Learned):
+    """Learns from the results of the ways after they have changed places: the control of learning.
+
+    What it gains is not from what it has learned. The places are drawn at each failure.
+    """
+
+    name = 'shuffled_labels'
+    draws = True
+
+    def order(self, situation: Situation) -> Tuple[Way, ...]:
+        """Return the order by the shuffled results."""
+        return super().order(self._shuffled(situation))
+
+    def choose(self, situation: Situation) -> ChosenOrder:
+        """Return that order, and what it hopes for."""
+        return super().choose(self._shuffled(situation))
+
+    def _shuffled(self, situation: Situation) -> Situation:
+        evidence = situation.menu.evidence
+        known = [each for each in evidence.results if each.helped is not None]
+        helped = [each.helped for each in known]
+        draws_of(self.seed, situation.past).shuffle(helped)
+        results = iter(helped)
+        shuffled = tuple(
+            each if each.helped is None else each._replace(helped=next(results))
+            for each in evidence.results
+        )
+        menu = situation.menu._replace(evidence=evidence._replace(results=shuffled))
+        return situation._replace(menu=menu)
+
+
 class Arm:
     """A policy as a command line names it, or none.
 
     `bare` has no oracle. `order:retry,step_back,ask` tries these in this order, and `shuffled`
-    tries `retry`, `step_back`, `restart` and `ask` in an order that is drawn. `ladder:wait_s=30` is
+    tries `retry`, `step_back`, `restart` and `ask` in an order that is drawn. `shuffled_labels`
+    learns as `learned` does, from results that have changed places. `ladder:wait_s=30` is
     a policy of the executive with a parameter. All others are such policies by name.
     """
 
@@ -99,11 +133,10 @@ class Arm:
                         name, ', '.join(sorted(POLICIES[self._kind].parameters)) or 'none'
                     )
                 )
-        elif name not in ('bare', 'shuffled'):
+        elif name not in ('bare', 'shuffled', ShuffledLabels.name):
             raise ValueError(
-                '{!r} is no policy. There are bare, shuffled, order:WAY,... and {}'.format(
-                    name, ', '.join(sorted(POLICIES))
-                )
+                '{!r} is no policy. There are bare, shuffled, shuffled_labels, order:WAY,... '
+                'and {}'.format(name, ', '.join(sorted(POLICIES)))
             )
 
     def policy(self, seed: object) -> Optional[Policy]:
@@ -114,7 +147,9 @@ class Arm:
             return Ordered(self._ways)
         if self._kind == 'shuffled':
             return Shuffled(seed)
+        if self._kind == ShuffledLabels.name:
+            return ShuffledLabels(seed=1000.0 * int(str(seed)))
         given = dict(self._parameters)
-        if POLICIES[self._kind].draws and 'seed' not in given:
+        if POLICIES[self._kind].with_parameters(given).draws and 'seed' not in given:
             given['seed'] = 1000.0 * int(str(seed))
         return POLICIES[self._kind].with_parameters(given)

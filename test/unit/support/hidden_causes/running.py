@@ -11,7 +11,7 @@ from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.decision.policy import Policy
 from smach_oracle.oracle.machine import tree
-from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.events import Event, EventKind
 
 from .building import Scene, build, keys_of
 from .causes import draw_causes
@@ -39,6 +39,7 @@ class Trial(NamedTuple):
     robot_min: float
     expert_min: float
     harm: int
+    streaks: int = 0  # of attempts, under a policy that goes by ways
 
     @property
     def is_failing(self) -> bool:
@@ -130,6 +131,7 @@ class Bed:
             (self._clock.now() - world.began_s) / 60.0,
             world.expert_s / 60.0,
             len(world.harmed),
+            sum(map(_begins_streak, self.events)),
         )
 
     def _judge(self, outcome: Optional[str]) -> str:
@@ -139,6 +141,12 @@ class Bed:
         if outcome != DONE:
             return FAILED
         return TRUE if self.world.is_goal_met() else FALSE
+
+
+def _begins_streak(decision: Event) -> bool:
+    """Whether a decision takes the first way of a streak."""
+    data = decision.data or {}
+    return bool(data.get('order')) and not data['streak']['tried']
 
 
 @contextlib.contextmanager
