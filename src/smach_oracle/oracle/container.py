@@ -12,11 +12,12 @@ from .execution.transitions import end_plainly
 from .execution.trial import ContainerRun
 from .execution.visiting import execute_observed, execute_watched
 from .execution.wrapping import execute_bare, sync_oracle, wrap_machine
+from .identity import renew_attributes
 from .machine.oracle import oracle_of, read_by_hand, write_by_hand
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone, marked_node
 from .machine.userdata_view import StateView, write_constants
-from .machine.wrapped_classes import rebuild, renew_attributes, two_classes
+from .machine.wrapped_classes import rebuild, two_classes
 from .records.events import EventKind
 from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction

@@ -61,6 +61,13 @@ def states_of(container: HasStates) -> Dict[str, smach.State]:
     return container._states
 
 
+def tables_of(
+    machine: smach.StateMachine,
+) -> Tuple[Dict[str, smach.State], Dict[str, Transitions]]:
+    """Return the states of a machine and its transitions, each by the label of the state."""
+    return machine._states, machine._transitions
+
+
 def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
     """Return where each outcome leads, by the label of the state. None leads nowhere."""
     return machine._transitions
@@ -326,12 +333,15 @@ class EngineProbe:
         'tells_transitions',
         'has_own_loop',
         '_class',
+        '_is_class_known',
         '_class_steps_as_drawn',
+        '_class_is_asked',
+        '_class_step',
     )
 
     def __init__(self) -> None:
         self._class: Optional[type] = None  # of the machine when it was looked at last
-        self._class_steps_as_drawn = False
+        self._is_class_known = False
         self.stepped = False
         self.lock_is_held = False
         self.attentive = True
@@ -342,6 +352,10 @@ class EngineProbe:
     def ring(self) -> None:
         """Look closely from now on: a state around the machine was abandoned."""
         self.attentive = True
+
+    def begin_trial(self) -> None:
+        """Look at the machine's class again, which may have been patched since."""
+        self._is_class_known = False
 
     def begin_execution(self) -> None:
         """Forget what was seen: the next step looks again."""
@@ -358,18 +372,22 @@ class EngineProbe:
         # of a re-entrant lock
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
-        cls = type(machine)
-        if cls is not self._class:
-            self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
-        self.stays_attentive = (
-            stays_attentive or cls.preempt_requested is not smach.State.preempt_requested
-        )
-        self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
+        if not self._is_class_known or type(machine) is not self._class:
+            self._look_at_class(type(machine))
+        self.stays_attentive = stays_attentive or self._class_is_asked
         # nobody but SMACH and this package has a say in how the machine steps
         step = getattr(machine, '_update_once', None)
-        self.has_own_loop = self._class_steps_as_drawn and getattr(
-            step, '__func__', None
-        ) is getattr(cls, '_update_once', None)
+        self.has_own_loop = (
+            self._class_steps_as_drawn and getattr(step, '__func__', None) is self._class_step
+        )
+
+    def _look_at_class(self, cls: Any) -> None:
+        if cls is not self._class:
+            self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
+        self._is_class_known = True
+        self._class_step = getattr(cls, '_update_once', None)
+        self._class_is_asked = cls.preempt_requested is not smach.State.preempt_requested
+        self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
 
     def __reduce__(self) -> Tuple[Type['EngineProbe'], Tuple[()]]:
         """A copied or pickled machine is looked at when it executes."""

@@ -4,7 +4,7 @@ from typing import Dict, List, Optional, Tuple, cast
 
 import smach
 
-from ..identity import own_attributes
+from ..identity import own_attributes, renew_attributes
 from ..machine.nesting import WRAPPER, branching_below
 from ..machine.tree_node import TreeNode
 from ..smach_private import Labels, set_mark
@@ -58,6 +58,8 @@ def _new_wrapper(
     kind = IteratorWrapper if isinstance(container, smach.Iterator) else ContainerWrapper
     wrapper = kind(container, parent, labels)
     own_attributes(container).update({WRAPPER: wrapper, **({HOOK: wrapper} if asks else {})})
+    for marked in (container, wrapper):
+        renew_attributes(marked)
     return wrapper
 
 
@@ -85,6 +87,7 @@ def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
     branch = Branch(label, is_alone=is_item)
     node = TreeNode(cast(smach.StateMachine, branch), parent.tree, parent.settings, '')
     set_mark(branch, node)
+    renew_attributes(branch)
     node.in_force.wrap_with(parent.in_force.strict, parent.in_force.nested, inherits=True)
     node.site = (IteratorSite if is_item else BranchSite)(container, label)
     node.lie_below(parent, wrapper.labels_from_parent)

@@ -189,9 +189,11 @@ class ContainerWrapper:
         """
         if isinstance(error, smach.InvalidStateError):
             error.__cause__ = error.__cause__ or self.parent.tree.early_end.of_program
-        too_deep = too_deep_here(self.parent, error) if too_deep_below(error) is None else None
-        if too_deep is not None:
-            raise too_deep from None
+        if too_deep_below(error) is None:
+            top = self.parent.top()
+            too_deep = too_deep_here(top.machine, top.path, error)
+            if too_deep is not None:
+                raise too_deep from None
 
     def states(self) -> Iterator[Tuple[str, smach.State]]:
         """Yield the user's states by label."""

@@ -69,6 +69,8 @@ def before_step(node: TreeNode) -> Optional[Stop]:
     was_preempted = node.machine.preempt_requested()
     if was_preempted:
         _heed_preempt(node)
+    elif not node.engine.attentive:
+        return None  # nor was the state drawn after `preempted`
     is_drawn = node.records.take_drawn()
     if not node.engine.attentive:
         return None

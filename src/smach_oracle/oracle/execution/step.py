@@ -103,7 +103,8 @@ class Step:
         """Return why the oracle is entered, or that the machine has gone on without it."""
         node, machine, record = self._node, self._machine, self._record
         if error is not None:
-            too_deep = too_deep_below(error) or too_deep_here(node, error)
+            top = node.top()
+            too_deep = too_deep_below(error) or too_deep_here(top.machine, top.path, error)
             if too_deep is not None:
                 node.execution.give_up()  # upstream's Concurrence drops what its states raise
                 raise too_deep.with_traceback(None) from None

@@ -20,7 +20,7 @@ from ..smach_private import (
     set_preempt_flag,
     set_preempted_state,
     states_of,
-    transitions_of,
+    tables_of,
 )
 
 
@@ -82,6 +82,11 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
             and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
         ):
             machine.service_preempt()
+    return _end(node, label, outcome, container_outcome)
+
+
+def _end(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
+    machine = node.machine
     set_current_label(machine, None)
     if node.site.is_container:
         smach.loginfo(
@@ -99,9 +104,10 @@ def end_plainly(
     It returns the container's outcome, None where more is to be done than that.
     """
     machine, label = node.machine, record.label
+    states, transitions = tables_of(machine)
     try:
         edge = record.fast[outcome]
-        drawn = transitions_of(machine)[label][outcome]
+        drawn = transitions[label][outcome]
     except (KeyError, TypeError):  # seen for the first time, or no outcome at all
         return None
     ending = edge.leads_to
@@ -109,7 +115,7 @@ def end_plainly(
         error is not None
         or edge.message
         or drawn is not edge.drawn
-        or ending in states_of(machine)
+        or ending in states
         # a stop, an operator or a departure may have a say, and an early end of the trial
         or has_preempt_flag(machine)
         or node.engine.attentive
@@ -122,4 +128,4 @@ def end_plainly(
     node.records.history.visited(edge.visit, record.has_preconditions)
     if node.events.observers:
         node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=ending)
-    return terminate(node, label, outcome, ending)
+    return _end(node, label, outcome, ending)

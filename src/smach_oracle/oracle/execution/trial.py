@@ -97,7 +97,7 @@ class ContainerRun(Execution):
             )
         else:
             tell_resumed(node, resumed)
-        tell_unknown_ends(node)
+        tell_unknown_ends(node.path, node.machine.get_registered_outcomes(), node.in_force.rule)
         node.tree.control.begin_trial()
         self._is_trial = True
         _running.append(node)

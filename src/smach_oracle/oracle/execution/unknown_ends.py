@@ -1,10 +1,10 @@
 """Says which ends of a machine have names that tell neither success nor failure."""
 
-from typing import Set, Tuple
+from typing import Iterable, Set, Tuple
 
 import smach
 
-from ..machine.tree_node import TreeNode
+from ..settings.failure_rule import FailureRule
 
 UNKNOWN_ENDS = (
     '{}: nothing says whether an end in {} is a success or a failure. Statistics count it as '
@@ -15,11 +15,10 @@ _MOST_TOLD = 1000  # machines. A program may make up machines without end
 _told: Set[Tuple[str, Tuple[str, ...]]] = set()
 
 
-def tell_unknown_ends(top: TreeNode) -> None:
-    """Name the ends of the top machine whose meaning is not known, once in a process."""
-    ends = top.site.shown(top).get_registered_outcomes()
-    unknown = top.in_force.rule.unknown(ends)
-    if not unknown or (top.path, unknown) in _told or len(_told) >= _MOST_TOLD:
+def tell_unknown_ends(name: str, ends: Iterable[object], rule: FailureRule) -> None:
+    """Name the ends of a top machine whose meaning is not known, once in a process."""
+    unknown = rule.unknown(ends)
+    if not unknown or (name, unknown) in _told or len(_told) >= _MOST_TOLD:
         return
-    _told.add((top.path, unknown))
-    smach.loginfo(UNKNOWN_ENDS.format(top.path, ' or '.join(unknown), unknown[0]))
+    _told.add((name, unknown))
+    smach.loginfo(UNKNOWN_ENDS.format(name, ' or '.join(unknown), unknown[0]))

@@ -22,6 +22,7 @@ from ..smach_private import (
     remove_mark,
     set_mark,
     states_of,
+    tables_of,
     transitions_of,
 )
 from .boundary import place_gates, remove_gates
@@ -187,13 +188,12 @@ def sync_oracle(node: TreeNode) -> None:
     :raises SettingsError: where its name is another's.
     """
     machine = node.machine
-    states = states_of(machine)
+    states, transitions = tables_of(machine)
     if not node.tree.recover or not states:
         return
     label = node.in_force.of_machine.oracle_label
     meta = states.get(label)
     outcomes = machine.get_registered_outcomes()
-    transitions = transitions_of(machine)
     if isinstance(meta, OracleState) and meta.leads_on(
         tuple(states), outcomes, transitions.get(label)
     ):

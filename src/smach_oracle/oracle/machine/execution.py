@@ -39,27 +39,23 @@ class Execution:
     `forget_unrecovered`, which belong to the threads of other containers.
     """
 
-    __slots__ = (
-        '_node',
-        'runs_around',
-        'departure',
-        'unrecovered',
-        'starts_in',
-        'starts_below',
-        '_is_preempt_told',
-    )
+    # of one that has just begun: many end before any of it is written
+    runs_around: Tuple[Scope, ...] = ()
+    departure: Optional[DeparturePort] = None
+    unrecovered = False
+    starts_in = ''  # '': its initial state
+    starts_below: Dict[int, str] = {}  # by the id of a node in the present state. Never written to
+    _is_preempt_told = False
 
     def __init__(self, node: 'TreeNode') -> None:
         self._node = node
-        self.runs_around: Tuple[Scope, ...] = ()
-        self.renew()
 
     def renew(self) -> None:
         """Begin once more, as an engine may do. What is around it stays."""
-        self.departure: Optional[DeparturePort] = None
+        self.departure = None
         self.unrecovered = False
-        self.starts_in = ''  # '': its initial state
-        self.starts_below: Dict[int, str] = {}  # by the id of a node in the present state
+        self.starts_in = ''
+        self.starts_below = {}
         self._is_preempt_told = False
 
     # -- what is around it
@@ -69,8 +65,8 @@ class Execution:
 
         Return whether it still may.
         """
-        self.runs_around = runs_around(self._node)
-        for run in self.runs_around:
+        runs = self.runs_around = runs_around(self._node)
+        for run in runs:
             run.tell(self._node.engine)
         return not self.is_left_behind()
 
@@ -113,7 +109,9 @@ class Execution:
     def is_led(self) -> bool:
         """Whether it begins elsewhere than in its initial state."""
         node = self._node
-        return bool(self.starts_in or node.tree.is_resumed) and (
+        if not (self.starts_in or node.tree.is_resumed):
+            return False
+        return (
             self.starts_in in states_of(node.machine)
             or node.tree.resumed.entry_of(node) is not None
         )

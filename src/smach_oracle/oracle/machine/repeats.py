@@ -25,7 +25,10 @@ class _Done(NamedTuple):
 
 def begin_watching(tree: Tree, nodes: Sequence[TreeNode]) -> None:
     """Begin a trial: number the visits where a state of the tree is guarded."""
-    tree.numbers_visits = tree.recover and any(each.in_force.guards_states for each in nodes)
+    numbers_visits = tree.recover and any(each.in_force.guards_states for each in nodes)
+    if tree.numbers_visits == numbers_visits:
+        return  # a record is made, and configured, by what holds then
+    tree.numbers_visits = numbers_visits
     for each in nodes:
         is_special = each.is_special()
         for record in each.records.by_label.values():

@@ -118,7 +118,7 @@ class Tree:
 
     def is_parents(self) -> bool:
         """Whether this is a child process of the program to which the tree belongs."""
-        return self.process != os.getpid() and is_child()
+        return is_child() and self.process != os.getpid()
 
     def silent_twin(self) -> 'Tree':
         """Return a tree for the same machines in a child process, with nothing of this one."""

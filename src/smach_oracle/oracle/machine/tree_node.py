@@ -293,6 +293,7 @@ class TreeNode:
     def begin_trial(self, trial_id: str) -> None:
         """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
+        self.engine.begin_trial()
         self.tree.resumed.forget(self)
         self.records.begin_trial()
 

@@ -5,7 +5,7 @@ from typing import Any, Dict, Optional, Tuple
 import smach
 
 from ..errors import SettingsError
-from ..identity import own_attributes, set_class
+from ..identity import set_class
 
 _MADE: Dict[Tuple[int, int], type] = {}  # by ids of both classes, which it keeps
 # static in StateMachine, so that the order of bases alone does not find the user's
@@ -72,13 +72,3 @@ def change_class(machine: smach.StateMachine, oracle_class: type) -> None:
         raise SettingsError(
             'machine', machine, 'a machine whose class can be extended ({})'.format(err)
         ) from err
-    renew_attributes(machine)
-
-
-def renew_attributes(machine: object) -> None:
-    """Give an object a fresh dictionary of its attributes.
-
-    CPython reads from it much faster than from one that was looked at, or whose object has changed
-    its class.
-    """
-    object.__setattr__(machine, '__dict__', dict(own_attributes(machine)))

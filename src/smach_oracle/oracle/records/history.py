@@ -46,6 +46,7 @@ class _CountedVisits(Deque[Visit]):
 # state of the latest visit without preconditions, those of the latest successes, two streaks
 Told = Tuple[Optional[str], Optional[str], Optional[str], _Streak, _Streak]
 _NO_STREAK = _Streak(None, 0, None, False)
+SUCCESS = VisitResult.SUCCESS  # looked up once
 
 
 class History:
@@ -105,7 +106,7 @@ class History:
         self.visits.append(visit)
         if not has_preconditions:
             self.unconditioned = visit.state
-        if visit.result is VisitResult.SUCCESS and visit.state != self.succeeded:
+        if visit.result is SUCCESS and visit.state != self.succeeded:
             self.succeeded_other = self.succeeded
             self.succeeded = visit.state
 

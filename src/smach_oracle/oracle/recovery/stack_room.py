@@ -13,7 +13,6 @@ import smach
 
 from ..errors import TooDeepError
 from ..machine.nesting import children_of
-from ..machine.tree_node import TreeNode
 
 NEEDED_FRAMES = 150  # for a recovery, with whoever is asked, logs or records it
 _FRAMES_OF_CONTAINER = 10  # at most, what is in a state not counted
@@ -24,15 +23,17 @@ def too_deep_below(error: BaseException) -> Optional[TooDeepError]:
     return next((each for each in _chain(error) if isinstance(each, TooDeepError)), None)
 
 
-def too_deep_here(node: TreeNode, error: BaseException) -> Optional[TooDeepError]:
-    """Return what says that an error in a container comes from a full stack, None where not.
+def too_deep_here(top: smach.Container, name: str, error: BaseException) -> Optional[TooDeepError]:
+    """Return what says that an error in a machine comes from a full stack, None where not.
 
     A state whose own functions call each other without end has failed as by any other error.
+
+    `top`, `name`: the top machine around it, and its name.
     """
     if sys.getrecursionlimit() - _frames_in_use() >= NEEDED_FRAMES:
         return None
     has_overrun = any(isinstance(each, RecursionError) for each in _chain(error))
-    return _too_deep(node) if has_overrun else None
+    return _too_deep(top, name) if has_overrun else None
 
 
 def _chain(error: BaseException) -> Iterator[BaseException]:
@@ -52,14 +53,13 @@ def _frames_in_use() -> int:
     return count
 
 
-def _too_deep(node: TreeNode) -> TooDeepError:
-    top, limit = node.top(), sys.getrecursionlimit()
-    depth = _depth_of(top.machine)
+def _too_deep(top: smach.Container, name: str) -> TooDeepError:
+    limit, depth = sys.getrecursionlimit(), _depth_of(top)
     wanted = limit + _FRAMES_OF_CONTAINER * depth
     return TooDeepError(
         '{}: {} containers lie in each other, and the stack of Python, which has {} frames, is '
         'full. Call sys.setrecursionlimit({}) before the machine runs'.format(
-            top.path, depth, limit, -(-wanted // 1000) * 1000
+            name, depth, limit, -(-wanted // 1000) * 1000
         )
     )
 
