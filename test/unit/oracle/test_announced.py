@@ -220,20 +220,31 @@ def test_a_success_or_a_preempt_is_none_wherever_it_leads(outcome):
     assert not machine.of(EventKind.FAILURE)
 
 
-def test_words_of_a_user_are_followed_to_the_letter():
+@pytest.mark.parametrize('says', ['succeeded', 'preempted'])
+@pytest.mark.parametrize(
+    'listed, end, visits', [(['failed'], 'done', ['NAV', 'NAV']), (None, 'failed', ['NAV'])]
+)
+def test_with_a_list_of_a_user_no_name_is_excused(says, listed, end, visits):
+    nav = Scripted(says, outcomes=('ok', says))
     machine = Watched(
-        made(
-            [
-                (
-                    'NAV',
-                    Scripted('succeeded', outcomes=('ok', 'succeeded')),
-                    {'ok': 'done', 'succeeded': 'failed'},
-                )
-            ]
-        ),
-        settings={'failing_outcomes': ['failed']},
+        made([('NAV', nav, {'ok': 'done', says: 'failed'})]),
+        settings={'failing_outcomes': listed},
+    )
+    assert machine.run() == end
+    assert machine.visits() == visits
+
+
+@pytest.mark.parametrize('says', ['said', 'succeeded', 'low'])
+@pytest.mark.parametrize('listed', [['failed'], ['broken', 'failed']])
+def test_with_a_list_of_a_user_a_failure_that_is_reported_is_that_of_the_first_state(says, listed):
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        Scripted(outcomes=(says,)),
+        settings={'failing_outcomes': listed},
     )
     assert machine.run() == 'done'
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT', 'WORK']
+    assert told(machine, EventKind.FAILURE) == [('FAILURE', 'WORK')]
 
 
 def test_a_failure_is_not_taken_up_where_an_oracle_below_has_given_up():
