@@ -213,6 +213,20 @@ def test_after_a_trial_that_was_cut_off_the_next_one_begins_as_usual():
     assert {trial.failures for trial in trials} == {30}
 
 
+def test_a_loop_that_an_author_drew_goes_on_as_without_an_oracle_until_it_is_cut_off(monkeypatch):
+    """Machine 13 enters M4 again whenever it is aborted, which lasts in its third trial."""
+    warned = []
+    monkeypatch.setattr(smach, 'logwarn', warned.append)
+    (*_, bare) = run_machine(13, Arm('bare'), 3)
+    assert bare.ended == CUT_OFF and bare.failures > 500
+    warned.clear()
+    (*_, trial) = run_machine(13, Arm('escalating'), 3)
+    assert trial.ended == CUT_OFF and trial.attempts <= 8 and trial.questions == 0
+    assert trial.failures == pytest.approx(bare.failures, rel=0.1)
+    loops = [text for text in warned if 'TOP/M4: keeps failing' in text]
+    assert len(loops) == 1 and 'and back again' in loops[0]
+
+
 def test_each_trial_begins_with_a_person_who_has_not_been_asked():
     with bed_of(chosen('ask'), [LIGHT, PICKED], ['light'], ['light']) as bed:
         trials = [bed.trial(number) for number in range(EXACT.most_questions + 2)]
