@@ -1,6 +1,6 @@
 """Reads the menu that a decision was made from, as its event tells it."""
 
-from typing import Any, Mapping, NamedTuple, Optional
+from typing import Any, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.decision.policy import Menu, Past
 from smach_oracle.oracle.decision.ways import Prices, StreakSoFar, Way, WayKind
@@ -26,7 +26,7 @@ def recorded_menu(event: Event, settings: Mapping[str, Any]) -> Optional[Recorde
         menu = Menu(
             tuple(_way(each) for each in data['menu']),
             _streak(data['streak']),
-            Prices(**{key[len(_PRICE) :]: settings[key] for key in settings if key in _PRICES}),
+            prices_of(settings),
             bool(data['has_expert']),
         )
         usual = data['usual_minutes']
@@ -38,10 +38,20 @@ def recorded_menu(event: Event, settings: Mapping[str, Any]) -> Optional[Recorde
         return None
 
 
+def prices_of(settings: Mapping[str, Any]) -> Prices:
+    """Return the prices that an oracle goes by, by its recorded settings."""
+    return Prices(**{key[len(_PRICE) :]: settings[key] for key in settings if key in _PRICES})
+
+
 def chosen_way(event: Event) -> str:
     """Return the key of the way that was chosen, '' where none was."""
+    return next(iter(order_of(event)), '')
+
+
+def order_of(event: Event) -> Tuple[str, ...]:
+    """Return the keys of the ways in the order in which the policy would go them."""
     order = _told(event).get('order')
-    return str(order[0]) if isinstance(order, (list, tuple)) and order else ''
+    return tuple(map(str, order)) if isinstance(order, (list, tuple)) else ()
 
 
 def offers_preconditions(event: Event) -> bool:

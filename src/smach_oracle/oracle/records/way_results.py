@@ -7,7 +7,7 @@ a shutdown or the act of a person.
 
 import re
 from collections import deque
-from typing import Any, Callable, Deque, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Deque, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from ..decision.ways import PLACES, WayResult
 from .events import FailureKind
@@ -151,3 +151,14 @@ def merged_ways(
     new = max(0, total - int(base.get(WAYS_TOTAL, 0)))
     results = deque([*others, *ours[len(ours) - min(new, len(ours)) :]], MOST_RESULTS)
     return told_of(results, other_total + new) if results else {}
+
+
+def counts_of_kinds(results: Iterable[WayResult]) -> Dict[Tuple[str, int], Tuple[float, float]]:
+    """Return how often ways of a kind at a place have helped, and how often not."""
+    counts: Dict[Tuple[str, int], Tuple[float, float]] = {}
+    for each in results:
+        if each.helped is not None:
+            kind = each.kind, each.place
+            helped, not_helped = counts.get(kind, (0.0, 0.0))
+            counts[kind] = helped + each.helped, not_helped + (not each.helped)
+    return counts

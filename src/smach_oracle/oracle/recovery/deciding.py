@@ -1,6 +1,6 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 
-from typing import Dict, Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 from ..decision.by_ways import action_of
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
@@ -12,6 +12,7 @@ from ..machine.places import TreePlace, levels_above, place_named
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.streaks import OpenStreak
+from ..records.way_results import counts_of_kinds
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import ALLOW
 from ..smach_private import initial_label_of
@@ -164,13 +165,8 @@ def _with_menu(
 
 def _evidence(recovery: Recovery) -> Evidence:
     """Return what the ways on from failures of the state, and of all states, have led to."""
-    of_kinds: Dict[Tuple[str, int], Tuple[float, float]] = {}
-    for record in records_of(recovery.node):
-        for each in record.ways_so_far():
-            if each.helped is not None:
-                kind = each.kind, each.place
-                helped, not_helped = of_kinds.get(kind, (0.0, 0.0))
-                of_kinds[kind] = helped + each.helped, not_helped + (not each.helped)
+    results = (each for record in records_of(recovery.node) for each in record.ways_so_far())
+    of_kinds = counts_of_kinds(results)
     return Evidence(recovery.record.ways_so_far(), recovery.failure_key, of_kinds)
 
 
