@@ -7,6 +7,10 @@ forecast how often such an oracle asks: after the first other decision the trial
 would have gone another way. To measure that, run the trials with the other settings (run_trials
 --memory ... --policy ...).
 
+Of a policy that goes by ways (--policy escalating) it says in how many streaks it agrees with the
+recorded decisions, and between what a mean streak lies: cured, questions, cost. Where ways were
+drawn (any_way, or a parameter `explore`), it weights the streaks, with 95% intervals.
+
 The record is first replayed under its own settings. If that does not reproduce the recorded rates
 and decisions, the folder is skipped and the reason is printed. Exit code: 0; 1, some bags or
 folders were skipped; 2, nothing could be replayed.
@@ -27,6 +31,9 @@ from .bag_events import BagError, SkippedBag
 from .reading import plain, report_error, report_skipped, write_json
 from .replaying.checks import beginnings, that_count
 from .replaying.replay import NOT_KNOWN, STAYS, Replay, ReplayedDecision, conditioned, policy_of
+from .replaying.streak_words import findings_as_data, findings_in_words
+from .replaying.streaks import StreakReader
+from .replaying.weighting import Findings, findings_of
 from .trials import load_replicates, summarise
 
 SAME = 'same'
@@ -44,6 +51,7 @@ class TriedSettings(NamedTuple):
     other_trials: int  # in which at least one decision is known to be another
     programs: int = 1  # found that began with nothing learned
     without_menu: int = 0  # decisions of a policy that goes by ways, where no menu is recorded
+    streaks: Optional[Findings] = None  # None: it does not go by ways
 
 
 def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[str, Any]:
@@ -75,19 +83,28 @@ class Recorded:
 
     def replay(self, settings: Mapping[str, Any]) -> Replay:
         """Return an oracle that has learned nothing, with these settings in place of its own."""
-        return Replay(_changed(self.settings, settings), self._conditioned)
+        return Replay(self.settings_with(settings), self._conditioned)
+
+    def settings_with(self, settings: Mapping[str, Any]) -> Dict[str, Any]:
+        """Return the recorded settings, with others in their place."""
+        return _changed(self.settings, settings)
 
 
 def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
     """Put the decisions of one replicate to an oracle of other settings."""
     counts = dict.fromkeys((*OUTCOMES, GIVES_UP), 0)
     other_trials = without_menu = 0
+    in_force = recorded.settings_with(settings)
+    policy = policy_of(in_force)
+    streaks = StreakReader(policy) if policy.goes_by_ways else None
     for number, trial in enumerate(recorded.trials):
         if number in recorded.beginnings:
             other = recorded.replay(settings)
         another = False
         for event in that_count(trial):
             tried = other.take(event)
+            if streaks is not None:
+                streaks.take(event, tried, in_force)
             if tried is not None:
                 outcome = _outcome(event, tried)
                 counts[outcome] += 1
@@ -101,6 +118,7 @@ def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
         other_trials,
         len(recorded.beginnings),
         without_menu,
+        None if streaks is None else findings_of(streaks.found),
     )
 
 
@@ -140,6 +158,9 @@ def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
                     name, row.without_menu
                 )
             )
+    for name, row in zip(names, rows):
+        if row.streaks is not None:
+            lines += ['{}: {}'.format(name, each) for each in findings_in_words(row.streaks)]
     if rows[0].programs > 1:
         lines.append(
             'at least {} programs, each of which began with nothing learned'.format(
@@ -161,6 +182,7 @@ def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
                 'outcomes': {name: row.counts[name] for name in OUTCOMES + (GIVES_UP,)},
                 'trials': row.trials,
                 'trials_with_another': row.other_trials,
+                **({} if row.streaks is None else {'streaks': findings_as_data(row.streaks)}),
             }
             for row in rows
         ],

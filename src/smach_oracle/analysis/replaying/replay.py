@@ -20,6 +20,7 @@ from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 
 from .menus import chosen_way, offers_preconditions, recorded_menu
+from .way_reader import WayReader
 
 ENOUGH_VISITS = 50
 NOT_KNOWN = 'not known'  # what it would decide
@@ -33,12 +34,14 @@ class ReplayedDecision(NamedTuple):
     """A decision of the oracle that follows.
 
     `action`: or 'not known'. `way`: of the menu, where the policy goes by ways. `lacks_menu`:
-    nothing is known since the recorded policy has told of no menu.
+    nothing is known since the recorded policy has told of no menu. `situation`: with the menu that
+    a policy that goes by ways chooses from.
     """
 
     action: str
     way: str = ''
     lacks_menu: bool = False
+    situation: Optional[Situation] = None
 
     def is_as(self, event: Event) -> bool:
         """Whether it is the recorded decision. Ways are compared where both go by ways."""
@@ -75,9 +78,12 @@ class Replay:
         self._branches: Dict[str, Tuple[str, ...]] = {}  # states that are on their own, by path
         self._running: Set[str] = set()  # paths of containers
         self._go_on: Set[str] = set()  # those that ran when the program was stopped
+        self._ways = WayReader() if self._policy.learns else None
 
     def take(self, event: Event) -> Optional[ReplayedDecision]:
         """Follow one event. Return the decision at a DECISION ('not known' included), else None."""
+        if self._ways is not None:
+            self._ways.take(event)
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
         elif event.kind == EventKind.RESUMED:
@@ -119,6 +125,10 @@ class Replay:
     def rate(self, event: Event) -> float:
         """Return what it has learned of the event's state."""
         return self._state(event).estimator.rate
+
+    def learned(self) -> Dict[Key, Dict[str, Any]]:
+        """Return what it has learned of each state, as a rates file has it."""
+        return {key: dict(state.estimator.snapshot()) for key, state in self._states.items()}
 
     def _state(self, event: Event) -> _LearnedState:
         key = (event.path, event.state)
@@ -215,17 +225,21 @@ class Replay:
         recorded, policy = recorded_menu(event, self._settings), self._policy
         if recorded is None or state.context is None:
             return ReplayedDecision(NOT_KNOWN, lacks_menu=recorded is None)
+        menu = recorded.menu
+        if self._ways is not None:
+            menu = menu._replace(evidence=self._ways.evidence((event.path, event.state)))
         situation = Situation(
             failure_class,
             Preconditions.NONE,
             policy.is_continuous(state.context),
             recorded.past,
-            recorded.menu,
+            menu,
         )
         order = policy.order(situation)
         if order and policy.draws:
-            return ReplayedDecision(NOT_KNOWN)
-        return ReplayedDecision(action_of(order).value, order[0].key if order else '')
+            return ReplayedDecision(NOT_KNOWN, situation=situation)
+        way = order[0].key if order else ''
+        return ReplayedDecision(action_of(order).value, way, situation=situation)
 
     def _preconditions(
         self, event: Event, state: _LearnedState, failure_class: FailureClass

@@ -108,6 +108,13 @@ class Escalating(Baseline):
             return choice._replace(chance=1.0 - self.explore)
         return ChosenOrder((second, first, *others), self.explore)
 
+    def chance_of(self, situation: Situation, key: str) -> float:
+        """Return the chance with which it goes a way first."""
+        first, *others = [way.key for way in self.order(situation)] or ['']
+        if not others or key not in (first, others[0]):
+            return float(key == first)
+        return 1.0 - self.explore if key == first else self.explore
+
     def _left(self, menu: Menu) -> List[Way]:
         return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
 
@@ -157,3 +164,8 @@ class AnyWay(Escalating):
         """Return the ways that are open, untried and pay, in the order that is drawn."""
         ways = super().order(situation)
         return tuple(draws_of(self.seed, situation.past).sample(ways, len(ways)))
+
+    def chance_of(self, situation: Situation, key: str) -> float:
+        """Return the chance with which it goes a way first. Each order is as likely."""
+        keys = [way.key for way in super().order(situation)] or ['']
+        return 1.0 / len(keys) if key in keys else 0.0

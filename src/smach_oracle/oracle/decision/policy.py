@@ -143,6 +143,14 @@ class Policy:
         """
         return ChosenOrder(self.order(situation))
 
+    def chance_of(self, situation: Situation, key: str) -> float:
+        """Return the chance with which it goes a way first. `key`: of the way, '' is to ask.
+
+        For a policy that goes by ways.
+        """
+        order = self.order(situation)
+        return float(key == (order[0].key if order else ''))
+
     def why(self, situation: Situation) -> str:
         """Say why it gives up or asks, as a clause, or '' where its cell says it all."""
         return ''

@@ -107,6 +107,10 @@ class Bed:
     def __exit__(self, *error: object) -> None:
         self._open.close()
 
+    def now_s(self) -> float:
+        """Return the time of its world."""
+        return self._clock.now()
+
     def _observe(self, event: Any) -> None:
         if event.kind is EventKind.DECISION:
             self.events.append(event)
