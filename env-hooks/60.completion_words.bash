@@ -1,9 +1,10 @@
 # The words of 61.completion. Written by write_completion.py.
 _smach_oracle_commands='bag_statistics compare_oracles compare_variants draw_results expert_console
 expert_query_server expert_terminal inspection_inspector inspection_navigator
-inspection_world joy_teleoperation manipulation_interface oracle_disk oracle_run
-oracle_state perception_interface pr2_film pr2_manipulation pr2_perception
-pr2_world run_trials same_trials scripted_expert scripted_operator what_if'
+inspection_world joy_teleoperation learn manipulation_interface oracle_disk
+oracle_run oracle_state perception_interface pr2_film pr2_manipulation
+pr2_perception pr2_world run_trials same_trials scripted_expert
+scripted_operator what_if'
 
 _smach_oracle_words() {
   case $1 in
@@ -33,6 +34,8 @@ _smach_oracle_words() {
       echo '--help --version -h' ;;
     'joy_teleoperation')
       echo '--help --version -h' ;;
+    'learn')
+      echo '--explain --help --output --version -h' ;;
     'manipulation_interface')
       echo '--help --version -h' ;;
     'oracle_disk')

@@ -16,6 +16,7 @@ PAGES = {
     'inspection_navigator': 'second_robot',
     'inspection_world': 'second_robot',
     'joy_teleoperation': 'shared_autonomy',
+    'learn': 'comparing',
     'manipulation_interface': 'shared_autonomy',
     'oracle_disk': 'recording',
     'oracle_run': 'oracle_run',

@@ -18,7 +18,7 @@ from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import TrialSummary, summarise
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.records.rates_file import write_learned
+from smach_oracle.oracle.records.rates_format import write_learned
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
 from .plan import ExperimentError, write_json

@@ -16,6 +16,7 @@ UNKNOWN = '--no-such-option'
 WORDS = {
     'bag_statistics': ['1'],
     'compare_oracles': ['1'],
+    'learn': ['1'],
     'pr2_film': ['1'],
     'same_trials': ['1', '1'],
     'what_if': ['1'],

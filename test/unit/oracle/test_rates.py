@@ -20,7 +20,7 @@ from smach_oracle.oracle.decision.failure_rate import (
     make_estimator,
 )
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.records import rates_file
+from smach_oracle.oracle.records import rates_format
 from smach_oracle.oracle.settings.failure_rule import rule_in
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -253,7 +253,7 @@ def test_one_state_that_makes_no_sense_costs_only_itself(tmp_path, log):
     path.write_text(
         json.dumps(
             {
-                'format': rates_file.FORMAT,
+                'format': rates_format.FORMAT,
                 'version': 1,
                 'containers': {'': {'A': 5, 'B': good, 'GONE': good}},
             }
@@ -344,7 +344,7 @@ def test_the_record_of_a_trial_tells_how_to_go_on_after_it(tmp_path):
     )
     assert learned == json.loads(path.read_text())['containers']
     rule = rule_in(watch.events[0].data)
-    rates_file.write_learned(str(tmp_path / 'again.json'), learned, rule)
+    rates_format.write_learned(str(tmp_path / 'again.json'), learned, rule)
     assert (tmp_path / 'again.json').read_text() == path.read_text()
     plain = watched(Scripted('aborted'))
     plain.machine.execute()

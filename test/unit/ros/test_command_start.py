@@ -70,6 +70,7 @@ def test_a_command_tells_the_version_without_ros(command):
         'bag_statistics ' + BAGS,
         'bag_statistics --help',
         'what_if ' + BAGS,
+        'learn --help',
         'oracle_disk --keep-gb 1 ' + BAGS,
         'run_trials --plan --protocol all',
         'oracle_run --help',

@@ -15,7 +15,7 @@ SCRIPTS = Path(__file__).resolve().parents[3] / 'scripts'
 COMMANDS = sorted(
     path.name for path in SCRIPTS.iterdir() if b'python3' in path.read_bytes().split(b'\n')[0]
 )
-WITH_BAGS = ['bag_statistics', 'compare_oracles', 'run_trials', 'same_trials', 'what_if']
+WITH_BAGS = ['bag_statistics', 'compare_oracles', 'learn', 'run_trials', 'same_trials', 'what_if']
 WITH_BODIES = [
     ('pr2_world', 'pybullet'),
     ('pr2_film', 'pybullet'),

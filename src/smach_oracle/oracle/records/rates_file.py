@@ -4,21 +4,13 @@ A crash at any moment leaves the old file or the new one. Who writes reads the f
 what its machine has learned since it last read or wrote. A lock on the folder keeps others out
 meanwhile.
 
-Format: {"format": "smach_oracle rates", "version": 1, "containers": {PATH: {STATE: estimator
-snapshot}}, "machines": {NAME: containers}}, with PATH relative to the top machine ('' itself).
-"machines" is there once a machine with a name has written. "containers" has all states of all
-machines then, for programs that do not know "machines". A machine without a name goes by ''.
-"states": {NAME: {PATH: [STATE]}} has the states of each, also those without a result. "renamed":
-{NAME: NEW NAME} has the machines whose rates one under a new name has taken over.
-"failure_rules": {NAME: RULE} has the rule by which failures of a machine were told when it last
-wrote. Files of earlier versions do not have it.
+`rates_format` says what is in it.
 """
 
 import contextlib
 import gc
 import json
 import os
-import tempfile
 from functools import partial
 from typing import (
     Any,
@@ -39,9 +31,8 @@ import smach
 
 from ..settings.failure_rule import RULE, FailureRule, rule_in
 from .folder_locks import folder_lock, is_claimed
+from .rates_format import FORMAT, VERSION, Containers, Labels, Machines, write_machines
 
-FORMAT = 'smach_oracle rates'
-VERSION = 1
 DAMAGED = '.damaged'
 INHERITS = (
     'Rates file {}: {!r} is new there, and begins with what {} has learned. It has the '
@@ -56,29 +47,6 @@ OTHER_RULE = (
     '{}. The rates stay, and change with the coming results'
 )
 NOT_NAMED = 'by the rule of an earlier version, or by a list'
-States = Dict[str, Mapping[str, object]]  # what was learned, by label
-Containers = Dict[str, States]  # by path below the top machine
-Labels = Dict[str, List[str]]  # by path, too
-
-
-class Machines(Dict[str, Containers]):
-    """What a file has, by the names of machines, '' for one that has none."""
-
-    def __init__(
-        self,
-        content: Mapping[str, Containers],
-        states: object = None,
-        renamed: object = None,
-        rules: object = None,
-    ) -> None:
-        """`states`: of each. `renamed`: new names, by those whose rates have gone there, too.
-
-        `rules`: by which failures were told, as plain data.
-        """
-        super().__init__(content)
-        self.states: Dict[str, Labels] = states if isinstance(states, dict) else {}
-        self.renamed: Dict[str, str] = renamed if isinstance(renamed, dict) else {}
-        self.rules: Dict[str, object] = rules if isinstance(rules, dict) else {}
 
 
 class Learner(Protocol):
@@ -141,7 +109,7 @@ def _rewritten(
         yield machines
         machines.states[name] = _labels(learners)
         machines.rules[name] = rule.as_data()
-        _write(path, machines, name)
+        write_machines(path, machines, name)
 
 
 def _merge(
@@ -176,59 +144,6 @@ def write_rates(path: str, name: str, learners: Iterable[Learner], rule: Failure
     learners = list(learners)
     with _rewritten(os.path.realpath(path), name, learners, rule) as machines:
         machines[name] = learned_by(learners)
-
-
-def write_learned(
-    path: str, containers: Mapping[str, States], rule: Optional[FailureRule] = None
-) -> None:
-    """Write what `learned_by` returned, in place of all that the file had.
-
-    `rule`: by which failures were told, where that is known.
-
-    :raises OSError: where it cannot be written. The old file is then untouched.
-    """
-    path = os.path.realpath(path)
-    with folder_lock(os.path.dirname(path)):
-        rules = {} if rule is None else {'': rule.as_data()}
-        _write(path, Machines({'': dict(containers)}, rules=rules), '')
-
-
-def _write(path: str, machines: Machines, name: str) -> None:
-    """Write all. In "containers" the machine of this name wins, as the latest."""
-    machines.renamed.pop(name, None)  # it is there again
-    containers: Containers = {}
-    for each in [each for each in machines if each != name] + [name]:
-        for place, states in machines[each].items():
-            containers.setdefault(place, {}).update(states)
-    content = {'format': FORMAT, 'version': VERSION, 'containers': containers}
-    if set(machines) != {''}:
-        content['machines'], content['states'] = machines, machines.states
-    if machines.rules:
-        content['failure_rules'] = machines.rules
-    if machines.renamed:
-        content['renamed'] = machines.renamed
-    text = json.dumps(content, indent=1, sort_keys=True)
-    folder = os.path.dirname(path)
-    descriptor, temporary = tempfile.mkstemp(
-        prefix=os.path.basename(path) + '.', suffix='.tmp', dir=folder
-    )
-    try:
-        with os.fdopen(descriptor, 'w', encoding='utf-8') as stream:
-            stream.write(text + '\n')
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.remove(temporary)
-        raise
-    with contextlib.suppress(OSError):  # not every file system lets folders be synced
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
 
 
 def read_rates(
@@ -299,7 +214,7 @@ def _inherited(
                 machines.renamed[before] = name
                 if told is not None:
                     machines.rules[name] = told
-                _write(path, machines, name)
+                write_machines(path, machines, name)
     except OSError as err:
         smach.logwarn(
             'Rates file {}: that {!r} is new cannot be noted there: {}'.format(path, name, err)

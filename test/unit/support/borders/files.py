@@ -25,7 +25,7 @@ from smach_oracle.analysis.variants import count_variants, time_series
 from smach_oracle.expert.console.feeds.views import event_view
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import CheckpointError
-from smach_oracle.oracle.records import rates_file
+from smach_oracle.oracle.records import rates_format
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.store import opening, state_command
@@ -184,7 +184,7 @@ _estimators = mapping_of(
 )
 _rates = mapping_of(
     {
-        'format': st.just(rates_file.FORMAT),
+        'format': st.just(rates_format.FORMAT),
         'version': st.just(1),
         'containers': st.dictionaries(
             words('', 'KITCHEN'),

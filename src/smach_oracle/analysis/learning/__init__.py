@@ -1,0 +1,1 @@
+"""What recorded trials teach of the ways on from failures, and of preconditions."""
