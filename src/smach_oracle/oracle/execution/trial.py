@@ -137,7 +137,8 @@ def _end_trial(
     is_lost = why is TrialEnd.ERROR or (
         why is TrialEnd.OUTCOME and outcome in node.in_force.failing
     )
-    settle_ways(node, False if is_lost else None)
+    if node.tree.budget.recoveries:  # else it has gone no way
+        settle_ways(node, False if is_lost else None)
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',
