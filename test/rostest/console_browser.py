@@ -23,7 +23,8 @@ YOURS = 'It is yours.'
 UNKNOWN_SUCCESS = """return import("/static/js/answering/state_choices.js").then(
 ({ stateLines }) => (
   stateLines({ state: "PICK", success: null, class: 0, visits: 0, missing: [], preconditions: [],
-    blocked: "", repeats: [], runs_again: [], helped: [0, 0], container: "" },
+    blocked: "", repeats: [], runs_again: [], helped: [0, 0], helped_s: null,
+    recommended: "", container: "" },
   { state: "PLACE", running: false }).map((line) => line ? line.textContent : "").join("")))"""
 NO_PLACE = """return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
   const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));

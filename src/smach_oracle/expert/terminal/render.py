@@ -149,8 +149,9 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
     table = _table('', 'state', 'success', 'class', 'visits', 'on arrival')
     for choice in goal.choices:
         dim = 'dim' if choice.blocked else ''
-        rate = 1.0 - choice.predicted_success
-        bar = rate_bar(choice.predicted_success, 6)
+        success = choice.helped / choice.tried if choice.tried else choice.predicted_success
+        rate = 1.0 - success
+        bar = rate_bar(success, 6)
         bar.stylize(dim or rate_colour(rate))  # the colour is that of its failure rate
         name = Text(clean(choice.state), dim or 'bold')
         if choice.container:
@@ -169,8 +170,14 @@ def _states(goal: ExpertQueryGoal, found: Iterable[AnswerOption]) -> Table:
 
 
 def _arrival(choice: StateChoice) -> Text:
-    """Return what would be missing or repeated, what must hold, or why it cannot be entered."""
+    """Return what is to be expected of a choice, and what speaks against it."""
     parts = []
+    if choice.recommended:
+        parts.append(Text('recommended', 'bold green'))
+    if choice.tried:
+        took = ', {}'.format(duration(choice.helped_s)) if choice.helped else ''
+        told = 'helped {} of {} times from here{}'.format(choice.helped, choice.tried, took)
+        parts.append(Text(told, 'green' if 2 * choice.helped > choice.tried else ''))
     if choice.blocked:
         parts.append(Text('blocked: ' + clean(choice.blocked), 'bold #cc3333'))
     if choice.repeats:

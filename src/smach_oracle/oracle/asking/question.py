@@ -39,6 +39,11 @@ class StateChoice(NamedTuple):
     # of the way of the menu that leads there (`Way`). '', 0: no way of the menu does
     way: str = ''  # its key
     minutes: float = 0.0  # that the robot is expected to take until it is where it was
+    # of going there after such a failure of the failed state. 0, 0, 0: nothing is known
+    helped: int = 0  # times that the failed state succeeded next
+    tried: int = 0  # of so many
+    helped_s: float = 0.0  # mean time until it did
+    recommended: str = ''  # why this choice is recommended, '' where it is not
 
 
 class OutcomeChoice(NamedTuple):

@@ -126,6 +126,27 @@ class Evidence(NamedTuple):
     failure: str = ''
     of_kinds: Mapping[Tuple[str, int], Tuple[float, float]] = {}
 
+    def of_way(self, key: str) -> 'WayCounts':
+        """Return what a way has led to after failures of this kind, after all kinds if none had."""
+        known = [each for each in self.results if each.way == key and each.helped is not None]
+        same = [each for each in known if each.failure == self.failure] or known
+        helped = [each for each in same if each.helped]
+        minutes = sum(each.minutes for each in helped) / max(1, len(helped))
+        return WayCounts(len(helped), len(same), minutes)
+
+
+class WayCounts(NamedTuple):
+    """How often a way has helped, of how many times, and the mean time that it took then."""
+
+    helped: int = 0
+    tried: int = 0
+    minutes: float = 0.0
+
+    @property
+    def share(self) -> float:
+        """Return the share of the times that it has helped, as if it had twice been one of two."""
+        return (self.helped + 1.0) / (self.tried + 2.0)
+
 
 class ChosenOrder(NamedTuple):
     """What a policy makes of a menu: the ways in the order in which it would go them.

@@ -1,6 +1,6 @@
 """Makes a question of a failure, with everything that an expert needs (paper, section V)."""
 
-from typing import Any, Collection, Dict, Iterator, List, Mapping, Optional, Tuple
+from typing import Any, Collection, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import smach
 from smach_common.foreign import repr_of
@@ -13,10 +13,10 @@ from ..asking.question import (
     Question,
     StateChoice,
 )
-from ..decision.ways import way_in_words
+from ..decision.ways import Evidence, WayCounts, key_of, way_in_words
 from ..identity import truth_of
 from ..machine.jump_path import JumpPath, missing_on
-from ..machine.places import TreePlace, levels_above, place_named
+from ..machine.places import TreePlace, levels_above, name_of, place_named
 from ..machine.snapshots import UserdataGate, behind
 from ..machine.tree_node import TreeNode
 from ..records.short_text import shortened
@@ -24,9 +24,11 @@ from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..smach_private import data_of, remapping_of, states_of
 from .falling_back import fallback_in_words
-from .options import choices_on, places_on
+from .options import Option, choices_on, places_on
 from .recovery import Recovery
 from .verdict import streak_of
+
+RECOMMENDED = 'it has helped {} of {} times after such a failure'
 
 
 def make_question(recovery: Recovery, deadline_s: float) -> Question:
@@ -89,7 +91,11 @@ def _target(node: TreeNode, place: TreePlace) -> Target:
 
 def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
-    for each, way in choices_on(recovery):
+    choices = list(choices_on(recovery))
+    evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key)
+    counts = [evidence.of_way(_way_key(recovery, each)) for each, _ in choices]
+    recommended = _recommended([each for each, _ in choices], counts)
+    for number, (each, way) in enumerate(choices):
         container, label = _target(recovery.node, each.place)
         record, jump_path = each.place.node.record(label), each.jump_path
         yield StateChoice(
@@ -105,7 +111,31 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
             _running_again(jump_path),
             '' if way is None else way.key,
             0.0 if way is None else way.minutes,
+            counts[number].helped,
+            counts[number].tried,
+            60.0 * counts[number].minutes,
+            RECOMMENDED.format(*counts[number]) if number == recommended else '',
         )
+
+
+def _way_key(recovery: Recovery, option: Option) -> str:
+    """Return the name by which the results of ways know to go to a place."""
+    return key_of(name_of(option.place, recovery.node), recovery.record.label)
+
+
+def _recommended(options: Sequence[Option], counts: Sequence[WayCounts]) -> Optional[int]:
+    """Return the number of the choice that has helped most of the time, None where none has.
+
+    It can be entered now, repeats nothing that is not to be repeated, and was tried twice or more.
+    """
+    possible = [
+        (each.share, -number)
+        for number, each in enumerate(counts)
+        if each.tried > 1
+        and 2 * each.helped > each.tried
+        and not (options[number].closed or options[number].repeats)
+    ]
+    return -max(possible)[1] if possible else None
 
 
 def _outcomes_of(node: TreeNode) -> Tuple[str, ...]:

@@ -62,6 +62,10 @@ def to_goal(question: Question, robot: str, asked: Optional[rospy.Time] = None) 
                     list(choice.repeats),
                     choice.container,
                     list(choice.runs_again),
+                    choice.helped,
+                    choice.tried,
+                    choice.helped_s,
+                    choice.recommended,
                 )
                 for choice in question.choices
             ],

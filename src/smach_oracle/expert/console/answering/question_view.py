@@ -3,7 +3,7 @@
 import math
 from typing import Any, Callable, Dict, List
 
-from smach_oracle.msg import ExpertQueryGoal, OpenQuery, UserdataItem
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem
 from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
@@ -95,10 +95,21 @@ def _choices(
             'blocked': choice.blocked,
             'repeats': list(choice.repeats),
             'runs_again': list(choice.runs_again),
-            'helped': [0, 0] if choice.container else list(recovery_counts(choice.state)),
+            'helped': list(_helped(choice, recovery_counts)),
+            'helped_s': choice.helped_s if choice.tried else None,
+            'recommended': choice.recommended,
         }
         for choice in goal.choices
     ]
+
+
+def _helped(
+    choice: StateChoice, recovery_counts: Callable[[str], RecoveryCounts]
+) -> RecoveryCounts:
+    """Return how often going there has helped: as the robot knows it, else as this console saw."""
+    if choice.tried:
+        return RecoveryCounts(choice.helped, choice.tried)
+    return RecoveryCounts(0, 0) if choice.container else recovery_counts(choice.state)
 
 
 def _supersede(goal: ExpertQueryGoal) -> List[Dict[str, str]]:

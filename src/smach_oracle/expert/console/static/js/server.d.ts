@@ -135,6 +135,8 @@ export interface StateChoice {
   repeats: string[]; // states that are not repeated by themselves
   runs_again: string[]; // branches of a Concurrence, which all run again
   helped: [helped: number, tried: number]; // how often going there helped
+  helped_s: number | null; // mean time until it did; null: only this console has counted
+  recommended: string; // why; '' where it is not
 }
 
 export interface LevelOutcome { container: string; outcome: string }

@@ -1,7 +1,7 @@
 // @ts-check
 // The states that a machine may be told to go to: which come first, and what is said of each.
 import { h } from '../page/dom.js';
-import { FAILURE_CLASSES, breakable, chip, counted, percent, rateBar } from '../page/format.js';
+import { FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Question} Question */
@@ -11,7 +11,7 @@ const LIKELIEST = 6;
 const MOST_HELPFUL = 2;
 
 /**
- * The likeliest of very many states: those that helped before, the failed one, the one that
+ * The likeliest of very many states: the recommended one, those that helped before, the failed one, the one that
  * follows its success, and those that succeeded last.
  * @param {Question} question
  */
@@ -21,7 +21,8 @@ export function likeliest({ choices, state, supersede, history }) {
   const helpful = choices.filter((choice) => choice.helped[0] > 0)
     .sort((one, other) => share(other) - share(one)).slice(0, MOST_HELPFUL);
   const came = history.filter((visit) => visit.result === 'success').reverse();
-  const names = [...helpful.map((choice) => choice.state), state,
+  const recommended = choices.filter((choice) => choice.recommended);
+  const names = [...recommended.map((choice) => choice.state), ...helpful.map((choice) => choice.state), state,
     ...supersede.map((choice) => choice.target), ...came.map((visit) => visit.state)];
   const known = names.filter((name) => choices.some((choice) => choice.state === name));
   const first = [...new Set(known)].slice(0, LIKELIEST);
@@ -43,14 +44,27 @@ export function stateLines(choice, { state: failed, running }) {
         breakable(choice.state, '_')),
       same && (running ? chip('runs on', '', 'You are asked again if it takes twice as long')
         : chip('again', '', 'The state that failed')),
-      h('span', { class: 'spacer' }), successBar(choice.success)),
+      choice.recommended && chip('recommended', 'good', choice.recommended),
+      h('span', { class: 'spacer' }), successBar(choice)),
     h('span', { class: 'chips' }, stateChips(choice, failed)),
   ];
 }
 
-/** @param {number | null} success predicted */
-function successBar(success) {
+/**
+ * What is to be expected of going there: how often that led on, else how often the state succeeds.
+ * @param {StateChoice} choice
+ */
+function successBar({ success, helped: [helped, tried] }) {
+  if (tried > 0) {
+    return rateBar(1 - helped / tried, helped / tried, 'led on ' + helped + ' of ' + tried);
+  }
   return success === null ? rateBar(null) : rateBar(1 - success, success, percent(success) + ' ok');
+}
+
+/** @param {StateChoice} choice */
+function helpedWords({ helped: [helped, tried], helped_s: seconds }) {
+  return 'helped ' + helped + ' of ' + tried + ' times from here'
+    + (seconds ? ', ' + duration(seconds) : '');
 }
 
 /**
@@ -72,7 +86,8 @@ function stateChips(choice, failed) {
     missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
       'Userdata that it needs and would not have'),
     visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),
-    tried > 0 && chip('helped ' + helped + ' of ' + tried, helped * 2 > tried ? 'good' : '',
-      'How often going there helped when ' + failed + ' had failed, as far as this console saw'),
+    tried > 0 && chip(helpedWords(choice), helped * 2 > tried ? 'good' : '',
+      'How often going there helped when ' + failed + ' had failed'
+      + (choice.helped_s === null ? ', as far as this console saw' : '')),
   ];
 }
