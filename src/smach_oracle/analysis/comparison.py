@@ -27,7 +27,7 @@ from .pairing import (
     pairs_to_test,
 )
 from .reading import report_error
-from .trial_counter import TrialEnding
+from .trial_counter import ended_otherwise
 from .trial_rows import LOST, TrialRow, read_rows
 
 SECONDS_PER_HOUR = 3600.0
@@ -41,10 +41,6 @@ SHARES: Tuple[Tuple[str, Happened], ...] = (
     ('false success', lambda row: row.ending == 'success' and not row.succeeded),
     ('lost or hung', lambda row: row.ending == LOST),
 )
-
-
-def _ended_otherwise(row: TrialRow) -> bool:
-    return row.ending == TrialEnding.OTHER.value
 
 
 class Share(NamedTuple):
@@ -86,8 +82,8 @@ def shares_of(rows: Sequence[TrialRow]) -> List[Share]:
     for row in rows:
         parts.setdefault(row.replicate, []).append(row)
     shares = list(SHARES)
-    if any(map(_ended_otherwise, rows)):
-        shares.append(('other end', _ended_otherwise))
+    if any(map(ended_otherwise, rows)):
+        shares.append(('other end', ended_otherwise))
     return [_share(name, happened, rows, list(parts.values())) for name, happened in shares]
 
 

@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from .trial_counter import TrialEnding
+from .trial_counter import TrialEnding, ended_otherwise
 from .trials import TrialSummary
 
 COLUMN_IN = {1: 3.5, 2: 7.16}  # widths of one and of two columns of an IEEE paper
@@ -238,14 +238,10 @@ def _draw_needed(axes: Any, variants: Dict[bool, VariantSeries], legend_columns:
 def _other_ends(variants: Dict[bool, VariantSeries]) -> List[Any]:
     """Return the lines of trials whose ends say neither success nor failure, where there are."""
     lines = (
-        (True, GREEN, (0, (1, 1)), 1.2, 'other end, with oracle', _ended_otherwise),
-        (False, GREEN, (0, (3, 1.5)), 0.9, 'other end, without oracle', _ended_otherwise),
+        (True, GREEN, (0, (1, 1)), 1.2, 'other end, with oracle', ended_otherwise),
+        (False, GREEN, (0, (3, 1.5)), 0.9, 'other end, without oracle', ended_otherwise),
     )
-    return [line for line in lines if any(map(_ended_otherwise, variants[line[0]].trials))]
-
-
-def _ended_otherwise(trial: TrialSummary) -> bool:
-    return trial.ending is TrialEnding.OTHER
+    return [line for line in lines if any(map(ended_otherwise, variants[line[0]].trials))]
 
 
 def _legend_above(axes: Any, columns: int) -> None:

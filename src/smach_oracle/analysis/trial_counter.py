@@ -5,15 +5,15 @@ The one definition for trials in bags and for trials that a console follows whil
 
 from collections import Counter
 from enum import Enum
-from typing import Any, Dict, Mapping, Optional, Set, Tuple
+from typing import Any, Dict, Mapping, Optional, Protocol, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import TrialEnd, ended_by, last_stored
+from smach_oracle.oracle.records.facts import JUMPED_FROM, TrialEnd, ended_by, last_stored
 from smach_oracle.oracle.settings.failure_rule import (
     FORMER_RULE,
     EndMeaning,
     FailureRule,
-    rule_in,
+    rule_after,
 )
 
 AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
@@ -37,6 +37,19 @@ _ENDINGS = {
 }
 
 
+class _Ended(Protocol):
+    """A row about a trial, of whatever table."""
+
+    @property
+    def ending(self) -> object:
+        """A TrialEnding, or the value of one."""
+
+
+def ended_otherwise(trial: _Ended) -> bool:
+    """Whether a trial has ended, and nothing says whether that is a success."""
+    return trial.ending in (TrialEnding.OTHER, TrialEnding.OTHER.value)
+
+
 class TrialCounter:
     """The counts of one trial so far. Its events are added in the order of their numbers."""
 
@@ -49,7 +62,7 @@ class TrialCounter:
         self.unwell_s = 0.0  # in which it waited until the robot was well
         self._unwell_since_s: Optional[float] = None
         self._rule = rule
-        self._recorded_rule: Optional[FailureRule] = None
+        self._recorded_rule = FORMER_RULE
         self._start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
         self._earliest_s = self._latest_s = self._before_s = 0.0
@@ -110,7 +123,7 @@ class TrialCounter:
 
         It is that of its record. A record of an earlier version names none.
         """
-        return self._rule or self._recorded_rule or FORMER_RULE
+        return self._rule or self._recorded_rule
 
     @property
     def outcome(self) -> str:
@@ -151,12 +164,12 @@ class TrialCounter:
         if event.kind == EventKind.TRIAL_START:
             self.experiment = _experiment(event)
             self._start = event.data if isinstance(event.data, Mapping) else {}
-            self._recorded_rule = rule_in(event.data)
+            self._recorded_rule = rule_after(FORMER_RULE, event.data)
         elif event.kind == EventKind.RESUMED:
             self.resumed += 1
             self._count_down_time(event)
             self._end = None  # it was stopped, and has not ended
-            self._recorded_rule = rule_in(event.data) or self._recorded_rule
+            self._recorded_rule = rule_after(self._recorded_rule, event.data)
         elif event.kind == EventKind.TRIAL_END:
             self._end = self._end or event
         elif event.kind == EventKind.STATE_START:
@@ -215,7 +228,7 @@ class TrialCounter:
             self._decided[event.path] = False
         elif event.kind == EventKind.JUMP:
             self.recoveries += self._decided.pop(event.path, False)
-            left = event.data.get('from', '') if isinstance(event.data, Mapping) else ''
+            left = event.data.get(JUMPED_FROM, '') if isinstance(event.data, Mapping) else ''
             self.recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
 
     def _was_stopped(self, end: Event) -> bool:

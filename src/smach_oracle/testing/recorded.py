@@ -1,6 +1,7 @@
 """Trials that ran elsewhere, such as under `oracle_run`, from their bags. It needs rosbag."""
 
 import json
+from functools import reduce
 from pathlib import Path
 from typing import Dict, Iterable, List, Optional
 
@@ -10,7 +11,7 @@ from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import TrialEnd, ended_by
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames
-from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, rule_in
+from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, rule_after
 
 from .observed_trial import ObservedTrial, TrialEvidence
 
@@ -58,8 +59,7 @@ def _trial_of(events: List[Event], failing: Optional[FailingNames]) -> ObservedT
         error = RuntimeError(end.text)
     outcome = end.outcome if end is not None and end.outcome else None
     if failing is None:
-        told = [rule for rule in (rule_in(event.data) for event in events) if rule is not None]
-        failing = told[-1].failing if told else FORMER_RULE.failing
+        failing = reduce(rule_after, (event.data for event in events), FORMER_RULE).failing
     return ObservedTrial(TrialEvidence(outcome, error, events, failing=failing))
 
 

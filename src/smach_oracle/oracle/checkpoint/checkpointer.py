@@ -15,7 +15,7 @@ from ..machine.nesting import Wrapper, nodes_of, wrappers_around, wrappers_in
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
-from ..records.facts import JUMPED_TO, TAKEN_UP
+from ..records.facts import JUMPED_FROM, JUMPED_TO, TAKEN_UP
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
 from ..smach_private import data_of, states_of
@@ -148,10 +148,8 @@ class Checkpointer:
             pending += self._facts_of(node).begin_execution()
         if event.kind is node.site.begins_by:
             self._entered.setdefault(_begins_line(node), []).append(node)
-        if event.kind is EventKind.JUMP:  # the way may have left the container of its streak
-            pending += (
-                fact for each in self._nodes.values() for fact in self._facts_of(each).streaks()
-            )
+        if event.kind is EventKind.JUMP:
+            pending += self._streaks(event, node)
         if event.kind is EventKind.CONTAINER_END:
             pending += self._collected(node, all_keys=True)
             pending += self._around(node)
@@ -235,15 +233,21 @@ class Checkpointer:
 
     def _node_of(self, event: Event) -> Optional[TreeNode]:
         """Return the container that an event is of: that of a branch goes by its label as well."""
-        for key in ('{}/{}'.format(event.path, event.state), event.path):
-            node = self._nodes.get(key)
-            if node is not None and node.path == event.path:
-                return node
+        known = self._known_node(event.path, event.state)
+        if known is not None:
+            return known
         found = {node.key: node for node in nodes_of(self._top.machine)}
         if found.keys() == self._nodes.keys():
             return None
         self._nodes = found
         return self._node_of(event)
+
+    def _known_node(self, path: str, label: str) -> Optional[TreeNode]:
+        for key in ('{}/{}'.format(path, label), path):
+            node = self._nodes.get(key)
+            if node is not None and node.path == path:
+                return node
+        return None
 
     def _facts_of(self, node: TreeNode) -> ContainerFacts:
         facts = self._facts.get(node.key)
@@ -296,6 +300,17 @@ class Checkpointer:
             outcome = node.site.ended_by(node, event)
             if outcome is not None:
                 yield fact_of(node.key, AT, [outcome, ENDED])
+
+    def _streaks(self, jump: Event, node: TreeNode) -> Iterator[Fact]:
+        """Yield what is new of the streaks that a jump adds to, or ends.
+
+        They are those around the failed state, whose container the machine may have left.
+        """
+        path, _, label = str((jump.data or {}).get(JUMPED_FROM, '')).rpartition('/')
+        around: Optional[TreeNode] = self._known_node(path, label) or node
+        while around is not None:
+            yield from self._facts_of(around).streaks()
+            around = around.parent
 
     def _not_begun_below(self, path: str) -> Iterator[Fact]:
         """Yield that what is in a container or state has not begun in this visit of it."""

@@ -12,6 +12,7 @@ from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata_view import missing_keys
 from ..records.events import EventKind
+from ..records.facts import JUMPED_FROM, JUMPED_TO
 from ..records.visits import VisitResult
 from ..recovery.levels import unnoticed
 from ..recovery.occasions import FirstStep, Occasion, Superseding
@@ -120,8 +121,8 @@ class Applying:
         lower = self._occasion.lower_verdict
         return {
             **({} if chosen is None else {'way': chosen.gone.way}),
-            **({} if lower is None else {'from': lower.failed_path}),
-            **({'to': way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
+            **({} if lower is None else {JUMPED_FROM: lower.failed_path}),
+            **({JUMPED_TO: way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
         }
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:

@@ -11,6 +11,8 @@ from ..number_checks import is_whole
 from .events import NO_OUTCOME, Event
 
 DECIDED_BY = 'decided_by'  # key in the data of DECISION
+# key in the data of JUMP: path of the failed state, where that is in a container below
+JUMPED_FROM = 'from'
 JUMPED_TO = 'to'  # key in the data of JUMP: path of the state, where it is in a container below
 # key in the data of TRANSITION: state, kind, outcome and text of an earlier failure that the
 # state has reported, and from which the oracle now recovers

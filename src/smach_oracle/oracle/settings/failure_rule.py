@@ -115,6 +115,14 @@ def rule_in(data: object) -> Optional[FailureRule]:
     return None
 
 
+def rule_after(before: FailureRule, data: object) -> FailureRule:
+    """Return the rule of a trial after one of its records: the one that it names, else `before`.
+
+    The first one has `FORMER_RULE` before it. A trial that goes on may go on by another rule.
+    """
+    return rule_in(data) or before
+
+
 @lru_cache(maxsize=100)
 def _names_by(words: Optional[Tuple[str, ...]]) -> FailingNames:
     return FailingNames(words)

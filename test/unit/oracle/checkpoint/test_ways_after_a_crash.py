@@ -5,6 +5,9 @@ from killed_machines import KilledMachine, Noted
 from killed_trees import make
 
 import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.checkpoint.container_facts import ContainerFacts
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.recovery import menu
 
 FAILURES = 4  # of PICK, in all processes together
@@ -55,3 +58,58 @@ def test_no_way_is_gone_twice_wherever_it_is_killed(tmp_path, userdata):
         assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
         if userdata == 'restore':  # what was in doubt has not come to its end
             assert rest['done'] == told['done'], point
+
+
+class Ends(smach.State):
+    """Ends as told, one entry a visit, and then well."""
+
+    def __init__(self, *results):
+        smach.State.__init__(self, ['succeeded', 'aborted'])
+        self._results = list(results)
+
+    def execute(self, userdata):
+        return self._results.pop(0) if self._results else 'succeeded'
+
+
+def boxes(depth, innermost, beside):
+    """Containers in containers, GET in GET, each with others BESIDE that have not run yet."""
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    with machine:
+        smach.StateMachine.add('HOME', Ends(), {'succeeded': 'GET'})
+        inner = boxes(depth - 1, innermost, beside) if depth else innermost
+        smach.StateMachine.add('GET', inner, {'succeeded': 'BESIDE_0'})
+        for number in range(beside):
+            other = smach.StateMachine(['succeeded', 'aborted'])
+            with other:
+                smach.StateMachine.add('ONLY', Ends())
+            following = 'BESIDE_{}'.format(number + 1) if number + 1 < beside else 'succeeded'
+            smach.StateMachine.add('BESIDE_{}'.format(number), other, {'succeeded': following})
+    return machine
+
+
+def test_a_jump_stores_the_streaks_around_the_failed_state_and_looks_at_no_others(
+    tmp_path, monkeypatch
+):
+    """The third way leaves the container of the failed state, whose streak has all three."""
+    monkeypatch.setattr(menu, 'WAITS_S', (0.001,))
+    store = tmp_path / 'store.db'
+    machine = boxes(1, Ends('aborted', 'aborted', 'aborted'), beside=12)
+    settings = {'policy': 'escalating', 'checkpoint': str(store)}
+    OracleContainer.wrap(machine, settings=settings, name='TOP')
+    looked, stored = [], []
+    look = ContainerFacts.streaks
+
+    def streaks(facts):
+        looked.append(facts._path)
+        return look(facts)
+
+    def observe(event):
+        if event.kind is EventKind.JUMP:
+            stored.append((event.data.get('way'), set(looked)))
+        looked.clear()
+
+    monkeypatch.setattr(ContainerFacts, 'streaks', streaks)
+    oracle_of(machine).events.observers.append(observe)
+    assert machine.execute() == 'succeeded'
+    assert [way for way, _ in stored] == ['again', 'wait 0.001 s', 'from /HOME']
+    assert all(paths == {'TOP', 'TOP/GET'} for _, paths in stored), stored
