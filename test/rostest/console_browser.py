@@ -171,8 +171,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.tap(QUESTION)
         self.assertTrue(browser.says(YOURS))
         self.assertTrue(
-            browser.says('helped 1 of 1', '.choice.goto[data-name=PLACE]'),
-            'how often it helped before',
+            browser.says('led on 1 of 1', '.choice.goto[data-name=PLACE]'),
+            'how often it led on before',
         )
         self.assertTrue(
             wait_for(lambda: browser.find('.choice.goto[data-name=PLACE]').is_enabled())

@@ -176,7 +176,7 @@ def _arrival(choice: StateChoice) -> Text:
         parts.append(Text('recommended', 'bold green'))
     if choice.tried:
         took = ', {}'.format(duration(choice.helped_s)) if choice.helped else ''
-        told = 'helped {} of {} times from here{}'.format(choice.helped, choice.tried, took)
+        told = 'led on {} of {} times from here{}'.format(choice.helped, choice.tried, took)
         parts.append(Text(told, 'green' if 2 * choice.helped > choice.tried else ''))
     if choice.blocked:
         parts.append(Text('blocked: ' + clean(choice.blocked), 'bold #cc3333'))

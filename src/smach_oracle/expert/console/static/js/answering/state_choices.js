@@ -44,7 +44,6 @@ export function stateLines(choice, { state: failed, running }) {
         breakable(choice.state, '_')),
       same && (running ? chip('runs on', '', 'You are asked again if it takes twice as long')
         : chip('again', '', 'The state that failed')),
-      choice.recommended && chip('recommended', 'good', choice.recommended),
       h('span', { class: 'spacer' }), successBar(choice)),
     h('span', { class: 'chips' }, stateChips(choice, failed)),
   ];
@@ -61,10 +60,17 @@ function successBar({ success, helped: [helped, tried] }) {
   return success === null ? rateBar(null) : rateBar(1 - success, success, percent(success) + ' ok');
 }
 
-/** @param {StateChoice} choice */
-function helpedWords({ helped: [helped, tried], helped_s: seconds }) {
-  return 'helped ' + helped + ' of ' + tried + ' times from here'
-    + (seconds ? ', ' + duration(seconds) : '');
+/**
+ * Where the count of the bar is from, or how long going there took.
+ * @param {StateChoice} choice
+ * @param {string} failed the state that failed
+ */
+function helpedChip({ helped: [helped, tried], helped_s: seconds }, failed) {
+  if (tried > 0 && seconds === null) {
+    return chip('as this console saw', '', 'How often going there led on from ' + failed);
+  }
+  return helped > 0 && seconds !== null && seconds >= 1
+    && chip('then after ' + duration(seconds), '', 'Mean time until ' + failed + ' succeeded');
 }
 
 /**
@@ -73,10 +79,11 @@ function helpedWords({ helped: [helped, tried], helped_s: seconds }) {
  * @returns {Child[]}
  */
 function stateChips(choice, failed) {
-  const { class: rank, blocked, repeats, missing, visits, helped: [helped, tried] } = choice;
+  const { class: rank, blocked, repeats, missing, visits, recommended } = choice;
   const again = choice.runs_again;
   const words = FAILURE_CLASSES[rank];
   return [
+    recommended && chip('recommended', 'good', recommended),
     words && chip(words, 'class-' + rank),
     blocked && chip('blocked: ' + blocked, 'bad'),
     repeats.length > 0 && chip('repeats: ' + repeats.join(', '), 'warn',
@@ -86,8 +93,6 @@ function stateChips(choice, failed) {
     missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
       'Userdata that it needs and would not have'),
     visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),
-    tried > 0 && chip(helpedWords(choice), helped * 2 > tried ? 'good' : '',
-      'How often going there helped when ' + failed + ' had failed'
-      + (choice.helped_s === null ? ', as far as this console saw' : '')),
+    helpedChip(choice, failed),
   ];
 }
