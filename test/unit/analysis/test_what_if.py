@@ -4,7 +4,7 @@ import json
 import random
 
 import pytest
-from failing_machines import KEPT, Chance, Hand, record, run
+from failing_machines import KEPT, Chance, Hand, by_trial, record, run
 
 import smach
 from smach_oracle.analysis import what_if
@@ -128,6 +128,38 @@ def test_what_was_not_counted_changes_no_replayed_decision(author_recovers, monk
     )
     tried = compare(trials, {})
     assert tried.counts['same'] == sum(tried.counts.values()) > 5
+
+
+def test_a_state_that_ends_while_its_machine_is_preempted_has_not_succeeded_by_a_failing_outcome():
+    """Whatever its failing outcome: it may have ended by the preempt."""
+    generator = random.Random(5)
+    pick = Chance(generator, 0.6)
+    machine = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('PICK', pick, {'succeeded': 'PLACE'})
+        smach.StateMachine.add('PLACE', Chance(generator, 0.3))
+    OracleContainer.wrap(machine, name='TOP', expert=Hand(generator), settings=KEPT)
+    execute = pick.execute
+
+    def preempted_now_and_then(userdata):
+        if generator.random() < 0.3:
+            machine.request_preempt()
+        return execute(userdata)
+
+    pick.execute = preempted_now_and_then
+    events = []
+    machine.events.observers.append(events.append)
+    for _ in range(40):
+        machine.execute()
+        machine.recall_preempt()
+    ended_so = {
+        after.outcome
+        for before, after in zip(events, events[1:])
+        if before.kind is EventKind.PREEMPT and after.kind is EventKind.TRANSITION
+    }
+    assert 'aborted' in ended_so
+    tried = compare(by_trial(events), {})
+    assert tried.counts['same'] == sum(tried.counts.values()) > 20
 
 
 def test_an_oracle_that_forgets_at_once_asks_where_the_recorded_one_recovered():

@@ -58,15 +58,44 @@ class WorkTime:
         return self._shown_s / 60.0
 
 
+class Preempts:
+    """Knows which states have ended under a preempt of their container: that says nothing.
+
+    A transition that the author drew after `preempted` obeys it.
+    """
+
+    def __init__(self) -> None:
+        self._paths: Set[str] = set()
+
+    def take(self, event: Event) -> None:
+        """Follow one event."""
+        if event.kind == EventKind.PREEMPT:
+            self._paths.add(event.path)
+        elif event.kind == EventKind.CONTAINER_START or (
+            event.kind == EventKind.TRANSITION and is_preempted(event.outcome)
+        ):
+            self._paths.discard(event.path)
+
+    def is_success(self, transition: Event) -> bool:
+        """Whether a TRANSITION without a FAILURE before it counts as a success of its state."""
+        return (
+            is_counted(transition)
+            and not is_preempted(transition.outcome)
+            and transition.path not in self._paths
+        )
+
+
 class Visits:
     """Says of each end of a visit how it went."""
 
     def __init__(self) -> None:
         self._failed: Set[Key] = set()
+        self._preempts = Preempts()
 
     def take(self, event: Event) -> Tuple[bool, Optional[bool]]:
         """Return whether a visit ends here, and whether in success. None: that says nothing."""
         key = key_of(event)
+        self._preempts.take(event)
         if event.kind == EventKind.STATE_START:
             self._failed.discard(key)
         elif event.kind == EventKind.FAILURE:
@@ -75,7 +104,7 @@ class Visits:
         elif event.kind == EventKind.TRANSITION and event.outcome and key not in self._failed:
             if event.text == UNCOUNTED['text']:
                 return False, None
-            return True, is_counted(event) and not is_preempted(event.outcome) or None
+            return True, self._preempts.is_success(event) or None
         return False, None
 
 

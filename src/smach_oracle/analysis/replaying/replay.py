@@ -14,11 +14,11 @@ from smach_oracle.oracle.decision.policy import (
     Situation,
 )
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by, is_counted
+from smach_oracle.oracle.records.facts import Decider, branches_of, decided_by
 from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.visits import Visit, VisitResult
-from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 
+from .followed import Preempts
 from .menus import chosen_way, offers_preconditions, recorded_menu
 from .way_reader import WayReader
 
@@ -78,12 +78,14 @@ class Replay:
         self._branches: Dict[str, Tuple[str, ...]] = {}  # states that are on their own, by path
         self._running: Set[str] = set()  # paths of containers
         self._go_on: Set[str] = set()  # those that ran when the program was stopped
+        self._preempts = Preempts()
         self._ways = WayReader() if self._policy.learns else None
 
     def take(self, event: Event) -> Optional[ReplayedDecision]:
         """Follow one event. Return the decision at a DECISION ('not known' included), else None."""
         if self._ways is not None:
             self._ways.take(event)
+        self._preempts.take(event)
         if event.kind == EventKind.TRIAL_START:
             self._begin_trial()
         elif event.kind == EventKind.RESUMED:
@@ -179,7 +181,7 @@ class Replay:
         # the end of the visit whose failure is known, or of none: the state was held back
         if state.context is not None or state.interrupted or not event.outcome:
             return
-        if not is_preempted(event.outcome) and is_counted(event):
+        if self._preempts.is_success(event):
             state.estimator.add(False)
             self._visited(event, VisitResult.SUCCESS)
 
