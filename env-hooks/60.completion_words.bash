@@ -90,7 +90,7 @@ retry step_back' ;;
       echo 'configured algorithm1 always_ask any_way escalating ladder learned prose random
 restart retry step_back' ;;
     'run_trials --protocol')
-      echo 'main persistence memory continuous all' ;;
+      echo 'main persistence memory continuous fifth fifth_extension all' ;;
     'run_trials --task')
       echo 'drink_retrieval pick_and_place' ;;
     'run_trials --variants')

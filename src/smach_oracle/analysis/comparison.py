@@ -3,8 +3,8 @@
 Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
 cost for a trial and for a robot hour. Prints the best that any variant did in each trial that all
 ran (hindsight), beside what each did there. Prints McNemar's exact test of the interventions, of
-`default` against each other variant, or of each two. Exit code: 0, or 2 if there was nothing to
-read.
+`default` against each other variant, or of each two. Where there are rows of its variants, prints
+the verdicts on the hypotheses of doc/protocol.md. Exit code: 0, or 2 if there was nothing to read.
 """
 
 import argparse
@@ -17,6 +17,7 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
 from .intervals import Interval, replicate_interval, wilson_interval
+from .judging.hypotheses import verdicts
 from .pairing import (
     COMPARED,
     HINDSIGHT,
@@ -318,4 +319,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except (BagError, OSError) as err:
         return report_error('compare_variants', err)
     sys.stdout.write(format_comparison(rows))
+    told = verdicts(rows)
+    if told:
+        sys.stdout.write('\n'.join(['Hypotheses (doc/protocol.md)', *told]) + '\n')
     return 0

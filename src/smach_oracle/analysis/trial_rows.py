@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .bag_events import BagError
+from .judging.account import Entry, account_in, account_text, harm_in, harm_text
 from .lasting.causes_log import LoggedCause, causes_in, causes_of, causes_text
 from .lasting.tries import StateTry, WorldClock, in_world_time, tries_in, tries_text
 from .trial_counter import TrialEnding
 from .trials import TrialSummary
-from .truth import DAMAGE
+from .truth import DAMAGE, SHARED
 
 OLDEST = 23  # columns of the oldest rows that can be read
 LOST = 'lost'  # an ending: the trial hung, or its processes died
@@ -53,6 +54,9 @@ class TrialRow(NamedTuple):
     tries: str = ''  # of the states that failed, in the world's time, as JSON
     memory: Optional[int] = None  # of the oracle, results of a state
     prior: Optional[float] = None  # failure rate that a state begins with
+    harmed: str = ''  # how, and which thing, as JSON
+    account: str = ''  # each failure, decision, jump and answer, as JSON
+    shared: Optional[bool] = None  # whether it was run by the bare script, for all variants
 
     @property
     def succeeded(self) -> bool:
@@ -105,6 +109,7 @@ class TruthDetails(NamedTuple):
     left: Optional[Mapping[str, Any]] = None  # how it left a world that goes on
     causes: Optional[List[LoggedCause]] = None
     clock: Optional[WorldClock] = None
+    shared: bool = False  # it is of the bare script's trial
 
 
 NO_DETAILS = TruthDetails()
@@ -121,10 +126,12 @@ def row_of(
     learned: Optional[Mapping[str, Any]] = None,
     lasting_share: Optional[float] = None,
     tries: Sequence[StateTry] = (),
+    account: Sequence[Entry] = (),
 ) -> TrialRow:
     """Return the row of a trial that has come to its end.
 
     :param tries: of the states that failed, in ROS time.
+    :param account: as account_of() returns it.
     """
     truth, cause, settings = summary.truth, summary.cause, dict(summary.settings)
     asked_s = None
@@ -158,6 +165,9 @@ def row_of(
         '' if details.clock is None else tries_text(in_world_time(tries, details.clock)),
         settings.get('memory'),
         settings.get('prior'),
+        '' if truth is None or truth.damage is None else harm_text(truth.damage),
+        account_text(account),
+        details.shared,
     )
 
 
@@ -270,6 +280,7 @@ _PARSERS: Mapping[str, Callable[[str], Any]] = {
     'hour': float,
     'memory': int,
     'prior': float,
+    'shared': _flag,
 }
 _MAY_BE_EMPTY = (
     'true_success',
@@ -282,9 +293,15 @@ _MAY_BE_EMPTY = (
     'hour',
     'memory',
     'prior',
+    'shared',
 )
 # columns that are JSON, where they are not empty
-_TEXTS: Mapping[str, Callable[[str], object]] = {'cause_log': causes_in, 'tries': tries_in}
+_TEXTS: Mapping[str, Callable[[str], object]] = {
+    'cause_log': causes_in,
+    'tries': tries_in,
+    'harmed': harm_in,
+    'account': account_in,
+}
 _ENDINGS = {ending.value for ending in TrialEnding} | {LOST}
 
 
@@ -358,6 +375,7 @@ def details_of(data: Mapping[str, Any]) -> TruthDetails:
         left if isinstance(left, dict) else None,
         causes_of(data.get('causes')),
         _clock(data),
+        data.get(SHARED) is True,
     )
 
 

@@ -11,8 +11,9 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tup
 from .bag_events import BagError
 
 TRUTH_FILE = 'truth.jsonl'
-# by name: the types that are allowed, and their name
+SHARED = 'shared'  # key of a line that was told in another job, for a trial that both share
 DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds. Each lists names of things
+# by name: the types that are allowed, and their name
 Allowed = Mapping[str, Tuple[Tuple[type, ...], str]]
 _FIELDS: Allowed = {
     'seed': ((int,), 'an int'),
@@ -41,6 +42,7 @@ class Truth(NamedTuple):
     wrong_object: str = ''  # another thing than the task's own that was brought to the goal
     # kind (one of DAMAGE) and thing, once for each time. None means the line is older than that
     damage: Optional[Tuple[Tuple[str, str], ...]] = None
+    shared: bool = False  # it is of the same trial under the bare script
 
     @property
     def false_success(self) -> bool:
@@ -103,6 +105,7 @@ def _parse(line: str, where: str) -> Truth:
         _shares(data['share'], where),
         data.get('wrong_object', ''),
         _damage(data['damage'], where) if 'damage' in data else None,
+        data.get(SHARED) is True,
     )
 
 

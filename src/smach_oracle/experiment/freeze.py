@@ -20,7 +20,16 @@ FROZEN, ABANDONED = 'frozen', 'abandoned'
 NAMED = re.compile(r'^```frozen\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 LOWEST, RANGE = 1_000_000, 1_000_000_000  # of the first seed: all older seeds are below
 BLOCK = 10_000  # seeds for each of these, one after the other
-BLOCKS = ('pick and place', 'drink retrieval', 'persistence', 'memory', 'continuous operation')
+BLOCKS = (
+    'pick and place',
+    'drink retrieval',
+    'persistence',
+    'memory',
+    'continuous operation',
+    'pick and place, extension',
+    'drink retrieval, extension',
+    'inspection',
+)
 
 
 class Freeze(NamedTuple):

@@ -6,18 +6,20 @@ It has a master, a world and learned rates of its own.
 import json
 import time
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Set, Tuple
 
 from smach_oracle.analysis.trials import TrialSummary
+from smach_oracle.analysis.truth import SHARED
 from smach_oracle.oracle.decision.policies import POLICIES
 
 from .estimate import JobWork
 from .lab import LAB_FILE, write_lab
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .one_line import write_config
-from .plan import TASKS, ExperimentError, ExperimentPlan, Variant
+from .plan import BARE, TASKS, ExperimentError, ExperimentPlan, Variant
 from .records import RecordedTrial, ReplicateRecords
 from .results import JobResults
+from .sharing import CleanTrial, Sharing, clean_trials, difference, is_run_again, write_shared
 
 LEFTOVER_GRACE_S = 15.0  # for processes that an earlier job left running
 ATTEMPTS = 2  # at a trial that hangs, or in which something dies
@@ -65,6 +67,10 @@ class ExperimentJob:
         self._untold: List[RecordedTrial] = []
         self._launch: Optional[Launch] = None
         self._attempts: Dict[int, int] = {}
+        self._sharing: Optional[Sharing] = None
+        self._bare: Optional['ExperimentJob'] = None  # that runs the trials which it shares
+        self._clean: Dict[int, CleanTrial] = {}  # trials of that by seed, in which nothing failed
+        self._compared: Set[int] = set()  # seeds of those that were run here as well
         # the latest trial's end, the latest line that the log grew by
         self._ended_at = self._sign_at = 0.0
         self._logged = 0  # bytes
@@ -90,13 +96,50 @@ class ExperimentJob:
         """The number of trials that are over, lost ones among them."""
         return min(self.trials, self._kept + len(self.summaries) + len(self._lost))
 
+    @property
+    def pairs(self) -> Tuple[object, ...]:
+        """Return what jobs have in common that run the same trials."""
+        return self._plan.task, self._seed, self.trials, self._plan.lasting
+
+    @property
+    def ready(self) -> bool:
+        """Whether it can start: the job is over that runs the trials which it shares."""
+        return self._bare is None or self._bare.over
+
     def work(self) -> JobWork:
         """Return what it has done and has to do."""
-        took = [row.wall_s for row in self._results.rows() if row.wall_s is not None]
+        run_here = [row for row in self._results.rows() if not row.shared]
+        took = [row.wall_s for row in run_here if row.wall_s is not None]
         return JobWork(self._plan.task, self.trials - self.finished, took)
 
+    def share(self, sharing: Sharing, bare: 'ExperimentJob') -> None:
+        """Have it share the trials of a bare job in which nothing fails. It has not started.
+
+        :raises ExperimentError, OSError: as the constructor does.
+        """
+        self._sharing, self._bare = sharing, bare
+        if sharing.ended:
+            self._stop_sharing()
+
+    def _stop_sharing(self) -> None:
+        """Have it run each trial itself, also those that it has shared."""
+        self._bare, self._clean, self._records.takes_shared = None, {}, False
+        self._look_through()
+
+    def heed(self) -> None:
+        """Run what was shared itself, once the sharing has ended.
+
+        :raises ExperimentError, OSError: as the constructor does.
+        """
+        if self._sharing is not None and self._sharing.ended and self._bare is not None:
+            runs = self._launch is not None
+            self.stop()
+            self._stop_sharing()
+            if runs and not self.over:
+                self.start()
+
     def _look_through(self) -> None:
-        progress = self._records.tidy_up(self._results.kept())
+        progress = self._records.tidy_up(self._results.kept(self._records.takes_shared))
         self._untold, self._kept = [], progress.kept
         self._results.forget_from(progress.next_trial)
         self._results.add(
@@ -135,6 +178,9 @@ class ExperimentJob:
             given['lasting'] = self._plan.lasting
         if self._plan.hours is not None:
             given['lab'] = self._records.folder / LAB_FILE
+        shared = self._to_replay()
+        if shared:
+            given['shared'] = write_shared(self._records.folder, shared)
         if self.variant.one_line:
             given['config'] = write_config(self._records.folder, self._plan.task)
         return {
@@ -148,6 +194,35 @@ class ExperimentJob:
             'benign': str(self._plan.benign).lower(),
             'oracle': json.dumps(settings),
         }
+
+    def _to_replay(self) -> List[CleanTrial]:
+        if self._bare is None:
+            return []
+        self._clean = self._clean or clean_trials(self._bare._records)
+        ours = range(self._seed + self._next, self._seed + self.trials)
+        return [
+            self._clean[seed] for seed in ours if seed in self._clean and not is_run_again(seed)
+        ]
+
+    def _compare(self) -> None:
+        """End the sharing where a trial that could be shared went otherwise here."""
+        for path, summary in self.summaries.items():
+            seed = None if summary.cause is None else summary.cause.seed
+            if seed is None or seed not in self._clean or seed in self._compared:
+                continue
+            truth, content = self._records.truth_lines().get(seed), self._records.events_of(path)
+            if truth is None or content is None:  # the world has not told of it yet
+                continue
+            self._compared.add(seed)
+            why = '' if truth.get(SHARED) else difference(self._clean[seed], content.events, truth)
+            if why and self._sharing is not None and not self._sharing.ended:
+                text = '{}: seed {} went otherwise than under {}: {}'.format(
+                    self.name, seed, BARE, why
+                )
+                self._sharing.end(text)
+                self.messages.append(
+                    text + '. The sharing ends, and each job runs again what it has shared'
+                )
 
     def watch(self) -> None:
         """Take in new trials. Start again after a trial in which something hung or died.
@@ -192,6 +267,7 @@ class ExperimentJob:
             self._results.add(
                 [self._records.with_truth(trial) for trial in told], {}, self._records.truth
             )
+            self._compare()
 
     def _again(self, why: str) -> None:
         self.stop()
@@ -233,3 +309,4 @@ class ExperimentJob:
         self._launch.stop()
         self._launch = None
         self._look_through()
+        self._compare()

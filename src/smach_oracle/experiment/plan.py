@@ -57,6 +57,8 @@ class ExperimentPlan(NamedTuple):
     benign: bool = False  # worlds without causes to fail
     lasting: Optional[float] = None  # share of the causes that last. None means the world's own
     hours: Optional[float] = None  # of a world that goes on. None means each trial has a fresh one
+    # trials in which nothing fails are run by the bare script alone, and count for all variants
+    shares: bool = False
 
     def first_seed(self, replicate: int) -> int:
         """Seed of the first trial of a replicate (from 0). Each next trial has the next seed."""
@@ -71,8 +73,8 @@ class ExperimentPlan(NamedTuple):
         """The plan as plain data, as its file has it."""
         data = self._asdict()
         del data['variants']
-        for name in ('lasting', 'hours'):  # folders of older versions have neither
-            if data[name] is None:
+        for name in ('lasting', 'hours', 'shares'):  # folders of older versions have none of them
+            if data[name] in (None, False):
                 del data[name]
         data[ARMS] = [variant.as_data() for variant in self.variants]
         return data

@@ -6,7 +6,7 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence
+from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.forking import unlock
 
@@ -15,6 +15,7 @@ from .job import ExperimentJob
 from .plan import ExperimentError, ExperimentPlan, enter_folder
 from .progress import PoolProgress, ProgressLine
 from .protocols import Part
+from .sharing import Sharing
 from .stop_signals import StopSignals
 
 POLL_S = 0.5
@@ -50,6 +51,7 @@ def run(
     with StopSignals() as signals:
         try:
             jobs += _make_jobs(plan, output, hung_after_s)
+            _let_share([(plan, jobs)], output)
             run_jobs(jobs, at_a_time, signals, progress)
         finally:
             progress.end()
@@ -84,6 +86,7 @@ def run_parts(
                 if goes_on:
                     made[-1].jobs[0].messages.insert(0, 'Going on in {}'.format(folder))
                 signals.check()
+            _let_share([(each.part.plan, each.jobs) for each in made], output)
             run_jobs(_longest_first(_all(made)), at_a_time, signals, progress, broken)
         finally:
             progress.end()
@@ -99,6 +102,19 @@ def _make_jobs(plan: ExperimentPlan, output: Path, hung_after_s: float) -> Itera
     for replicate in range(plan.replicates):
         for variant in plan.variants:
             yield ExperimentJob(plan, variant, replicate, output, hung_after_s)
+
+
+def _let_share(
+    made: Sequence[Tuple[ExperimentPlan, Sequence[ExperimentJob]]], output: Path
+) -> None:
+    """Let jobs share the trials of the bare job of the same seeds, where their plan has it so."""
+    # a world that goes on is not as it was for another variant
+    jobs = [job for plan, mine in made if plan.shares and plan.hours is None for job in mine]
+    bare = {job.pairs: job for job in jobs if not job.variant.recovers}
+    sharing = Sharing(output) if bare else None
+    for job in jobs:
+        if sharing is not None and job.variant.recovers and job.pairs in bare:
+            job.share(sharing, bare[job.pairs])
 
 
 def _longest_first(jobs: Sequence[ExperimentJob]) -> List[ExperimentJob]:
@@ -139,8 +155,13 @@ def run_jobs(
     progress.show(jobs)
     while waiting or active:
         while waiting and len(active) < at_a_time:
-            waiting[0].core = _free_core(active, at_a_time)
-            active.append(waiting.pop(0))
+            # a job that waits for one which was left shares what is there of it
+            ready = [job for job in waiting if job.ready] or ([] if active else waiting)
+            if not ready:
+                break
+            waiting.remove(ready[0])
+            ready[0].core = _free_core(active, at_a_time)
+            active.append(ready[0])
             active[-1].start()
         time.sleep(POLL_S)
         signals.check()
@@ -156,6 +177,14 @@ def run_jobs(
                 broken[job.name] = str(err)
                 job.messages.append('{}; the replicate is left'.format(err))
         active = [job for job in active if not job.over and job.name not in (broken or ())]
+        for job in jobs:
+            job.heed()
+        left = {id(job) for job in [*active, *waiting]}
+        waiting += [
+            job
+            for job in jobs
+            if not job.over and id(job) not in left and job.name not in (broken or ())
+        ]
         progress.show(jobs)
 
 

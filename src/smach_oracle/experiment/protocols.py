@@ -3,7 +3,7 @@
 from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .freeze import BLOCKS
-from .plan import BARE, DEFAULT, TASKS, ExperimentPlan, Variant, named_variants
+from .plan import BARE, DEFAULT, ONE_LINE, TASKS, ExperimentPlan, Variant, named_variants
 
 COMPARED = (BARE, DEFAULT, 'restart')  # variants with all replicates, and at all shares
 # with one. They are the policies of then: a later one is judged by a protocol of its own
@@ -13,9 +13,33 @@ SWEPT = {'pick_and_place': 100, 'drink_retrieval': 60}  # trials of a point of a
 MEMORIES = (2, 5, 10, 20, 50)
 SHARES = (0.0, 0.5, 1.0)  # of the causes, that last
 HOURS = {'pick_and_place': 20.0, 'drink_retrieval': 16.0}  # of continuous operation
-ALL = 'all'
+ALL = 'all'  # of the protocol that the fourth freeze holds
+# of the fifth freeze: doc/protocol.md says why these
+JUDGED = (
+    BARE,
+    'restart',
+    DEFAULT,
+    *(ONE_LINE + name for name in ('escalating', 'learned', 'any_way')),
+)
+BESIDE = (ONE_LINE + 'prose', 'ladder', 'escalating', 'learned')  # with one replicate
+EXTENDED = (BARE, DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')
+GOING_ON = (DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')  # in continuous operation
+# replicates, and trials of each: with those of JUDGED they are 1,100 pairs
+EXTENSION = {'pick_and_place': (5, 130), 'drink_retrieval': (7, 100)}
 BLOCK_OF = dict(
-    zip(('pick_and_place', 'drink_retrieval', 'persistence', 'memory', 'continuous'), BLOCKS)
+    zip(
+        (
+            'pick_and_place',
+            'drink_retrieval',
+            'persistence',
+            'memory',
+            'continuous',
+            'pick_and_place_extension',
+            'drink_retrieval_extension',
+            'inspection',
+        ),
+        BLOCKS,
+    )
 )
 
 
@@ -45,20 +69,23 @@ class ProtocolChoice(NamedTuple):
         variants: Sequence[Variant],
         lasting: Optional[float] = None,
         hours: Optional[float] = None,
+        fifth: bool = False,
     ) -> Part:
         """Return a part of so many trials and replicates at most.
 
         Where fewer trials are run, a world that goes on does so for fewer hours.
 
         :param name: of the figure.
+        :param fifth: it is of the fifth freeze, whose trials are shared where nothing fails.
         """
         fewer = min(trials, self.trials or trials)
         if hours is not None:
             hours *= fewer / trials
-        seed = self.seeds[BLOCK_OF.get(name, BLOCK_OF[task])]
+        block = BLOCK_OF.get('{}_{}'.format(task, name), BLOCK_OF.get(name, BLOCK_OF[task]))
+        seed = self.seeds[block]
         told = '' if lasting is None else '_{:.0f}'.format(100 * lasting)
         return Part(
-            '{}_{}{}'.format(task, name, told),
+            '{}_{}{}{}'.format(task, 'fifth_' if fifth else '', name, told),
             ExperimentPlan(
                 task,
                 fewer,
@@ -68,6 +95,7 @@ class ProtocolChoice(NamedTuple):
                 self.answer_delay,
                 lasting=lasting,
                 hours=hours,
+                shares=fifth and hours is None,
             ),
         )
 
@@ -126,12 +154,54 @@ def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
         )
 
 
+def fifth_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield the parts of the fifth freeze, without its extension."""
+    for task in choice.tasks:
+        trials, all_of = TASKS[task][1], choice.variants
+        yield choice.part(
+            'compared',
+            task,
+            trials,
+            REPLICATES[task],
+            named_variants(all_of or JUDGED, {}),
+            fifth=True,
+        )
+        if not all_of:
+            yield choice.part('others', task, trials, 1, named_variants(BESIDE, {}), fifth=True)
+        yield choice.part(
+            'continuous',
+            task,
+            trials,
+            1,
+            named_variants(all_of or GOING_ON, {}),
+            hours=HOURS[task],
+            fifth=True,
+        )
+
+
+def extension_parts(choice: ProtocolChoice) -> Iterator[Part]:
+    """Yield the parts of the one extension of the fifth freeze."""
+    for task in choice.tasks:
+        replicates, trials = EXTENSION[task]
+        yield choice.part(
+            'extension',
+            task,
+            trials,
+            replicates,
+            named_variants(choice.variants or EXTENDED, {}),
+            fifth=True,
+        )
+
+
 PROTOCOLS: Dict[str, Callable[[ProtocolChoice], Iterator[Part]]] = {
     'main': main_parts,
     'persistence': persistence_parts,
     'memory': memory_parts,
     'continuous': continuous_parts,
+    'fifth': fifth_parts,
+    'fifth_extension': extension_parts,
 }
+FOURTH = ('main', 'persistence', 'memory', 'continuous')
 
 
 def parts_of(protocol: str, choice: ProtocolChoice) -> List[Part]:
@@ -139,5 +209,5 @@ def parts_of(protocol: str, choice: ProtocolChoice) -> List[Part]:
 
     :raises KeyError: for one that is not there.
     """
-    names = list(PROTOCOLS) if protocol == ALL else [protocol]
+    names = FOURTH if protocol == ALL else (protocol,)
     return [part for name in names for part in PROTOCOLS[name](choice)]

@@ -12,7 +12,8 @@ import os
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
+from smach_oracle.analysis.bag_events import BagContent, BagError, EventReader, find_bags
+from smach_oracle.analysis.judging.account import Entry, account_of
 from smach_oracle.analysis.lasting.tries import StateTry, tries_of
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import TrialSummary, summarise
@@ -34,6 +35,7 @@ class RecordedTrial(NamedTuple):
     summary: TrialSummary
     learned: Optional[Mapping[str, Any]]  # at its end, or None where the bag lacks it
     tries: Tuple[StateTry, ...] = ()  # of the states that failed, in ROS time
+    account: Tuple[Entry, ...] = ()
 
 
 class JobProgress(NamedTuple):
@@ -80,6 +82,7 @@ class ReplicateRecords:
         self._first_seed = first_seed
         self._trials = trials
         self._reader = EventReader()
+        self.takes_shared = True  # trials that the bare script ran count, as if they were run here
         folder.mkdir(parents=True, exist_ok=True)
 
     def tidy_up(self, kept: KeptTrials = NONE_KEPT) -> JobProgress:
@@ -138,13 +141,18 @@ class ReplicateRecords:
                 return count, recorded.summary.cause.seed - self._first_seed
         return len(bags), self._trials
 
-    def read(self, path: str) -> Optional[RecordedTrial]:
-        """The trial of a bag, or None where the bag cannot be read, or is not of one trial."""
+    def events_of(self, path: str) -> Optional[BagContent]:
+        """Return the content of a bag, None where it cannot be read, or is not of one trial."""
         try:
             content = self._reader.read(path)
         except BagError:
             return None
-        if len({event.trial_id for event in content.events}) != 1:
+        return content if len({event.trial_id for event in content.events}) == 1 else None
+
+    def read(self, path: str) -> Optional[RecordedTrial]:
+        """The trial of a bag, or None where the bag cannot be read, or is not of one trial."""
+        content = self.events_of(path)
+        if content is None:
             return None
         summary = summarise(content.events, (path,))
         end = next((event for event in content.events if event.kind == EventKind.TRIAL_END), None)
@@ -155,6 +163,7 @@ class ReplicateRecords:
             summary._replace(cause=content.causes.get(summary.trial_id)),
             learned,
             tuple(tries_of(content.events, content.stamps)),
+            tuple(account_of(content.events)),
         )
 
     def is_complete(self, recorded: RecordedTrial) -> bool:
@@ -171,6 +180,8 @@ class ReplicateRecords:
     def _is_complete(self, recorded: RecordedTrial, seed: int, truths: Mapping[int, Any]) -> bool:
         summary = recorded.summary
         if summary.ending in (TrialEnding.UNFINISHED, TrialEnding.PREEMPTED) or seed not in truths:
+            return False
+        if truths[seed].shared and not self.takes_shared:
             return False
         if summary.cause is not None and summary.cause.seed != seed:
             raise ExperimentError(
@@ -210,6 +221,13 @@ class ReplicateRecords:
         except (ValueError, AttributeError) as err:
             raise ExperimentError('{}: {}'.format(path, err)) from err
 
+    def truth_lines(self) -> Dict[int, Mapping[str, Any]]:
+        """Return the world's lines by seed, as they are, without those that cannot be read."""
+        if not self.truth.exists():
+            return {}
+        lines = map(_data_of, self.truth.read_text(encoding='utf-8').split('\n'))
+        return {line['seed']: line for line in lines if isinstance(line.get('seed'), int)}
+
     def _truths(self) -> Mapping[int, Any]:
         try:
             return read_truth(str(self.truth))
@@ -240,9 +258,14 @@ class ReplicateRecords:
             self.rates.unlink()
 
 
-def _seed_of(line: str) -> Optional[int]:
+def _data_of(line: str) -> Mapping[str, Any]:
     try:
-        seed = json.loads(line).get('seed')
-    except (ValueError, AttributeError):
-        return None
+        data = json.loads(line)
+    except ValueError:
+        return {}
+    return data if isinstance(data, dict) else {}
+
+
+def _seed_of(line: str) -> Optional[int]:
+    seed = _data_of(line).get('seed')
     return seed if isinstance(seed, int) else None

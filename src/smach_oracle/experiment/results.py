@@ -80,14 +80,15 @@ class JobResults:
             except BagError as err:
                 raise ExperimentError(str(err)) from err
 
-    def kept(self) -> KeptTrials:
+    def kept(self, takes_shared: bool = True) -> KeptTrials:
         """Return the trials from the first one on that have rows, without a gap.
 
+        :param takes_shared: whether the rows of shared trials count. They are a gap otherwise.
         :raises ExperimentError: where a row does not tell what was learned.
         """
         kept = KeptTrials([], {}, [])
         seed = self._first_seed
-        while seed in self._rows:
+        while seed in self._rows and (takes_shared or not self._rows[seed].shared):
             row, number = self._rows[seed], seed - self._first_seed
             if row.ending == LOST:
                 kept.lost[number] = row.why
@@ -142,6 +143,7 @@ class JobResults:
                     trial.learned,
                     self._lasting_share,
                     trial.tries,
+                    trial.account,
                 )
             )
         for number, why in lost.items():

@@ -25,7 +25,7 @@ class FakeRecords:
 
     def __init__(self, folder, first_seed, trials):
         self.folder, self.rates, self.truth = folder, folder / 'rates.json', folder / 'truth.jsonl'
-        self._trials = trials
+        self._trials, self.takes_shared = trials, True
         self.done, self.lost = [], {}
         FakeLaunch.records = self
 

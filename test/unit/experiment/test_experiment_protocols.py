@@ -187,7 +187,10 @@ class FakeRunner:
         self.finished = sum(
             (row.variant, row.replicate) == (variant.name, replicate) for row in kept
         )
-        self.running = False
+        self.running, self.ready = False, True
+
+    def heed(self):
+        pass
 
     @property
     def over(self):

@@ -57,7 +57,8 @@ from .settings import NONE, WorldSettings, read_settings
 from .sim_clock import SimClock
 from .state_publisher import StatePublisher, publish_description, ros_time
 from .trial_film import TrialFilm
-from .truth import TrialTruth, append_line
+from .truth import TrialTruth
+from .truth_file import append_line
 
 # simulated s from one time on /clock to the next, by whether time is that of the commands. Each one
 # wakes every action server of every node.

@@ -1,7 +1,5 @@
 """The record of a trial's truth: one line of JSON for each trial that has ended."""
 
-import json
-import os
 import time
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
@@ -84,14 +82,3 @@ class TrialTruth:
             },
             'cpu_s': {what: round(seconds, 4) for what, seconds in sorted(used.items())},
         }
-
-
-def append_line(path: str, record: Mapping[str, Any]) -> None:
-    """Append a line that is on the disk when this returns.
-
-    :raises OSError: where it cannot be written.
-    """
-    with open(path, 'a', encoding='utf-8') as file:
-        file.write(json.dumps(record, allow_nan=False) + '\n')
-        file.flush()
-        os.fsync(file.fileno())

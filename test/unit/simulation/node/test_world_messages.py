@@ -19,7 +19,8 @@ from smach_oracle.simulation.node.camera_publisher import camera_info
 from smach_oracle.simulation.node.reveal import reveal
 from smach_oracle.simulation.node.state_publisher import odometry, transforms
 from smach_oracle.simulation.node.streamed_target import StreamedTarget
-from smach_oracle.simulation.node.truth import TrialTruth, append_line
+from smach_oracle.simulation.node.truth import TrialTruth
+from smach_oracle.simulation.node.truth_file import append_line
 from smach_oracle.simulation.physics.camera import INTRINSICS
 from smach_oracle.simulation.physics.cause_log import CauseSpan
 from smach_oracle.simulation.physics.harm import DROPPED, Harm

@@ -1,0 +1,1 @@
+"""Judging policies from rows alone: accounts of trials, tests of hypotheses, verdicts."""
