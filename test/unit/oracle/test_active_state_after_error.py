@@ -73,3 +73,19 @@ def test_the_machine_runs_again_after_the_error():
         machine.execute()
     assert machine.execute() == 'done'
     assert machine.get_active_states() == ['None']
+
+
+@pytest.mark.parametrize(
+    ('end', 'said'),
+    [('exception', ["State 'B' ended in an error."]), ('unregistered outcome', [])],
+)
+def test_where_the_oracle_only_observes_the_log_names_a_state_that_has_raised(
+    end, said, monkeypatch
+):
+    returned, kind = ENDS[end]
+    machine = OracleContainer.wrap(machine_that(returned), recover=False)
+    logged = []
+    monkeypatch.setattr(smach, 'logerr', logged.append)
+    with pytest.raises(kind):
+        machine.execute()
+    assert [text for text in logged if 'ended in an error' in text] == said
