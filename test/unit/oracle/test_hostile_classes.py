@@ -123,9 +123,13 @@ def test_a_method_is_the_same_at_each_access_and_an_equal_object_is_not():
         def is_well(self):
             return True
 
+        def is_near(self):
+            return True
+
     robot = Robot()
     assert is_same(('a', [1, robot.is_well]), ('a', [1, robot.is_well]))
     assert not is_same(robot.is_well, Robot().is_well)
+    assert not is_same(robot.is_well, robot.is_near)
     assert not is_same(robot, Robot())
 
 
