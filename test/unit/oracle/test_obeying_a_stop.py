@@ -8,6 +8,8 @@ from held_machines import LIMIT_S, Gate, Held, Trail, eventually
 from waiting import wait_for
 
 import smach
+from smach_oracle.oracle.control.control import Control
+from smach_oracle.oracle.scope.clock import Clock
 
 FROM_B = ('ok', 'aborted', 'preempted', 'stopped')
 
@@ -204,3 +206,11 @@ def test_an_operator_sends_a_nested_machine_on_after_a_stop():
 
     held = run_and_stop(in_another(machine), ends, then=send)
     assert (held.end(), trail.ran) == ('done', ['A', 'B', 'CLEAN', 'C'])
+
+
+def test_a_stop_is_not_over_while_its_preempt_is_under_way():
+    control = Control(Clock())
+    control.pause()
+    with control.stop():
+        control.stop_is_over()
+        assert not control.holds_all
