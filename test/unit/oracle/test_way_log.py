@@ -106,6 +106,41 @@ def test_a_trial_that_is_lost_first_says_that_the_way_has_not_helped():
     assert noted(watch, 'B')[-1] == ('from A', LATER, False)
 
 
+def test_a_trial_that_is_preempted_says_nothing_of_its_last_way():
+    def stopped(state, ud):
+        watch.machine.request_preempt()
+        return 'stop'
+
+    a = Scripted('ok', stopped, outcomes=('ok', 'stop'))
+    b = Scripted(*['aborted'] * 3)
+    machine = smach.StateMachine(outcomes=[*ENDS, 'failed'])
+    with machine:
+        smach.StateMachine.add('A', a, {'ok': 'B', 'stop': 'failed'})
+        smach.StateMachine.add('B', b, {'ok': 'done', 'aborted': 'aborted'})
+    watch = Watched(
+        machine,
+        settings={'policy': 'escalating', 'intended_outcomes': ['stop'], 'max_recoveries': 50},
+    )
+    oracle_of(watch.machine).waiting = FakeWaiting()
+    assert watch.run() == 'failed'
+    assert noted(watch, 'B')[-1] == ('from A', LATER, None)
+
+
+def test_a_lost_trial_says_that_the_choice_of_a_person_has_not_helped():
+    a = Scripted('ok', 'stop', outcomes=('ok', 'stop'))
+    machine = smach.StateMachine(outcomes=[*ENDS, 'failed'])
+    with machine:
+        smach.StateMachine.add('A', a, {'ok': 'B', 'stop': 'failed'})
+        smach.StateMachine.add('B', Scripted('aborted'), {'ok': 'done'})
+    watch = Watched(
+        machine,
+        settings={'policy': 'escalating', 'intended_outcomes': ['stop'], 'max_recoveries': 0},
+        expert=FakeExpert(goto('A')),
+    )
+    assert watch.run() == 'failed'
+    assert noted(watch, 'B') == [('from A', BY_PERSON, False)]
+
+
 def test_a_trial_that_a_person_gives_up_says_nothing_of_the_last_way():
     expert = FakeExpert(give_up())
     machine = machine_of(Scripted(), Scripted(*['aborted'] * 9), expert=expert)

@@ -33,12 +33,16 @@ class WayReader:
         self._counter = TrialCounter()
         self._failed: Dict[Key, Event] = {}  # in the latest visit
         self._decided_min: Dict[Key, float] = {}
+        self._top = ''  # path of the top machine
+        self._was_preempted = False
 
     def take(self, event: Event) -> None:
         """Follow one event."""
         if event.kind == EventKind.TRIAL_START:
             self._settle_all(None)
             self._begin()
+            self._top = event.path
+        self._was_preempted |= event.kind == EventKind.PREEMPT and event.path == self._top
         self._time.take(event)
         self._counter.add(event)
         key = key_of(event)
@@ -54,8 +58,8 @@ class WayReader:
         elif event.kind == EventKind.RESUMED:  # the program has forgotten which ways were gone
             self._forget()
         elif event.kind == EventKind.TRIAL_END:
-            ended_badly = self._counter.ending is TrialEnding.FAILURE
-            self._settle_all(False if ended_badly else None)
+            is_lost = self._counter.ending is TrialEnding.FAILURE and not self._was_preempted
+            self._settle_all(False if is_lost else None)
         elif is_act_of_person(event):
             self._settle_all(None)
         gone = self._decisions.take(event)

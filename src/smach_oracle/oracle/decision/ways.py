@@ -136,7 +136,7 @@ class Evidence(NamedTuple):
 
 
 class WayCounts(NamedTuple):
-    """How often a way has helped, of how many times, and the mean time that it took then."""
+    """The times that a way has helped, of how many, and the mean time that it took then."""
 
     helped: int = 0
     tried: int = 0

@@ -94,7 +94,7 @@ class Applying:
         node, way = self._node, jump.jump_path
         if jump.chosen is not None:
             jump.chosen.note()
-        elif jump.by and node.in_force.policy.goes_by_ways:
+        elif jump.by and node.in_force.policy.goes_by_ways and self._occasion.failure.is_counted:
             self._note_choice(way)
         if jump.restarts:  # with the userdata of the start in all containers
             start_over(node, way.first_label)

@@ -137,8 +137,9 @@ def _end_trial(
     is_lost = why is TrialEnd.ERROR or (
         why is TrialEnd.OUTCOME and outcome in node.in_force.failing
     )
-    if node.tree.budget.recoveries:  # else it has gone no way
-        settle_ways(node, False if is_lost else None)
+    if node.tree.budget.is_spent_from:  # else it has gone no way
+        is_known = is_lost and not node.execution.was_preempted
+        settle_ways(node, False if is_known else None)
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',

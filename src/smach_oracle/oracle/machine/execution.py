@@ -33,7 +33,7 @@ class Execution:
 
     `runs_around`: the watched executions inside which it takes place. `departure`: the verdict from
     below, or from here, that ends the present state. `unrecovered`: whether the oracle has given
-    up, and so ended it.
+    up, and so ended it. `was_preempted`: whether a preempt was told of it.
 
     The thread of the container calls its methods, except `depart_by`, `start_of` and
     `forget_unrecovered`, which belong to the threads of other containers.
@@ -45,7 +45,7 @@ class Execution:
     unrecovered = False
     starts_in = ''  # '': its initial state
     starts_below: Dict[int, str] = {}  # by the id of a node in the present state. Never written to
-    _is_preempt_told = False
+    _is_preempt_told = was_preempted = False
 
     def __init__(self, node: 'TreeNode') -> None:
         self._node = node
@@ -176,7 +176,7 @@ class Execution:
     def tell_preempt(self) -> None:
         """Emit PREEMPT, once for each request."""
         if not self._is_preempt_told:
-            self._is_preempt_told = True
+            self._is_preempt_told = self.was_preempted = True
             self._node.emit(EventKind.PREEMPT, state=current_label_of(self._node.machine))
 
     def note_no_preempt(self) -> None:

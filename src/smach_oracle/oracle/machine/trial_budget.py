@@ -57,6 +57,11 @@ class TrialBudget:
         """The recoveries that are spent."""
         return self._recoveries
 
+    @property
+    def is_spent_from(self) -> bool:
+        """Whether a recovery was made, or a question asked."""
+        return bool(self._recoveries or self._questions)
+
     def spent(self) -> List[float]:
         """Return the recoveries, the questions, the seconds spent, and those of work."""
         with self._lock:

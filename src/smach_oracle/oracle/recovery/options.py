@@ -63,9 +63,13 @@ def option_on(recovery: Recovery, way: JumpPath) -> Option:
 
 def menu_on(recovery: Recovery) -> Iterator[OpenWay]:
     """Yield the ways of the menu, none of them blocked yet. A state that still runs has none."""
-    if not recovery.failure.still_runs:
-        for way, jump_path in menu_of(recovery.node, recovery.record, visited_on(recovery)):
-            yield OpenWay(way, option_on(recovery, jump_path))
+    if recovery.failure.still_runs:
+        return
+    option: Optional[Option] = None
+    for way, jump_path in menu_of(recovery.node, recovery.record, visited_on(recovery)):
+        if option is None or option.jump_path is not jump_path:  # several enter the failed state
+            option = option_on(recovery, jump_path)
+        yield OpenWay(way, option)
 
 
 def visited_on(recovery: Recovery) -> Tuple[str, ...]:

@@ -54,8 +54,6 @@ OPTIONS_WITH_VALUE = (
     '--resume-map',
     '--repeat',
 )
-
-
 # those that a machine gets when `oracle_run` wraps it
 _OPTIONS_OF_WRAPPING = (
     '--config',

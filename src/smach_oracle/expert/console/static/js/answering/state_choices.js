@@ -1,7 +1,9 @@
 // @ts-check
 // The states that a machine may be told to go to: which come first, and what is said of each.
 import { h } from '../page/dom.js';
-import { FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
+import {
+  FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar,
+} from '../page/format.js';
 
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Question} Question */
@@ -11,8 +13,8 @@ const LIKELIEST = 6;
 const MOST_HELPFUL = 2;
 
 /**
- * The likeliest of very many states: the recommended one, those that helped before, the failed one, the one that
- * follows its success, and those that succeeded last.
+ * The likeliest of very many states: the recommended one, those that helped before, the failed one,
+ * the one that follows its success, and those that succeeded last.
  * @param {Question} question
  */
 export function likeliest({ choices, state, supersede, history }) {
@@ -22,7 +24,7 @@ export function likeliest({ choices, state, supersede, history }) {
     .sort((one, other) => share(other) - share(one)).slice(0, MOST_HELPFUL);
   const came = history.filter((visit) => visit.result === 'success').reverse();
   const recommended = choices.filter((choice) => choice.recommended);
-  const names = [...recommended.map((choice) => choice.state), ...helpful.map((choice) => choice.state), state,
+  const names = [...recommended, ...helpful].map((choice) => choice.state).concat(state,
     ...supersede.map((choice) => choice.target), ...came.map((visit) => visit.state)];
   const known = names.filter((name) => choices.some((choice) => choice.state === name));
   const first = [...new Set(known)].slice(0, LIKELIEST);
