@@ -53,10 +53,9 @@ class Streaks:
         streak = self._open.get(label)
         return streak if streak is not None and streak.successes == successes else None
 
-    def begin(self, label: str, streak: OpenStreak) -> OpenStreak:
+    def begin(self, label: str, streak: OpenStreak) -> None:
         """Have this as that of a state."""
         self._open[label] = streak
-        return streak
 
     def end(self, label: str) -> None:
         """End that of a state."""
