@@ -1,5 +1,6 @@
 """The policy `learned`: the order of ways, by what they have led to."""
 
+import json
 import random
 from typing import List, Sequence, Set
 
@@ -9,7 +10,7 @@ from machines import FakeWaiting, Scripted, watched
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.by_ways import Escalating
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.learned import Estimates, Learned
+from smach_oracle.oracle.decision.learned import WEIGHT, Estimates, Learned, _Gain
 from smach_oracle.oracle.decision.policies import policy_named
 from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation
 from smach_oracle.oracle.decision.ways import (
@@ -23,6 +24,7 @@ from smach_oracle.oracle.decision.ways import (
     WayResult,
 )
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.streaks import OpenStreak, Streaks
 
 AGAIN = Way(WayKind.AGAIN, 'HERE', minutes=1.0)
 BACK = Way(WayKind.STEP_BACK, 'LOOK', 1, minutes=2.0, repeats=('LOOK',))
@@ -115,6 +117,49 @@ def test_old_results_count_less():
         for each in (old, old + new)
     )
     assert sum(aged) < sum(fresh) and aged.mean < fresh.mean
+
+
+def test_a_result_counts_half_after_thirty_streaks():
+    old = [result(BACK, LATER, True)]
+    later = [result(AGAIN, FIRST, True)] * 30
+    chance = Estimates(Evidence(tuple(old + later), FAILURE), AGAIN).chance(BACK, LATER)
+    assert sum(chance) == pytest.approx(WEIGHT + 0.5)
+
+
+def test_what_helped_last_after_the_same_kind_of_failure_is_looked_at_first():
+    # both are surely better in front than to enter the state again
+    vain = [result(AGAIN, FIRST, False)]
+    both = [*vain, result(BACK, LATER, True), *vain, result(FAR, LATER, True)] * 8
+    ways = [each._replace(repeats=(), minutes=2.0) for each in (BACK, FAR)]
+    both = [each._replace(minutes=2.0) for each in both]
+    for last in ways:
+        evidence = [*both, *vain, result(last, LATER, True)]
+        other = [*vain, result(FAR if last.key == BACK.key else BACK, LATER, True)]
+        others = [each._replace(failure='another') for each in other]
+        choice = Learned().choose(situation([*evidence, *others], (AGAIN, *ways)))
+        assert choice.ways[0].key == last.key
+
+
+def test_later_in_a_streak_a_moved_way_hopes_for_the_chance_of_a_later_place():
+    results = vain_then_back(4) + [result(BACK, FIRST, False)] * 4 + vain_then_back(4)
+    evidence = Evidence(tuple(results), FAILURE)
+    first, later = (
+        round(Estimates(evidence, AGAIN).chance(BACK, place).mean, 3) for place in (FIRST, LATER)
+    )
+    policy, given = Learned(), situation(results, tried=[FAR.key])
+    gain = _Gain(policy, given, Estimates(evidence, AGAIN), [AGAIN], BACK)
+    assert round(gain.chance.mean, 3) == later != first
+
+
+def test_a_streak_that_goes_on_knows_which_way_was_moved():
+    streaks = Streaks()
+    streak = OpenStreak(0, 0.0, ())
+    streaks.begin('A', streak)
+    streak.note('from B', moved=True)
+    streak.note('again')
+    again = Streaks()
+    again.take_over(json.loads(json.dumps(streaks.told())))
+    assert again.of('A', 0).so_far(0.0).moved == 'from B'
 
 
 def test_unknown_results_count_their_time_alone():

@@ -1,5 +1,6 @@
 """What the ways on from failures have led to: noted as a machine runs, kept beside its rates."""
 
+import copy
 import json
 
 import pytest
@@ -8,7 +9,7 @@ from machines import FakeExpert, FakeWaiting, Scripted, Watched, give_up, goto, 
 import smach
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.ways import BY_PERSON, FIRST, LATER, WayResult
-from smach_oracle.oracle.machine.nesting import marked_node
+from smach_oracle.oracle.machine.nesting import marked_node, settle_ways
 from smach_oracle.oracle.machine.state_record import StateRecord
 from smach_oracle.oracle.records.way_results import (
     MOST_FAILURES,
@@ -148,6 +149,83 @@ def test_a_trial_that_a_person_gives_up_says_nothing_of_the_last_way():
     assert [helped for _, _, helped in noted(machine, 'B')] == [False] * 3
 
 
+def test_a_choice_in_another_container_is_noted_for_the_state_that_failed():
+    inner = smach.StateMachine(outcomes=ENDS)
+    with inner:
+        smach.StateMachine.add('S', Scripted('aborted'), {'ok': 'done'})
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'M'})
+        smach.StateMachine.add('M', inner, {'done': 'done'})
+    watch = Watched(
+        top,
+        settings={'policy': 'escalating', 'max_recoveries': 0, 'escalate': False},
+        expert=FakeExpert(goto('A', container='SM_ROOT')),
+    )
+    assert watch.run() == 'done'
+    (result,) = marked_node(inner).record('S').ways_so_far()
+    assert (result.way, result.place, result.helped) == ('from /A', BY_PERSON, True)
+    assert noted(watch, 'M') == []
+
+
+def test_a_person_without_a_name_is_a_person():
+    expert = FakeExpert(supersede('ok')._replace(by=''))
+    b = Scripted('ok', *['aborted'] * 9)
+    machine = machine_of(Scripted(), b, Scripted(*['aborted'] * 3), expert=expert)
+    assert machine.run() == 'done'
+    assert noted(machine, 'C')[-1] == ('from A', LATER, None)
+
+
+def test_a_failure_that_another_state_reports_goes_by_its_own_text():
+    work = Scripted('failed', outcomes=('ok', 'failed'))
+    machine = smach.StateMachine(outcomes=ENDS)
+    with machine:
+        smach.StateMachine.add('WORK', work, {'ok': 'done', 'failed': 'TIDY'})
+        smach.StateMachine.add('TIDY', Scripted(outcomes=('ok',)), {'ok': 'aborted'})
+    watch = Watched(machine, settings={'policy': 'escalating', 'max_recoveries': 50})
+    oracle_of(watch.machine).waiting = FakeWaiting()
+    oracle_of(watch.machine).describe_failure = lambda state: 'the arm blocks the view'
+    assert watch.run() == 'done'
+    (result,) = marked_node(watch.machine).record('WORK').ways_so_far()
+    assert result.failure == 'failing_outcome failed: the arm blocks the view'
+
+
+def test_an_operator_who_sends_the_machine_on_says_nothing_of_a_way():
+    machine = machine_of(Scripted(), Scripted('aborted'))
+    record = marked_node(machine.machine).record('B')
+    record.go_way(a_result(), float)
+    settle_ways(marked_node(machine.machine), None)
+    assert noted(machine, 'B') == [('again', FIRST, None)]
+
+
+def test_a_new_trial_says_nothing_of_the_way_of_the_last_one():
+    record = StateRecord('A', StateSettings())
+    record.go_way(a_result(), float)
+    record.begin_trial()
+    assert [each.helped for each in record.ways_so_far()] == [None]
+
+
+def test_a_copy_has_the_results_and_not_the_way_under_way():
+    record = StateRecord('A', StateSettings())
+    record.go_way(a_result(), float)
+    record.settle_way(True)
+    record.go_way(a_result(), float)
+    twin = copy.deepcopy(record)
+    twin.settle_way(True)
+    assert len(twin.ways_so_far()) == 1
+
+
+def test_an_error_that_ends_the_trial_says_that_the_way_has_not_helped():
+    def broken(state, ud):
+        raise ValueError('broken')
+
+    a = Scripted('ok', broken)
+    machine = machine_of(a, Scripted(*['aborted'] * 9), budget={'recoveries': 3})
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine.run()
+    assert noted(machine, 'B')[-1] == ('from A', LATER, False)
+
+
 def test_other_policies_note_nothing():
     machine = machine_of(Scripted(), Scripted('aborted'), policy='prose')
     assert machine.run() == 'done'
@@ -171,9 +249,14 @@ def test_machines_that_share_a_rates_file_share_the_results(tmp_path):
     'damage',
     [
         7,
-        {'names': [['again', 'again']], 'failures': [], 'results': [[0, 0, 0, True, 1.0]]},
-        {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 9, 0, True, 1.0]]},
-        {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 0, 0, 'yes', 1.0]]},
+        {'names': [['again', 'again']], 'failures': [], 'results': ['0 0 0 1 1.0']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 9 0 1 1.0']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 yes 1.0']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 nan']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 -5']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['-1 0 0 1 1.0']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 1.0 nan']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 0, 0, True, 1.0]]},
     ],
 )
 def test_damaged_results_leave_the_state_with_its_prior_and_are_warned_of(tmp_path, damage):
@@ -188,6 +271,17 @@ def test_damaged_results_leave_the_state_with_its_prior_and_are_warned_of(tmp_pa
     again = machine_of(Scripted(), Scripted('aborted'), rates_file=str(path))
     assert again.run() == 'done'
     assert any("'B' of" in text and 'results of ways' in text for text in warned)
+
+
+def test_a_number_of_results_without_end_is_damage(tmp_path):
+    path = tmp_path / 'rates.json'
+    machine = machine_of(Scripted(), Scripted('aborted'), rates_file=str(path))
+    assert machine.run() == 'done'
+    text = path.read_text()
+    assert '"ways_total": 1' in text
+    path.write_text(text.replace('"ways_total": 1', '"ways_total": Infinity'))
+    again = machine_of(Scripted(), Scripted('aborted'), rates_file=str(path))
+    assert again.run() == 'done'
 
 
 def a_result(number=0, failure='failing_outcome aborted', **more):
@@ -216,7 +310,7 @@ def test_what_is_new_since_the_last_share_comes_behind_the_others():
     base = {'ways_total': 4}
     merged = merged_ways(own.told(), base, theirs.told())
     assert merged['ways_total'] == 4
-    assert [row[4] for row in merged['ways']['results']] == [0.0, 1.0, 2.0, 4.0]
+    assert [row.split()[4] for row in merged['ways']['results']] == ['0', '1', '2', '4']
 
 
 def test_results_that_a_program_of_an_earlier_version_has_dropped_stay():

@@ -2,10 +2,7 @@
 
 from typing import Mapping, Optional, Sequence
 
-from ..decision.ways import BY_PERSON, WayKind, WayResult, key_of
 from ..machine.jump_path import JumpPath
-from ..machine.nesting import settle_ways
-from ..machine.places import name_of
 from ..machine.repeats import note_superseded
 from ..machine.site import route_of
 from ..machine.state_record import StateRecord
@@ -59,8 +56,6 @@ class Applying:
 
         :raises Exception: what the machine would raise without an oracle, where that gives up.
         """
-        if not isinstance(verdict, Preempted) and verdict.by:
-            settle_ways(self._node, None)  # it helped, or did not, with the help of a person
         if isinstance(verdict, Supersede):
             self._count_superseded(verdict.outcome)
         if self._node.tree.early_end.why is not None:
@@ -94,8 +89,8 @@ class Applying:
         node, way = self._node, jump.jump_path
         if jump.chosen is not None:
             jump.chosen.note()
-        elif jump.by and node.in_force.policy.goes_by_ways and self._occasion.failure.is_counted:
-            self._note_choice(way)
+        elif jump.asked is not None:
+            jump.asked.go()
         if jump.restarts:  # with the userdata of the start in all containers
             start_over(node, way.first_label)
             userdata, missing = 'start', None
@@ -105,16 +100,6 @@ class Applying:
         self._note_entry(way.first_label)
         told = self._told_of(way, jump.chosen)
         self._go_on(way.first_label, jump.by, jump.text, userdata, missing, told)
-
-    def _note_choice(self, path: JumpPath) -> None:
-        """Note the choice of a person as a way on, which shows what is to be expected of it."""
-        record, failure = self._record, self._occasion.failure
-        key = key_of(name_of(path.entered_places[-1], self._node), record.label)
-        kind = WayKind.AGAIN if key == WayKind.AGAIN.value else WayKind.STEP_BACK
-        failure_key = record.failure_key(failure.kind, failure.outcome, failure.text)
-        since_s = self._node.tree.budget.work_time.now()
-        gone = WayResult(key, kind.value, BY_PERSON, failure_key, None, 0.0)
-        ChosenWay(self._node, record, gone, since_s).go()
 
     def _told_of(self, way: JumpPath, chosen: Optional[ChosenWay]) -> Mapping[str, str]:
         """Return what is told of a jump by a way of the menu, or across containers."""

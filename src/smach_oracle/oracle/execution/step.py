@@ -279,6 +279,7 @@ class Step:
         continuous = node.in_force.policy.is_continuous(context)
         tell_failure(node, record, failure, continuous)
         record.learn(True)
+        record.last_failure = failure.kind, failure.outcome, failure.text
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
             node.site.tell_item_passed_over(node, failure.state, failure.outcome)

@@ -11,6 +11,7 @@ from ..decision.failure_rate import (
     make_estimator,
     merged,
 )
+from ..records.events import FailureKind
 from ..records.visits import Visit
 from ..records.way_results import WayLog, WayResult, merged_ways
 from ..settings.settings import StateSettings
@@ -81,6 +82,8 @@ class StateRecord:
         # what of it the rates file has, as `base_of` tells it
         self.shared: Dict[str, object] = {}
         self._ways = WayLog()
+        # its latest failure in this program: kind, outcome and text
+        self.last_failure: Optional[Tuple[FailureKind, str, str]] = None
         self._retired = 0  # successes by way of edges that are no more
         self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
         self._visits = 0  # not counted by an FastEdge
@@ -292,7 +295,8 @@ class StateRecord:
         """Leave out what belongs to an execution under way."""
         state: Dict[str, object] = {**vars(self), 'snapshot': None, 'view': None, 'way_down': ()}
         ways = state['_ways'] = WayLog()
-        ways.take_over(self._ways.told())
+        with self._lock:
+            ways.take_over(self._ways.told())
         del state['_lock']
         return state
 

@@ -5,6 +5,7 @@ state fails again in any kind, or if the trial ends in failure first. Nobody kno
 a shutdown or the act of a person.
 """
 
+import math
 import re
 from collections import deque
 from typing import Any, Callable, Deque, Dict, Iterable, List, Mapping, Optional, Tuple
@@ -17,6 +18,8 @@ MOST_RESULTS = 120  # that are kept of a state, the latest ones
 MOST_FAILURES = 8  # kinds of failure with a text of their own, among these
 WAYS, WAYS_TOTAL = 'ways', 'ways_total'  # keys of what was learned of a state
 
+_HELPED = {True: '1', False: '0', None: '-'}
+_READ = {told: helped for helped, told in _HELPED.items()}
 _LONGEST = 120
 _LONGEST_READ = 2000
 _NUMBER = re.compile(r'(?:(?<!\w)[-+])?(?:0x[0-9a-f]+|\d+(?:\.\d+)?(?:e[-+]?\d+)?)', re.IGNORECASE)
@@ -51,6 +54,7 @@ class WayLog:
         self.results: Deque[WayResult] = deque(maxlen=MOST_RESULTS)
         self.total = 0
         self._gone: Optional[WayResult] = None
+        self._told: Optional[Dict[str, Any]] = None  # until there is one more
         self._minutes: Callable[[], float] = float
 
     def failure_key(self, kind: int, outcome: str, text: str) -> str:
@@ -71,10 +75,15 @@ class WayLog:
             self._gone, self._minutes = None, float
             self.results.append(result)
             self.total += 1
+            self._told = None
 
     def told(self) -> Dict[str, Any]:
         """Return the results as plain data, nothing where there is none. See `results_in`."""
-        return told_of(self.results, self.total) if self.results else {}
+        if not self.results:
+            return {}
+        if self._told is None:
+            self._told = told_of(self.results, self.total)
+        return self._told
 
     def take_over(self, learned: Mapping[str, Any]) -> None:
         """Go on with the results that are among what was learned of a state.
@@ -84,24 +93,25 @@ class WayLog:
         results, total = results_in(learned)
         self.results = deque(results, MOST_RESULTS)
         self.total = total
+        self._told = None
 
 
-def told_of(results: Deque[WayResult], total: int) -> Dict[str, Any]:
-    """Return results as plain data: each way and kind of failure by its place in a list."""
+def told_of(results: Iterable[WayResult], total: int) -> Dict[str, Any]:
+    """Return results as plain data: each way and kind of failure by its place in a list.
+
+    A result is a short text: the numbers of these two around its place, `1`, `0` or `-` for
+    whether it helped, the minutes, and the hope, where there is one.
+    """
     ways: Dict[Tuple[str, str], int] = {}
     failures: Dict[str, int] = {}
-    rows: List[List[Any]] = []
+    rows: List[str] = []
     for each in results:
         way = ways.setdefault((each.way, each.kind), len(ways))
         failure = failures.setdefault(each.failure, len(failures))
-        row = [way, each.place, failure, each.helped, each.minutes]
-        rows.append(row if each.hoped is None else [*row, each.hoped])
-    ways_told = {
-        'names': [list(each) for each in ways],
-        'failures': list(failures),
-        'results': rows,
-    }
-    return {WAYS: ways_told, WAYS_TOTAL: total}
+        row = [way, each.place, failure, _HELPED[each.helped], '{:g}'.format(each.minutes)]
+        rows.append(' '.join(map(str, row if each.hoped is None else [*row, each.hoped])))
+    names = [list(each) for each in ways]
+    return {WAYS: {'names': names, 'failures': list(failures), 'results': rows}, WAYS_TOTAL: total}
 
 
 def results_in(learned: Mapping[str, Any]) -> Tuple[List[WayResult], int]:
@@ -115,25 +125,33 @@ def results_in(learned: Mapping[str, Any]) -> Tuple[List[WayResult], int]:
         told, total = learned[WAYS], int(learned[WAYS_TOTAL])
         names, failures = told['names'], list(map(str, told['failures']))
         results = [_result(row, names, failures) for row in told['results']][-MOST_RESULTS:]
-    except (AttributeError, KeyError, IndexError, TypeError, ValueError) as err:
+    except (AttributeError, LookupError, OverflowError, TypeError, ValueError) as err:
         raise ValueError('{}: cannot be read as results of ways: {}'.format(WAYS, err)) from err
     return results, max(total, len(results))
 
 
-def _result(row: List[Any], names: List[List[str]], failures: List[str]) -> WayResult:
-    way, place, failure, helped, minutes, *hoped = row
-    key, kind = names[way]
-    if helped not in (True, False, None) or place not in PLACES:
-        raise ValueError('{!r} is no result'.format(row))
-    return WayResult(
+def _result(row: str, names: List[List[str]], failures: List[str]) -> WayResult:
+    way, place, failure, helped, minutes, *hoped = row.split(' ')
+    key, kind = names[_index(way)]
+    result = WayResult(
         str(key),
         str(kind),
         int(place),
-        failures[failure],
-        None if helped is None else bool(helped),
+        failures[_index(failure)],
+        _READ[helped],
         float(minutes),
         float(hoped[0]) if hoped else None,
     )
+    is_sound = 0.0 <= result.minutes < math.inf and 0.0 <= (result.hoped or 0.0) <= 1.0
+    if result.place not in PLACES or not is_sound:
+        raise ValueError('{!r} is no result'.format(row))
+    return result
+
+
+def _index(text: str) -> int:
+    if int(text) < 0:
+        raise ValueError('{} is no number of a list'.format(text))
+    return int(text)
 
 
 def merged_ways(

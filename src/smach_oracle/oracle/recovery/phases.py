@@ -16,6 +16,7 @@ from ..decision.sentence import DecisionFacts, cause_of
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
 from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
+from ..machine.nesting import settle_ways
 from ..machine.places import TreePlace, levels_above, place_at
 from ..machine.repeats import repeated_by_going_to
 from ..machine.tree_node import TreeNode
@@ -273,6 +274,7 @@ def _asked_in_words(recovery: Recovery) -> str:
 def _obey(recovery: Recovery, answer: Answer) -> Verdict:
     """Write the outputs of an answer, and go as it says."""
     node, watch = recovery.node, recovery.watch
+    settle_ways(node, None)  # what helps from now on does so with the help of a person
     remapping = remapping_of(node.machine, recovery.record.label)
     for key, value in (answer.outputs or {}).items():
         watch.gate[remapping.get(key, key)] = value
@@ -282,7 +284,8 @@ def _obey(recovery: Recovery, answer: Answer) -> Verdict:
         if way is None:  # an answer that was checked has one
             named = '{}/{}'.format(answer.container or node.path, answer.state)
             raise smach.InvalidStateError('there is no way to ' + named)
-        return recovery.when_well(JumpTo(way, answer.by, answer.why, way.kept(watch)))
+        asked = recovery.asked_for(way)
+        return recovery.when_well(JumpTo(way, answer.by, answer.why, way.kept(watch), asked=asked))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Supersede(answer.outcome, answer.by, answer.why)
     ending = (

@@ -94,7 +94,11 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     choices = list(choices_on(recovery))
     evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key)
     counts = [evidence.of_way(_way_key(recovery, each)) for each, _ in choices]
-    recommended = _recommended([each for each, _ in choices], counts)
+    streak = streak_of(recovery.node, recovery.record)
+    tried = () if streak is None else tuple(streak.tried)
+    recommended = _recommended(
+        [(each, _way_key(recovery, each) in tried) for each, _ in choices], counts
+    )
     for number, (each, way) in enumerate(choices):
         container, label = _target(recovery.node, each.place)
         record, jump_path = each.place.node.record(label), each.jump_path
@@ -123,17 +127,21 @@ def _way_key(recovery: Recovery, option: Option) -> str:
     return key_of(name_of(option.place, recovery.node), recovery.record.label)
 
 
-def _recommended(options: Sequence[Option], counts: Sequence[WayCounts]) -> Optional[int]:
+def _recommended(
+    options: Sequence[Tuple[Option, bool]], counts: Sequence[WayCounts]
+) -> Optional[int]:
     """Return the number of the choice that has helped most of the time, None where none has.
 
     It can be entered now, repeats nothing that is not to be repeated, and was tried twice or more.
+
+    :param options: each with whether going there was in vain just before.
     """
     possible = [
         (each.share, -number)
         for number, each in enumerate(counts)
         if each.tried > 1
         and 2 * each.helped > each.tried
-        and not (options[number].closed or options[number].repeats)
+        and not (options[number][1] or options[number][0].closed or options[number][0].repeats)
     ]
     return -max(possible)[1] if possible else None
 

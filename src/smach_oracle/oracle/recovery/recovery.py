@@ -8,12 +8,21 @@ import smach
 from ..asking.question import Answer
 from ..decision.policy import Action, Situation
 from ..decision.sentence import DecisionFacts, cause_of
-from ..decision.ways import FIRST, LATER, ChosenOrder, WayResult
+from ..decision.ways import (
+    BY_PERSON,
+    FIRST,
+    LATER,
+    ChosenOrder,
+    WayKind,
+    WayResult,
+    key_of,
+)
 from ..machine.jump_path import JumpPath
+from ..machine.places import name_of
 from ..machine.snapshots import WriteWatch
 from ..machine.state_record import RateReading, StateRecord
 from ..machine.tree_node import TreeNode
-from ..records.events import EventKind
+from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from ..scope.scope import Reason, Scope, standing_still
 from .occasions import Occasion
@@ -155,20 +164,39 @@ class Recovery:
     @property
     def chosen(self) -> Optional[ChosenWay]:
         """Return the way that it has decided for, None where no streak is to know of it."""
-        if self.choice is None or not self.choice.ways or not self.failure.is_counted:
+        choice, situation = self.choice, self.situation
+        if choice is None or situation is None or not choice.ways:
             return None
-        way, streak = self.choice.ways[0], self.situation.menu.streak if self.situation else None
-        place = LATER if streak is not None and streak.tried else FIRST
-        gone = WayResult(
-            way.key, way.kind.value, place, self.failure_key, None, 0.0, self.choice.hoped
-        )
+        way, place = choice.ways[0], LATER if situation.menu.streak.tried else FIRST
+        return self._gone(way.key, way.kind, place, choice.hoped)
+
+    def asked_for(self, path: JumpPath) -> Optional[ChosenWay]:
+        """Return the choice of a person as a way, None where its result is not to be noted."""
+        if not self.node.in_force.policy.goes_by_ways:
+            return None
+        key = key_of(name_of(path.entered_places[-1], self.node), self.record.label)
+        kind = WayKind.AGAIN if key == WayKind.AGAIN.value else WayKind.STEP_BACK
+        return self._gone(key, kind, BY_PERSON)
+
+    def _gone(
+        self, key: str, kind: WayKind, place: int, hoped: Optional[float] = None
+    ) -> Optional[ChosenWay]:
+        if not self.failure.is_counted:
+            return None
+        gone = WayResult(key, kind.value, place, self.failure_key, None, 0.0, hoped)
         return ChosenWay(self.node, self.record, gone, self.budget.work_time.now())
 
     @property
     def failure_key(self) -> str:
-        """Return the name of this kind of failure, as the results of ways have it."""
-        failure = self.failure
-        return self.record.failure_key(failure.kind, failure.outcome, failure.text)
+        """Return the name of this kind of failure, as the results of ways have it.
+
+        That of a failure which another state has reported goes by what the failed one said.
+        """
+        failure, record = self.failure, self.record
+        told: Tuple[FailureKind, str, str] = failure.kind, failure.outcome, failure.text
+        if self.occasion.visits_since and record.last_failure is not None:
+            told = record.last_failure
+        return record.failure_key(*told)
 
     # -- waits
 

@@ -79,6 +79,7 @@ class JumpTo(NamedTuple):
     decided_by: Optional[TreeNode] = None  # the level above, as if its own state had failed
     restarts: bool = False  # with the userdata of the start, in all containers
     chosen: Optional[ChosenWay] = None  # of the streak that it belongs to
+    asked: Optional[ChosenWay] = None  # the choice of a person, of no streak
 
 
 class Supersede(NamedTuple):
