@@ -24,8 +24,11 @@ export function likeliest({ choices, state, supersede, history }) {
     .sort((one, other) => share(other) - share(one)).slice(0, MOST_HELPFUL);
   const came = history.filter((visit) => visit.result === 'success').reverse();
   const recommended = choices.filter((choice) => choice.recommended);
-  const names = [...recommended, ...helpful].map((choice) => choice.state).concat(state,
-    ...supersede.map((choice) => choice.target), ...came.map((visit) => visit.state)];
+  const names = [...recommended, ...helpful].map((choice) => choice.state).concat(
+    state,
+    supersede.map((choice) => choice.target),
+    came.map((visit) => visit.state),
+  );
   const known = names.filter((name) => choices.some((choice) => choice.state === name));
   const first = [...new Set(known)].slice(0, LIKELIEST);
   return choices.filter((choice) => first.includes(choice.state));
