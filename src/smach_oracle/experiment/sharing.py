@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import RecordedCause
+from smach_oracle.analysis.trial_rows import details_of
 from smach_oracle.analysis.trial_steps import steps_of
 from smach_oracle.analysis.truth import SHARED
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
@@ -47,6 +48,7 @@ class CleanTrial(NamedTuple):
     ended: str  # outcome of the machine
     steps: Tuple[object, ...]  # all that happened, without times
     truth: Mapping[str, Any]  # the world's line on it
+    took_s: float  # of the world's time
 
     def as_data(self) -> Dict[str, Any]:
         """Return it as plain data, for who replays it."""
@@ -58,6 +60,7 @@ class CleanTrial(NamedTuple):
             'details': list(details),
             'outcomes': [list(each) for each in self.outcomes],
             'ended': self.ended,
+            'took_s': self.took_s,
             'truth': {**self.truth, SHARED: True},
         }
 
@@ -106,6 +109,12 @@ def differing(first: Mapping[str, Any], second: Mapping[str, Any]) -> List[str]:
     return sorted(key for key in keys if first.get(key) != second.get(key))
 
 
+def world_seconds(stamps: Sequence[float], truth: Mapping[str, Any]) -> float:
+    """Return how much of the world's time passes between the first and the last of some stamps."""
+    first, last, clock = min(stamps), max(stamps), details_of(truth).clock
+    return last - first if clock is None else clock.world_s(last) - clock.world_s(first)
+
+
 def clean_trials(records: ReplicateRecords) -> Dict[int, CleanTrial]:
     """Return the trials of a bare job in which nothing failed, by seed.
 
@@ -122,7 +131,10 @@ def clean_trials(records: ReplicateRecords) -> Dict[int, CleanTrial]:
                 if cause.seed in truths:
                     steps = steps_of(content.events)
                     truth = truths[cause.seed]
-                    found[cause.seed] = CleanTrial(cause, outcomes, last.outcome, steps, truth)
+                    took_s = world_seconds(content.stamps, truth)
+                    found[cause.seed] = CleanTrial(
+                        cause, outcomes, last.outcome, steps, truth, took_s
+                    )
     return found
 
 

@@ -34,6 +34,7 @@ from smach_oracle.forking import in_child
 from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.identity import WeakIdentityMap, own_mark, remove_identical
+from smach_oracle.oracle.scope.scope import Waiting
 from smach_oracle.oracle.settings.paths import path_of
 
 from .diagnostics.diagnostics_publisher import DiagnosticsPublisher
@@ -54,6 +55,7 @@ from .shutdown import ShutdownGuard
 from .signals.latch import start_thread
 from .stored import prepare_store
 from .waiting.service_waiting import ServiceWaiting
+from .waiting.work_clock import MachineTimeWaiting, WorkClock, clock_of_work
 
 # for trials to tell their end, before their bags are closed under them. Roslaunch gives a node 15 s
 TRIAL_END_WAIT_S = 10.0
@@ -103,6 +105,8 @@ class Attachments:
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
         self._node_started = False
+        # of the work of all trials, under simulated time
+        self.work_clock: Optional[WorkClock] = None
         self.guard: Optional[ShutdownGuard] = None  # its signals wait for the trials
         self.has_parents_node = False  # a forked child cannot use it
         in_child(self._let_go)
@@ -118,7 +122,7 @@ class Attachments:
         self._introspection.clear()
         self._shown.clear()
         self._expert = self._events = self._rates = self._hand = self._diagnostics = None
-        self._node_started = False
+        self._node_started, self.work_clock = False, None
         self.has_parents_node = rospy.core.is_initialized()
         leave_node_to_parent()
 
@@ -225,6 +229,7 @@ class Attachments:
         if self._node_started:
             return
         self._node_started = True
+        self.work_clock = clock_of_work(private_text('pass_time'))
         start_master_watch()
         log_through_rospy()
         track_goals_from_the_start()
@@ -243,9 +248,7 @@ class Attachments:
         if oracle.recovers and oracle.expert is None:
             oracle.expert = self._shared_expert()
         oracle.listen_to_health(self._listen_to_health)
-        pass_time = private_text('pass_time')
-        if pass_time:
-            oracle.waiting = ServiceWaiting(rospy.resolve_name(pass_time))
+        self._let_time_pass(machine)
         if self._events is not None:
             oracle.events.observers.append(self._events)
         if self._rates is not None:
@@ -256,6 +259,18 @@ class Attachments:
             self._hand.watch(machine)
         if self._diagnostics is not None:
             self._diagnostics.watch(machine)
+
+    def _let_time_pass(self, machine: OracleContainer) -> None:
+        """Have waits and work take the time of the world, where there is a simulated one."""
+        oracle, clock = oracle_of(machine), self.work_clock
+        pass_time = private_text('pass_time')
+        by_itself = Waiting() if clock is None else MachineTimeWaiting(clock)
+        if clock is not None:
+            oracle.count_work_by(clock)
+        if pass_time:
+            oracle.waiting = ServiceWaiting(rospy.resolve_name(pass_time), by_itself)
+        elif type(oracle.waiting) is Waiting:  # else the program has its own
+            oracle.waiting = by_itself
 
     def _introspect(self, machine: OracleContainer) -> None:
         """Show the machine in place of an earlier one of its name.

@@ -13,7 +13,13 @@ from smach_oracle.analysis.trial_steps import steps_of
 from smach_oracle.experiment import job as job_module
 from smach_oracle.experiment import pool, sharing
 from smach_oracle.experiment.plan import ExperimentPlan, named_variants
-from smach_oracle.experiment.sharing import CleanTrial, difference, is_run_again, outcomes_of
+from smach_oracle.experiment.sharing import (
+    CleanTrial,
+    difference,
+    is_run_again,
+    outcomes_of,
+    world_seconds,
+)
 from smach_oracle.msg import TrialCause
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, FailureKind
 from smach_oracle.ros.recorder import TrialRecorder
@@ -94,10 +100,16 @@ TRUTH = {'seed': 1, 'success': True, 'sim_s': 20.0, 'wall_s': 3.0, 'share': {}, 
 )
 def test_one_difference_in_anything_but_the_machines_time_is_told(truth, events, told):
     clean = CleanTrial(
-        RecordedCause(1, 't', (), ()), (), 'succeeded', steps_of(clean_events()), TRUTH
+        RecordedCause(1, 't', (), ()), (), 'succeeded', steps_of(clean_events()), TRUTH, 20.0
     )
     assert difference(clean, events, truth).startswith(told)
     assert bool(difference(clean, events, truth)) == bool(told)
+
+
+def test_a_shared_trial_takes_the_time_of_the_world_without_its_pauses():
+    truth = {**TRUTH, 'clock_s': 10.0, 'pauses': [[12.0, 30.0], [60.0, 5.0]]}
+    assert world_seconds([11.0, 50.0, 61.0], truth) == 19.0
+    assert world_seconds([11.0, 50.0, 61.0], TRUTH) == 50.0
 
 
 class FakeLaunch:

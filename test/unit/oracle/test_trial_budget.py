@@ -9,6 +9,7 @@ from guarded_machines import chain, deciders, sentences
 from machines import FakeExpert, Scripted, Watched, give_up, goto, waits
 
 import smach
+from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.machine.trial_budget import TrialBudget
 from smach_oracle.oracle.records.events import EventKind
@@ -326,6 +327,43 @@ def test_the_time_of_work_stands_still_while_a_person_is_asked():
     budget.end()
     assert (budget.work_time.now(), budget.usual_minutes) == (120.0, 2.0)
     assert budget.time.now() == 3720.0
+
+
+def test_the_time_of_work_goes_by_a_clock_of_its_own_and_the_minutes_do_not():
+    clock, work = FakeClock(), FakeClock(5.0)
+    budget = TrialBudget(clock)
+    budget.count_work_by(work)
+    budget.begin(Budget(minutes=2))
+    clock.advance(60)
+    work.advance(600)
+    with budget.paused():
+        work.advance(600)
+    budget.end()
+    assert (budget.work_time.now(), budget.usual_minutes) == (600.0, 10.0)
+    assert (budget.time.now(), budget.left_s(), budget.within(90.0)) == (60.0, 60.0, (60.0, True))
+
+
+def test_a_menu_a_way_and_a_streak_have_the_minutes_of_the_clock_of_work():
+    fake_clock = FakeClock()
+
+    def takes(outcome):
+        return lambda state, userdata: fake_clock.advance(30.0) or outcome
+
+    pick = Scripted(takes('aborted'), takes('aborted'), takes('ok'))
+    machine = Watched(
+        chain(LOOK=Scripted(takes('ok'), takes('ok'), takes('ok')), PICK=pick),
+        settings={'policy': 'escalating'},
+    )
+    oracle = oracle_of(machine.machine)
+    oracle.count_work_by(fake_clock)
+    assert machine.run() == 'done'
+    first, second = (event.data for event in machine.of(EventKind.DECISION))
+    minutes = {way['kind']: way['minutes'] for way in first['menu']}
+    assert (minutes['again'], minutes['wait']) == (0.5, pytest.approx(0.5 + 60.0 / 60.0))
+    assert (first['streak']['minutes'], second['streak']['minutes']) == (0.0, 0.5)
+    record = machine.machine._oracle.record('PICK')
+    assert record.ways_so_far()[0].minutes == 0.5
+    assert machine.machine._oracle.tree.budget.usual_minutes in (2.0, 2.5)
 
 
 def test_of_several_threads_none_takes_more_than_a_policy_makes_do_with():

@@ -10,6 +10,7 @@ from ..records.events import EventSource
 from ..records.folder_locks import claim
 from ..records.rates_file import read_rates, share_rates, write_rates
 from ..records.visits import StateRateRow, TransitionRow
+from ..scope.clock import Clock
 from ..scope.scope import Waiting
 from ..settings.health import HealthFunction
 from ..settings.settings import Settings
@@ -199,6 +200,13 @@ class Oracle:
     @waiting.setter
     def waiting(self, waiting: Waiting) -> None:
         self._node.tree.waiting = waiting
+
+    def count_work_by(self, clock: Clock) -> None:
+        """Have the minutes by which ways are priced go by a clock, from the next trial on.
+
+        Its time never goes back. Limits and deadlines stay in monotonic time.
+        """
+        self._node.tree.budget.count_work_by(clock)
 
     @property
     def health(self) -> Optional[HealthFunction]:

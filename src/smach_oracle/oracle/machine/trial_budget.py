@@ -36,6 +36,10 @@ class TrialBudget:
             self.time.begin()
             self.work_time.begin()
 
+    def count_work_by(self, clock: Clock) -> None:
+        """Have the time of work go by another clock, from the next trial on."""
+        self.work_time = PausableClock(clock)
+
     @contextlib.contextmanager
     def paused(self) -> Iterator[None]:
         """Let all its time stand still."""

@@ -24,10 +24,10 @@ _ENOUGH = 0.99  # share of the time, for what the clock's messages are late
 class ServiceWaiting(Waiting):
     """Lets time pass by a service, and by waiting where that has let none pass."""
 
-    def __init__(self, service: str) -> None:
-        """`service`: resolved name of a PassTime service."""
+    def __init__(self, service: str, by_itself: Optional[Waiting] = None) -> None:
+        """`service`: resolved name of a PassTime service. `by_itself`: waits without it."""
         self._service = service
-        self._by_itself = Waiting()
+        self._by_itself = by_itself or Waiting()
 
     def wait(self, seconds: float, what: str, scope: Scope) -> None:
         """Wait so many seconds, or until `scope` is cancelled."""

@@ -90,9 +90,15 @@ class WorldNode:
         if settings.film != NONE:
             self._film = TrialFilm(Path(settings.film), settings.film_events)
         clock = rospy.Publisher('/clock', Clock, queue_size=1, tcp_nodelay=True)
-        self._clock = SimClock(
-            lambda now: clock.publish(Clock(ros_time(now))), CLOCK_S[settings.lock_step]
+        world_time = rospy.Publisher(
+            'world/time', Clock, queue_size=1, latch=True, tcp_nodelay=True
         )
+
+        def publish_clock(now_ns: int, worlds_ns: int) -> None:
+            world_time.publish(Clock(ros_time(worlds_ns)))  # first: it is there with the other
+            clock.publish(Clock(ros_time(now_ns)))
+
+        self._clock = SimClock(publish_clock, CLOCK_S[settings.lock_step])
         self._motions = MotionTable(self._world)
         self._loop = WorldLoop(self._motions, self._clock, settings, self._after_tick)
         self._state = StatePublisher(

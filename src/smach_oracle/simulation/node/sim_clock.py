@@ -11,16 +11,18 @@ class SimClock:
 
     Not for several threads: the world's own thread keeps it.
 
-    :param publish: gets the time (ns) each time it is to be published.
+    :param publish: gets the time (ns) each time it is to be published, and how much of it is the
+        world's: without the pauses.
     :param period_s: simulated s from one time published to the next, while it goes on in smaller
         steps.
     """
 
-    def __init__(self, publish: Callable[[int], None], period_s: float = 0.05) -> None:
+    def __init__(self, publish: Callable[[int, int], None], period_s: float = 0.05) -> None:
         self._publish = publish
         self._period_ns = int(period_s * 1e9)
         self._published_ns = 0
         self._stamped_ns = 0
+        self._paused_ns = 0  # in all
         # ROS takes a time of 0 for none
         self.now_ns = int(1e9)
         self._trial_ns = self.now_ns  # at which the trial began
@@ -52,6 +54,7 @@ class SimClock:
 
     def _note_pause(self, seconds: float) -> None:
         begin, length = self.now_ns, int(round(seconds * 1e9))
+        self._paused_ns += length
         if self._pauses and begin - sum(self._pauses[-1]) <= TOUCHING_NS:
             first = self._pauses.pop()[0]
             begin, length = first, begin + length - first
@@ -78,7 +81,7 @@ class SimClock:
     def publish(self) -> None:
         """Publish the time now."""
         self._published_ns = self.now_ns
-        self._publish(self.now_ns)
+        self._publish(self.now_ns, self.now_ns - self._paused_ns)
 
     def stamp(self) -> int:
         """Publish and return a time (ns) that no stamp has had."""

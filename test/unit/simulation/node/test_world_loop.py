@@ -114,7 +114,7 @@ class Running:
 
     def __init__(self, world, **settings):
         self.times, self.world, self.table = [], world, MotionTable(world)
-        self.clock = SimClock(self.times.append)
+        self.clock = SimClock(lambda now, worlds: self.times.append(now))
         self.loop = WorldLoop(self.table, self.clock, WorldSettings(**settings), lambda: None)
         self.closed = threading.Event()
         self.thread = threading.Thread(target=self.loop.run, args=(self.closed.set,), daemon=True)
@@ -190,7 +190,7 @@ def test_who_asks_a_world_that_ends_is_not_left_waiting(world):
 
 def test_a_clock_never_gives_a_stamp_twice():
     told = []
-    clock = SimClock(told.append)
+    clock = SimClock(lambda now, worlds: told.append(now))
     stamps = [clock.stamp(), clock.stamp()]
     clock.advance(1 / 60)
     stamps.append(clock.stamp())
@@ -198,7 +198,7 @@ def test_a_clock_never_gives_a_stamp_twice():
 
 
 def test_the_clock_tells_in_which_times_of_a_trial_the_world_stood_still():
-    clock = SimClock(lambda now: None)
+    clock = SimClock(lambda now, worlds: None)
     clock.pause(3.0)
     clock.begin_trial()
     clock.advance(1.0)
@@ -210,6 +210,17 @@ def test_the_clock_tells_in_which_times_of_a_trial_the_world_stood_still():
     record = clock.trial_record()
     assert record['clock_s'] == 4.0
     assert record['pauses'] == [[5.0, 1.0], [8.0, 0.25]]
+
+
+def test_the_worlds_own_time_stands_still_in_the_pauses_of_all_trials():
+    told = []
+    clock = SimClock(lambda now, worlds: told.append((now / 1e9, worlds / 1e9)))
+    clock.pause(3.0)
+    clock.begin_trial()
+    clock.skip(2.0)
+    clock.pause(0.5)
+    clock.pause(0.5)
+    assert told == [(4.0, 1.0), (6.0, 3.0), (6.5, 3.0), (7.0, 3.0)]
 
 
 @pytest.mark.parametrize('running', [LOCK_STEP], indirect=True)
