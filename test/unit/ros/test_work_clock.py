@@ -42,7 +42,7 @@ def test_it_stands_still_with_the_world(times):
 def test_in_a_world_that_jumps_back_it_goes_on_from_what_it_shows(times):
     clock = WorkClock()
     shown = []
-    for world_s in (60.0, 10.0, 25.0, 0.0, 3.0, 4.0):  # a reset, and a bag that begins anew
+    for world_s in (60.0, 10.0, 25.0, 0.0, 3.0, 4.0):  # a reset, and a bag that begins again
         times.world_s = world_s
         shown.append(clock.now())
     assert shown == [10.0, 10.0, 25.0, 25.0, 25.0, 26.0]

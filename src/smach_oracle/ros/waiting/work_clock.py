@@ -40,7 +40,7 @@ class WorkClock(Clock):
 
     def _hear(self, message: ClockMessage) -> None:
         told_s = float(message.clock.to_sec())
-        if told_s <= 0:  # as of ROS time, 0 is none
+        if told_s <= 0:  # as in ROS time, 0 means that nothing was told
             return
         with self._lock:
             if not self._told_s:  # it has been ROS time until now
