@@ -91,18 +91,25 @@ def test_the_choice_of_a_person_is_noted_as_such():
     assert noted(machine, 'B')[-1] == ('from A', BY_PERSON, True)
 
 
-def test_a_trial_that_is_lost_first_says_that_the_way_has_not_helped():
-    a = Scripted('ok', 'stop', outcomes=('ok', 'stop'))
-    b = Scripted(*['aborted'] * 3)
+def failing_at_a(end):
+    """B fails for good. Going back to A then ends as told, in the machine's outcome `failed`."""
+    a = Scripted('ok', end, outcomes=('ok', 'stop'))
     machine = smach.StateMachine(outcomes=[*ENDS, 'failed'])
     with machine:
         smach.StateMachine.add('A', a, {'ok': 'B', 'stop': 'failed'})
-        smach.StateMachine.add('B', b, {'ok': 'done', 'aborted': 'aborted'})
+        smach.StateMachine.add(
+            'B', Scripted(*['aborted'] * 3), {'ok': 'done', 'aborted': 'aborted'}
+        )
     watch = Watched(
         machine,
         settings={'policy': 'escalating', 'intended_outcomes': ['stop'], 'max_recoveries': 50},
     )
     oracle_of(watch.machine).waiting = FakeWaiting()
+    return watch
+
+
+def test_a_trial_that_is_lost_first_says_that_the_way_has_not_helped():
+    watch = failing_at_a('stop')
     assert watch.run() == 'failed'
     assert noted(watch, 'B')[-1] == ('from A', LATER, False)
 
@@ -112,17 +119,7 @@ def test_a_trial_that_is_preempted_says_nothing_of_its_last_way():
         watch.machine.request_preempt()
         return 'stop'
 
-    a = Scripted('ok', stopped, outcomes=('ok', 'stop'))
-    b = Scripted(*['aborted'] * 3)
-    machine = smach.StateMachine(outcomes=[*ENDS, 'failed'])
-    with machine:
-        smach.StateMachine.add('A', a, {'ok': 'B', 'stop': 'failed'})
-        smach.StateMachine.add('B', b, {'ok': 'done', 'aborted': 'aborted'})
-    watch = Watched(
-        machine,
-        settings={'policy': 'escalating', 'intended_outcomes': ['stop'], 'max_recoveries': 50},
-    )
-    oracle_of(watch.machine).waiting = FakeWaiting()
+    watch = failing_at_a(stopped)
     assert watch.run() == 'failed'
     assert noted(watch, 'B')[-1] == ('from A', LATER, None)
 

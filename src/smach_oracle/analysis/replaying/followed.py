@@ -4,7 +4,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Set, Tuple
 
 from smach_oracle.oracle.decision.ways import key_of as key_of_way
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import JUMPED_TO, UNCOUNTED, is_counted
+from smach_oracle.oracle.records.facts import JUMPED_FROM, JUMPED_TO, UNCOUNTED, is_counted
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 
 from .menus import chosen_way
@@ -139,7 +139,7 @@ class Decisions:
 
     def _gone(self, jump: Event) -> Optional[GoneWay]:
         data: Mapping[str, Any] = jump.data if isinstance(jump.data, Mapping) else {}
-        left = str(data.get('from', ''))
+        left = str(data.get(JUMPED_FROM, ''))
         failed = _split(left) if left else key_of(jump)
         if jump.by:
             self._open.pop(failed, None)

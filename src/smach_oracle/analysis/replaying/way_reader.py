@@ -10,6 +10,7 @@ from smach_oracle.oracle.decision.ways import (
     Evidence,
     WayKind,
     WayResult,
+    kind_of_choice,
 )
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.way_results import WayLog, counts_of_kinds
@@ -78,9 +79,7 @@ class WayReader:
             log.settle(helped)
 
     def _forget(self) -> None:
-        for key, log in self.logs.items():
-            kept = self.logs[key] = WayLog()
-            kept.take_over(log.told())
+        self.logs = {key: log.twin() for key, log in self.logs.items()}
 
     def _go(self, gone: GoneWay) -> None:
         failed = self._failed.get(gone.key)
@@ -102,8 +101,7 @@ class WayReader:
         if gone.decision is None:
             if not self._goes_by_ways():
                 return None
-            is_again = gone.way == WayKind.AGAIN.value
-            return BY_PERSON, WayKind.AGAIN if is_again else WayKind.STEP_BACK
+            return BY_PERSON, kind_of_choice(gone.way)
         recorded = recorded_menu(gone.decision, {})
         if recorded is None:
             return None

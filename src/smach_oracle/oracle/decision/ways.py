@@ -71,6 +71,11 @@ def key_of(target: str, here: str) -> str:
     return WayKind.AGAIN.value if target == here else _FROM + target
 
 
+def kind_of_choice(key: str) -> WayKind:
+    """Return the kind of way that a person chooses with a state. `key`: of the way."""
+    return WayKind.AGAIN if key == WayKind.AGAIN.value else WayKind.STEP_BACK
+
+
 def way_in_words(key: str) -> str:
     """Return what was done by a way, for people. `key`: that of the way."""
     if key.startswith(_FROM):
@@ -100,7 +105,7 @@ class WayResult(NamedTuple):
 
     `way`: its key. `kind`: the value of its WayKind. `place`: 0 for the first way of its streak, 1
     for a later one, 2 for the choice of a person. `failure`: the kind of failure, a
-    `failure_text_key`. `helped`: None is not known. `minutes`: from the failure on, until the
+    `failure_text_key`. `helped`: None is not known. `minutes`: from the decision on, until the
     state had its next result, or until it was clear that nobody knows. `hoped`: the chance to help
     for which a policy preferred it to the ways of the menu's own order, None where none did.
     """

@@ -134,12 +134,11 @@ def _end_trial(
         node.machine.service_preempt()
         for state in states_of(node.machine).values():
             recall_preempts(state)
-    is_lost = why is TrialEnd.ERROR or (
-        why is TrialEnd.OUTCOME and outcome in node.in_force.failing
-    )
     if node.tree.budget.is_spent_from:  # else it has gone no way
-        is_known = is_lost and not node.execution.was_preempted
-        settle_ways(node, False if is_known else None)
+        is_lost = why is TrialEnd.ERROR or (
+            why is TrialEnd.OUTCOME and outcome in node.in_force.failing
+        )
+        settle_ways(node, False if is_lost and not node.execution.was_preempted else None)
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',

@@ -294,9 +294,8 @@ class StateRecord:
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way."""
         state: Dict[str, object] = {**vars(self), 'snapshot': None, 'view': None, 'way_down': ()}
-        ways = state['_ways'] = WayLog()
         with self._lock:
-            ways.take_over(self._ways.told())
+            state['_ways'] = self._ways.twin()
         del state['_lock']
         return state
 

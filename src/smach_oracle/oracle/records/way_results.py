@@ -20,6 +20,7 @@ WAYS, WAYS_TOTAL = 'ways', 'ways_total'  # keys of what was learned of a state
 
 _HELPED = {True: '1', False: '0', None: '-'}
 _READ = {told: helped for helped, told in _HELPED.items()}
+_KINDS = {int(each): each.name.lower() for each in FailureKind}
 _LONGEST = 120
 _LONGEST_READ = 2000
 _NUMBER = re.compile(r'(?:(?<!\w)[-+])?(?:0x[0-9a-f]+|\d+(?:\.\d+)?(?:e[-+]?\d+)?)', re.IGNORECASE)
@@ -33,8 +34,7 @@ def failure_text_key(kind: int, outcome: str, text: str) -> str:
     >>> failure_text_key(1, 'aborted', 'no object within 0.25 m (try 3)')
     'failing_outcome aborted: no object within # m (try #)'
     """
-    names = {int(each): each.name.lower() for each in FailureKind}
-    words = [names.get(kind, str(kind)), outcome]
+    words = [_KINDS.get(kind, str(kind)), outcome]
     plain = ' '.join(_NUMBER.sub('#', shortened(text, _LONGEST_READ)).split())
     return shortened(': '.join(filter(None, (' '.join(filter(None, words)), plain))), _LONGEST)
 
@@ -76,6 +76,12 @@ class WayLog:
             self.results.append(result)
             self.total += 1
             self._told = None
+
+    def twin(self) -> 'WayLog':
+        """Return the results alone, without the way that is gone now."""
+        twin = WayLog()
+        twin.results, twin.total = self.results.copy(), self.total
+        return twin
 
     def told(self) -> Dict[str, Any]:
         """Return the results as plain data, nothing where there is none. See `results_in`."""

@@ -93,11 +93,12 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
     choices = list(choices_on(recovery))
     evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key)
-    counts = [evidence.of_way(_way_key(recovery, each)) for each, _ in choices]
+    keys = [_way_key(recovery, each) for each, _ in choices]
+    counts = [evidence.of_way(key) for key in keys]
     streak = streak_of(recovery.node, recovery.record)
     tried = () if streak is None else tuple(streak.tried)
     recommended = _recommended(
-        [(each, _way_key(recovery, each) in tried) for each, _ in choices], counts
+        [(each, key in tried) for (each, _), key in zip(choices, keys)], counts
     )
     for number, (each, way) in enumerate(choices):
         container, label = _target(recovery.node, each.place)

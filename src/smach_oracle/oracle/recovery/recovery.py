@@ -16,6 +16,7 @@ from ..decision.ways import (
     WayKind,
     WayResult,
     key_of,
+    kind_of_choice,
 )
 from ..machine.jump_path import JumpPath
 from ..machine.places import name_of
@@ -175,8 +176,7 @@ class Recovery:
         if not self.node.in_force.policy.goes_by_ways:
             return None
         key = key_of(name_of(path.entered_places[-1], self.node), self.record.label)
-        kind = WayKind.AGAIN if key == WayKind.AGAIN.value else WayKind.STEP_BACK
-        return self._gone(key, kind, BY_PERSON)
+        return self._gone(key, kind_of_choice(key), BY_PERSON)
 
     def _gone(
         self, key: str, kind: WayKind, place: int, hoped: Optional[float] = None
