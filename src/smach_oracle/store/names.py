@@ -3,9 +3,9 @@
 # of a container
 AT, HISTORY, EXECUTION, STREAKS = 'at', 'history', 'execution', 'streaks'
 ASKED, ITEMS = 'asked', 'items'
-# how the names of such facts begin: of a visit, a state, the mark of one that has begun, a userdata
-# key, one that was kept out
-VISIT, STATE, MARK, KEY, KEPT_OUT = 'visit:', 'state:', 'mark:', 'key:', 'out:'
+# how the names of such facts begin: of a visit, a state, the results of its ways, the mark of one
+# that has begun, a userdata key, one that was kept out
+VISIT, STATE, WAYS, MARK, KEY, KEPT_OUT = 'visit:', 'state:', 'ways:', 'mark:', 'key:', 'out:'
 # of the whole tree: the id of its structure, and names that states have from then on
 STRUCTURE, RENAMED = 'structure', 'renamed'
 GOAL = 'goal:'  # and of one of the whole tree that has a goal's server

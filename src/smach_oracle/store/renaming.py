@@ -6,7 +6,7 @@ What is stored stays as it is. A fact that is read is told under the new names.
 import json
 from typing import Any, Collection, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
-from .names import ASKED, AT, BEFORE, EDIT, ENDED, HISTORY, MARK, MOVED, STATE, VISIT
+from .names import ASKED, AT, BEFORE, EDIT, ENDED, HISTORY, MARK, MOVED, STATE, VISIT, WAYS
 from .rows import StoredFact, StoredValue
 
 
@@ -37,7 +37,7 @@ class Renaming:
         fact = fact._replace(moment_path=self._whole(place.container), label=place.label)
         if not fact.path:
             return fact
-        for word in (STATE, MARK):
+        for word in (STATE, WAYS, MARK):
             if fact.name.startswith(word):
                 path, label = self.state(fact.path, fact.name[len(word) :])
                 return fact._replace(path=path, name=word + label)

@@ -310,6 +310,16 @@ def test_what_is_new_since_the_last_share_comes_behind_the_others():
     assert [row.split()[4] for row in merged['ways']['results']] == ['0', '1', '2', '4']
 
 
+def test_where_nothing_is_new_here_or_there_the_results_stay_as_they_are():
+    own = filled(MOST_RESULTS + 3).told()
+    theirs = json.loads(json.dumps(own))
+    assert merged_ways(own, {'ways_total': own['ways_total']}, theirs) == own
+    filled_up = filled(MOST_RESULTS + 4).told()
+    assert merged_ways(own, {'ways_total': own['ways_total']}, filled_up) == filled_up
+    base = {'ways_total': own['ways_total'] - 1}  # by chance others have learned the same
+    assert merged_ways(own, base, theirs)['ways_total'] == own['ways_total'] + 1
+
+
 def test_results_that_a_program_of_an_earlier_version_has_dropped_stay():
     own = filled(5)
     assert merged_ways(own.told(), {'ways_total': 5}, {'successes': 3}) == own.told()

@@ -9,6 +9,7 @@ import traceback
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.machine.nesting import records_of
 from smach_oracle.oracle.records.events import EventKind
 
 
@@ -147,6 +148,10 @@ class KilledMachine:
                 'events': kinds,
                 'log': log,
                 'ended_by': ended_by[-1],
+                'ways': {
+                    record.label: [[each.way, each.helped] for each in record.ways_so_far()]
+                    for record in records_of(machine._oracle)
+                },
                 'done': machine.userdata.done,
                 'rates': [
                     [row.path, row.state, row.successes, row.failures] for row in machine.rates()

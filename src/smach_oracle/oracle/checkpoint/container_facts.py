@@ -19,15 +19,27 @@ from typing import (
 import smach
 from smach_common.foreign import ends_program, text_of, type_name
 from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
-from smach_oracle.store.names import EXECUTION, HISTORY, KEPT_OUT, KEY, MARK, STATE, STREAKS, VISIT
+from smach_oracle.store.names import (
+    EXECUTION,
+    HISTORY,
+    KEPT_OUT,
+    KEY,
+    MARK,
+    STATE,
+    STREAKS,
+    VISIT,
+    WAYS,
+)
 from smach_oracle.store.rows import Fact
 
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..records.history import History
 from ..records.visits import Visit
 from ..smach_private import remapping_of, states_of
 from .stored_tree import StoredContainer
 
+_NOTHING: Dict[str, object] = {}
 _as_json = json.JSONEncoder(separators=(',', ':')).encode
 
 
@@ -45,6 +57,7 @@ class ContainerFacts:
         self._path = node.key
         self._execution = before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
+        self._ways: Dict[str, Dict[str, object]] = {}  # by label
         self._marks: Dict[str, List[object]] = {}  # by label
         self._latest: Optional[Visit] = None  # that is stored
         self._visits = before.visits_of_execution  # that are stored
@@ -67,12 +80,20 @@ class ContainerFacts:
             if record is not None:
                 counts = (record.visits, record.recoveries, record.fallbacks, record.unwell_repeats)
                 told = {
-                    'learned': record.learned(),
+                    'learned': record.rates(),
                     'counts': counts,
                     'longest_s': record.longest_s,
                     'shared': record.shared,
                 }
                 yield from self._if_new(STATE + label, told)
+                yield from self._ways_of(record)
+
+    def _ways_of(self, record: StateRecord) -> Iterator[Fact]:
+        """Yield the results of ways of a state, where one was added: most visits add none."""
+        ways, stored = record.way_results(), self._ways.get(record.label, _NOTHING)
+        if ways is not stored and (ways or stored):
+            self._ways[record.label] = ways
+            yield fact_of(self._path, WAYS + record.label, ways)
 
     def streaks(self) -> Iterator[Fact]:
         """Yield what is new of the ways that were gone."""

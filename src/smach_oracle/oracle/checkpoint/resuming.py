@@ -189,7 +189,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         for label, told in stored.states.items():
             if node.has(label):
                 record = node.record(label)
-                record.restore(told['learned'])
+                record.restore({**told['learned'], **stored.ways.get(label, {})})
                 record.shared = told.get('shared', record.shared)
                 record.go_on(told['counts'], told['longest_s'])
         if stored.history:

@@ -34,7 +34,10 @@ _Values = Dict[str, StoredValue]  # by key
 
 
 class StoredState(TypedDict, total=False):
-    """What a state has learned and counted. `mark`: of an earlier version."""
+    """What a state has learned and counted.
+
+    Of an earlier version are `mark`, and results of ways in `learned`.
+    """
 
     learned: Dict[str, object]
     counts: List[int]
@@ -50,9 +53,10 @@ class StoredContainer:
     `at`: label (or, where it has ended, its outcome), phase, and what belongs to that, or empty
     where it has not begun in the present visit of the state that holds it. `keys`: userdata.
     `missing`: why a key that was there is not. `gone`: keys that were deleted. `visits`: of its
-    latest execution, oldest first. `snapshots`: userdata with which its states began, by label.
-    `asked`: label and id of the open question. `item`: of an Iterator, the number of the one under
-    way.
+    latest execution, oldest first. `ways`: results of those on from a state, by label, as
+    `StateRecord.way_results` tells them. `snapshots`: userdata with which its states began, by
+    label. `asked`: label and id of the open question. `item`: of an Iterator, the number of the one
+    under way.
     """
 
     at: List[object] = field(default_factory=list)
@@ -62,6 +66,7 @@ class StoredContainer:
     visits: List[Visit] = field(default_factory=list)
     visits_of_execution: int = 0
     states: Dict[str, StoredState] = field(default_factory=dict)
+    ways: Dict[str, Dict[str, object]] = field(default_factory=dict)
     marks: Dict[str, List[int]] = field(default_factory=dict)
     begun: Set[str] = field(default_factory=set)  # at which it has stood, and which had begun
     # sent elsewhere by oracle_state: the states that may be repeated. None: it was not
@@ -219,6 +224,8 @@ class _Reading:
             told = container.states[of] = _plain(value, cast(StoredState, {}))
             if 'mark' in told:  # of an earlier version
                 container.marks[of] = told['mark']
+        elif word == names.WAYS:
+            container.ways[of] = _plain(value, {})
         elif word == names.MARK:
             mark: List[int] = _plain(value, [])
             container.marks[of] = mark[:4]

@@ -159,7 +159,20 @@ class StateRecord:
     def learned(self) -> Dict[str, object]:
         """Return what was learned as plain data."""
         with self._lock:
-            return {**self._up_to_date().snapshot(), **self._ways.told()}
+            return {**self.rates(), **self.way_results()}
+
+    def rates(self) -> Dict[str, object]:
+        """Return what was learned of its failure rate as plain data."""
+        with self._lock:
+            return self._up_to_date().snapshot()
+
+    def way_results(self) -> Dict[str, Any]:
+        """Return the results of its ways as plain data, the same object until there is one more.
+
+        It is empty where there is none. See `WayLog.told`.
+        """
+        with self._lock:
+            return self._ways.told()
 
     def merged_with(self, theirs: Mapping[str, object]) -> Dict[str, object]:
         """Return what others have learned, with what was learned here since it was last shared.

@@ -169,8 +169,12 @@ def merged_ways(
 
     :raises ValueError: where they cannot be read.
     """
+    told = {key: own[key] for key in (WAYS, WAYS_TOTAL) if key in own}
     if WAYS not in theirs:
-        return {key: own[key] for key in (WAYS, WAYS_TOTAL) if key in own}
+        return told
+    is_new = own.get(WAYS_TOTAL) != base.get(WAYS_TOTAL)
+    if told and not is_new and all(theirs.get(key) == each for key, each in told.items()):
+        return told  # as of most states, if one has failed: there is nothing to read
     (ours, total), (others, other_total) = results_in(own), results_in(theirs)
     new = max(0, total - int(base.get(WAYS_TOTAL, 0)))
     results = deque([*others, *ours[len(ours) - min(new, len(ours)) :]], MOST_RESULTS)

@@ -1,5 +1,8 @@
 """Killed as it tries one way after the other, a machine goes on with those that are left."""
 
+import json
+import sqlite3
+
 import pytest
 from killed_machines import KilledMachine, Noted
 from killed_trees import make
@@ -9,6 +12,8 @@ from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.checkpoint.container_facts import ContainerFacts
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.recovery import menu
+from smach_oracle.store.renaming import Renaming
+from smach_oracle.store.rows import StoredFact, StoredValue
 
 FAILURES = 4  # of PICK, in all processes together
 
@@ -58,6 +63,73 @@ def test_no_way_is_gone_twice_wherever_it_is_killed(tmp_path, userdata):
         assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
         if userdata == 'restore':  # what was in doubt has not come to its end
             assert rest['done'] == told['done'], point
+
+
+def facts(store, name):
+    """Kind of the moment and text of each fact of a name, oldest first."""
+    with sqlite3.connect(store) as database:
+        found = database.execute(
+            'SELECT kind, text FROM facts JOIN moments ON moments.number = facts.moment '
+            'WHERE facts.name = ? ORDER BY moments.number',
+            (name,),
+        ).fetchall()
+    database.close()
+    return found
+
+
+def test_the_results_are_stored_where_there_is_one_more_and_not_at_each_visit(tmp_path):
+    killed, told = killed_at(tmp_path / 'whole', 0)
+    assert [helped for _, helped in told['ways']['PICK']] == [False, False, False, True]
+    stored = [json.loads(text) for _, text in facts(killed.store, 'ways:PICK')]
+    assert [each['ways_total'] for each in stored] == [1, 2, 3, 4]
+    assert all('ways' not in text for _, text in facts(killed.store, 'state:PICK'))
+    assert not facts(killed.store, 'ways:LOOK')
+
+
+def test_a_crash_loses_the_result_of_the_way_under_way_alone(tmp_path):
+    for point in range(1, killed_at(tmp_path / 'whole', 0)[1]['points'], 3):
+        killed, _ = killed_at(tmp_path / 'killed', point)
+        found = killed.run()['ways']['PICK']
+        # the state in doubt is entered again, and may succeed earlier than it would have
+        assert 2 <= len(found) <= 4 and all(not helped for _, helped in found[:-1]), (point, found)
+
+
+def as_before(store):
+    """Have the results of ways in the facts of the states, as an earlier version had them."""
+    with sqlite3.connect(store) as database:
+        for moment, name, text in database.execute(
+            "SELECT moment, name, text FROM facts WHERE name LIKE 'state:%'"
+        ).fetchall():
+            ways = database.execute(
+                'SELECT text FROM facts WHERE name = ? AND moment <= ? ORDER BY moment DESC',
+                ('ways:' + name.partition(':')[2], moment),
+            ).fetchone()
+            told = json.loads(text)
+            told['learned'].update(json.loads(ways[0]) if ways else {})
+            database.execute(
+                'UPDATE facts SET text = ? WHERE moment = ? AND name = ?',
+                (json.dumps(told), moment, name),
+            )
+        assert database.execute("DELETE FROM facts WHERE name LIKE 'ways:%'").rowcount == 3
+    database.close()
+
+
+def test_the_results_in_a_store_of_an_earlier_version_are_read(tmp_path):
+    points = killed_at(tmp_path / 'whole', 0)[1]['points']
+    killed, _ = killed_at(tmp_path / 'killed', points - 4)
+    before = facts(killed.store, 'ways:PICK')[-1][1]
+    as_before(killed.store)
+    assert json.loads(before)['ways_total'] == 3
+    killed.run(kill_at=2)
+    assert facts(killed.store, 'ways:PICK') == [('RESUMED', before)]
+    assert len(killed.run()['ways']['PICK']) >= 3
+
+
+def test_the_results_of_a_renamed_state_are_those_of_its_new_name():
+    renaming = Renaming('TOP', {'GET/PICK': 'TAKE'}, ['', 'GET'])
+    value = StoredValue('{}', None)
+    fact = StoredFact(1, 'JUMP', 'TOP/GET', 'PICK', 'TOP/GET', 'ways:PICK', value)
+    assert renaming(fact)[4:] == ('TOP', 'ways:TAKE', value)
 
 
 class Ends(smach.State):
