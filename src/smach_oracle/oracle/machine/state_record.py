@@ -261,8 +261,12 @@ class StateRecord:
 
     def settle_way(self, helped: Optional[bool]) -> None:
         """Note the result of the way that is gone, where one is. None: nobody knows it."""
-        with self._lock:
-            self._ways.settle(helped)
+        # Almost every visit finds none, so it looks without the lock. That misses no way: one is
+        # gone before the thread that comes here enters the state, and other threads only settle it.
+        # Whoever reads the results waits for the lock.
+        if self._ways.gone is not None:
+            with self._lock:
+                self._ways.settle(helped)
 
     def ways_so_far(self) -> Tuple[WayResult, ...]:
         """Return the results of the ways on from its failures, the latest ones, oldest first."""

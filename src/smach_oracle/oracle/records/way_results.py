@@ -45,15 +45,15 @@ def plain_failure_key(key: str) -> str:
 
 
 class WayLog:
-    """The results of the ways on from one state, and the way that is gone now.
+    """The results of the ways on from one state.
 
-    `total`: how many results there were in all.
+    `total`: how many results there were in all. `gone`: the way that is gone now.
     """
 
     def __init__(self) -> None:
         self.results: Deque[WayResult] = deque(maxlen=MOST_RESULTS)
         self.total = 0
-        self._gone: Optional[WayResult] = None
+        self.gone: Optional[WayResult] = None
         self._told: Optional[Dict[str, Any]] = None  # until there is one more
         self._minutes: Callable[[], float] = float
 
@@ -66,13 +66,13 @@ class WayLog:
     def go(self, gone: WayResult, minutes: Callable[[], float]) -> None:
         """Note that a way is gone from now on. `minutes`: since it was chosen, later on."""
         self.settle(None)
-        self._gone, self._minutes = gone, minutes
+        self.gone, self._minutes = gone, minutes
 
     def settle(self, helped: Optional[bool]) -> None:
         """Note the result of the way that is gone, where one is. None: nobody knows it."""
-        if self._gone is not None:
-            result = self._gone._replace(helped=helped, minutes=round(self._minutes(), 3))
-            self._gone, self._minutes = None, float
+        if self.gone is not None:
+            result = self.gone._replace(helped=helped, minutes=round(self._minutes(), 3))
+            self.gone, self._minutes = None, float
             self.results.append(result)
             self.total += 1
             self._told = None
