@@ -2,6 +2,7 @@
 
 import json
 import random
+from collections import Counter
 from typing import List, Sequence, Set
 
 import pytest
@@ -10,10 +11,17 @@ from machines import FakeWaiting, Scripted, watched
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.by_ways import Escalating
 from smach_oracle.oracle.decision.failure_rate import FailureClass
-from smach_oracle.oracle.decision.learned import WEIGHT, Estimates, Learned, _Gain
+from smach_oracle.oracle.decision.learned import (
+    HALF_LIFE,
+    WEIGHT,
+    Estimates,
+    Learned,
+    _Gain,
+)
 from smach_oracle.oracle.decision.policies import policy_named
 from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation
 from smach_oracle.oracle.decision.ways import (
+    BY_PERSON,
     FIRST,
     LATER,
     Evidence,
@@ -183,6 +191,52 @@ def test_the_first_place_follows_from_the_later_one():
     later, first = (estimates.chance(BACK, place).mean for place in (LATER, FIRST))
     assert first < later
     assert estimates.chance(AGAIN, LATER).mean < estimates.chance(AGAIN, FIRST).mean
+
+
+class PlainEstimates(Estimates):
+    """Goes through the results once for each count."""
+
+    def _count(self, evidence: Evidence) -> None:
+        weighted, age = [], 0.0
+        for each in reversed(evidence.results):
+            if each.place != BY_PERSON:
+                weighted.append((0.5 ** (age / HALF_LIFE), each))
+            age += each.place == FIRST
+        known = [(weight, each) for weight, each in weighted if each.helped is not None]
+        same = [(weight, each) for weight, each in known if each.failure == evidence.failure]
+        for weight, each in weighted:
+            total, number = self._minutes.get(each.way, (0.0, 0.0))
+            self._minutes[each.way] = total + weight * each.minutes, number + weight
+        for counts, counted in ((self._of_state, known), (self._of_failure, same)):
+            for weight, each in counted:
+                has, has_not = counts.get((each.way, each.place), (0.0, 0.0))
+                has, has_not = has + weight * each.helped, has_not + weight * (not each.helped)
+                counts[each.way, each.place] = has, has_not
+        self.results.update(Counter(each.way for _, each in known))
+
+
+@pytest.mark.parametrize('seed', range(50))
+def test_the_estimates_are_those_of_a_plain_count_to_the_last_digit(seed):
+    rng = random.Random(seed)
+    ways = drawn_ways(rng)
+    results = [
+        result(
+            rng.choice(ways),
+            rng.choice([FIRST, FIRST, LATER, BY_PERSON]),
+            rng.choice([True, False, None]),
+            failure=rng.choice('abc'),
+            minutes=rng.random(),
+        )
+        for _ in range(rng.randrange(120))
+    ]
+    evidence = Evidence(tuple(results), 'a', {})
+    counted, plain = Estimates(evidence, ways[0]), PlainEstimates(evidence, ways[0])
+    assert vars(counted) == vars(plain)
+    for way in ways:
+        assert counted.minutes(way) == plain.minutes(way)
+        assert [counted.chance(way, place) for place in (FIRST, LATER)] == [
+            plain.chance(way, place) for place in (FIRST, LATER)
+        ]
 
 
 def test_where_moved_ways_disappoint_it_goes_back_and_says_so():

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import random
 
 import pytest
 from machines import FakeExpert, FakeWaiting, Scripted, Watched, give_up, goto, supersede, watched
@@ -15,6 +16,7 @@ from smach_oracle.oracle.records.way_results import (
     MOST_FAILURES,
     MOST_RESULTS,
     WayLog,
+    counts_of_kinds,
     merged_ways,
     plain_failure_key,
 )
@@ -335,6 +337,43 @@ def test_a_state_has_so_many_kinds_of_failure_with_a_text():
     assert len(kinds) == MOST_FAILURES + 1
     assert plain_failure_key('failing_outcome aborted: part a') in kinds
     assert log.failure_key(1, 'aborted', 'part a') == 'failing_outcome aborted: part a'
+
+
+def counted_from_nothing(results):
+    counts = {}
+    for each in results:
+        if each.helped is not None:
+            helped, not_helped = counts.get((each.kind, each.place), (0.0, 0.0))
+            counts[each.kind, each.place] = helped + each.helped, not_helped + (not each.helped)
+    return counts
+
+
+@pytest.mark.parametrize('seed', range(20))
+def test_a_log_counts_as_one_does_who_looks_at_all_its_results(seed):
+    rng = random.Random(seed)
+    logs = [WayLog(), WayLog()]
+    for _ in range(3 * MOST_RESULTS):
+        number = rng.randrange(2)
+        log = logs[number]
+        failure = rng.choice(['failing_outcome aborted', 'failing_outcome aborted: '])
+        text = chr(ord('a') + rng.randrange(12)) if failure.endswith(' ') else ''
+        way = a_result(0, failure + text, kind=rng.choice('xyz'), place=rng.randrange(3))
+        log.go(way, float)
+        log.settle(rng.choice([True, False, None]))
+        if rng.random() < 0.05:
+            logs[number] = log = log.twin()
+        elif rng.random() < 0.05:
+            log.take_over(copy.deepcopy(log.told()))
+        assert log.of_kinds == counted_from_nothing(log.results)
+        known = {each.failure for each in log.results if ':' in each.failure}
+        for text in 'abcdefghijkl':
+            key = 'failing_outcome aborted: ' + text
+            is_known = key in known or len(known) < MOST_FAILURES
+            assert log.failure_key(1, 'aborted', text) == (
+                key if is_known else 'failing_outcome aborted'
+            )
+    both = [each for log in logs for each in log.results]
+    assert counts_of_kinds(log.of_kinds for log in logs) == counted_from_nothing(both)
 
 
 def test_records_of_earlier_versions_are_read():

@@ -71,8 +71,8 @@ class WayReader:
         """Return what is known of the ways on from the present failure of a state."""
         log, failed = self.logs.get(key, WayLog()), self._failed.get(key)
         name = '' if failed is None else _name_in(log, failed)
-        results = (each for one in self.logs.values() for each in one.results)
-        return Evidence(tuple(log.results), name, counts_of_kinds(results))
+        of_kinds = counts_of_kinds(each.of_kinds for each in self.logs.values())
+        return Evidence(tuple(log.results), name, of_kinds)
 
     def _settle_all(self, helped: Optional[bool]) -> None:
         for log in self.logs.values():

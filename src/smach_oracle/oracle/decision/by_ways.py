@@ -3,11 +3,16 @@
 doc/ways.md says what is on the menu, what a way costs, and which one is taken.
 """
 
-from typing import List, Mapping, Sequence, Tuple
+from operator import itemgetter
+from typing import Collection, List, Mapping, Sequence, Tuple
 
 from .failure_rate import FailureClass
 from .policy import Action, Baseline, Menu, Situation, draws_of
 from .ways import KEEP, ChosenOrder, Prices, Way
+
+Keyed = Sequence[Tuple[str, Way]]  # the ways of a menu, each behind its key
+
+_FIRST_THREE = itemgetter(0, 1, 2)
 
 
 def action_of(order: Sequence[Way]) -> Action:
@@ -15,6 +20,15 @@ def action_of(order: Sequence[Way]) -> Action:
     if not order:
         return Action.ASK
     return Action.REVISIT if order[0].enters_again else Action.STEP_BACK
+
+
+def keyed_ways(menu: Menu) -> Keyed:
+    """Return the ways of a menu, each with its key: that is asked for many times."""
+    return [(way.key, way) for way in menu.ways]
+
+
+def _reached(keyed: Keyed, tried: Collection[str]) -> int:
+    return max((way.reach for key, way in keyed if key in tried), default=0) if tried else 0
 
 
 class Escalating(Baseline):
@@ -62,13 +76,18 @@ class Escalating(Baseline):
         one and two states back as between two and four. So a step back has the hope of each
         doubling that no way of the streak has reached.
         """
-        menu, price = situation.menu, self.price(way, situation.menu.prices)
-        tried = menu.streak.tried
-        new = way.reach - max((each.reach for each in menu.ways if each.key in tried), default=0)
+        keyed = keyed_ways(situation.menu)
+        tried = situation.menu.streak.tried
+        price = self.price(way, situation.menu.prices)
+        return self._for_its_hope(price, way, situation, _reached(keyed, tried))
+
+    def _for_its_hope(self, price: float, way: Way, situation: Situation, reached: int) -> float:
+        """Return a price by its hope. `reached`: the farthest reach of the ways that were tried."""
+        new = way.reach - reached
         if new > 0:
             return price / new
         hope = self.hope[situation.failure_class] if way.enters_again else 1.0
-        return price / (hope * self.hope_after_each ** len(tried))
+        return price / (hope * self.hope_after_each ** len(situation.menu.streak.tried))
 
     def price_of_asking(self, situation: Situation) -> float:
         """Return what it costs to ask, or to lose the trial where there is nobody to ask."""
@@ -81,16 +100,23 @@ class Escalating(Baseline):
 
     def order(self, situation: Situation) -> Tuple[Way, ...]:
         """Return the ways that are open, untried and pay. The first costs least for its hope."""
+        return self._order_of(situation, keyed_ways(situation.menu))
+
+    def _order_of(self, situation: Situation, keyed: Keyed) -> Tuple[Way, ...]:
+        """Return that order. `keyed`: the ways of the menu, by their keys."""
         if self._spent(situation):
             return ()
-        menu, limit = situation.menu, self.price_of_asking(situation)
-        priced = [
-            (self.cost(way, situation), way)
-            for way in self._left(menu)
-            if self.price(way, menu.prices) < limit
-        ]
-        priced.sort(key=lambda each: (each[0], each[1].minutes, each[1].key))
-        return tuple(way for cost, way in priced if cost < limit)
+        limit, prices = self.price_of_asking(situation), situation.menu.prices
+        tried = situation.menu.streak.tried
+        reached, priced = _reached(keyed, tried), []
+        for key, way in keyed:
+            price = limit if way.blocked or key in tried else self.price(way, prices)
+            if price < limit:
+                cost = self._for_its_hope(price, way, situation, reached)
+                if cost < limit:
+                    priced.append((cost, way.minutes, key, way))
+        priced.sort(key=_FIRST_THREE)
+        return tuple(each[3] for each in priced)
 
     def choose(self, situation: Situation) -> ChosenOrder:
         """Return the order of the ways, in which the first two may have changed places."""

@@ -7,9 +7,9 @@ import math
 import random
 from typing import Dict, List, NamedTuple, Sequence, Tuple
 
-from .by_ways import Escalating
+from .by_ways import Escalating, keyed_ways
 from .policy import Situation
-from .ways import BY_PERSON, FIRST, LATER, ChosenOrder, Evidence, Way, WayResult
+from .ways import BY_PERSON, FIRST, LATER, ChosenOrder, Count, Evidence, Way, WayResult
 
 HALF_LIFE = 30.0  # streaks of the state, after which a result counts half
 PRIOR = 0.35  # chance to help of a way of which nothing is known
@@ -26,7 +26,6 @@ FALLS_BACK = (
     "The oracle goes by the menu's own order from now on"
 )
 
-Count = Tuple[float, float]  # times that it helped, and that it did not, weighted by their age
 _NOTHING: Count = (0.0, 0.0)
 
 
@@ -59,30 +58,34 @@ class Estimates:
         """`usual`: the way that comes first in the menu's own order."""
         self._of_kinds = evidence.of_kinds
         self._usual = usual
-        self._of_state: Dict[Tuple[str, int], Count] = {}
+        self._of_state: Dict[Tuple[str, int], Count] = {}  # weighted by their age, as the next one
         self._of_failure: Dict[Tuple[str, int], Count] = {}
         self._minutes: Dict[str, Count] = {}  # sum and number
         self.results: Dict[str, int] = {}  # known ones, by way
         self._known: Dict[Tuple[str, int], Chance] = {}
-        age = 0.0
-        for each in reversed(evidence.results):
-            if each.place != BY_PERSON:
-                self._add(each, 0.5 ** (age / HALF_LIFE), each.failure == evidence.failure)
-            age += each.place == FIRST
+        self._count(evidence)
 
-    def _add(self, result: WayResult, weight: float, is_same_failure: bool) -> None:
-        minutes, number = self._minutes.get(result.way, _NOTHING)
-        self._minutes[result.way] = minutes + weight * result.minutes, number + weight
-        if result.helped is None:
-            return
-        self.results[result.way] = self.results.get(result.way, 0) + 1
-        place = result.way, result.place
-        for counts in (self._of_state, self._of_failure)[: 1 + is_same_failure]:
-            helped, not_helped = counts.get(place, _NOTHING)
-            counts[place] = (
-                helped + weight * result.helped,
-                not_helped + weight * (not result.helped),
-            )
+    def _count(self, evidence: Evidence) -> None:
+        """Count all results, the latest first. It is done at each decision, so it is one loop."""
+        minutes, results = self._minutes, self.results
+        of_state, of_failure, age, weight = self._of_state, self._of_failure, 0.0, 1.0
+        for way, _, place, failure, helped, took, _ in reversed(evidence.results):
+            if place != BY_PERSON:
+                total, number = minutes.get(way, _NOTHING)
+                minutes[way] = total + weight * took, number + weight
+                if helped is not None:
+                    results[way] = results.get(way, 0) + 1
+                    key = way, place
+                    has, has_not = of_state.get(key, _NOTHING)
+                    of_state[key] = (has + weight, has_not) if helped else (has, has_not + weight)
+                    if failure == evidence.failure:
+                        has, has_not = of_failure.get(key, _NOTHING)
+                        of_failure[key] = (
+                            (has + weight, has_not) if helped else (has, has_not + weight)
+                        )
+            if place == FIRST:
+                age += 1.0
+                weight = 0.5 ** (age / HALF_LIFE)
 
     def minutes(self, way: Way) -> float:
         """Return how long a way takes, by the menu and by its results."""
@@ -173,8 +176,9 @@ class Learned(Escalating):
         """Return the ways that the menu's own order would go one after the other, in vain."""
         found: List[Way] = []
         menu, past = situation.menu, situation.past
+        keyed = keyed_ways(menu)
         while True:
-            ways = super().order(situation._replace(menu=menu, past=past))
+            ways = self._order_of(situation._replace(menu=menu, past=past), keyed)
             if not ways:
                 return found
             found.append(ways[0])

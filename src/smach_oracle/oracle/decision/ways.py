@@ -13,6 +13,7 @@ WAITS_S = (10.0, 60.0)  # before the failed state is entered again
 # the places of a way: the first of its streak, a later one, the choice of a person
 PLACES = FIRST, LATER, BY_PERSON = 0, 1, 2
 _FROM = 'from '
+Count = Tuple[float, float]  # times that ways have helped, and that they have not
 
 
 class WayKind(str, Enum):
@@ -129,7 +130,7 @@ class Evidence(NamedTuple):
 
     results: Tuple[WayResult, ...] = ()
     failure: str = ''
-    of_kinds: Mapping[Tuple[str, int], Tuple[float, float]] = {}
+    of_kinds: Mapping[Tuple[str, int], Count] = {}
 
     def of_way(self, key: str) -> 'WayCounts':
         """Return what a way has led to after failures of this kind, after all kinds if none had."""

@@ -11,6 +11,7 @@ from ..decision.failure_rate import (
     make_estimator,
     merged,
 )
+from ..decision.ways import Count
 from ..records.events import FailureKind
 from ..records.visits import Visit
 from ..records.way_results import WayLog, WayResult, merged_ways
@@ -272,6 +273,11 @@ class StateRecord:
         """Return the results of the ways on from its failures, the latest ones, oldest first."""
         with self._lock:
             return tuple(self._ways.results)
+
+    def ways_of_kinds(self) -> Mapping[Tuple[str, int], Count]:
+        """Return how often ways of a kind at a place have helped, and how often not."""
+        with self._lock:
+            return self._ways.of_kinds.copy()
 
     def failure_key(self, kind: int, outcome: str, text: str) -> str:
         """Return the name of a kind of its failures. See `WayLog.failure_key`."""

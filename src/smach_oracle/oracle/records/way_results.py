@@ -8,9 +8,10 @@ a shutdown or the act of a person.
 import math
 import re
 from collections import deque
+from functools import lru_cache
 from typing import Any, Callable, Deque, Dict, Iterable, List, Mapping, Optional, Tuple
 
-from ..decision.ways import PLACES, WayResult
+from ..decision.ways import PLACES, Count, WayResult
 from .events import FailureKind
 from .short_text import shortened
 
@@ -26,6 +27,7 @@ _LONGEST_READ = 2000
 _NUMBER = re.compile(r'(?:(?<!\w)[-+])?(?:0x[0-9a-f]+|\d+(?:\.\d+)?(?:e[-+]?\d+)?)', re.IGNORECASE)
 
 
+@lru_cache(maxsize=32)  # a state fails with the same text again and again
 def failure_text_key(kind: int, outcome: str, text: str) -> str:
     """Return the name of a kind of failure: its FailureKind, its outcome, and its text.
 
@@ -47,12 +49,15 @@ def plain_failure_key(key: str) -> str:
 class WayLog:
     """The results of the ways on from one state.
 
-    `total`: how many results there were in all. `gone`: the way that is gone now.
+    `total`: how many results there were in all. `gone`: the way that is gone now. `of_kinds`: how
+    often ways of a kind at a place have helped, and how often not.
     """
 
     def __init__(self) -> None:
         self.results: Deque[WayResult] = deque(maxlen=MOST_RESULTS)
         self.total = 0
+        self.of_kinds: Dict[Tuple[str, int], Count] = {}
+        self._failures: Dict[str, int] = {}  # results by kind of failure, of those with a text
         self.gone: Optional[WayResult] = None
         self._told: Optional[Dict[str, Any]] = None  # until there is one more
         self._minutes: Callable[[], float] = float
@@ -60,7 +65,7 @@ class WayLog:
     def failure_key(self, kind: int, outcome: str, text: str) -> str:
         """Return the name of a kind of failure. It has no text where enough others have one."""
         key = failure_text_key(kind, outcome, text)
-        known = {each.failure for each in self.results if ':' in each.failure}
+        known = self._failures
         return key if key in known or len(known) < MOST_FAILURES else plain_failure_key(key)
 
     def go(self, gone: WayResult, minutes: Callable[[], float]) -> None:
@@ -73,15 +78,45 @@ class WayLog:
         if self.gone is not None:
             result = self.gone._replace(helped=helped, minutes=round(self._minutes(), 3))
             self.gone, self._minutes = None, float
-            self.results.append(result)
+            self._add(result)
             self.total += 1
             self._told = None
+
+    def _add(self, result: WayResult) -> None:
+        """Have one result more, and the oldest one no more where there are too many."""
+        if len(self.results) == MOST_RESULTS:
+            self._count(self.results[0], -1)
+        self.results.append(result)
+        self._count(result, 1)
+
+    def _count(self, result: WayResult, by: int) -> None:
+        """Count a result, or take it out: a decision asks for the counts of all states."""
+        if ':' in result.failure:
+            self._failures[result.failure] = self._failures.get(result.failure, 0) + by
+            if not self._failures[result.failure]:
+                del self._failures[result.failure]
+        if result.helped is not None:
+            kind = result.kind, result.place
+            helped, not_helped = self.of_kinds.get(kind, (0.0, 0.0))
+            count = helped + by * result.helped, not_helped + by * (not result.helped)
+            self.of_kinds[kind] = count
+            if count == (0.0, 0.0):
+                del self.of_kinds[kind]
 
     def twin(self) -> 'WayLog':
         """Return the results alone, without the way that is gone now."""
         twin = WayLog()
-        twin.results, twin.total = self.results.copy(), self.total
+        twin.hold(self.results, self.total)
         return twin
+
+    def hold(self, results: Iterable[WayResult], total: int) -> None:
+        """Have these results alone. `total`: how many there were in all."""
+        self.results.clear()
+        self.of_kinds, self._failures = {}, {}
+        for each in results:
+            self._add(each)
+        self.total = total
+        self._told = None
 
     def told(self) -> Dict[str, Any]:
         """Return the results as plain data, nothing where there is none. See `results_in`."""
@@ -96,10 +131,7 @@ class WayLog:
 
         :raises ValueError: where they cannot be read.
         """
-        results, total = results_in(learned)
-        self.results = deque(results, MOST_RESULTS)
-        self.total = total
-        self._told = None
+        self.hold(*results_in(learned))
 
 
 def told_of(results: Iterable[WayResult], total: int) -> Dict[str, Any]:
@@ -181,12 +213,13 @@ def merged_ways(
     return told_of(results, other_total + new) if results else {}
 
 
-def counts_of_kinds(results: Iterable[WayResult]) -> Dict[Tuple[str, int], Tuple[float, float]]:
-    """Return how often ways of a kind at a place have helped, and how often not."""
-    counts: Dict[Tuple[str, int], Tuple[float, float]] = {}
-    for each in results:
-        if each.helped is not None:
-            kind = each.kind, each.place
-            helped, not_helped = counts.get(kind, (0.0, 0.0))
-            counts[kind] = helped + each.helped, not_helped + (not each.helped)
+def counts_of_kinds(
+    logs: Iterable[Mapping[Tuple[str, int], Count]],
+) -> Dict[Tuple[str, int], Count]:
+    """Return the sum of what the logs of several states have as their `of_kinds`."""
+    counts: Dict[Tuple[str, int], Count] = {}
+    for each in logs:
+        for kind, (helped, not_helped) in each.items():
+            before = counts.get(kind, (0.0, 0.0))
+            counts[kind] = before[0] + helped, before[1] + not_helped
     return counts

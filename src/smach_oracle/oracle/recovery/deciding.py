@@ -165,8 +165,7 @@ def _with_menu(
 
 def _evidence(recovery: Recovery) -> Evidence:
     """Return what the ways on from failures of the state, and of all states, have led to."""
-    results = (each for record in records_of(recovery.node) for each in record.ways_so_far())
-    of_kinds = counts_of_kinds(results)
+    of_kinds = counts_of_kinds(each.ways_of_kinds() for each in records_of(recovery.node))
     return Evidence(recovery.record.ways_so_far(), recovery.failure_key, of_kinds)
 
 

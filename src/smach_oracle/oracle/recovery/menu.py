@@ -37,9 +37,10 @@ def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...
         visits = _visits_of(level)
         if level is node and since:
             del visits[-since:]
-        rounds = [number for number, visit in enumerate(visits, 1) if _has_succeeded(visit, label)]
-        if rounds:
-            del visits[: rounds[-1]]
+        numbers = range(len(visits), 0, -1)
+        last = next((each for each in numbers if _has_succeeded(visits[each - 1], label)), 0)
+        if last:
+            del visits[:last]
             leading -= _ending_without(level, label)
         labels = dict.fromkeys(each.state for each in reversed(visits) if each.state in leading)
         found.extend(name_of(TreePlace(level, each), node) for each in labels)
@@ -104,19 +105,19 @@ def menu_of(
     yield way, again
     for wait_s in WAITS_S:
         minutes = visit_min + wait_s / 60.0
-        yield way._replace(kind=WayKind.WAIT, wait_s=wait_s, minutes=minutes), again
+        yield Way(WayKind.WAIT, here, 0, wait_s, way.userdata, minutes), again
     specs = record.settings.preconditions
     if specs:
         minutes = visit_min * (1 + len(specs))
-        yield way._replace(kind=WayKind.PREPARE, minutes=minutes), again
+        yield Way(WayKind.PREPARE, here, userdata=way.userdata, minutes=minutes), again
     for kind, name, place in _goals(node, here, visited):
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
             passed = visited[: visited.index(name) + 1]
             entered = [each for one in passed for each in _entered_at(node, one)]
-            back = way._replace(
-                kind=kind,
-                target=name,
+            back = Way(
+                kind,
+                name,
                 back=len(passed),
                 userdata=jump_path.meeting_node.in_force.userdata,
                 minutes=visit_min * (1 + len(entered)),

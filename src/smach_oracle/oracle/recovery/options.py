@@ -51,7 +51,11 @@ class OpenWay(NamedTuple):
 
     def blocked_by(self, why: str) -> 'OpenWay':
         """Return it with why it is not open, '' where it is."""
-        return self._replace(way=self.way._replace(blocked=why))
+        return (
+            self
+            if why == self.way.blocked
+            else OpenWay(self.way._replace(blocked=why), self.option)
+        )
 
 
 def option_on(recovery: Recovery, way: JumpPath) -> Option:
@@ -135,6 +139,8 @@ def _why_blocked(recovery: Recovery, each: OpenWay, why_not_above: WhyNotAbove) 
 
 def why_closed(recovery: Recovery, option: Option) -> str:
     """Say that a place, or one on the way down, is closed, or '' where it is not."""
+    if not option.closed:
+        return ''
     return closed_in_words(option.jump_path, option.closed, named(recovery, option.jump_path))
 
 
