@@ -78,10 +78,10 @@ retry step_back' ;;
     'pr2_world')
       echo '--help --version -h' ;;
     'run_trials')
-      echo '--abandon-freeze --answer-delay --arms --benign --estimator --freeze --frozen
---help --high-from --hours --hung-after --jobs --lasting --max-recoveries
---memory --moderate-from --output --plan --policy --prior --protocol
---replicates --seed --task --trials --variants --version -h' ;;
+      echo '--abandon-freeze --answer-delay --arms --benign --estimator --extra-causes
+--freeze --frozen --help --high-from --hours --hung-after --jobs --lasting
+--max-recoveries --memory --moderate-from --output --plan --policy --prior
+--protocol --replicates --seed --task --trials --variants --version -h' ;;
     'run_trials --arms')
       echo 'both with without' ;;
     'run_trials --estimator')

@@ -32,7 +32,23 @@ from .trial_counter import ended_otherwise
 from .trial_rows import LOST, TrialRow, read_rows
 
 SECONDS_PER_HOUR = 3600.0
-Group = Tuple[str, Optional[float]]  # a task, and the share of causes that last
+
+
+class Group(NamedTuple):
+    """The rows that may be compared."""
+
+    task: str
+    share: Optional[float]  # of the causes that last. None means the world's own
+    extra_causes: bool  # each has one of the extra kinds, and none of the usual ones
+
+    @property
+    def told(self) -> str:
+        """Return what sets it apart from the other rows of its task, '' where nothing does."""
+        if self.extra_causes:
+            return ', extra causes'
+        return '' if self.share is None else ', {:.0%} of the causes last'.format(self.share)
+
+
 SHARES: Tuple[Tuple[str, Happened], ...] = (
     ('true success', lambda row: row.succeeded),
     ('interventions', lambda row: row.intervened),
@@ -185,10 +201,11 @@ def _ratio(above: Optional[float], below: Optional[float]) -> Optional[float]:
 def format_comparison(rows: Sequence[TrialRow]) -> str:
     """Return the tables, one task after the other."""
     texts = []
-    for (task, share), mine in groups_of(rows).items():
+    for group, mine in groups_of(rows).items():
         variants = by_variant(mine)
-        told = '' if share is None else ', {:.0%} of the causes last'.format(share)
-        texts += ['{}{}\n'.format(task, told)] + [_variant(*each) for each in variants.items()]
+        texts += ['{}{}\n'.format(group.task, group.told)] + [
+            _variant(*each) for each in variants.items()
+        ]
         texts += _same_seeds(mine) + _tests(variants)
     return '\n'.join(texts)
 
@@ -229,10 +246,13 @@ def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
 
 
 def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
-    """Return the rows that may be compared: of one task, and one share of causes that last."""
+    """Return the rows that may be compared: of one task, and with the same kinds of causes."""
     found: Dict[Group, List[TrialRow]] = {}
-    for row in sorted(rows, key=lambda row: (row.task, row.lasting_share or 0.0)):
-        found.setdefault((row.task, row.lasting_share), []).append(row)
+    for row in sorted(
+        rows, key=lambda row: (row.task, bool(row.extra_causes), row.lasting_share or 0.0)
+    ):
+        group = Group(row.task, row.lasting_share, bool(row.extra_causes))
+        found.setdefault(group, []).append(row)
     return found
 
 

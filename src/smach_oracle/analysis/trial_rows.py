@@ -57,6 +57,7 @@ class TrialRow(NamedTuple):
     harmed: str = ''  # how, and which thing, as JSON
     account: str = ''  # each failure, decision, jump and answer, as JSON
     shared: Optional[bool] = None  # whether it was run by the bare script, for all variants
+    extra_causes: Optional[bool] = None  # whether it had one of the extra kinds of causes
 
     @property
     def succeeded(self) -> bool:
@@ -127,11 +128,13 @@ def row_of(
     lasting_share: Optional[float] = None,
     tries: Sequence[StateTry] = (),
     account: Sequence[Entry] = (),
+    extra_causes: bool = False,
 ) -> TrialRow:
     """Return the row of a trial that has come to its end.
 
     :param tries: of the states that failed, in ROS time.
     :param account: as account_of() returns it.
+    :param extra_causes: whether it had one of the extra kinds of causes.
     """
     truth, cause, settings = summary.truth, summary.cause, dict(summary.settings)
     asked_s = None
@@ -168,6 +171,7 @@ def row_of(
         '' if truth is None or truth.damage is None else harm_text(truth.damage),
         account_text(account),
         details.shared,
+        extra_causes,
     )
 
 
@@ -281,6 +285,7 @@ _PARSERS: Mapping[str, Callable[[str], Any]] = {
     'memory': int,
     'prior': float,
     'shared': _flag,
+    'extra_causes': _flag,
 }
 _MAY_BE_EMPTY = (
     'true_success',
@@ -294,6 +299,7 @@ _MAY_BE_EMPTY = (
     'memory',
     'prior',
     'shared',
+    'extra_causes',
 )
 # columns that are JSON, where they are not empty
 _TEXTS: Mapping[str, Callable[[str], object]] = {

@@ -181,6 +181,11 @@ def make_parser() -> argparse.ArgumentParser:
         help='of a world that goes on from trial to trial (default: each trial has a fresh one)',
     )
     parser.add_argument(
+        '--extra-causes',
+        action='store_true',
+        help='one of two more kinds of causes in each trial, and none of the usual ones',
+    )
+    parser.add_argument(
         '--hung-after',
         type=float,
         default=HUNG_AFTER_S,
@@ -235,6 +240,9 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
                 check(option, value)
         except SettingsError as err:
             parser.error('{} must be {}'.format(err.key, err.allowed))
+    for name in ('benign', 'lasting', 'hours'):
+        if args.extra_causes and getattr(args, name) != parser.get_default(name):
+            parser.error('--extra-causes: not with --{}'.format(name))
     if not args.hung_after > 0:
         parser.error('--hung-after must be more than 0')
     settings = {
@@ -258,6 +266,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
         args.benign,
         args.lasting,
         args.hours,
+        extra_causes=args.extra_causes,
     )
     args.names = [name for name in args.variants if name not in BOTH]  # of a protocol's variants
     _check_protocol(parser, args)
@@ -274,6 +283,7 @@ def _check_protocol(parser: argparse.ArgumentParser, args: argparse.Namespace) -
             'benign',
             'lasting',
             'hours',
+            'extra_causes',
             *(name for name, _, _ in OVERRIDES),
         )
         for name in said:

@@ -29,6 +29,9 @@ BLOCKS = (
     'pick and place, extension',
     'drink retrieval, extension',
     'inspection',
+    'pick and place, extra causes',
+    'drink retrieval, extra causes',
+    'inspection, extra causes',
 )
 
 

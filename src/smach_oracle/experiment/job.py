@@ -61,7 +61,14 @@ class ExperimentJob:
             output / variant.name / 'replicate_{}'.format(replicate), self._seed, plan.trials
         )
         self._results = JobResults(
-            output, plan.task, variant.name, replicate, self._seed, plan.lasting, plan.slot_h
+            output,
+            plan.task,
+            variant.name,
+            replicate,
+            self._seed,
+            plan.lasting,
+            plan.slot_h,
+            plan.extra_causes,
         )
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
@@ -99,7 +106,8 @@ class ExperimentJob:
     @property
     def pairs(self) -> Tuple[object, ...]:
         """Return what jobs have in common that run the same trials."""
-        return self._plan.task, self._seed, self.trials, self._plan.lasting
+        plan = self._plan
+        return plan.task, self._seed, self.trials, plan.lasting, plan.extra_causes
 
     @property
     def ready(self) -> bool:
@@ -178,6 +186,8 @@ class ExperimentJob:
             given['lasting'] = self._plan.lasting
         if self._plan.hours is not None:
             given['lab'] = self._records.folder / LAB_FILE
+        if self._plan.extra_causes:
+            given['extra_causes'] = 'true'
         shared = self._to_replay()
         if shared:
             given['shared'] = write_shared(self._records.folder, shared)

@@ -59,6 +59,7 @@ class ExperimentPlan(NamedTuple):
     hours: Optional[float] = None  # of a world that goes on. None means each trial has a fresh one
     # trials in which nothing fails are run by the bare script alone, and count for all variants
     shares: bool = False
+    extra_causes: bool = False  # one of the extra kinds in each trial, and none of the usual ones
 
     def first_seed(self, replicate: int) -> int:
         """Seed of the first trial of a replicate (from 0). Each next trial has the next seed."""
@@ -73,7 +74,8 @@ class ExperimentPlan(NamedTuple):
         """The plan as plain data, as its file has it."""
         data = self._asdict()
         del data['variants']
-        for name in ('lasting', 'hours', 'shares'):  # folders of older versions have none of them
+        # folders of older versions have none of them
+        for name in ('lasting', 'hours', 'shares', 'extra_causes'):
             if data[name] in (None, False):
                 del data[name]
         data[ARMS] = [variant.as_data() for variant in self.variants]

@@ -26,6 +26,9 @@ EXTENDED = (BARE, DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')
 GOING_ON = (DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')  # in continuous operation
 # replicates, and trials of each: with those of JUDGED they are 1,100 pairs
 EXTENSION = {'pick_and_place': (5, 130), 'drink_retrieval': (7, 100)}
+# with the extra kinds of causes: trials, in one replicate
+UNFORESEEN = (BARE, 'restart', DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')
+EXTRA = {'pick_and_place': 40, 'drink_retrieval': 30}
 BLOCK_OF = dict(
     zip(
         (
@@ -37,6 +40,9 @@ BLOCK_OF = dict(
             'pick_and_place_extension',
             'drink_retrieval_extension',
             'inspection',
+            'pick_and_place_extra',
+            'drink_retrieval_extra',
+            'inspection_extra',
         ),
         BLOCKS,
     )
@@ -70,6 +76,7 @@ class ProtocolChoice(NamedTuple):
         lasting: Optional[float] = None,
         hours: Optional[float] = None,
         fifth: bool = False,
+        extra: bool = False,
     ) -> Part:
         """Return a part of so many trials and replicates at most.
 
@@ -77,6 +84,7 @@ class ProtocolChoice(NamedTuple):
 
         :param name: of the figure.
         :param fifth: it is of the fifth freeze, whose trials are shared where nothing fails.
+        :param extra: its trials have the extra kinds of causes. These are not shared.
         """
         fewer = min(trials, self.trials or trials)
         if hours is not None:
@@ -95,7 +103,8 @@ class ProtocolChoice(NamedTuple):
                 self.answer_delay,
                 lasting=lasting,
                 hours=hours,
-                shares=fifth and hours is None,
+                shares=fifth and hours is None and not extra,
+                extra_causes=extra,
             ),
         )
 
@@ -176,6 +185,15 @@ def fifth_parts(choice: ProtocolChoice) -> Iterator[Part]:
             named_variants(all_of or GOING_ON, {}),
             hours=HOURS[task],
             fifth=True,
+        )
+        yield choice.part(
+            'extra',
+            task,
+            EXTRA[task],
+            1,
+            named_variants(all_of or UNFORESEEN, {}),
+            fifth=True,
+            extra=True,
         )
 
 

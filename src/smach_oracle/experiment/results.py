@@ -53,10 +53,12 @@ class JobResults:
         first_seed: int,
         lasting_share: Optional[float] = None,
         slot_h: Optional[float] = None,
+        extra_causes: bool = False,
     ) -> None:
         """Read them.
 
         :param slot_h: h from the begin of one trial to that of the next, in a world that goes on.
+        :param extra_causes: whether the world has the extra kinds of causes.
         :raises ExperimentError: where the file cannot be used.
         :raises OSError: where it cannot be read.
         """
@@ -67,6 +69,7 @@ class JobResults:
         self._first_seed = first_seed
         self._lasting_share = lasting_share
         self._slot_h = slot_h
+        self._extra_causes = extra_causes
         self._version = code_version()
         self._rows: Dict[int, TrialRow] = {}  # by seed
         if self._path.exists():
@@ -144,6 +147,7 @@ class JobResults:
                     self._lasting_share,
                     trial.tries,
                     trial.account,
+                    self._extra_causes,
                 )
             )
         for number, why in lost.items():
@@ -159,6 +163,7 @@ class JobResults:
                         version=self._version,
                         lasting_share=self._lasting_share,
                         hour=self._hour_of(number),
+                        extra_causes=self._extra_causes,
                     )
                 )
         if new:

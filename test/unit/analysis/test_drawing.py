@@ -359,6 +359,15 @@ def test_shares_of_lasting_causes_are_never_compared_with_each_other():
     assert 'McNemar' not in text and 'hindsight' not in text
 
 
+def test_rows_with_extra_causes_are_never_compared_with_the_others():
+    usual = rows_of('restart', 4) + rows_of('default', 1)
+    extra = rows_of('default', 3, count=5, extra_causes=True)
+    assert format_tables(usual) in format_tables(usual + extra)
+    told = format_comparison(usual + extra)
+    assert told.startswith(format_comparison(usual)) and told.count('extra causes') == 1
+    assert '(5 trials' in told and '(15 trials' not in told
+
+
 def test_a_world_that_goes_on_has_hours_between_its_trials():
     rows = [row._replace(hour=0.5 * number) for number, row in enumerate(rows_of('default', 1, 3))]
     assert robot_hours(rows) == pytest.approx(1.0 + 60 / 3600)
@@ -372,6 +381,7 @@ def test_the_command_draws_what_there_is_and_the_same_rows_give_the_same_files(t
         ('pick_and_place_memory', rows_of('default_memory_5', 1)),
         ('pick_and_place_persistence_50', rows_of('bare', 1, lasting_share=0.5)),
         ('pick_and_place_continuous', rows_of('default', 1, hour=0.0)),
+        ('pick_and_place_fifth_extra', rows_of('bare', 1, extra_causes=True)),
     ):
         (tmp_path / name).mkdir()
         append_rows(tmp_path / name / 'results.csv', rows)

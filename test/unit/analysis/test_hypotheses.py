@@ -198,3 +198,12 @@ def test_the_account_of_a_trial_has_each_failure_decision_and_answer():
     for wrong in ('[["danced", "PICK"]]', '[["failed"]]', '3'):
         with pytest.raises((ValueError, TypeError)):
             account_in(wrong)
+
+
+def test_rows_with_extra_causes_decide_nothing():
+    rows = [row for world in WORLDS for row in rows_of(world, ASKED, CHEAP)]
+    extra = [
+        row._replace(seed=row.seed + 10_000, questions=1, damage=2, extra_causes=True)
+        for row in rows
+    ]
+    assert verdicts(rows + extra) == verdicts(rows) and not verdicts(extra)

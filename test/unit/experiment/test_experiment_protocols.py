@@ -414,3 +414,53 @@ def test_the_line_of_a_pool_counts_trials_and_replicates():
     )
     PoolProgress(stream, 2).show([job])
     assert stream.getvalue().startswith('3/9 trials, 0/1 replicates over, 1 lost   about ')
+
+
+def test_the_fifth_protocol_has_parts_with_extra_causes_on_seeds_of_their_own():
+    seeds = {name: BLOCK * number for number, name in enumerate(BLOCKS)}
+    parts = by_name('fifth', seeds=seeds)
+    for task, trials, block in (('pick_and_place', 40, 8), ('drink_retrieval', 30, 9)):
+        part = parts[task + '_fifth_extra']
+        assert (part.trials, part.replicates, part.seed) == (trials, 1, BLOCK * block)
+        assert part.extra_causes and not part.shares
+        assert names_of(part) == [
+            'bare',
+            'restart',
+            'default',
+            'one_line:escalating',
+            'one_line:learned',
+        ]
+    usual = [plan for name, plan in parts.items() if not name.endswith('_extra')]
+    assert not any(plan.extra_causes for plan in usual)
+
+
+def test_the_blocks_of_before_are_where_they_were():
+    assert BLOCKS[:8] == (
+        'pick and place',
+        'drink retrieval',
+        'persistence',
+        'memory',
+        'continuous operation',
+        'pick and place, extension',
+        'drink retrieval, extension',
+        'inspection',
+    )
+
+
+def test_a_plan_tells_of_extra_causes_where_it_has_them():
+    usual, extra = (command.parse(['--task', TASKS[0], *more]).plan for more in ([], EXTRA))
+    assert not usual.extra_causes and 'extra_causes' not in usual.as_data()
+    assert extra.as_data() == {**usual.as_data(), 'extra_causes': True}
+
+
+EXTRA = ['--extra-causes']
+
+
+@pytest.mark.parametrize(
+    'more',
+    [['--benign'], ['--lasting', '0.5'], ['--hours', '2'], ['--protocol', 'main']],
+)
+def test_extra_causes_stand_alone(more, capsys):
+    with pytest.raises(SystemExit) as ended:
+        command.parse(['--task', TASKS[0], *EXTRA, *more])
+    assert ended.value.code == 2 and '--extra-causes' in capsys.readouterr().err

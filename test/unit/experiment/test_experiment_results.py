@@ -273,6 +273,17 @@ def test_the_share_of_lasting_causes_is_given_to_the_world_and_told_by_the_rows(
     )
 
 
+def test_extra_causes_are_asked_of_the_world_and_told_by_the_rows(tmp_path):
+    given = plan('--variants', 'bare', '--extra-causes')
+    job = ExperimentJob(given, given.variants[0], 0, tmp_path, 300.0)
+    assert job._arguments()['extra_causes'] == 'true'
+    job._results.add([trial(0)], {1: 'hung'}, tmp_path / 'none')
+    assert [row.extra_causes for row in read_rows(tmp_path / RESULTS_FILE)] == [True] * 2
+    usual = plan('--variants', 'bare')
+    job = ExperimentJob(usual, usual.variants[0], 0, tmp_path / 'other', 300.0)
+    assert 'extra_causes' not in job._arguments()
+
+
 def test_a_world_that_goes_on_goes_on_as_the_last_row_tells(tmp_path, monkeypatch):
     given = plan('--variants', 'bare', '--hours', '3')
     truth = tmp_path / 'truth.jsonl'

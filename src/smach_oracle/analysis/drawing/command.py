@@ -1,8 +1,8 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
 FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
-needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, each with a
-PNG, and tables.md, as far as there are rows of them.
+needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, extra.svg,
+each with a PNG, and tables.md, as far as there are rows of them.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from .sweep_tables import format_sweeps
 from .tables import format_tables
 
 ROWS = 'results.csv'
-KINDS = ('main', 'persistence', 'memory', 'continuous')
+KINDS = ('main', 'persistence', 'memory', 'continuous', 'extra')
 
 
 def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
@@ -66,7 +66,7 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
     from .sweep_figures import draw_memory, draw_persistence
 
     draws: Dict[str, Callable[[Sequence[TrialRow]], Any]] = dict(
-        zip(KINDS, (draw_main, draw_persistence, draw_memory, draw_hours))
+        zip(KINDS, (draw_main, draw_persistence, draw_memory, draw_hours, draw_main))
     )
     output.mkdir(parents=True, exist_ok=True)
     paths = [output / 'tables.md']

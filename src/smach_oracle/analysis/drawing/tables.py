@@ -47,33 +47,32 @@ COSTS: Tuple[Tuple[str, str], ...] = (
 SUMMARY = ('true success', 'interventions', 'a question asked', 'recovered')
 # of Costs, in the summary
 SUMMED_UP = ('damage', 'expert_s', 'completion_s')
-COMPARING = ('main', 'persistence')
+COMPARING = ('main', 'persistence', 'extra')
 SAME_SEEDS = ('true success', 'interventions', 'a question asked')
 
 
 def format_tables(rows: Sequence[TrialRow], kind: str = 'main') -> str:
-    """Return the tables of each task and share of lasting causes.
+    """Return the tables of each task, and of each choice of its causes.
 
     :param kind: of the figure. Variants are compared in those of COMPARING.
     """
     texts: List[str] = []
     groups = groups_of(rows)
     for task in tasks_of(rows):
-        for group in (each for each in groups if each[0] == task):
+        for group in (each for each in groups if each.task == task):
             title, variants = named(group), by_variant(groups[group])
             texts += [_summary(title, variants), _main(title, variants)]
             if kind in COMPARING:
                 texts += _tests(title, variants) + _same_seeds(title, groups[group])
                 texts += by_class(title, variants)
-                texts += by_cause(title, variants) if kind == 'main' else []
+                texts += by_cause(title, variants) if kind in ('main', 'extra') else []
                 texts += by_log(title, variants)
     return '\n'.join(texts)
 
 
 def named(group: Group) -> str:
-    """Return what a task and a share of lasting causes are called in a title."""
-    task, share = group
-    return title_of(task) + ('' if share is None else ', {:.0%} of the causes last'.format(share))
+    """Return what a task and its kinds of causes are called in a title."""
+    return title_of(group.task) + group.told
 
 
 def _summary(title: str, variants: Dict[str, List[TrialRow]]) -> str:

@@ -142,11 +142,12 @@ HARM = _within(HARM_MARGIN, was_harmful)
 def arms_of(rows: Sequence[TrialRow]) -> Dict[str, Dict[str, List[TrialRow]]]:
     """Return the rows of the hypotheses by world and variant.
 
-    Rows of a world that goes on, or of another share of lasting causes, are of another experiment.
+    Rows of a world that goes on, or of other causes, are of another experiment.
     """
     found: Dict[str, Dict[str, List[TrialRow]]] = {world: {} for world in WORLDS}
     for row in rows:
-        if row.task in found and row.hour is None and row.lasting_share is None:
+        usual = row.hour is None and row.lasting_share is None and not row.extra_causes
+        if row.task in found and usual:
             found[row.task].setdefault(row.variant, []).append(row)
     return found
 

@@ -198,7 +198,8 @@ class WorldNode:
             self._truth.charge(what, on, self._world.time)
 
     def _drawn(self, seed: int) -> Scene:
-        return draw(self._settings.task, seed, self._settings.benign, self._settings.lasting)
+        settings = self._settings
+        return draw(settings.task, seed, settings.benign, settings.lasting, settings.extra_causes)
 
     def _reset(self, seed: int) -> None:
         self._motions.stop_all('the world was reset')
@@ -324,7 +325,8 @@ def main() -> None:
     parameters_only(
         'Node: a simulated PR2 and the world around it. Parameters: ~task, ~seed, ~benign, '
         '~lasting, ~lab, ~real_time_factor, ~idle_speed, ~idle_grace, ~truth_file, ~state_rate, '
-        '~camera_rate, ~camera_binning, ~film, ~film_events, ~reveal; see doc/simulation.md.'
+        '~camera_rate, ~camera_binning, ~film, ~film_events, ~reveal, ~extra_causes; '
+        'see doc/simulation.md.'
     )
     sys.setswitchinterval(SWITCH_S)
     try:

@@ -86,6 +86,8 @@ class WorldSettings:
     reveal: bool = setting(False, checks.flag)
     # columns and rows of the camera's sensor that make one pixel of its images
     camera_binning: int = setting(1, _one_or_two)
+    # in place of the usual causes one of the extra kinds in each scene, half of which last
+    extra_causes: bool = setting(False, checks.flag)
 
     @property
     def lock_step(self) -> bool:
@@ -103,4 +105,7 @@ def read_settings(get: Callable[[str, Any], Any]) -> WorldSettings:
     if not get('~real_time_factor', 0.0):
         defaults.update(state_rate=1.0, camera_rate=0.0)
     given = {name: get('~' + name, default) for name, default in defaults.items()}
-    return WorldSettings(**checked(WorldSettings, '~', given))
+    settings = WorldSettings(**checked(WorldSettings, '~', given))
+    if settings.extra_causes and (settings.benign or settings.lab != NONE):
+        raise SettingsError('~extra_causes', True, 'false, where ~benign or ~lab is given')
+    return settings

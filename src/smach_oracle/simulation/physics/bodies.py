@@ -71,6 +71,7 @@ def check_scene(scene: Scene) -> None:
         ('robot.base', robot.base),
         ('robot.drive_error', robot.drive_error),
         ('robot.localisation_error', robot.localisation_error),
+        ('robot.drive_bias', robot.drive_bias),
         ('robot.encoder_errors', [error for _, error in robot.encoder_errors]),
         ('robot.camera_error', robot.camera_error),
         ('camera', scene.camera),

@@ -12,6 +12,10 @@ Kinds, with their values (a scene's Disturbance.values) and the defaults of thes
   ``duration`` s (1.5).
 * ``nudge:BODY``: a body is pushed over what it stands on by ``dx``, ``dy`` m (0) in ``duration`` s
   (0.4).
+* ``suck:BODY``: the doors of a body that are shut are held so with ``torque`` N m (50) at first,
+  and with less and less, for ``duration`` s (30). It ends where one is opened.
+* ``halt:ARM``: the motor of an arm's gripper is off for ``duration`` s (30).
+* ``stick:BODY``: a body sticks to what it stands on with ``force`` N (20), until it is pulled off.
 
 Each also takes ``delay`` s (0): how long after its event it begins. All times are the world's.
 
@@ -49,7 +53,11 @@ OPTIONS: Dict[str, Dict[str, float]] = {
     **light.OPTIONS,
     'swing': {'angle': 0.0, 'duration': 1.5},
     'nudge': {'dx': 0.0, 'dy': 0.0, 'duration': 0.4},
+    'suck': {'torque': 50.0, 'duration': 30.0},
+    'halt': {'duration': 30.0},
+    'stick': {'force': 20.0},
 }
+HOLDING = ('suck', 'halt', 'stick')  # those that move nothing, and hold something
 
 
 class DisturbedWorld(Protocol):
@@ -81,6 +89,15 @@ class DisturbedWorld(Protocol):
         """See World."""
 
     def turn_body(self, name: str, joint: str, speed: float, let_go: bool) -> None:
+        """See World."""
+
+    def suck_door(self, name: str, torque: float) -> bool:
+        """See World."""
+
+    def stick_body(self, name: str, force: float) -> None:
+        """See World."""
+
+    def comes_off(self, name: str) -> bool:
         """See World."""
 
 
@@ -120,6 +137,42 @@ class _ActiveDisturbance(NamedTuple):
     start: Dict[str, float]  # arm, swing: where the joints were. Nudge: where the body was, x and y
 
 
+class _ActiveHold(NamedTuple):
+    """A disturbance that holds something, from a control period on."""
+
+    cause: Disturbance
+    values: Dict[str, float]
+    begun: int
+
+    @property
+    def ends(self) -> float:
+        """The control period at which it ends by itself, inf for none."""
+        periods = self.values.get('duration', math.inf) / PERIOD
+        return self.begun + (max(1, round(periods)) if math.isfinite(periods) else math.inf)
+
+    def begin(self, world: DisturbedWorld) -> None:
+        """Take hold."""
+        kind, _, what = self.cause.kind.partition(':')
+        if kind == 'stick':
+            world.stick_body(what, self.values['force'])
+        elif kind == 'halt':
+            world.robot.halt_gripper(what, True)
+
+    def tick(self, world: DisturbedWorld) -> int:
+        """Hold on. Return the control period at which it has ended, 0 where it has not."""
+        kind, _, what = self.cause.kind.partition(':')
+        ended = int(self.ends) if world.periods >= self.ends else 0
+        if kind == 'suck':
+            left = 0.0 if ended else (self.ends - world.periods) / (self.ends - self.begun)
+            shut = world.suck_door(what, left * self.values['torque'])
+            return ended if shut else ended or world.periods
+        if kind == 'halt' and ended:
+            world.robot.halt_gripper(what, False)
+        if kind == 'stick' and world.comes_off(what):
+            return world.periods
+        return ended
+
+
 class Disturbances:
     """The disturbances of one trial."""
 
@@ -133,6 +186,7 @@ class Disturbances:
         self._waiting = [_Outstanding(each) for each in scene.disturbances]
         self._due: List[_Due] = []
         self._moving: List[_ActiveDisturbance] = []
+        self._holding: List[_ActiveHold] = []
         self.lights = light.Lights()
         self.log = CauseLog(scene.causes, [each.cause for each in scene.disturbances])
 
@@ -165,10 +219,11 @@ class Disturbances:
         return bool(self._moving or any(not _values(each.cause)['delay'] for each in self._due))
 
     def next_period(self, period: int, end: int) -> int:
-        """The control period, from `period` to `end`, up to which no disturbance is due."""
+        """The control period, from `period` to `end`, up to which none is due, and none lets go."""
         if self._moving:
             return period
-        return max(period, min([end] + [each.period for each in self._due]))
+        lets_go = [int(each.ends) for each in self._holding if math.isfinite(each.ends)]
+        return max(period, min([end, *lets_go] + [each.period for each in self._due]))
 
     def tick(self, world: DisturbedWorld) -> None:
         """Move what is disturbed. It is called before each control period."""
@@ -178,6 +233,10 @@ class Disturbances:
         for disturbance, _ in now:
             values = _values(disturbance)
             self.log.began(disturbance.cause, world.periods)
+            if disturbance.kind.partition(':')[0] in HOLDING:
+                self._holding.append(_ActiveHold(disturbance, values, world.periods))
+                self._holding[-1].begin(world)
+                continue
             self._moving.append(
                 _ActiveDisturbance(
                     disturbance,
@@ -188,6 +247,11 @@ class Disturbances:
                 )
             )
         self._due = [each for each in self._due if each not in now]
+        for hold in list(self._holding):
+            ended = hold.tick(world)
+            if ended:
+                self._holding.remove(hold)
+                self.log.ended(hold.cause.cause, ended)
         for active in list(self._moving):
             done = world.periods - active.begun
             if done >= active.periods:
@@ -279,12 +343,16 @@ def _check(disturbance: Disturbance, scene: Scene, robot: Pr2Body) -> None:
         wrong = 'near is {}; allowed: a place of finite m, within more than 0 m'.format(
             tuple(disturbance.near)
         )
-    elif kind == 'swing' and body not in [
+    elif kind in ('swing', 'suck') and body not in [
         each.name for each in scene.bodies if each.shape == 'urdf'
     ]:
         wrong = 'no body {!r} with joints'.format(body)
-    elif kind == 'nudge' and body not in [each.name for each in scene.bodies if each.mass > 0]:
+    elif kind in ('nudge', 'stick') and body not in [
+        each.name for each in scene.bodies if each.mass > 0
+    ]:
         wrong = 'no body {!r} that can be moved'.format(body)
+    elif kind == 'halt' and body not in ARMS:
+        wrong = 'unknown arm {!r}; allowed: {}'.format(body, ', '.join(ARMS))
     else:
         wrong = _wrong_value(kind, disturbance, robot)
     if wrong:

@@ -23,6 +23,7 @@ class DoorHinges:
             for joint, hinge in each.body.joint_closing
         ]
         self._driven: Dict[Tuple[str, str], bool] = {}  # by a person, just now
+        self._sucked: Dict[Tuple[str, str], float] = {}  # N m that hold it shut
 
     def tick(self) -> None:
         """Pull doors shut that are not past their stop, in the coming control period."""
@@ -35,6 +36,17 @@ class DoorHinges:
             else:
                 self._drive(name, joint, 0.0, self._friction(name, joint))
 
+    def suck(self, name: str, joint: str, torque: float) -> bool:
+        """Hold a joint where it is with a torque (N m), as long as the door is shut.
+
+        :returns: whether it is. Where it is not, air has come in, and nothing holds it any more.
+        """
+        shut = self._angle(name, joint) < SHUT
+        self._sucked[name, joint] = torque if shut else 0.0
+        if not self._driven.get((name, joint)):
+            self._drive(name, joint, 0.0, self._friction(name, joint))
+        return shut
+
     def turn(self, name: str, joint: str, speed: float) -> None:
         """Drive a joint at rad/s with a person's strength. What is in its way stops it."""
         self._driven[name, joint] = True
@@ -46,7 +58,8 @@ class DoorHinges:
         self._drive(name, joint, 0.0, self._friction(name, joint))
 
     def _friction(self, name: str, joint: str) -> float:
-        return dict(self._placed[name].body.joint_friction).get(joint, 0.0)
+        dry = dict(self._placed[name].body.joint_friction).get(joint, 0.0)
+        return dry + self._sucked.get((name, joint), 0.0)
 
     def _angle(self, name: str, joint: str) -> float:
         angle: float = pybullet.getJointState(

@@ -91,6 +91,7 @@ class Pr2Body:
         self._read_more = np.zeros(len(infos))  # what encoders read too much
         self._limp: Set[int] = set()  # joints whose motors are off
         self._grips = dict.fromkeys(ARMS, (2 * JAW_OPEN, GRIP))
+        self._halted: Set[str] = set()  # arms, the motor of whose gripper is off
         self._jaws = {arm: [self.numbers[name] for name in FINGER_JOINTS[arm]] for arm in ARMS}
         self._stand(start)
         for arm in ARMS:
@@ -270,6 +271,18 @@ class Pr2Body:
         """Send a gripper to a gap between the tips (m), each finger with at most `force` N."""
         self._grips[arm] = (gap, force)
 
+    def halt_gripper(self, arm: str, halted: bool) -> None:
+        """Switch the motor of a gripper off: its spindle holds the fingers where they are.
+
+        :param halted: False switches it on again.
+        """
+        if not halted:
+            self._halted.discard(arm)
+            return
+        self._halted.add(arm)
+        for name, position in zip(FINGER_JOINTS[arm], self._jaw_positions(arm)):
+            self.set_target(name, position, 0.0, self.efforts[name])
+
     def sent_gap(self, arm: str) -> float:
         """m, to which a gripper was sent last."""
         return self._grips[arm][0]
@@ -322,6 +335,8 @@ class Pr2Body:
 
     def _drive_jaws(self, arm: str) -> None:
         """Send both fingers the same way, neither further than LEAD from the middle of the two."""
+        if arm in self._halted:
+            return
         gap, force = self._grips[arm]
         middle = sum(self._jaw_positions(arm)) / 2
         target = min(max(gap / 2, middle - LEAD), middle + LEAD)

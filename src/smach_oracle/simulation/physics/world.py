@@ -21,7 +21,7 @@ from .door_hinges import DoorHinges
 from .harm import HarmWatch
 from .pr2_body import FINGERS, PERIOD, STEP, Pr2Body
 from .pushed_arm import PushedArm
-from .weights import Weights
+from .weights import StickingThing, Weights
 
 EMPTY = Scene('none', 0, (), Goal('stands_at', ''))
 REST_PERIODS = 30  # control periods after a reset, in which things come to rest
@@ -73,6 +73,7 @@ class World:
         self._weights = Weights(client, placed.values())
         self._hinges = DoorHinges(client, placed)
         self._pushed: List[PushedArm] = []
+        self._sticking: Dict[str, StickingThing] = {}
         self.scene, self._disturbances = scene, disturbances
         self._names = {robot.index: 'robot', floor: 'floor'}
         self._names.update({each.number: name for name, each in placed.items()})
@@ -249,7 +250,7 @@ class World:
         before = np.array(
             [self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)]
         )
-        x, y, yaw = (1.0 - share) * before + share * drawn
+        x, y, yaw = (1.0 - share) * before + share * (drawn + self.scene.robot.drive_bias)
         return from_rpy((x, y, 0.0), yaw=yaw)
 
     def link_pose(self, link: str) -> np.ndarray:
@@ -369,6 +370,24 @@ class World:
             self._hinges.let_go(name, joint)
         else:
             self._hinges.turn(name, joint, speed)
+
+    def suck_door(self, name: str, torque: float) -> bool:
+        """Hold the doors of a body shut with a torque (N m). Whether they are shut."""
+        return all([self._hinges.suck(name, joint, torque) for joint in self.body_joints(name)])
+
+    def stick_body(self, name: str, force: float) -> None:
+        """Let a body stick to what it stands on, with at most `force` N."""
+        self._sticking[name] = StickingThing(
+            self._client, self._find(name), self.body_pose(name), force
+        )
+
+    def comes_off(self, name: str) -> bool:
+        """Whether a body that sticks has been pulled away. It sticks no more then."""
+        sticks = self._sticking.get(name)
+        if sticks is not None and not sticks.comes_off(self.body_pose(name)):
+            return False
+        self._sticking.pop(name, None)
+        return True
 
     def contacts(self, name: str) -> List[Contact]:
         """Return what touches a body ('robot' is one here, too), as of the last step."""

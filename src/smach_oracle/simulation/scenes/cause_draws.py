@@ -7,6 +7,8 @@ from typing import Iterator, List, Mapping, Tuple
 
 import numpy as np
 
+from .chance import generator_for
+
 LASTING, PASSING = 'lasting', 'passing'
 LASTING_SHARE = 0.6  # of the causes. A parameter of the world may say otherwise
 ANOTHER = 0.10  # chance of a second cause, where there is one
@@ -41,6 +43,20 @@ def drawn_kinds(
             return
         found.append(_chosen(weights, which))
         yield found[-1], np.random.default_rng([seed, stream, *found[-1].encode('ascii')])
+
+
+def extra_kind(
+    seed: int, task: str, kinds: Mapping[str, WEIGHTS]
+) -> Tuple[str, np.random.Generator]:
+    """The one kind of a trial with extra causes, and the generator for its values.
+
+    Half of the trials have a kind that lasts.
+
+    :param kinds: as in drawn_kinds().
+    """
+    which, lasts = generator_for(seed, 'extra_causes:' + task).random(2)
+    kind = _chosen(kinds[LASTING if lasts < 0.5 else PASSING], which)
+    return kind, generator_for(seed, 'extra_causes:{}:{}'.format(task, kind))
 
 
 def _chosen(weights: WEIGHTS, share: float) -> str:

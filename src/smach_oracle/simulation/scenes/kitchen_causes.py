@@ -12,6 +12,7 @@ from .cause_draws import (
     LASTING_SHARE,
     PASSING,
     drawn_kinds,
+    extra_kind,
 )
 from .drafts import caused, declared
 from .fridge import closing_hinge
@@ -31,6 +32,12 @@ KINDS_OF = {
     },
     PASSING: {'door_swings_back': 0.45, 'drink_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10},
 }
+EXTRA_KINDS_OF = {LASTING: {'worn_caster': 1.0}, PASSING: {'door_sucked_shut': 1.0}}
+# m, m, rad, least and most, by which each long drive ends beside its goal, to one side of x
+WORN_FROM: Vector = (0.0, 0.06, 0.02)
+WORN_TO: Vector = (0.04, 0.11, 0.06)
+SUCTION: Tuple[float, float] = (120.0, 240.0)  # N m about the hinge, right after the door was shut
+SUCTION_S: Tuple[float, float] = (40.0, 150.0)  # in which air comes in
 EYE = np.array([1.08, -0.14, 1.48])  # m, of the camera that looks into the fridge
 LOOKS_AT = np.array([1.75, 0.0, 0.85])  # m, the middle of its image then
 BEFORE_SHELF = Near((1.08, -0.14, 1.48), 0.25)  # the camera there looks at the drinks
@@ -56,6 +63,7 @@ class KitchenDraft(NamedTuple):
     drive_error: Vector = STEADY
     localisation_error: Vector = (0.0, 0.0, 0.0)  # see RobotStart
     closing: Optional[ClosingHinge] = None  # of the fridge's door
+    drive_bias: Vector = (0.0, 0.0, 0.0)  # see RobotStart
     disturbances: Tuple[Disturbance, ...] = ()
     causes: Tuple[SceneCause, ...] = ()
 
@@ -76,6 +84,12 @@ def with_causes(
         if kind not in without:
             draft = MAKERS[kind](draft, generator)
     return declared(draft, KINDS_OF[LASTING])
+
+
+def with_extra_cause(draft: KitchenDraft, seed: int, task: str) -> KitchenDraft:
+    """A kitchen with the one extra cause that its seed has for it."""
+    kind, generator = extra_kind(seed, task, EXTRA_KINDS_OF)
+    return declared(EXTRA_MAKERS[kind](draft, generator), EXTRA_KINDS_OF[LASTING])
 
 
 def _base_misplaced(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
@@ -204,6 +218,32 @@ def _room_at(draft: KitchenDraft, x: float, y: float) -> float:
     return min(gaps + [draft.half_width - abs(y - draft.front[1])])
 
 
+def _worn_caster(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """Hair and dust have wound themselves about a caster: each drive goes off to the same side."""
+    x, y, yaw = (float(generator.uniform(*limits)) for limits in zip(WORN_FROM, WORN_TO))
+    x_way, side = (float(each) for each in generator.choice([-1.0, 1.0], 2))
+    bias = (x_way * x, side * y, side * yaw)
+    return caused(
+        draft._replace(drive_bias=bias),
+        'worn_caster',
+        'a caster drags: a long drive ends {:+.1f} cm further on, {:+.1f} cm further left and '
+        '{:+.1f} degrees turned'.format(100 * bias[0], 100 * bias[1], np.degrees(bias[2])),
+    )
+
+
+def _door_sucked_shut(draft: KitchenDraft, generator: np.random.Generator) -> KitchenDraft:
+    """Somebody has just shut the door. The air inside cools down, and holds it for a while."""
+    torque, seconds = float(generator.uniform(*SUCTION)), float(generator.uniform(*SUCTION_S))
+    return caused(
+        draft,
+        'door_sucked_shut',
+        'the door was just shut: suction holds it with {:.0f} N m at first, for {:.0f} s'.format(
+            torque, seconds
+        ),
+        Disturbance('suck:fridge', 'drive', (('torque', torque), ('duration', seconds))),
+    )
+
+
 Maker = Callable[[KitchenDraft, np.random.Generator], KitchenDraft]
 _IN_THE_LIGHT: LightCauses[KitchenDraft] = LightCauses(
     View(EYE, LOOKS_AT, near=BEFORE_SHELF), lambda draft: draft.drinks[TARGET].position
@@ -216,5 +256,9 @@ MAKERS: Dict[str, Maker] = {
     **_IN_THE_LIGHT.makers(),
     'slippery_drink': _slippery_drink,
     'drink_moved': _drink_moved,
+}
+EXTRA_MAKERS: Dict[str, Maker] = {
+    'worn_caster': _worn_caster,
+    'door_sucked_shut': _door_sucked_shut,
 }
 KINDS: List[str] = sorted(MAKERS)

@@ -12,7 +12,7 @@ from .calibration import camera_error, encoder_errors
 from .cause_draws import LASTING_SHARE
 from .chance import generator_for
 from .fridge import fridge
-from .kitchen_causes import KitchenDraft, with_causes
+from .kitchen_causes import KitchenDraft, with_causes, with_extra_cause
 from .person import PALM_SIZE, person
 from .scene import Body, Goal, RobotStart, Scene
 from .unlike_the_map import drink_size, localisation_error, true_kitchen, true_palm
@@ -35,11 +35,14 @@ HAND = 0.11
 START_TORSO = 0.15  # m
 
 
-def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Scene:
+def draw(
+    seed: int, benign: bool = False, lasting: float = LASTING_SHARE, extra: bool = False
+) -> Scene:
     """The scene of a trial.
 
     :param benign: without any reason to fail that could be left out.
     :param lasting: the share of the causes that last, 0 to 1.
+    :param extra: with one of the extra causes, in place of the usual ones.
     :raises ValueError: for a negative seed.
     """
     if seed < 0:
@@ -48,7 +51,9 @@ def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Sce
     draft = drafted(kitchen, fresh_drinks(seed, kitchen))._replace(
         localisation_error=localisation_error(seed)
     )
-    if not benign:
+    if extra:
+        draft = with_extra_cause(draft, seed, TASK)
+    elif not benign:
         draft = with_causes(draft, seed, lasting)
     robot = RobotStart(
         posture(), encoder_errors=encoder_errors(seed), camera_error=camera_error(seed)
@@ -69,7 +74,9 @@ def composed(seed: int, draft: KitchenDraft, kitchen: Kitchen, robot: RobotStart
     palm = true_palm(seed)
     goal = Goal('in_hand', ORDERED, palm, PALM_SIZE[0] / 2)
     robot = robot._replace(
-        drive_error=draft.drive_error, localisation_error=draft.localisation_error
+        drive_error=draft.drive_error,
+        localisation_error=draft.localisation_error,
+        drive_bias=draft.drive_bias,
     )
     return Scene(
         TASK,

@@ -93,6 +93,9 @@ class RobotStart(NamedTuple):
     # m and rad (roll, pitch, yaw) of the head camera, from where the URDF has it, in its own frame
     camera_error: Tuple[float, float, float, float, float, float] = (0.0,) * 6
     tip_wear: float = 0.0  # share of their friction that the finger tips have lost
+    # x, y (m) and yaw (rad) that a long drive ends beside its goal each time, in its own axes: the
+    # odometry does not see it
+    drive_bias: Vector = (0.0, 0.0, 0.0)
 
 
 class Goal(NamedTuple):

@@ -18,6 +18,7 @@ from .cause_draws import (
     LASTING_SHARE,
     PASSING,
     drawn_kinds,
+    extra_kind,
 )
 from .drafts import caused, declared
 from .light_causes import LightCauses, View
@@ -47,6 +48,10 @@ KINDS_OF = {
     },
     PASSING: {'arm_in_view': 0.45, 'object_moved': 0.25, 'reflex': 0.20, 'shadow': 0.10},
 }
+EXTRA_KINDS_OF = {LASTING: {'sticky_ring': 1.0}, PASSING: {'gripper_halts': 1.0}}
+STICKS: Tuple[float, float] = (30.0, 75.0)  # N, least and most, that a dried ring of a drink holds
+# s, median and spread of its logarithm, that the motor of a gripper is off until it has cooled
+HALTS_S, HALTS_SPREAD = 12.0, 0.8
 
 
 class TabletopDraft(NamedTuple):
@@ -71,6 +76,12 @@ def with_causes(
         if kind not in without:
             draft = MAKERS[kind](draft, generator) or draft
     return declared(draft, KINDS_OF[LASTING])
+
+
+def with_extra_cause(draft: TabletopDraft, seed: int, task: str) -> TabletopDraft:
+    """A scene with the one extra cause that its seed has for it."""
+    kind, generator = extra_kind(seed, task, EXTRA_KINDS_OF)
+    return declared(EXTRA_MAKERS[kind](draft, generator), EXTRA_KINDS_OF[LASTING])
 
 
 def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Optional[TabletopDraft]:
@@ -243,6 +254,32 @@ def _edge_of_reach(draft: TabletopDraft, generator: np.random.Generator) -> Tabl
     )
 
 
+def _sticky_ring(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+    """The nearest thing stands in a drink that was spilled and has dried, and sticks to the table.
+
+    Once it has come off, it does not stick again.
+    """
+    force = float(generator.uniform(*STICKS))
+    thing = draft.things[TARGET].name
+    return caused(
+        draft,
+        'sticky_ring',
+        'the nearest thing sticks to the table until it is pulled with {:.0f} N'.format(force),
+        Disturbance('stick:' + thing, 'start', (('force', force),)),
+    )
+
+
+def _gripper_halts(draft: TabletopDraft, generator: np.random.Generator) -> TabletopDraft:
+    """The motor of the right gripper is too hot. Its board keeps it off until it has cooled."""
+    seconds = float(generator.lognormal(np.log(HALTS_S), HALTS_SPREAD))
+    return caused(
+        draft,
+        'gripper_halts',
+        'the motor of the right gripper is off for {:.0f} s'.format(seconds),
+        Disturbance('halt:right', 'look_at', (('duration', seconds),)),
+    )
+
+
 def _spare_things(draft: TabletopDraft) -> Tuple[Body, ...]:
     """Return the things that no cause needs in place, without the nearest one."""
     needed = {name for cause in draft.causes for name in cause.until}
@@ -301,5 +338,9 @@ MAKERS: Dict[str, Maker] = {
     'object_moved': _object_moved,
     'goal_occupied': _goal_occupied,
     'edge_of_reach': _edge_of_reach,
+}
+EXTRA_MAKERS: Dict[str, Callable[[TabletopDraft, np.random.Generator], TabletopDraft]] = {
+    'sticky_ring': _sticky_ring,
+    'gripper_halts': _gripper_halts,
 }
 KINDS: List[str] = sorted(MAKERS)

@@ -10,7 +10,15 @@ from .chance import generator_for
 from .clutter import another
 from .kitchen_causes import STEADY
 from .scene import Body, CameraQuality, Goal, RobotStart, Scene
-from .tabletop_causes import GOAL, TABLE_TOP, TORSO, TabletopDraft, radius_of, with_causes
+from .tabletop_causes import (
+    GOAL,
+    TABLE_TOP,
+    TORSO,
+    TabletopDraft,
+    radius_of,
+    with_causes,
+    with_extra_cause,
+)
 from .unlike_the_map import TrueTable, true_table
 
 TASK = 'pick_and_place'
@@ -40,15 +48,20 @@ COLOURS = (
 WOOD = (0.58, 0.42, 0.27)
 
 
-def draw(seed: int, benign: bool = False, lasting: float = LASTING_SHARE) -> Scene:
+def draw(
+    seed: int, benign: bool = False, lasting: float = LASTING_SHARE, extra: bool = False
+) -> Scene:
     """The trial's world.
 
     :param seed: 0 or more.
     :param benign: without any reason to fail.
     :param lasting: the share of the causes that last, 0 to 1.
+    :param extra: with one of the extra causes, in place of the usual ones.
     """
     draft = TabletopDraft(fresh_things(seed))
-    if not benign:
+    if extra:
+        draft = with_extra_cause(draft, seed, TASK)
+    elif not benign:
         draft = with_causes(draft, seed, lasting)
     robot = RobotStart(
         (('torso_lift_joint', TORSO),),
