@@ -217,14 +217,21 @@ def software() -> Dict[str, str]:
 
 
 def write_json(path: Path, content: Any) -> None:
+    """Write a file as write_text() does.
+
+    :raises OSError: where it cannot be written.
+    """
+    write_text(path, json.dumps(content, indent=1, sort_keys=True) + '\n')
+
+
+def write_text(path: Path, text: str) -> None:
     """Write a file so that a crash at any moment leaves the old one or the new.
 
     :raises OSError: where it cannot be written.
     """
     temporary = path.with_name(path.name + '.tmp')
     with temporary.open('w', encoding='utf-8') as stream:
-        json.dump(content, stream, indent=1, sort_keys=True)
-        stream.write('\n')
+        stream.write(text)
         stream.flush()
         os.fsync(stream.fileno())
     os.replace(str(temporary), str(path))

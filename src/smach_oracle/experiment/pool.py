@@ -12,16 +12,18 @@ from smach_oracle.forking import unlock
 
 from .estimate import seconds_missing
 from .job import ExperimentJob
-from .plan import ExperimentError, ExperimentPlan, enter_folder
+from .plan import EXPERIMENT_FILE, ExperimentError, ExperimentPlan, enter_folder
 from .progress import PoolProgress, ProgressLine
 from .protocols import Part
-from .sharing import Sharing
+from .results import RESULTS_FILE
+from .sharing import CLEAN_FILE, ENDED_FILE, Sharing
 from .stop_signals import StopSignals
 
 POLL_S = 0.5
 BROKEN_AT_ONCE = 3  # jobs, before a trial has ended: then something is wrong with more than a job
-# a protocol's folder may lie in a repository: commit its rows, and not its bags
-IGNORED = '*\n!*/\n!.gitignore\n!results.csv\n!experiment.json\n'
+# a protocol's folder may lie in a repository: commit what it goes on from, and not its bags
+COMMITTED = ('*/', '.gitignore', RESULTS_FILE, EXPERIMENT_FILE, CLEAN_FILE, ENDED_FILE)
+IGNORED = '\n'.join(['*', *('!' + name for name in COMMITTED), ''])
 
 
 class PartJobs(NamedTuple):

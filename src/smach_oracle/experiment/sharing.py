@@ -19,11 +19,12 @@ from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.settings.failing_outcomes import FailingNames, is_preempted
 from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 
-from .plan import ExperimentError, write_json
+from .plan import ExperimentError, write_json, write_text
 from .records import ReplicateRecords
 
 ENDED_FILE = 'sharing_ended.json'
 SHARED_FILE = 'shared.json'  # in a job's folder: the trials that it replays
+CLEAN_FILE = 'clean_trials.jsonl'  # in a bare job's folder: those that others replay, without bags
 RUN_AGAIN = 0.1  # of the trials that could be shared
 # all that happens where nothing fails
 PLAIN = frozenset(
@@ -63,6 +64,22 @@ class CleanTrial(NamedTuple):
             'took_s': self.took_s,
             'truth': {**self.truth, SHARED: True},
         }
+
+    @classmethod
+    def of_data(cls, data: Mapping[str, Any]) -> 'CleanTrial':
+        """Return the trial of as_data(), with its steps beside.
+
+        :raises KeyError, TypeError, ValueError: where something is missing or of another type.
+        """
+        kinds, details = map(str, data['kinds']), map(str, data['details'])
+        return cls(
+            RecordedCause(int(data['seed']), str(data['task']), tuple(kinds), tuple(details)),
+            tuple((str(state), str(outcome)) for state, outcome in data['outcomes']),
+            str(data['ended']),
+            tuple(map(tuple, data['steps'])),
+            {key: value for key, value in data['truth'].items() if key != SHARED},
+            float(data['took_s']),
+        )
 
 
 def is_run_again(seed: int) -> bool:
@@ -116,11 +133,15 @@ def world_seconds(stamps: Sequence[float], truth: Mapping[str, Any]) -> float:
 
 
 def clean_trials(records: ReplicateRecords) -> Dict[int, CleanTrial]:
-    """Return the trials of a bare job in which nothing failed, by seed.
+    """Return and keep the trials of a bare job in which nothing failed, by seed.
 
-    Those without a bag, or without the world's line on them, are not known.
+    Those without a bag are as they were kept. Those without the world's line on them are not known.
+
+    :raises ExperimentError: where what was kept cannot be read.
+    :raises OSError: where it cannot be written.
     """
-    found: Dict[int, CleanTrial] = {}
+    found = _kept(records.folder / CLEAN_FILE)
+    kept = dict(found)
     truths = records.truth_lines()
     for path in records.closed_bags():
         content = records.events_of(path)
@@ -135,7 +156,21 @@ def clean_trials(records: ReplicateRecords) -> Dict[int, CleanTrial]:
                     found[cause.seed] = CleanTrial(
                         cause, outcomes, last.outcome, steps, truth, took_s
                     )
+    if found != kept:
+        lines = [{**found[seed].as_data(), 'steps': found[seed].steps} for seed in sorted(found)]
+        write_text(records.folder / CLEAN_FILE, ''.join(json.dumps(each) + '\n' for each in lines))
     return found
+
+
+def _kept(path: Path) -> Dict[int, CleanTrial]:
+    if not path.exists():
+        return {}
+    try:
+        lines = path.read_text(encoding='utf-8').splitlines()
+        trials = [CleanTrial.of_data(json.loads(line)) for line in lines]
+    except (ValueError, KeyError, TypeError, AttributeError) as err:
+        raise ExperimentError('{}: no trials to share: {!r}'.format(path, err)) from err
+    return {trial.cause.seed: trial for trial in trials}
 
 
 class Sharing:

@@ -12,7 +12,7 @@ from smach_oracle.analysis.trial_rows import read_rows
 from smach_oracle.analysis.trial_steps import steps_of
 from smach_oracle.experiment import job as job_module
 from smach_oracle.experiment import pool, sharing
-from smach_oracle.experiment.plan import ExperimentPlan, named_variants
+from smach_oracle.experiment.plan import ExperimentError, ExperimentPlan, named_variants
 from smach_oracle.experiment.sharing import (
     CleanTrial,
     difference,
@@ -289,9 +289,39 @@ def test_nothing_is_shared_where_the_world_goes_on(run):
     assert seeds_of(FakeLaunch.ran, 'restart') == list(range(SEED, SEED + TRIALS))
 
 
-def test_without_the_bags_of_the_bare_script_each_variant_runs_its_trials(run, tmp_path):
-    run(dies_before={('restart', SEED), ('one_line:prose', SEED)})
-    for bag in (tmp_path / 'here/bare').rglob('*.bag'):
+def without_bags(folder):
+    for bag in (folder / 'here/bare').rglob('*.bag'):
         bag.unlink()
+
+
+def test_without_the_bags_of_the_bare_script_its_trials_are_shared_as_they_were_kept(run, tmp_path):
+    run(dies_before={('restart', SEED), ('one_line:prose', SEED)})
+    without_bags(tmp_path)
+    rows = run()
+    assert seeds_of(FakeLaunch.ran, 'bare') == []
+    assert seeds_of(FakeLaunch.ran, 'restart') == sorted(FAILING | AGAIN)
+    assert run(folder='another') == rows
+
+
+def test_what_was_kept_is_compared_as_well(run, tmp_path, capsys):
+    run(dies_before={('restart', SEED), ('one_line:prose', SEED)})
+    without_bags(tmp_path)
+    rows = run(otherwise={('restart', 103)})
+    assert 'seed 103 went otherwise' in capsys.readouterr().out
+    assert not any(row.shared for row in rows.values())
+
+
+def test_without_what_was_kept_each_variant_runs_its_trials(run, tmp_path):
+    run(dies_before={('restart', SEED), ('one_line:prose', SEED)})
+    without_bags(tmp_path)
+    (tmp_path / 'here/bare/replicate_0' / sharing.CLEAN_FILE).unlink()
     run()
     assert FakeLaunch.replayed == [] and seeds_of(FakeLaunch.ran, 'bare') == []
+
+
+@pytest.mark.parametrize('text', ['{', '{"seed": 1}', '7', '{"seed": "x", "task": 1, "kinds": []}'])
+def test_trials_that_were_kept_and_cannot_be_read_are_named(run, tmp_path, text):
+    run(dies_before={('restart', SEED), ('one_line:prose', SEED)})
+    (tmp_path / 'here/bare/replicate_0' / sharing.CLEAN_FILE).write_text(text + '\n')
+    with pytest.raises(ExperimentError, match='clean_trials.jsonl: no trials to share: '):
+        run()
