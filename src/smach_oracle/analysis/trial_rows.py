@@ -12,7 +12,14 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .bag_events import BagError
-from .judging.account import Entry, account_in, account_text, harm_in, harm_text
+from .judging.account import (
+    Entry,
+    HarmedThing,
+    account_in,
+    account_text,
+    harm_in,
+    harm_text,
+)
 from .lasting.causes_log import LoggedCause, causes_in, causes_of, causes_text
 from .lasting.tries import StateTry, WorldClock, in_world_time, tries_in, tries_text
 from .trial_counter import TrialEnding
@@ -54,10 +61,11 @@ class TrialRow(NamedTuple):
     tries: str = ''  # of the states that failed, in the world's time, as JSON
     memory: Optional[int] = None  # of the oracle, results of a state
     prior: Optional[float] = None  # failure rate that a state begins with
-    harmed: str = ''  # how, and which thing, as JSON
+    harmed: str = ''  # how, which thing and when, as JSON
     account: str = ''  # each failure, decision, jump and answer, as JSON
     shared: Optional[bool] = None  # whether it was run by the bare script, for all variants
     extra_causes: Optional[bool] = None  # whether it had one of the extra kinds of causes
+    asked_s: Optional[float] = None  # of the world's time, at which a person was first asked
 
     @property
     def succeeded(self) -> bool:
@@ -111,6 +119,7 @@ class TruthDetails(NamedTuple):
     causes: Optional[List[LoggedCause]] = None
     clock: Optional[WorldClock] = None
     shared: bool = False  # it is of the bare script's trial
+    harmed: Optional[Tuple[HarmedThing, ...]] = None
 
 
 NO_DETAILS = TruthDetails()
@@ -129,17 +138,19 @@ def row_of(
     tries: Sequence[StateTry] = (),
     account: Sequence[Entry] = (),
     extra_causes: bool = False,
+    first_asked: Optional[float] = None,
 ) -> TrialRow:
     """Return the row of a trial that has come to its end.
 
     :param tries: of the states that failed, in ROS time.
     :param account: as account_of() returns it.
     :param extra_causes: whether it had one of the extra kinds of causes.
+    :param first_asked: ROS time (s) of the first question. None means that there was none.
     """
     truth, cause, settings = summary.truth, summary.cause, dict(summary.settings)
-    asked_s = None
+    expert_s = None
     if details.passed_s is not None:  # a world that was not told of the expert's time has no entry
-        asked_s = details.passed_s.get('expert', None if summary.questions else 0.0)
+        expert_s = details.passed_s.get('expert', None if summary.questions else 0.0)
     return TrialRow(
         task,
         variant,
@@ -153,7 +164,7 @@ def row_of(
         summary.recoveries,
         summary.questions,
         summary.answered,
-        asked_s,
+        expert_s,
         None if truth is None else truth.sim_s,
         ' '.join(cause.kinds) if cause is not None else '',
         details.lasting,
@@ -168,10 +179,13 @@ def row_of(
         '' if details.clock is None else tries_text(in_world_time(tries, details.clock)),
         settings.get('memory'),
         settings.get('prior'),
-        '' if truth is None or truth.damage is None else harm_text(truth.damage),
+        '' if details.harmed is None else harm_text(details.harmed),
         account_text(account),
         details.shared,
         extra_causes,
+        None
+        if first_asked is None or details.clock is None
+        else round(details.clock.world_s(first_asked), 2),
     )
 
 
@@ -286,6 +300,7 @@ _PARSERS: Mapping[str, Callable[[str], Any]] = {
     'prior': float,
     'shared': _flag,
     'extra_causes': _flag,
+    'asked_s': float,
 }
 _MAY_BE_EMPTY = (
     'true_success',
@@ -300,6 +315,7 @@ _MAY_BE_EMPTY = (
     'prior',
     'shared',
     'extra_causes',
+    'asked_s',
 )
 # columns that are JSON, where they are not empty
 _TEXTS: Mapping[str, Callable[[str], object]] = {
@@ -382,6 +398,7 @@ def details_of(data: Mapping[str, Any]) -> TruthDetails:
         causes_of(data.get('causes')),
         _clock(data),
         data.get(SHARED) is True,
+        _harmed(data.get('damage')),
     )
 
 
@@ -410,3 +427,14 @@ def _lasting(causes: object) -> Optional[int]:
         return None
     told = [cause.get('lasting') for cause in causes if isinstance(cause, dict)]
     return sum(map(bool, told)) if all(isinstance(each, bool) for each in told) else None
+
+
+def _harmed(by_kind: object) -> Optional[Tuple[HarmedThing, ...]]:
+    """Return what came to harm. A line of an older world does not tell when."""
+    if not isinstance(by_kind, dict):
+        return None
+    if 'seen_s' in by_kind:
+        return tuple(harm_in(json.dumps(by_kind['seen_s'])))
+    lists = [(kind, by_kind.get(kind)) for kind in DAMAGE]
+    named = [(kind, things) for kind, things in lists if isinstance(things, list)]
+    return tuple(HarmedThing(kind, str(thing)) for kind, things in named for thing in things)

@@ -36,6 +36,7 @@ class RecordedTrial(NamedTuple):
     learned: Optional[Mapping[str, Any]]  # at its end, or None where the bag lacks it
     tries: Tuple[StateTry, ...] = ()  # of the states that failed, in ROS time
     account: Tuple[Entry, ...] = ()
+    first_asked: Optional[float] = None  # ROS time (s) of the first question
 
 
 class JobProgress(NamedTuple):
@@ -164,6 +165,14 @@ class ReplicateRecords:
             learned,
             tuple(tries_of(content.events, content.stamps)),
             tuple(account_of(content.events)),
+            min(
+                (
+                    second
+                    for event, second in zip(content.events, content.stamps)
+                    if event.kind == EventKind.QUERY_OPENED
+                ),
+                default=None,
+            ),
         )
 
     def is_complete(self, recorded: RecordedTrial) -> bool:

@@ -148,6 +148,7 @@ class JobResults:
                     trial.tries,
                     trial.account,
                     self._extra_causes,
+                    trial.first_asked,
                 )
             )
         for number, why in lost.items():

@@ -1,5 +1,7 @@
 """The verdicts on the hypotheses of the fifth freeze, from rows."""
 
+import json
+
 import pytest
 
 from smach_oracle.analysis import comparison
@@ -14,6 +16,7 @@ from smach_oracle.analysis.judging.hypotheses import (
     RESTART,
     WORLDS,
     cost_of,
+    harmed_unasked,
     verdicts,
 )
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows
@@ -207,3 +210,25 @@ def test_rows_with_extra_causes_decide_nothing():
         for row in rows
     ]
     assert verdicts(rows + extra) == verdicts(rows) and not verdicts(extra)
+
+
+@pytest.mark.parametrize(
+    'harmed, asked_s, unasked',
+    [
+        ('[["dropped","cup",12.0]]', None, True),
+        ('[["dropped","cup",12.0]]', 30.0, True),
+        ('[["dropped","cup",42.0]]', 30.0, False),
+        ('[["dropped","cup",42.0],["dropped","can",7.0]]', 30.0, True),
+        ('[["dropped","cup"]]', 30.0, False),  # nobody knows when
+        ('', None, False),
+    ],
+)
+def test_harm_before_a_person_was_asked_is_that_of_the_oracle_alone(harmed, asked_s, unasked):
+    damage = len(json.loads(harmed or '[]'))
+    row = TrialRow('pick_and_place', MENU, 0, 1, 'success', damage=damage, harmed=harmed)
+    assert harmed_unasked(row._replace(asked_s=asked_s)) is unasked
+
+
+def test_the_verdicts_tell_how_often_harm_came_before_a_person_was_asked():
+    lines = told(harmed={MENU: 30})
+    assert any(line.endswith(' before a person was asked: 60 beside 0') for line in lines)

@@ -99,7 +99,8 @@ def test_rows_come_back_as_they_were_written(tmp_path):
             prior=0.1,
             cause_log='[["glare",true,4.2,null]]',
             tries='[["PICK",1.5,3.0,0]]',
-            harmed='[["dropped","object_0"]]',
+            harmed='[["dropped","object_0",12.5],["knocked_over","object_1"]]',
+            asked_s=40.25,
             account='[["failed","PICK","aborted","it slips"],["asked","PICK",""]]',
             shared=False,
         ),
@@ -186,7 +187,19 @@ def test_what_older_truth_does_not_tell_is_not_known(tmp_path):
     details = read_details(str(path))
     assert details == {
         1: NO_DETAILS,
-        2: ('cup', 2, {'expert': 12.5}, 1, 9.0, 0.5, {'ended': 1}, None, None, False),
+        2: (
+            'cup',
+            2,
+            {'expert': 12.5},
+            1,
+            9.0,
+            0.5,
+            {'ended': 1},
+            None,
+            None,
+            False,
+            (('dropped', 'a', None), ('dropped', 'b', None)),
+        ),
     }
     assert details_of({'damage': {'dropped': 3}}).damage == 3
 

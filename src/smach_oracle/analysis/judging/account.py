@@ -1,7 +1,7 @@
 """The account of a trial in its row: each failure, decision, jump and answer, without its bag."""
 
 import json
-from typing import Any, Dict, List, Mapping, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import decided_by
@@ -83,14 +83,26 @@ def account_in(text: str) -> List[Entry]:
     return entries
 
 
-def harm_text(damage: Sequence[Tuple[str, str]]) -> str:
-    """Return what came to harm, and how, as it stands in a row."""
-    return json.dumps([list(each) for each in damage], separators=(',', ':'))
+class HarmedThing(NamedTuple):
+    """A thing that came to harm."""
+
+    how: str
+    thing: str
+    seen_s: Optional[float] = None  # of the world's time since the trial began. None: not told
 
 
-def harm_in(text: str) -> List[Tuple[str, str]]:
-    """Return what came to harm: how, and which thing, once for each time.
+def harm_text(harmed: Sequence[HarmedThing]) -> str:
+    """Return what came to harm, how and when, as it stands in a row."""
+    told = [each[: 2 if each.seen_s is None else 3] for each in harmed]
+    return json.dumps(told, separators=(',', ':'))
+
+
+def harm_in(text: str) -> List[HarmedThing]:
+    """Return what came to harm, once for each time.
 
     :raises ValueError or TypeError: where the text is none of harm_text().
     """
-    return [(str(how), str(thing)) for how, thing in json.loads(text)]
+    return [
+        HarmedThing(str(how), str(thing), *map(float, seen_s))
+        for how, thing, *seen_s in json.loads(text)
+    ]

@@ -7,6 +7,7 @@ from smach_oracle.oracle.decision.ways import Prices
 
 from ..pairing import BARE, DEFAULT, RESTART, PairedCounts, paired_counts
 from ..trial_rows import TrialRow
+from .account import harm_in
 from .paired_tests import (
     ONE_SIDED,
     costs_less,
@@ -63,6 +64,15 @@ def cost_of(row: TrialRow, prices: Prices = PRICES) -> float:
 def was_harmful(row: TrialRow) -> bool:
     """Whether something came to harm. A lost trial counts as one without harm."""
     return (row.damage or 0) > 0
+
+
+def harmed_unasked(row: TrialRow) -> bool:
+    """Whether something came to harm before a person was asked: the oracle alone was at work."""
+    if not was_harmful(row):
+        return False
+    seen = [each.seen_s for each in harm_in(row.harmed)] if row.harmed else []
+    times = [second for second in seen if second is not None]
+    return row.asked_s is None or (bool(times) and min(times) < row.asked_s)
 
 
 def _needs_a_person(row: TrialRow) -> bool:
@@ -220,6 +230,7 @@ def _harm_lines(rows: Sequence[TrialRow], passed: Dict[str, bool]) -> List[str]:
                 '{}'.format(variant, beside, 'holds' if found.passed else 'is not shown')
             )
             lines.append('    {:<16} {}; p = {:.3g}'.format('both', found.text, found.p_value))
+            lines.append('    {:<16} {}'.format('', _before_a_person(rows, variant, beside)))
             if (variant, beside) == (MENU, BARE) and {'H1', 'H2'} <= set(passed):
                 passes = found.passed and passed['H1'] and passed['H2']
                 lines.append(
@@ -230,6 +241,15 @@ def _harm_lines(rows: Sequence[TrialRow], passed: Dict[str, bool]) -> List[str]:
                     )
                 )
     return lines
+
+
+def _before_a_person(rows: Sequence[TrialRow], *variants: str) -> str:
+    """Say how often something came to harm before a person was asked."""
+    arms = arms_of(rows).values()
+    counts = [
+        sum(harmed_unasked(row) for each in arms for row in each.get(name, ())) for name in variants
+    ]
+    return 'before a person was asked: {} beside {}'.format(*counts)
 
 
 def _extension(rows: Sequence[TrialRow]) -> List[str]:

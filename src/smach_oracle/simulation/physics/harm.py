@@ -9,6 +9,7 @@ from typing import Dict, List, NamedTuple, Protocol, Tuple
 import numpy as np
 
 from ..scenes.scene import Body
+from .pr2_body import PERIOD
 
 KNOCKED_OVER, DROPPED, PUSHED_OFF = KINDS = ('knocked_over', 'dropped', 'pushed_off')
 EVERY = 6  # control periods between two looks
@@ -40,6 +41,7 @@ class Harm(NamedTuple):
 
     kind: str  # one of KINDS
     thing: str  # name of the body
+    seen_s: float = 0.0  # s since the trial began, at which it was seen to have come to that
 
 
 class _Watched(NamedTuple):
@@ -86,7 +88,8 @@ class HarmWatch:
             for name, seen in self._things.items()
             if not seen.held
         ]
-        return tuple(self._done + [Harm(kind, name) for name, kind in now if kind])
+        seen_s = _second(world)
+        return tuple(self._done + [Harm(kind, name, seen_s) for name, kind in now if kind])
 
     def _looked(self, world: HarmedWorld, name: str, seen: _Watched, pose: np.ndarray) -> _Watched:
         still = bool(np.abs(pose - seen.pose).max() < STILL)
@@ -100,7 +103,7 @@ class HarmWatch:
             return seen._replace(pose=pose, held=False)
         kind = self._harm(world, name, seen, pose)
         if kind:
-            self._done.append(Harm(kind, name))
+            self._done.append(Harm(kind, name, _second(world)))
         return _Watched(pose, False, _bottom(world.body(name), pose), _stands(pose))
 
     @staticmethod
@@ -109,6 +112,10 @@ class HarmWatch:
         if seen.bottom - _bottom(world.body(name), pose) > FALL:
             return DROPPED if seen.was_held else PUSHED_OFF
         return KNOCKED_OVER if seen.upright and not _stands(pose) else ''
+
+
+def _second(world: HarmedWorld) -> float:
+    return round(world.periods * PERIOD, 2)
 
 
 def _settled(world: HarmedWorld, name: str, seen: _Watched, pose: np.ndarray) -> bool:
@@ -131,7 +138,8 @@ def _bottom(body: Body, pose: np.ndarray) -> float:
 
 
 def harm_record(found: Tuple[Harm, ...]) -> Dict[str, object]:
-    """The harm of a trial as its truth line has it: how many, and which by kind."""
+    """The harm of a trial as its truth line has it: how many, which by kind, and when each."""
     record: Dict[str, object] = {'count': len(found)}
+    record['seen_s'] = [[each.kind, each.thing, each.seen_s] for each in found]
     record.update({kind: [each.thing for each in found if each.kind == kind] for kind in KINDS})
     return record

@@ -42,6 +42,10 @@ def topple(world, name):
     world.step(120)
 
 
+def told(world):
+    return tuple((each.kind, each.thing) for each in world.harm.found(world))
+
+
 def slide(world, name, speed, periods):
     for _ in range(periods):
         world.slide_body(name, speed, 0.0)
@@ -59,18 +63,21 @@ def test_what_stands_or_is_pushed_about_has_come_to_no_harm(world):
 def test_what_falls_over_is_told_once(world):
     world.reset(scene())
     topple(world, 'carton')
-    assert world.harm.found(world) == (Harm(KNOCKED_OVER, 'carton'),)
+    assert told(world) == ((KNOCKED_OVER, 'carton'),)
+    seen_s = world.harm.found(world)[0].seen_s
+    assert 0.0 < seen_s <= 2.0
     world.step(120)
-    assert world.harm.found(world) == (Harm(KNOCKED_OVER, 'carton'),)
+    assert told(world) == ((KNOCKED_OVER, 'carton'),)
+    assert world.harm.found(world)[0].seen_s == seen_s
 
 
 def test_what_is_pushed_off_the_table_is_no_thing_that_was_dropped(world):
     world.reset(scene(TABLE, CAN._replace(position=(0.54, -0.2, 0.78)), CARTON))
     slide(world, 'can', -0.4, 30)
     world.step(10)
-    assert world.harm.found(world) == (Harm(PUSHED_OFF, 'can'),), 'also while it falls'
+    assert told(world) == ((PUSHED_OFF, 'can'),), 'also while it falls'
     world.step(200)
-    assert world.harm.found(world) == (Harm(PUSHED_OFF, 'can'),), 'and not knocked over besides'
+    assert told(world) == ((PUSHED_OFF, 'can'),), 'and not knocked over besides'
 
 
 def test_what_slips_out_of_the_hand_was_dropped(world):
@@ -80,7 +87,7 @@ def test_what_slips_out_of_the_hand_was_dropped(world):
     assert world.harm.was_carried('can') and not world.harm.found(world)
     robot.gripper('right', 0.085)
     world.step(120)
-    assert Harm(DROPPED, 'can') in world.harm.found(world)
+    assert (DROPPED, 'can') in told(world)
     assert all(each.thing == 'can' for each in world.harm.found(world))
 
 
@@ -131,9 +138,10 @@ def test_what_stood_at_the_goal_before_is_no_wrong_object(world):
 
 
 def test_a_truth_line_counts_and_names_what_came_to_harm():
-    found = (Harm(KNOCKED_OVER, 'a'), Harm(DROPPED, 'b'), Harm(KNOCKED_OVER, 'c'))
+    found = (Harm(KNOCKED_OVER, 'a', 1.5), Harm(DROPPED, 'b', 2.0), Harm(KNOCKED_OVER, 'c', 3.0))
     assert harm_record(found) == {
         'count': 3,
+        'seen_s': [['knocked_over', 'a', 1.5], ['dropped', 'b', 2.0], ['knocked_over', 'c', 3.0]],
         'knocked_over': ['a', 'c'],
         'dropped': ['b'],
         'pushed_off': [],
