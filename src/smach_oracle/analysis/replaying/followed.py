@@ -11,16 +11,9 @@ from .menus import chosen_way
 
 Key = Tuple[str, str]  # path and state
 
-_BEGINS = frozenset((EventKind.QUERY_OPENED, EventKind.HEALTH_WAIT_START, EventKind.HOLD_START))
-_ENDS = frozenset(
-    (
-        EventKind.QUERY_ANSWERED,
-        EventKind.QUERY_EXPIRED,
-        EventKind.QUERY_CANCELLED,
-        EventKind.HEALTH_WAIT_END,
-        EventKind.HOLD_END,
-    )
-)
+_CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
+_BEGINS = frozenset((EventKind.HEALTH_WAIT_START, EventKind.HOLD_START))
+_ENDS = frozenset((EventKind.HEALTH_WAIT_END, EventKind.HOLD_END))
 
 
 def key_of(event: Event) -> Key:
@@ -41,16 +34,23 @@ class WorkTime:
     def __init__(self) -> None:
         self._shown_s = 0.0
         self._at_s: Optional[float] = None
-        self._paused = 0
+        # states about which a person is asked: no event closes a question that is put again
+        self._asked: Set[Key] = set()
+        self._held = 0
 
     def take(self, event: Event) -> None:
         """Go on to the time of an event."""
-        if self._at_s is not None and not self._paused and event.kind != EventKind.RESUMED:
+        is_paused = self._asked or self._held
+        if self._at_s is not None and not is_paused and event.kind != EventKind.RESUMED:
             self._shown_s += max(0.0, event.wall_time - self._at_s)
         self._at_s = event.wall_time
         if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
-            self._paused = 0
-        self._paused += (event.kind in _BEGINS) - (event.kind in _ENDS and self._paused > 0)
+            self._asked, self._held = set(), 0
+        elif event.kind == EventKind.QUERY_OPENED:
+            self._asked.add(key_of(event))
+        elif event.kind in _CLOSES:
+            self._asked.discard(key_of(event))
+        self._held += (event.kind in _BEGINS) - (event.kind in _ENDS and self._held > 0)
 
     @property
     def minutes(self) -> float:

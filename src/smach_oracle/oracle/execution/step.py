@@ -21,7 +21,7 @@ from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import Overrun, recall_preempts
 from ..records.events import EventKind, FailureKind
-from ..records.facts import LEFT, TAKEN_UP, UNCOUNTED
+from ..records.facts import LEFT, STOPPING, TAKEN_UP, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
 from ..recovery.announced import Announced, announced_by
@@ -121,8 +121,10 @@ class Step:
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
             return self._unfinished(judged, outcome)
-        stopping = node.execution.scope.reason is not None or ends_program(error)
-        if machine.preempt_requested():
+        reason = node.execution.scope.reason
+        stopping = reason is not None or ends_program(error)
+        # a request that comes from here on has come after the end of the state
+        if reason is not None and machine.preempt_requested():
             node.execution.tell_preempt()
             note_end_under_preempt(
                 node, record.label, outcome if isinstance(judged, Route) else None
@@ -134,7 +136,7 @@ class Step:
             result = visit_result(outcome, stopping)
             node.records.visit_ended(record, outcome, result)
             learn = result is VisitResult.SUCCESS and not self._may_fail(outcome, judged)
-            return self._advance(outcome, judged, learn)
+            return self._advance(outcome, judged, learn, STOPPING if stopping else NO_FACTS)
         stopping = stopping or winds_down(node)
         if judged.is_held_back:
             return self._held_back(judged, stopping)
@@ -346,11 +348,11 @@ class Step:
         """
         node = self._node
         if failure.kind not in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK):
-            return self._end(failure, natural_ending(node, failure))
+            return self._end(failure, natural_ending(node, failure), STOPPING)
         ending = preempted_ending(node, failure)
         if ending.obeys:
             obey_preempt(node, states_of(self._machine)[failure.state])
-        return self._end(failure, ending)
+        return self._end(failure, ending, STOPPING)
 
     def _end(self, failure: Failure, ending: ContainerEnding, facts: Facts = NO_FACTS) -> Stop:
         if ending.error is not None:

@@ -34,6 +34,10 @@ LEFT: Mapping[str, object] = {
     'data': {NOT_COUNTED: True},
 }
 
+# fields of the TRANSITION of a state that has ended while a preempt or a shutdown was under way.
+# The request may not have come to its container yet: then there is no PREEMPT before it
+STOPPING: Mapping[str, object] = {'data': {NOT_COUNTED: True}}
+
 # fields of the TRANSITION from a state that was held, and that a preempt has ended before it began
 PASSED_BY: Mapping[str, object] = {'text': 'preempted before it began', 'data': {NOT_COUNTED: True}}
 
