@@ -9,7 +9,7 @@ from smach_oracle.oracle.decision.by_ways import Escalating
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policies import POLICIES, policy_named
 from smach_oracle.oracle.decision.policy import Action, Menu, Past, Policy, Preconditions, Situation
-from smach_oracle.oracle.decision.ways import Prices, StreakSoFar, Way, WayKind
+from smach_oracle.oracle.decision.ways import Prices, StreakSoFar, Way, WayKind, parts_of
 
 BY_WAYS = sorted(name for name, policy in POLICIES.items() if policy.goes_by_ways)
 DRAWS = 300
@@ -311,3 +311,21 @@ def test_the_control_draws_by_the_seed_the_trial_the_state_and_its_visits():
     assert order(3, 4, 'TASK/A 1') == order(3, 4, 'TASK/A 1') == order(0, 7, 'TASK/A 1')
     differing = [(3, 5, 'TASK/A 1'), (3, 4, 'TASK/A 2'), (3, 4, 'TASK/B 1')]
     assert all(order(3, 4, 'TASK/A 1') != order(*each) for each in differing)
+
+
+@pytest.mark.parametrize(
+    'way, kind, what',
+    [
+        (Way(WayKind.AGAIN, 'HERE'), WayKind.AGAIN, ''),
+        (Way(WayKind.WAIT, 'HERE', wait_s=10.0), WayKind.WAIT, '10 s'),
+        (Way(WayKind.PREPARE, 'HERE'), WayKind.PREPARE, ''),
+        (Way(WayKind.STEP_BACK, 'wait 3'), WayKind.STEP_BACK, 'wait 3'),
+        (Way(WayKind.TOP, '/A/from B'), WayKind.STEP_BACK, '/A/from B'),
+    ],
+)
+def test_the_parts_of_a_key_are_those_of_its_way(way, kind, what):
+    assert parts_of(way.key) == (kind, what)
+
+
+def test_another_text_is_no_key_of_a_way():
+    assert parts_of('reboot') == (None, '')

@@ -3,7 +3,7 @@
 import math
 from typing import Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
-from smach_oracle.oracle.decision.ways import BY_PERSON, WayKind, WayResult
+from smach_oracle.oracle.decision.ways import BY_PERSON, WayKind, WayResult, parts_of
 
 from .record import Counted, MachineRecord, counts_by_way
 from .words import failure_in_words, in_words
@@ -12,7 +12,6 @@ LEVEL = 0.05  # of all comparisons of a record together
 WOULD_SHOW = 0.3  # the chance to help of a precondition that would have been seen to help
 _AGAIN = (WayKind.AGAIN.value, WayKind.WAIT.value)
 _BACK = (WayKind.STEP_BACK.value, WayKind.START.value, WayKind.TOP.value)
-_FROM = 'from '
 
 
 class Suggestion(NamedTuple):
@@ -98,7 +97,7 @@ def _sum(counts: Iterable[Counted]) -> Counted:
 
 def _target(way: str, state: str) -> str:
     """Return the state that a way goes on from, as a precondition of the failed one names it."""
-    name = way[len(_FROM) :]
+    _, name = parts_of(way)
     if not name.startswith('/'):
         return name
     # a name without '/' would be one of the failed state's own container

@@ -2,7 +2,7 @@
 
 from typing import Dict, List, Sequence
 
-from smach_oracle.oracle.decision.ways import BY_PERSON, WayKind, WayResult
+from smach_oracle.oracle.decision.ways import BY_PERSON, WayKind, WayResult, parts_of
 
 from .record import Counted, counts_by_way
 
@@ -33,13 +33,12 @@ def in_words(way: str, count: Counted) -> str:
 
 def way_in_words(way: str) -> str:
     """Return what is done by a way."""
-    if way == WayKind.AGAIN.value:
-        return 'entering again'
-    if way == WayKind.PREPARE.value:
-        return 'after its preconditions'
-    if way.startswith(WayKind.WAIT.value + ' '):
-        return 'after ' + way[len(WayKind.WAIT.value) + 1 :]
-    return way
+    kind, what = parts_of(way)
+    return {
+        WayKind.AGAIN: 'entering again',
+        WayKind.PREPARE: 'after its preconditions',
+        WayKind.WAIT: 'after ' + what,
+    }.get(kind or WayKind.STEP_BACK, way)
 
 
 def failure_in_words(failure: str) -> str:

@@ -70,7 +70,7 @@ class IteratorWrapper(ContainerWrapper):
         resumed = self._to_resume()
         items.begins_with = 1 if resumed is None else resumed.item
         # a branch notes by itself that an item begins
-        items.begins = None if self.branches else self._keep_userdata
+        items.begins = None if self.branches else self.begin_item
         if self.goes_on:
             self._pass_on(items)
         else:
@@ -118,9 +118,6 @@ class IteratorWrapper(ContainerWrapper):
             if unfinished is not None and unfinished.snapshot is not None:
                 data = unfinished.snapshot  # before the program was stopped: it has written since
         self.at_item = self._snapshot(data)
-
-    def _keep_userdata(self) -> None:
-        self.at_item = self._snapshot(data_of(self.container.userdata))
 
     def _snapshot(self, data: Mapping[str, Any]) -> Dict[str, Any]:
         parent = self.parent

@@ -12,7 +12,7 @@ KEEP, RESTORE = 'keep', 'restore'
 WAITS_S = (10.0, 60.0)  # before the failed state is entered again
 # the places of a way: the first of its streak, a later one, the choice of a person
 PLACES = FIRST, LATER, BY_PERSON = 0, 1, 2
-_FROM = 'from '
+_FROM, _WAIT = 'from ', 'wait '  # how the keys of ways begin
 Count = Tuple[float, float]  # times that ways have helped, and that they have not
 
 
@@ -50,7 +50,7 @@ class Way(NamedTuple):
     def key(self) -> str:
         """Return the name by which a streak knows it: another way to the same place is the same."""
         if self.kind is WayKind.WAIT:
-            return 'wait {:g} s'.format(self.wait_s)
+            return _WAIT + '{:g} s'.format(self.wait_s)
         return self.kind.value if self.enters_again else _FROM + self.target
 
     @property
@@ -77,14 +77,26 @@ def kind_of_choice(key: str) -> WayKind:
     return WayKind.AGAIN if key == WayKind.AGAIN.value else WayKind.STEP_BACK
 
 
+def parts_of(key: str) -> Tuple[Optional[WayKind], str]:
+    """Return the kind of way that a key names, and the state that it enters, or how long it waits.
+
+    All ways back have the kind STEP_BACK, and None is no key of a way.
+    """
+    for kind, begin in ((WayKind.STEP_BACK, _FROM), (WayKind.WAIT, _WAIT)):
+        if key.startswith(begin):
+            return kind, key[len(begin) :]
+    return {each.value: each for each in (WayKind.AGAIN, WayKind.PREPARE)}.get(key), ''
+
+
 def way_in_words(key: str) -> str:
     """Return what was done by a way, for people. `key`: that of the way."""
-    if key.startswith(_FROM):
-        return 'going back to ' + key[len(_FROM) :]
-    return {
-        WayKind.AGAIN.value: 'trying it again',
-        WayKind.PREPARE.value: 'trying it again after its preconditions',
-    }.get(key, 'trying it again after ' + key[len(WayKind.WAIT.value) + 1 :])
+    kind, what = parts_of(key)
+    if kind is WayKind.STEP_BACK:
+        return 'going back to ' + what
+    return 'trying it again' + {
+        WayKind.PREPARE: ' after its preconditions',
+        WayKind.WAIT: ' after ' + what,
+    }.get(kind or WayKind.AGAIN, '')
 
 
 class StreakSoFar(NamedTuple):
