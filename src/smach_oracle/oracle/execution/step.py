@@ -46,6 +46,7 @@ from ..recovery.verdict import (
     natural_ending,
     preempted_ending,
 )
+from ..settings.failing_outcomes import is_preempted
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
 from .departure import Departure, depart, is_settled, take_departure
@@ -136,7 +137,8 @@ class Step:
             result = visit_result(outcome, stopping)
             node.records.visit_ended(record, outcome, result)
             learn = result is VisitResult.SUCCESS and not self._may_fail(outcome, judged)
-            return self._advance(outcome, judged, learn, STOPPING if stopping else NO_FACTS)
+            facts = self._facts_of_stop(outcome) if stopping else NO_FACTS
+            return self._advance(outcome, judged, learn, facts)
         stopping = stopping or winds_down(node)
         if judged.is_held_back:
             return self._held_back(judged, stopping)
@@ -346,13 +348,21 @@ class Step:
 
         An overrun, and a state that was held back, go as preempted ones, all else as it would.
         """
-        node = self._node
+        node, facts = self._node, self._facts_of_stop(failure.outcome)
         if failure.kind not in (FailureKind.TIME_LIMIT, FailureKind.HELD_BACK):
-            return self._end(failure, natural_ending(node, failure), STOPPING)
+            return self._end(failure, natural_ending(node, failure), facts)
         ending = preempted_ending(node, failure)
         if ending.obeys:
             obey_preempt(node, states_of(self._machine)[failure.state])
-        return self._end(failure, ending, STOPPING)
+        return self._end(failure, ending, facts)
+
+    def _facts_of_stop(self, outcome: str) -> Facts:
+        """Return what the TRANSITION of a state says that has ended under a preempt or a shutdown.
+
+        Its outcome, or a PREEMPT of its container, may say it, too.
+        """
+        is_told = self._machine.preempt_requested() or is_preempted(outcome)
+        return NO_FACTS if is_told else STOPPING
 
     def _end(self, failure: Failure, ending: ContainerEnding, facts: Facts = NO_FACTS) -> Stop:
         if ending.error is not None:

@@ -34,8 +34,8 @@ LEFT: Mapping[str, object] = {
     'data': {NOT_COUNTED: True},
 }
 
-# fields of the TRANSITION of a state that has ended while a preempt or a shutdown was under way.
-# The request may not have come to its container yet: then there is no PREEMPT before it
+# fields of the TRANSITION of a state that has ended while a preempt or a shutdown was under way, of
+# which its own container has not heard yet: there is no PREEMPT before it
 STOPPING: Mapping[str, object] = {'data': {NOT_COUNTED: True}}
 
 # fields of the TRANSITION from a state that was held, and that a preempt has ended before it began
