@@ -91,9 +91,14 @@ class SecondRobot(unittest.TestCase):
 
     def test_bare_it_ends_where_its_author_foresaw_nothing(self) -> None:
         told = self.told(self.launch('with_oracle:=false'))
-        self.assertEqual((told['success'], told['causes']), (False, ['wet_floor']))
+        self.assertEqual((told['success'], told['damage']['count']), (False, 0))
+        (cause,) = told['causes']
+        self.assertEqual(
+            (cause['kind'], cause['began_s'], cause['lasting']), ('wet_floor', 0, True)
+        )
         trial = self.trial()
         self.assertEqual((trial.outcome, trial.recoveries, trial.questions), ('aborted', 0, 0))
+        self.assertEqual(trial.cause and trial.cause.kinds, ('wet_floor',))
         self.assertEqual(dict(trial.failures_by_state)[AT_PLACE + 'INSPECT'], 1)
 
     def test_with_the_oracle_it_finds_its_way_back_and_reads_all_gauges(self) -> None:

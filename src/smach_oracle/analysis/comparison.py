@@ -17,7 +17,7 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
 from .intervals import Interval, replicate_interval, wilson_interval
-from .judging.hypotheses import verdicts
+from .judging.hypotheses import undecided, verdicts
 from .pairing import (
     COMPARED,
     HINDSIGHT,
@@ -339,7 +339,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except (BagError, OSError) as err:
         return report_error('compare_variants', err)
     sys.stdout.write(format_comparison(rows))
-    told = verdicts(rows)
+    told = verdicts(rows) + undecided(rows)
     if told:
         sys.stdout.write('\n'.join(['Hypotheses (doc/protocol.md)', *told]) + '\n')
     return 0

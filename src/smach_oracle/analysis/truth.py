@@ -12,7 +12,8 @@ from .bag_events import BagError
 
 TRUTH_FILE = 'truth.jsonl'
 SHARED = 'shared'  # key of a line that was told in another job, for a trial that both share
-DAMAGE = ('knocked_over', 'dropped', 'pushed_off')  # kinds. Each lists names of things
+# kinds. Each lists names of things
+DAMAGE = ('knocked_over', 'dropped', 'pushed_off', 'driven_against')
 # by name: the types that are allowed, and their name
 Allowed = Mapping[str, Tuple[Tuple[type, ...], str]]
 _FIELDS: Allowed = {

@@ -105,10 +105,8 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--trials',
         type=int,
-        help='per variant and replicate (default: as in the paper, {})'.format(
-            ', '.join(
-                '{} of {}'.format(trials, task) for task, (_, trials) in sorted(TASKS.items())
-            )
+        help='per variant and replicate (default: {})'.format(
+            ', '.join('{} of {}'.format(each.trials, task) for task, each in sorted(TASKS.items()))
         ),
     )
     parser.add_argument(
@@ -224,7 +222,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
         parser.error('name what to run: --task {}, for example'.format(DEFAULT_TASK))
     args = parser.parse_args(given)
     task = args.task or DEFAULT_TASK
-    trials = TASKS[task][1] if args.trials is None else args.trials
+    trials = TASKS[task].trials if args.trials is None else args.trials
     replicates = 1 if args.replicates is None else args.replicates
     for check, option, value in (
         (COUNT, '--trials', trials),
@@ -243,6 +241,13 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     for name in ('benign', 'lasting', 'hours'):
         if args.extra_causes and getattr(args, name) != parser.get_default(name):
             parser.error('--extra-causes: not with --{}'.format(name))
+    for name in ('lasting', 'hours', 'extra_causes'):
+        if getattr(args, name) != parser.get_default(name) and not TASKS[task].lock_step:
+            parser.error(
+                '--{}: the world of {} cannot do that; leave it out, or take another --task'.format(
+                    name.replace('_', '-'), task
+                )
+            )
     if not args.hung_after > 0:
         parser.error('--hung-after must be more than 0')
     settings = {

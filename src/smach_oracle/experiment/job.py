@@ -12,7 +12,8 @@ from smach_oracle.analysis.trials import TrialSummary
 from smach_oracle.analysis.truth import SHARED
 from smach_oracle.oracle.decision.policies import POLICIES
 
-from .estimate import JobWork
+from .estimate import ALONE, SHARING, JobWork, replayed
+from .estimate import BARE as BARE_JOB
 from .lab import LAB_FILE, write_lab
 from .launching import LOG_FILE, Launch, end_marked, last_words, size_of
 from .one_line import write_config
@@ -118,7 +119,13 @@ class ExperimentJob:
         """Return what it has done and has to do."""
         run_here = [row for row in self._results.rows() if not row.shared]
         took = [row.wall_s for row in run_here if row.wall_s is not None]
-        return JobWork(self._plan.task, self.trials - self.finished, took)
+        missing = self.trials - self.finished
+        if self._bare is None:
+            kind = ALONE if self.variant.recovers else BARE_JOB
+            return JobWork(self._plan.task, missing, took, kind)
+        left = range(self._seed + self.trials - missing, self._seed + self.trials)
+        shared = replayed(self._plan.task, left, self._bare._results.rows())
+        return JobWork(self._plan.task, missing - shared, took, SHARING, shared)
 
     def share(self, sharing: Sharing, bare: 'ExperimentJob') -> None:
         """Have it share the trials of a bare job in which nothing fails. It has not started.
@@ -173,7 +180,7 @@ class ExperimentJob:
                 self._records.folder, self._seed, self._plan.slot_h, self._results.last_left()
             )
         self._launch = Launch(
-            self._records.folder, TASKS[self._plan.task][0], self._arguments(), self.core
+            self._records.folder, TASKS[self._plan.task].launch_file, self._arguments(), self.core
         )
 
     def _arguments(self) -> Dict[str, Any]:
@@ -181,7 +188,7 @@ class ExperimentJob:
         name = settings.get('policy')
         if name in POLICIES and POLICIES[name].draws:  # by the trial, also after an interruption
             settings['policy'] = {'name': name, 'seed': self._seed + self._next}
-        given: Dict[str, Any] = {}
+        given = TASKS[self._plan.task].arguments()
         if self._plan.lasting is not None:
             given['lasting'] = self._plan.lasting
         if self._plan.hours is not None:

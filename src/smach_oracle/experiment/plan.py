@@ -12,11 +12,7 @@ EXPERIMENT_FILE = 'experiment.json'
 LIMITS = 'hung_after_s'  # key of the limits that trials were run with, in the order of their use
 FORMAT = 'smach_oracle experiment'
 VERSION = 1
-# The task, its launch file, and how many trials the paper has of it.
-TASKS: Dict[str, Tuple[str, int]] = {
-    'pick_and_place': ('pick_and_place.launch', 150),
-    'drink_retrieval': ('drink_retrieval.launch', 100),
-}
+SPEED = 4  # world's s per wall s, of a world that is not in lock-step
 ARMS = 'arms'  # key of the variants in an experiment's file: the older name
 BARE = 'bare'  # name of the variant without the oracle
 DEFAULT = 'default'  # and of that with the oracle as the task has it
@@ -27,6 +23,27 @@ PACKAGES = ('pybullet', 'ompl', 'numpy', 'scipy', 'opencv-python-headless', 'exa
 
 class ExperimentError(Exception):
     """The experiment cannot be run. The text says which part of it, why and where its log is."""
+
+
+class RunTask(NamedTuple):
+    """A task that can be run."""
+
+    launch_file: str
+    trials: int  # by default: as many as the paper has of it, where it has it
+    # its world waits for commands. So the same seed gives the same trial, and causes can be told
+    # to last, and the world to go on from trial to trial
+    lock_step: bool = True
+
+    def arguments(self) -> Dict[str, Any]:
+        """Return arguments of the launch file that every trial of the task has."""
+        return {} if self.lock_step else {'speed': SPEED}
+
+
+TASKS: Dict[str, RunTask] = {
+    'pick_and_place': RunTask('pick_and_place.launch', 150),
+    'drink_retrieval': RunTask('drink_retrieval.launch', 100),
+    'inspection': RunTask('inspection.launch', 60, lock_step=False),
+}
 
 
 class Variant(NamedTuple):

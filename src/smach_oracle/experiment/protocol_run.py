@@ -2,21 +2,32 @@
 
 import argparse
 from pathlib import Path
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.comparison import format_comparison
 from smach_oracle.analysis.drawing.command import draw_all, find_rows
-from smach_oracle.analysis.trial_rows import read_rows
+from smach_oracle.analysis.trial_rows import TrialRow, read_rows
 from smach_oracle.packages import lacking
 
-from .estimate import JobWork, duration, paces, seconds_left, seconds_missing
+from .estimate import (
+    ALONE,
+    BARE,
+    SHARING,
+    JobWork,
+    duration,
+    paces,
+    replayed,
+    seconds_left,
+    seconds_missing,
+)
 from .freeze import BLOCKS, checkout, frozen_seeds, last_freeze
-from .plan import TASKS, ExperimentError
+from .plan import TASKS, ExperimentError, ExperimentPlan
 from .pool import run_parts
 from .protocols import Part, ProtocolChoice, parts_of
 from .results import RESULTS_FILE
 
+_Place = Tuple[str, int, int, Optional[float]]  # task, first seed, trials, share that lasts
 FIGURES = 'figures'  # folder in that of a protocol
 DONE, FAILED, LOST = 0, 1, 3  # exit codes
 
@@ -112,55 +123,94 @@ def plan_text(parts: List[Part], output: Optional[Path], at_a_time: int) -> str:
         )
     ]
     everything: List[JobWork] = []
-    by_part = [(part, _works(part, output)) for part in parts]
+    kept = [(part, _kept(part, output)) for part in parts]
+    bare = _bare_rows(kept)
+    by_part = [(part, _works(part.plan, rows, bare)) for part, rows in kept]
     pace = paces([work for _, works in by_part for work in works])
     for part, works in by_part:
         plan, everything = part.plan, everything + works
         total = plan.trials * plan.replicates * len(plan.variants)
-        mine = seconds_missing([work._replace(took_s=(pace[work.task],)) for work in works])
+        mine = seconds_missing(works, pace)
         lines.append(
             '{:34}{:>12}{:>11}{:>8}{:>8}{:>12}  {}'.format(
                 part.name or plan.task,
                 plan.seed,
                 plan.replicates,
                 total,
-                total - sum(work.missing for work in works),
+                total - _left(works),
                 duration(sum(mine)),
                 ' '.join(variant.name for variant in plan.variants),
             )
         )
+    shared = sum(work.replays for work in everything)
     lines.append(
-        '{} trials to run, {} at {} jobs at a time ({})'.format(
-            sum(work.missing for work in everything),
+        '{} trials to run{}, {} at {} jobs at a time ({})'.format(
+            round(sum(work.missing for work in everything)),
+            ', and about {:.0f} that they share'.format(shared) if shared else '',
             duration(seconds_left(everything, at_a_time)),
             at_a_time,
             ', '.join(
-                '{:.1f} s a trial of {}'.format(each, task) for task, each in sorted(pace.items())
+                '{:.1f} s a trial of {}{}'.format(each, task, _KINDS[kind])
+                for (task, kind), each in sorted(pace.items())
             ),
         )
     )
     return '\n'.join(lines)
 
 
-def _works(part: Part, output: Optional[Path]) -> List[JobWork]:
+_KINDS = {ALONE: '', BARE: ', bare', SHARING: ', where trials are shared'}
+
+
+def _left(works: List[JobWork]) -> int:
+    """Return how many trials have no rows yet, those that are shared among them."""
+    return round(sum(work.missing + work.replays for work in works))
+
+
+def _kept(part: Part, output: Optional[Path]) -> List[TrialRow]:
+    """Return the rows that a part has.
+
+    :raises ExperimentError: where they cannot be read.
+    """
     rows = output / part.name / RESULTS_FILE if output else None
     try:
-        kept = read_rows(rows) if rows is not None and rows.exists() else []
+        return read_rows(rows) if rows is not None and rows.exists() else []
     except BagError as err:
         raise ExperimentError(str(err)) from err
+
+
+def _bare_rows(kept: Sequence[Tuple[Part, List[TrialRow]]]) -> Dict[_Place, List[TrialRow]]:
+    """Return the rows of each bare job whose trials others share, none where it has not begun."""
+    return {
+        _place(part.plan, replicate): [
+            row for row in rows if (row.variant, row.replicate) == (variant.name, replicate)
+        ]
+        for part, rows in kept
+        if part.plan.shares and part.plan.hours is None
+        for variant in part.plan.variants
+        if not variant.recovers
+        for replicate in range(part.plan.replicates)
+    }
+
+
+def _place(plan: ExperimentPlan, replicate: int) -> _Place:
+    """Return what jobs have in common that run the same trials."""
+    return plan.task, plan.first_seed(replicate), plan.trials, plan.lasting
+
+
+def _works(
+    plan: ExperimentPlan, kept: Sequence[TrialRow], bare: Mapping[_Place, Sequence[TrialRow]]
+) -> List[JobWork]:
     works = []
-    for replicate in range(part.plan.replicates):
-        for variant in part.plan.variants:
-            took = [
-                row.wall_s
-                for row in kept
-                if (row.variant, row.replicate) == (variant.name, replicate)
+    for replicate in range(plan.replicates):
+        first, place = plan.first_seed(replicate), _place(plan, replicate)
+        for variant in plan.variants:
+            mine = [
+                row for row in kept if (row.variant, row.replicate) == (variant.name, replicate)
             ]
-            works.append(
-                JobWork(
-                    part.plan.task,
-                    max(0, part.plan.trials - len(took)),
-                    [each for each in took if each is not None],
-                )
-            )
+            left = set(range(first, first + plan.trials)) - {row.seed for row in mine}
+            took = [row.wall_s for row in mine if row.wall_s is not None and not row.shared]
+            kind, shared = ALONE if variant.recovers else BARE, 0.0
+            if variant.recovers and plan.shares and place in bare:
+                kind, shared = SHARING, replayed(plan.task, left, bare[place])
+            works.append(JobWork(plan.task, len(left) - shared, took, kind, shared))
     return works

@@ -24,6 +24,9 @@ JUDGED = (
 BESIDE = (ONE_LINE + 'prose', 'ladder', 'escalating', 'learned')  # with one replicate
 EXTENDED = (BARE, DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')
 GOING_ON = (DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')  # in continuous operation
+# of the inspection robot, and further ones for which its folder of the fifth freeze has no room
+TOURED = EXTENDED
+MORE_TOURS = 140
 # replicates, and trials of each: with those of JUDGED they are 1,100 pairs
 EXTENSION = {'pick_and_place': (5, 130), 'drink_retrieval': (7, 100)}
 # with the extra kinds of causes: trials, in one replicate
@@ -66,6 +69,16 @@ class ProtocolChoice(NamedTuple):
     trials: Optional[int] = None  # of a replicate, at most
     replicates: Optional[int] = None  # at most
 
+    @property
+    def lock_step(self) -> Tuple[str, ...]:
+        """Return those of the tasks whose worlds are in lock-step."""
+        return tuple(task for task in self.tasks if TASKS[task].lock_step)
+
+    @property
+    def paced(self) -> Tuple[str, ...]:
+        """Return the others, whose worlds have a pace of their own."""
+        return tuple(task for task in self.tasks if not TASKS[task].lock_step)
+
     def part(
         self,
         name: str,
@@ -77,6 +90,7 @@ class ProtocolChoice(NamedTuple):
         hours: Optional[float] = None,
         fifth: bool = False,
         extra: bool = False,
+        behind: int = 0,
     ) -> Part:
         """Return a part of so many trials and replicates at most.
 
@@ -85,12 +99,13 @@ class ProtocolChoice(NamedTuple):
         :param name: of the figure.
         :param fifth: it is of the fifth freeze, whose trials are shared where nothing fails.
         :param extra: its trials have the extra kinds of causes. These are not shared.
+        :param behind: seeds of its block that other parts have before it.
         """
         fewer = min(trials, self.trials or trials)
         if hours is not None:
             hours *= fewer / trials
         block = BLOCK_OF.get('{}_{}'.format(task, name), BLOCK_OF.get(name, BLOCK_OF[task]))
-        seed = self.seeds[block]
+        seed = self.seeds[block] + behind
         told = '' if lasting is None else '_{:.0f}'.format(100 * lasting)
         return Part(
             '{}_{}{}{}'.format(task, 'fifth_' if fifth else '', name, told),
@@ -103,7 +118,7 @@ class ProtocolChoice(NamedTuple):
                 self.answer_delay,
                 lasting=lasting,
                 hours=hours,
-                shares=fifth and hours is None and not extra,
+                shares=fifth and hours is None and not extra and TASKS[task].lock_step,
                 extra_causes=extra,
             ),
         )
@@ -111,8 +126,8 @@ class ProtocolChoice(NamedTuple):
 
 def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the main table's parts: the compared variants, and the others in one replicate."""
-    for task in choice.tasks:
-        trials = TASKS[task][1]
+    for task in choice.lock_step:
+        trials = TASKS[task].trials
         yield choice.part(
             'compared',
             task,
@@ -126,7 +141,7 @@ def main_parts(choice: ProtocolChoice) -> Iterator[Part]:
 
 def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part for each share of causes that last."""
-    for task in choice.tasks:
+    for task in choice.lock_step:
         for share in SHARES:
             yield choice.part(
                 'persistence',
@@ -140,7 +155,7 @@ def persistence_parts(choice: ProtocolChoice) -> Iterator[Part]:
 
 def memory_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield a part with a variant for each memory."""
-    for task in choice.tasks:
+    for task in choice.lock_step:
         yield choice.part(
             'memory',
             task,
@@ -152,11 +167,11 @@ def memory_parts(choice: ProtocolChoice) -> Iterator[Part]:
 
 def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the parts of continuous operation."""
-    for task in choice.tasks:
+    for task in choice.lock_step:
         yield choice.part(
             'continuous',
             task,
-            TASKS[task][1],
+            TASKS[task].trials,
             1,
             named_variants(choice.variants or (DEFAULT,), {}),
             hours=HOURS[task],
@@ -165,8 +180,8 @@ def continuous_parts(choice: ProtocolChoice) -> Iterator[Part]:
 
 def fifth_parts(choice: ProtocolChoice) -> Iterator[Part]:
     """Yield the parts of the fifth freeze, without its extension."""
-    for task in choice.tasks:
-        trials, all_of = TASKS[task][1], choice.variants
+    for task in choice.lock_step:
+        trials, all_of = TASKS[task].trials, choice.variants
         yield choice.part(
             'compared',
             task,
@@ -195,11 +210,30 @@ def fifth_parts(choice: ProtocolChoice) -> Iterator[Part]:
             fifth=True,
             extra=True,
         )
+    yield from _tours(choice, 'compared')
+
+
+def _tours(choice: ProtocolChoice, name: str, more: int = 0) -> Iterator[Part]:
+    """Yield a part of each world that has a pace of its own. It decides no hypothesis.
+
+    :param more: tours behind the default number. 0 means the default number of them.
+    """
+    for task in choice.paced:
+        usual = TASKS[task].trials
+        yield choice.part(
+            name,
+            task,
+            more or usual,
+            1,
+            named_variants(choice.variants or TOURED, {}),
+            fifth=True,
+            behind=usual if more else 0,
+        )
 
 
 def extension_parts(choice: ProtocolChoice) -> Iterator[Part]:
-    """Yield the parts of the one extension of the fifth freeze."""
-    for task in choice.tasks:
+    """Yield the parts of the one extension of the fifth freeze, and further tours."""
+    for task in choice.lock_step:
         replicates, trials = EXTENSION[task]
         yield choice.part(
             'extension',
@@ -209,6 +243,7 @@ def extension_parts(choice: ProtocolChoice) -> Iterator[Part]:
             named_variants(choice.variants or EXTENDED, {}),
             fifth=True,
         )
+    yield from _tours(choice, 'more', MORE_TOURS)
 
 
 PROTOCOLS: Dict[str, Callable[[ProtocolChoice], Iterator[Part]]] = {

@@ -2,7 +2,7 @@
 
 import threading
 import time
-from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import rospy
 
@@ -16,7 +16,8 @@ from smach_oracle.ros.loaded_settings import LoadedSettings
 from smach_oracle.ros.master_watch import start_master_watch
 from smach_oracle.ros.parameters import name_of
 from smach_oracle.ros.reading.yaml_files import read_yaml
-from smach_oracle.ros.service_calls import ServerGoneError
+from smach_oracle.ros.service_calls import CALL_LIMIT_S, ServerGoneError, ServiceCall
+from smach_oracle.srv import ChargeTime, ChargeTimeRequest
 
 from .followed_server import ListedQuestion
 from .front_end import FrontEnd
@@ -24,8 +25,12 @@ from .rules import IGNORE, Rule, Rules
 from .wording import still_runs
 
 ALL_SERVERS = 'all'
+NONE = 'none'
+LONGEST_DELAY_S = 3600.0
 _IDLE_S = 0.5
 _RETRY_S = 0.2
+_LOOK_S = 0.05  # at ROS time
+_WORK = 'expert'  # to which its time is charged
 
 
 class _PlannedAnswer(NamedTuple):
@@ -33,7 +38,7 @@ class _PlannedAnswer(NamedTuple):
 
     listed: ListedQuestion
     rule: Rule
-    due_s: float  # monotonic, or infinity for a question left to others
+    due_s: float  # by the clock of delays, or infinity for a question left to others
 
 
 class ScriptedExpert:
@@ -44,9 +49,27 @@ class ScriptedExpert:
     A question that another expert has claimed is left alone until it is free again.
     """
 
-    def __init__(self, front_end: FrontEnd, rules: Rules) -> None:
+    def __init__(
+        self,
+        front_end: FrontEnd,
+        rules: Rules,
+        answer_delay_s: Optional[float] = None,
+        charge_time: str = '',
+    ) -> None:
+        """
+        :param answer_delay_s: of ROS time, in place of the delays of the rules. None means theirs,
+            which are of the machine's time.
+        :param charge_time: resolved name of a ChargeTime service that counts the time of its work.
+            '' means nobody does.
+        """
         self._front_end = front_end
         self._rules = rules
+        self._delay_s = answer_delay_s
+        self._now: Callable[[], float] = (
+            time.monotonic if answer_delay_s is None else rospy.get_time
+        )
+        self._charge_time = charge_time
+        self._charged = False  # its work has begun there
         self._planned: Dict[str, _PlannedAnswer] = {}
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name='scripted expert', daemon=True)
@@ -63,13 +86,17 @@ class ScriptedExpert:
         while not (self._stopped or rospy.is_shutdown()):
             version = self._front_end.wait_for_change(version, self._pause_s())
             self._take_in({listed.key: listed for listed in self._front_end.questions()})
-            now_s = time.monotonic()
+            self._charge()
+            now_s = self._now()
             for key, planned in list(self._planned.items()):
                 if planned.due_s <= now_s:
                     self._answer(key, planned)
+            self._charge()
 
     def _pause_s(self) -> float:
         due_s = min((planned.due_s for planned in self._planned.values()), default=float('inf'))
+        if self._delay_s is not None:  # ROS time may pass faster
+            return _IDLE_S if due_s == float('inf') else _LOOK_S
         return max(0.0, min(_IDLE_S, due_s - time.monotonic()))
 
     def _take_in(self, questions: Mapping[str, ListedQuestion]) -> None:
@@ -90,8 +117,10 @@ class ScriptedExpert:
         why_not = rule.why_not(goal.choices)
         if why_not:
             rospy.logwarn('The rule for %s does not answer: %s', goal.failed_state, why_not)
+        if self._delay_s is not None:
+            rule = rule._replace(delay_s=self._delay_s)
         ignores = rule.kind == IGNORE or bool(why_not)
-        due_s = float('inf') if ignores else time.monotonic() + rule.delay_s
+        due_s = float('inf') if ignores else self._now() + rule.delay_s
         self._planned[key] = _PlannedAnswer(listed, rule, due_s)
         if rule.delay_s > 0 and not ignores:
             try:
@@ -105,7 +134,7 @@ class ScriptedExpert:
             response = self._front_end.answer(planned.listed, decision)
         except ServerGoneError as err:
             rospy.logwarn('%s', err)
-            self._planned[key] = planned._replace(due_s=time.monotonic() + _RETRY_S)
+            self._planned[key] = planned._replace(due_s=self._now() + _RETRY_S)
             return
         except OracleError as err:
             rospy.logerr(
@@ -123,6 +152,17 @@ class ScriptedExpert:
         """Done with it: answered, or to be left to others."""
         self._front_end.release(planned.listed)
         self._planned[key] = planned._replace(due_s=float('inf'))
+
+    def _charge(self) -> None:
+        """Tell a world that counts its time when work begins, or ends."""
+        on = any(planned.due_s < float('inf') for planned in self._planned.values())
+        if on == self._charged or not self._charge_time:
+            return
+        self._charged, request = on, ChargeTimeRequest(_WORK, on)
+        try:
+            ServiceCall(self._charge_time, ChargeTime, request).result(CALL_LIMIT_S)
+        except (ServerGoneError, rospy.ServiceException) as err:
+            rospy.logwarn('Nobody counts the time of the expert: %s', err)
 
 
 def load_rules(rules: Optional[Mapping[str, Any]], path: str) -> Rules:
@@ -169,14 +209,32 @@ def servers_of(value: object) -> List[str]:
     return [] if names == [ALL_SERVERS] else names
 
 
+def delay_of(value: object) -> Optional[float]:
+    """Return the delay (s) that a parameter gives to every answer, None where it is NONE.
+
+    :raises SettingsError: for anything else than NONE or a number from 0 to 3600.
+    """
+    if value == NONE:
+        return None
+    try:
+        seconds = float(str(value))
+    except ValueError:
+        seconds = float('nan')
+    if not 0.0 <= seconds <= LONGEST_DELAY_S:
+        raise SettingsError(
+            '~answer_delay', value, '{}, or s from 0 to {:g}'.format(NONE, LONGEST_DELAY_S)
+        )
+    return seconds
+
+
 def main() -> None:
     """Entry point of the node `scripted_expert`.
 
-    Parameters: ~rules or ~rules_file, ~servers, ~expert.
+    Parameters: ~rules or ~rules_file, ~servers, ~expert, ~answer_delay, ~charge_time.
     """
     parameters_only(
         'Node: an expert who answers by rules. Parameters: ~rules or ~rules_file, ~servers, '
-        '~expert; '
+        '~expert, ~answer_delay, ~charge_time; '
         'see doc/expert.md.'
     )
     rospy.init_node('scripted_expert')
@@ -185,9 +243,12 @@ def main() -> None:
         rules = load_rules(rospy.get_param('~rules', None), rospy.get_param('~rules_file', ''))
         servers = servers_of(rospy.get_param('~servers', ALL_SERVERS))
         name = name_of('~expert', rospy.get_name().strip('/'))
+        delay_s = delay_of(rospy.get_param('~answer_delay', NONE))
+        charge_time = name_of('~charge_time', NONE)
     except SettingsError as err:
         rospy.logfatal('scripted_expert: %s', err)
         raise SystemExit(2) from err
-    expert = ScriptedExpert(FrontEnd(name, servers), rules)
+    counted = '' if charge_time == NONE else rospy.resolve_name(charge_time)
+    expert = ScriptedExpert(FrontEnd(name, servers), rules, delay_s, counted)
     rospy.on_shutdown(expert.stop)
     rospy.spin()

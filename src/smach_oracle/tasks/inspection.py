@@ -135,7 +135,7 @@ def wait_for_robot() -> None:
 
     :raises SystemExit: where they do not come.
     """
-    for name in ('new_trial', 'localise', 'inspect'):
+    for name in ('new_trial', 'end_trial', 'localise', 'inspect'):
         try:
             rospy.wait_for_service(name, SERVER_WAIT_S)
         except rospy.ROSInterruptException:
@@ -154,7 +154,7 @@ def run_trials(sm: smach.StateMachine, trials: int) -> int:
 
     :returns: how many trials ended in success.
     """
-    begin = rospy.ServiceProxy('new_trial', Trigger)
+    begin, end = (rospy.ServiceProxy(name, Trigger) for name in ('new_trial', 'end_trial'))
     successes = 0
     for trial in range(trials):
         if rospy.is_shutdown():
@@ -162,6 +162,9 @@ def run_trials(sm: smach.StateMachine, trials: int) -> int:
         begun, told = time.monotonic(), begin()
         sm.userdata.readings = []
         outcome = sm.execute()
+        if rospy.is_shutdown():
+            break
+        end()
         successes += outcome == 'succeeded'
         rospy.loginfo(
             'trial %d of %d (%s): %s after %.0f s: %s',

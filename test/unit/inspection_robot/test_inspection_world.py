@@ -9,8 +9,16 @@ from smach_oracle.inspection_robot.rays import clearance, ranges, to_circle, to_
 from smach_oracle.inspection_robot.site import PANELS, ROBOT_RADIUS, START, WALLS, before_panel
 from smach_oracle.inspection_robot.world.base import MAX_SPEED, WetPatch, WheeledBase
 from smach_oracle.inspection_robot.world.causes import AT_PANEL_S, CHANCE, draw
+from smach_oracle.inspection_robot.world.contacts import Contacts
+from smach_oracle.inspection_robot.world.hall_log import in_words
 from smach_oracle.inspection_robot.world.inspection_world import BEAMS, InspectionWorld
-from smach_oracle.inspection_robot.world.people import KEEPS_AWAY, WALKS_AROUND, Errand, Walker
+from smach_oracle.inspection_robot.world.people import (
+    KEEPS_AWAY,
+    WAITS_S,
+    WALKS_AROUND,
+    Errand,
+    Walker,
+)
 
 DT_S = 0.05
 
@@ -164,3 +172,72 @@ def test_the_goal_is_every_panel_reported_and_right():
 def test_one_stands_straight_before_a_panel():
     x, y, yaw = before_panel(PANELS[2], 1.5)
     assert (x, y, abs(yaw)) == pytest.approx((8.5, 4.8, 0.0), abs=1e-9)
+
+
+def stepped(world, until_s):
+    while world.time_s < until_s:
+        world.step(DT_S)
+    return world
+
+
+def test_the_hall_logs_when_each_cause_came_and_was_gone():
+    scene = draw(3, only=list(CHANCE))
+    log = {each['kind']: each for each in stepped(InspectionWorld(scene), 90.0).log.record()}
+    assert list(log) == list(CHANCE)
+    assert {kind for kind in log if log[kind]['lasting']} == {'wet_floor'}
+    assert (log['wet_floor']['began_s'], log['wet_floor']['ended_s']) == (0.0, None)
+    for kind, begins_s, ends_s in (
+        ('glare', scene.glare.begins_s, scene.glare.ends_s),
+        ('low_battery', *scene.sag),
+    ):
+        assert log[kind]['began_s'] == pytest.approx(begins_s, abs=2 * DT_S)
+        assert log[kind]['ended_s'] == pytest.approx(ends_s, abs=2 * DT_S)
+    for kind in ('person_in_the_way', 'person_at_the_panel'):
+        (errand,) = [each for each in scene.errands if each.cause == kind]
+        stood_s = log[kind]['ended_s'] - log[kind]['began_s']
+        assert log[kind]['began_s'] > errand.begins_s
+        assert errand.stands_s[1] - 0.1 <= stood_s <= errand.stands_s[1] + WAITS_S + 1.0
+
+
+def test_a_cause_that_has_not_come_yet_has_no_times():
+    log = stepped(InspectionWorld(draw(3, only=['low_battery'])), 1.0).log.record()
+    assert [(each['began_s'], each['ended_s']) for each in log] == [(None, None)]
+    assert 'voltage' in log[0]['text']
+    with pytest.raises(ValueError, match='rain'):
+        in_words('rain', draw(3, only=[]))
+
+
+def test_each_contact_with_a_wall_counts_once_until_the_robot_has_come_away():
+    world = InspectionWorld(draw(3, only=[]))
+    world.base.pose = (1.0, 1.2, math.pi)
+
+    def drive(v, for_s):
+        for _ in range(int(for_s / DT_S)):
+            world.base.command(v, 0.0)
+            world.step(DT_S)
+
+    drive(0.8, 3.0)
+    assert world.contacts.things == ['wall']
+    drive(0.0, 1.0)
+    drive(0.3, 1.0)  # it still stands there
+    assert world.contacts.things == ['wall']
+    drive(-0.5, 1.0)
+    drive(0.8, 2.0)
+    assert world.contacts.things == ['wall', 'wall']
+
+
+def test_a_person_whom_the_robot_drives_against_is_named():
+    contacts, base = Contacts(), WheeledBase((2.0, 1.2, math.pi))
+    people = [(9.0, 5.0, 0.22), (1.0, 1.2, 0.22)]
+    for _ in range(60):
+        base.command(0.5, 0.0)
+        base.step(DT_S, people)
+        contacts.look(base, people)
+    assert contacts.things == ['person 2']
+
+
+def test_a_wrong_reading_names_its_panel_and_a_missing_one_does_not():
+    world = InspectionWorld(draw(3))
+    true = world.scene.readings
+    world.reported = {1: true[1] + 0.7, 2: true[2] + 0.3}
+    assert world.wrong_readings() == ['panel 1']

@@ -4,7 +4,11 @@ from typing import List, Sequence
 
 from ..trial_rows import TrialRow
 
-TITLES = {'pick_and_place': 'Pick and place', 'drink_retrieval': 'Drink retrieval'}
+TITLES = {
+    'pick_and_place': 'Pick and place',
+    'drink_retrieval': 'Drink retrieval',
+    'inspection': 'Inspection',
+}
 
 
 def title_of(task: str) -> str:

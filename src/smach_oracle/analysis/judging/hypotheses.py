@@ -220,6 +220,12 @@ def verdicts(rows: Sequence[TrialRow]) -> List[str]:
     return lines
 
 
+def undecided(rows: Sequence[TrialRow]) -> List[str]:
+    """Return a line for each task whose rows decide no hypothesis, whatever variants they have."""
+    others = sorted({row.task for row in rows} - set(WORLDS))
+    return ['  {}: decides no hypothesis, and is told as it is'.format(task) for task in others]
+
+
 def _harm_lines(rows: Sequence[TrialRow], passed: Dict[str, bool]) -> List[str]:
     lines = []
     for variant, beside in itertools.product((MENU, LEARNED), (BARE, DEFAULT)):

@@ -1,7 +1,7 @@
 """The robot's base: wheels that follow commands, a floor that may be wet, and odometry."""
 
 import math
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -107,8 +107,16 @@ class WheeledBase:
 
     @staticmethod
     def _room(pose: Pose, people: Sequence[Tuple[float, float, float]]) -> float:
-        gaps = [math.hypot(pose[0] - x, pose[1] - y) - radius for x, y, radius in people]
-        return min([clearance(pose[0], pose[1], WALLS)] + gaps)
+        return min(gaps(pose, people))
+
+
+def gaps(pose: Pose, people: Sequence[Tuple[float, float, float]]) -> List[float]:
+    """Return m from the robot's middle to the nearest wall, and to each of some people.
+
+    :param people: x, y and radius in m.
+    """
+    to_people = [math.hypot(pose[0] - x, pose[1] - y) - radius for x, y, radius in people]
+    return [clearance(pose[0], pose[1], WALLS), *to_people]
 
 
 def noisy_ranges(exact: np.ndarray, rng: np.random.Generator) -> np.ndarray:

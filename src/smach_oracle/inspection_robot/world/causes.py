@@ -17,6 +17,7 @@ CHANCE = {
     'glare': 0.3,
     'low_battery': 0.25,
 }
+LASTING = frozenset(('wet_floor',))  # there at a second try, too, and after a restart
 # on the robot's ways: where people stop for a talk (m), and when a robot without trouble passes (s)
 CROSSINGS = (
     (1.5, 3.6, 4.0),
@@ -80,7 +81,7 @@ def draw(seed: int, only: Optional[Sequence[str]] = None) -> TrialScene:
     wet, glare, sag = _wet(rng), _glare(rng), _sag(rng)
     blocking, looking, strolling = _blocking(rng), _looking(rng), _strolling(rng)
     errands = [strolling] + [
-        errand
+        errand._replace(cause=kind)
         for errand, kind in ((blocking, 'person_in_the_way'), (looking, 'person_at_the_panel'))
         if kind in causes
     ]

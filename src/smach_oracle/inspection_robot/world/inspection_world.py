@@ -1,6 +1,6 @@
 """One trial's world, and how time passes in it."""
 
-from typing import Dict, List, Optional
+from typing import Dict, List, Optional, Set
 
 import numpy as np
 
@@ -8,7 +8,9 @@ from ..rays import Circle, ranges
 from ..site import PANELS, START, WALLS, Pose
 from .base import WheeledBase, noisy_ranges
 from .causes import TrialScene
+from .contacts import Contacts
 from .gauge import painted
+from .hall_log import HallLog
 from .people import Walker
 from .view import Sunlight, view
 
@@ -26,11 +28,14 @@ class InspectionWorld:
         self.time_s = 0.0
         self.base = WheeledBase(START, scene.wet)
         self.reported: Dict[int, float] = {}  # bar, by the number of the panel
+        self.contacts = Contacts()
+        self.log = HallLog(scene)
         self._people = [Walker(errand) for errand in scene.errands]
         self._fronts = {
             panel.number: painted(panel.number, scene.readings[panel.number]) for panel in PANELS
         }
         self._rng = np.random.default_rng(scene.seed + 1)
+        self.log.look(0.0, self._there())
 
     @property
     def people(self) -> List[Circle]:
@@ -54,7 +59,22 @@ class InspectionWorld:
         for walker in self._people:
             walker.step(dt_s, self.base.pose)
         self.base.powered = not self.battery_is_low
-        self.base.step(dt_s, self.people)
+        people = self.people
+        self.base.step(dt_s, people)
+        self.contacts.look(self.base, people)
+        self.log.look(self.time_s, self._there())
+
+    def _there(self) -> Set[str]:
+        """Return the kinds of the causes that are there now."""
+        kinds = {walker.makes for walker in self._people if walker.makes}
+        for kind, there in (
+            ('wet_floor', self.scene.wet is not None),
+            ('glare', self._sunlight() is not None),
+            ('low_battery', self.battery_is_low),
+        ):
+            if there:
+                kinds.add(kind)
+        return kinds
 
     def scan(self) -> np.ndarray:
         """(n,) m along each of BEAMS, as the laser scanner tells it."""
@@ -72,6 +92,15 @@ class InspectionWorld:
         if glare is None or not glare.begins_s <= self.time_s < glare.ends_s:
             return None
         return Sunlight(glare.panel, glare.angle)
+
+    def wrong_readings(self) -> List[str]:
+        """Return the panels of which another reading was reported than they show."""
+        true = self.scene.readings
+        return [
+            'panel {}'.format(number)
+            for number, reading in sorted(self.reported.items())
+            if number in true and abs(reading - true[number]) > CLOSE_ENOUGH
+        ]
 
     def shortcomings(self) -> List[str]:
         """Return what the goal lacks: every panel must have been reported, and reported right."""

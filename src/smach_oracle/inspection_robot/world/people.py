@@ -17,6 +17,7 @@ class Errand(NamedTuple):
     begins_s: float  # of the trial
     places: Tuple[Tuple[float, float], ...]  # m. The first is where they wait before it
     stands_s: Tuple[float, ...]  # how long they stand at each place
+    cause: str = ''  # kind of the cause that they are at the second place. '' means none
 
 
 class Walker:
@@ -33,6 +34,12 @@ class Walker:
     def circle(self) -> Tuple[float, float, float]:
         """x, y and radius (m)."""
         return self.x, self.y, BODY_RADIUS
+
+    @property
+    def makes(self) -> str:
+        """Kind of the cause that they are where they stand now. '' means none."""
+        there = self._errand.places[1:2] == ((self.x, self.y),)
+        return self._errand.cause if there and self._next == 1 else ''
 
     def step(self, dt_s: float, robot: Sequence[float]) -> None:
         """Let time pass (s). `robot`: where it is, x and y in m."""
