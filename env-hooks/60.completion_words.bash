@@ -92,7 +92,7 @@ restart retry step_back' ;;
     'run_trials --protocol')
       echo 'main persistence memory continuous fifth fifth_extension all' ;;
     'run_trials --task')
-      echo 'drink_retrieval pick_and_place' ;;
+      echo 'drink_retrieval inspection pick_and_place' ;;
     'run_trials --variants')
       echo 'both with without bare default algorithm1 always_ask any_way escalating ladder
 learned prose random restart retry step_back one_line:algorithm1

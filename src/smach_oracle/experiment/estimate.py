@@ -22,7 +22,7 @@ SECONDS = {
     'drink_retrieval': TrialSeconds(8.5, 15.0, 0.42),
     'inspection': TrialSeconds(8.6, 12.0, 0.8),
 }
-REPLAYED_S = 0.7  # of one that is shared: its bag stays open for a moment
+REPLAYED_S = 0.1  # of one that is shared
 START_S = 15.0  # of the nodes of a job
 ENOUGH = 20  # trials of the bare script, from which the share that fails is theirs
 ALONE, BARE, SHARING = 'alone', 'bare', 'sharing'  # kinds of jobs

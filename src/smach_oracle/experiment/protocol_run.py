@@ -27,7 +27,7 @@ from .pool import run_parts
 from .protocols import Part, ProtocolChoice, parts_of
 from .results import RESULTS_FILE
 
-_Place = Tuple[str, int, int, Optional[float]]  # task, first seed, trials, share that lasts
+_Place = Tuple[object, ...]  # what jobs have in common that run the same trials
 FIGURES = 'figures'  # folder in that of a protocol
 DONE, FAILED, LOST = 0, 1, 3  # exit codes
 
@@ -194,7 +194,7 @@ def _bare_rows(kept: Sequence[Tuple[Part, List[TrialRow]]]) -> Dict[_Place, List
 
 def _place(plan: ExperimentPlan, replicate: int) -> _Place:
     """Return what jobs have in common that run the same trials."""
-    return plan.task, plan.first_seed(replicate), plan.trials, plan.lasting
+    return plan.task, plan.first_seed(replicate), plan.trials, plan.lasting, plan.extra_causes
 
 
 def _works(

@@ -34,11 +34,11 @@ def test_by_default_it_has_sixty_tours():
     assert parse(['--task', 'inspection']).plan.trials == 60
 
 
-@pytest.mark.parametrize('option', ['--lasting', '--hours'])
-def test_what_its_world_cannot_do_is_refused(option, capsys):
+@pytest.mark.parametrize('given', [['--lasting', '0.5'], ['--hours', '2'], ['--extra-causes']])
+def test_what_its_world_cannot_do_is_refused(given, capsys):
     with pytest.raises(SystemExit):
-        parse(['--task', 'inspection', option, '0.5'])
-    assert '{}: the world of inspection cannot do that'.format(option) in capsys.readouterr().err
+        parse(['--task', 'inspection', *given])
+    assert '{}: the world of inspection cannot do that'.format(given[0]) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('variant', FOUR)
@@ -102,8 +102,8 @@ def test_the_plan_counts_a_shared_trial_once_and_a_tenth_again():
     run, shared = numbers[0], numbers[1]
     again = sum(map(is_run_again, range(1, 451)))
     clean = 1 - SECONDS['pick_and_place'].share
-    # bare, and continuous operation, which shares nothing
-    assert run == pytest.approx(450 + 300 + 450 - (450 - again) * clean, abs=1.0)
+    # bare, and continuous operation and the extra causes, which share nothing
+    assert run == pytest.approx(450 + 300 + 80 + 450 - (450 - again) * clean, abs=1.0)
     assert shared == pytest.approx((450 - again) * clean, abs=1.0)
     assert 'where trials are shared' in line and REPLAYED_S < 2.8
 

@@ -1,4 +1,4 @@
-"""The things that the robot drives against: a wall, or a person."""
+"""Contacts of the robot: the walls and people that it drives against."""
 
 from typing import List, Sequence, Set
 
