@@ -241,11 +241,11 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     for name in ('benign', 'lasting', 'hours'):
         if args.extra_causes and getattr(args, name) != parser.get_default(name):
             parser.error('--extra-causes: not with --{}'.format(name))
-    for name in ('lasting', 'hours', 'extra_causes'):
-        if getattr(args, name) != parser.get_default(name) and not TASKS[task].lock_step:
+    for name in ('lasting', 'hours'):
+        if getattr(args, name) is not None and not TASKS[task].lock_step:
             parser.error(
                 '--{}: the world of {} cannot do that; leave it out, or take another --task'.format(
-                    name.replace('_', '-'), task
+                    name, task
                 )
             )
     if not args.hung_after > 0:

@@ -31,7 +31,7 @@ MORE_TOURS = 140
 EXTENSION = {'pick_and_place': (5, 130), 'drink_retrieval': (7, 100)}
 # with the extra kinds of causes: trials, in one replicate
 UNFORESEEN = (BARE, 'restart', DEFAULT, ONE_LINE + 'escalating', ONE_LINE + 'learned')
-EXTRA = {'pick_and_place': 40, 'drink_retrieval': 30}
+EXTRA = {'pick_and_place': 40, 'drink_retrieval': 30, 'inspection': 20}
 BLOCK_OF = dict(
     zip(
         (
@@ -201,16 +201,23 @@ def fifth_parts(choice: ProtocolChoice) -> Iterator[Part]:
             hours=HOURS[task],
             fifth=True,
         )
-        yield choice.part(
-            'extra',
-            task,
-            EXTRA[task],
-            1,
-            named_variants(all_of or UNFORESEEN, {}),
-            fifth=True,
-            extra=True,
-        )
+        yield _unforeseen(choice, task, UNFORESEEN)
     yield from _tours(choice, 'compared')
+    for task in choice.paced:
+        yield _unforeseen(choice, task, TOURED)
+
+
+def _unforeseen(choice: ProtocolChoice, task: str, variants: Sequence[str]) -> Part:
+    """Return the part of a task with the extra kinds of causes. It decides no hypothesis."""
+    return choice.part(
+        'extra',
+        task,
+        EXTRA[task],
+        1,
+        named_variants(choice.variants or variants, {}),
+        fifth=True,
+        extra=True,
+    )
 
 
 def _tours(choice: ProtocolChoice, name: str, more: int = 0) -> Iterator[Part]:

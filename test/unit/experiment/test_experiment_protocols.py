@@ -430,6 +430,10 @@ def test_the_fifth_protocol_has_parts_with_extra_causes_on_seeds_of_their_own():
             'one_line:escalating',
             'one_line:learned',
         ]
+    tours = parts['inspection_fifth_extra']
+    assert (tours.trials, tours.replicates, tours.seed) == (20, 1, BLOCK * 10)
+    assert tours.extra_causes and not tours.shares
+    assert names_of(tours) == ['bare', 'default', 'one_line:escalating', 'one_line:learned']
     usual = [plan for name, plan in parts.items() if not name.endswith('_extra')]
     assert not any(plan.extra_causes for plan in usual)
 

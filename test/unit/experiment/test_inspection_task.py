@@ -34,7 +34,7 @@ def test_by_default_it_has_sixty_tours():
     assert parse(['--task', 'inspection']).plan.trials == 60
 
 
-@pytest.mark.parametrize('given', [['--lasting', '0.5'], ['--hours', '2'], ['--extra-causes']])
+@pytest.mark.parametrize('given', [['--lasting', '0.5'], ['--hours', '2']])
 def test_what_its_world_cannot_do_is_refused(given, capsys):
     with pytest.raises(SystemExit):
         parse(['--task', 'inspection', *given])
@@ -77,7 +77,8 @@ def test_the_fifth_protocol_has_its_tours_and_the_extension_further_ones():
         assert not plan.variants[1].settings, "the task's own"
     assert (tours.trials, further.trials) == (60, 140)
     assert further.seed == tours.seed + tours.trials
-    assert not [name for name in fifth if name.startswith('inspection')][1:]
+    named = [name for name in fifth if name.startswith('inspection')]
+    assert named == ['inspection_fifth_compared', 'inspection_fifth_extra']
     for protocol in FOURTH:
         assert not [name for name in parts('--protocol', protocol) if 'inspection' in name]
 

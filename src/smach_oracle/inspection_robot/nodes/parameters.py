@@ -35,6 +35,21 @@ def number_in(name: str, default: float, low: float, high: float) -> float:
     return float(value)
 
 
+def flag_in(name: str, default: bool) -> bool:
+    """A private parameter that is true or false.
+
+    :raises ParameterError: where it is neither.
+    """
+    value = rospy.get_param('~' + name, default)
+    if not isinstance(value, bool):
+        raise ParameterError(
+            '{}: {!r} is not allowed; allowed: true, false'.format(
+                rospy.resolve_name('~' + name), value
+            )
+        )
+    return value
+
+
 def words_in(name: str, default: str) -> List[str]:
     """A private parameter that is words with spaces between them.
 

@@ -24,7 +24,7 @@ from smach_oracle.srv import (
 from ..world.causes import CHANCE, draw
 from ..world.inspection_world import InspectionWorld
 from .hardware_topics import HardwareTopics
-from .parameters import ParameterError, number_in, parameters_of, words_in
+from .parameters import ParameterError, flag_in, number_in, parameters_of, words_in
 from .tour_record import TimeUse, TourRecord, append_record
 
 STEP_S = 0.05
@@ -53,9 +53,16 @@ class InspectionWorldNode:
                     rospy.resolve_name('~causes'), DRAWN, ', '.join(CHANCE)
                 )
             )
+        self._extra = flag_in('extra_causes', False)
+        if self._extra and self._only is not None:
+            raise ParameterError(
+                '{} is true: leave {} out'.format(
+                    rospy.resolve_name('~extra_causes'), rospy.resolve_name('~causes')
+                )
+            )
         self._truth_file = str(rospy.get_param('~truth_file', 'none'))
         self._lock = threading.Lock()
-        self._world = InspectionWorld(draw(self._seed, self._only))
+        self._world = InspectionWorld(draw(self._seed, self._only, self._extra))
         self._in_trial = False  # the first has begun
         self._record: Optional[TourRecord] = None  # of the trial that is under way
         self._steps = 0
@@ -125,7 +132,7 @@ class InspectionWorldNode:
         self._finish_trial()
         with self._lock:
             self._seed += self._in_trial
-            self._world = world = InspectionWorld(draw(self._seed, self._only))
+            self._world = world = InspectionWorld(draw(self._seed, self._only, self._extra))
             self._in_trial = True
             self._use.restart()
             now_s = self._steps * STEP_S
@@ -198,7 +205,8 @@ def main() -> Optional[int]:
     """Entry point of the node."""
     parameters_of(
         'Node: the hall of the inspection robot, its base, its sensors, and the clock. '
-        'Parameters: ~speed, ~seed, ~causes, ~truth_file; see doc/second_robot.md.'
+        'Parameters: ~speed, ~seed, ~causes, ~extra_causes, ~truth_file; '
+        'see doc/second_robot.md.'
     )
     rospy.init_node('inspection_world')
     try:

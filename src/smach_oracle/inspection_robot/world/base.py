@@ -48,7 +48,10 @@ def _moved(pose: Pose, twist: Twist, dt_s: float) -> Pose:
 class WheeledBase:
     """The robot's base: where it truly is, and where its wheels say that it is."""
 
-    def __init__(self, pose: Pose, wet: Optional[WetPatch] = None) -> None:
+    def __init__(self, pose: Pose, wet: Optional[WetPatch] = None, veer: float = 0.0) -> None:
+        """
+        :param veer: rad for each m of way, that it turns and its wheels do not know of.
+        """
         self.pose = pose  # in the map
         self.odometry: Pose = (0.0, 0.0, 0.0)  # from where it was started
         self.wheels = Twist()  # what the wheels turn
@@ -56,6 +59,7 @@ class WheeledBase:
         self.powered = True  # the motors
         self.bumped = False  # it stands against something
         self._wet = wet
+        self._veer = veer
         self._wanted = Twist()
         self._silent_s = 0.0
 
@@ -92,7 +96,7 @@ class WheeledBase:
     def _on_the_floor(self, dt_s: float) -> Twist:
         """Return how the robot moves where its wheels turn as they do."""
         if self._wet is None or not self.on_wet_floor():
-            return self.wheels
+            return self.wheels._replace(w=self.wheels.w + self._veer * self.wheels.v)
         share = -math.expm1(-dt_s / WET_LAG_S)
         v = self.twist.v + share * (self.wheels.v - self.twist.v)
         # the turn that the drift gave it is no momentum

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..site import GAUGE_RANGE, PANELS, before_panel
 from .base import WetPatch
+from .extra_causes import SLACK_TYRE, Plume, extra_kind, plume, veer
 from .people import Errand
 
 # of each cause, by itself
@@ -17,7 +18,7 @@ CHANCE = {
     'glare': 0.3,
     'low_battery': 0.25,
 }
-LASTING = frozenset(('wet_floor',))  # there at a second try, too, and after a restart
+LASTING = frozenset(('wet_floor', SLACK_TYRE))  # there at a second try, too, and after a restart
 # on the robot's ways: where people stop for a talk (m), and when a robot without trouble passes (s)
 CROSSINGS = (
     (1.5, 3.6, 4.0),
@@ -59,15 +60,22 @@ class TrialScene(NamedTuple):
     wet: Optional[WetPatch] = None
     glare: Optional[Glare] = None
     sag: Optional[Sag] = None
+    veer: float = 0.0  # rad for each m of way, that a slack tyre turns the robot
+    plume: Optional[Plume] = None  # of steam
 
 
-def draw(seed: int, only: Optional[Sequence[str]] = None) -> TrialScene:
+def draw(seed: int, only: Optional[Sequence[str]] = None, extra: bool = False) -> TrialScene:
     """The world of a seed.
 
     :param only: the causes that are there for certain, and no others. None means each by its
         chance.
-    :raises ValueError: for a cause that is not among CHANCE.
+    :param extra: with one of the extra causes, and no others.
+    :raises ValueError: for a cause that is not among CHANCE, or for causes and `extra` together.
     """
+    if extra:
+        if only is not None:
+            raise ValueError('extra causes: no other causes are allowed beside them')
+        return _with_extra_cause(draw(seed, ()))
     unknown = sorted(set(only or ()) - set(CHANCE))
     if unknown:
         raise ValueError('cause {!r}: allowed are {}'.format(unknown[0], ', '.join(CHANCE)))
@@ -94,6 +102,14 @@ def draw(seed: int, only: Optional[Sequence[str]] = None) -> TrialScene:
         glare=glare if 'glare' in causes else None,
         sag=sag if 'low_battery' in causes else None,
     )
+
+
+def _with_extra_cause(scene: TrialScene) -> TrialScene:
+    kind = extra_kind(scene.seed)
+    scene = scene._replace(causes=(kind,))
+    if kind == SLACK_TYRE:
+        return scene._replace(veer=veer(scene.seed))
+    return scene._replace(plume=plume(scene.seed, CROSSINGS, AT_PANEL_S))
 
 
 def _pick(rng: np.random.Generator, places: Sequence[Tuple[float, float]]) -> Tuple[float, float]:

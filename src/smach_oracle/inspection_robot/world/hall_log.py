@@ -4,6 +4,7 @@ import math
 from typing import Any, Dict, List, Mapping, Set
 
 from .causes import LASTING, TrialScene
+from .extra_causes import SLACK_TYRE, STEAM
 
 
 class HallLog:
@@ -57,6 +58,13 @@ def in_words(kind: str, scene: TrialScene) -> str:
         )
     if kind == 'low_battery' and sag is not None:
         return 'the voltage breaks down from {:.0f} to {:.0f} s'.format(*sag)
+    if kind == SLACK_TYRE:
+        return 'a slack tyre turns it by {:+.3f} rad a m'.format(scene.veer)
+    if kind == STEAM and scene.plume is not None:
+        x, y, _, begins_s, ends_s = scene.plume
+        return 'a trap at ({:.1f}, {:.1f}) lets off steam from {:.0f} to {:.0f} s'.format(
+            x, y, begins_s, ends_s
+        )
     for errand in scene.errands:
         if errand.cause == kind:
             (x, y), stands_s = errand.places[1], errand.stands_s[1]

@@ -4,11 +4,12 @@ from typing import Dict, List, Optional, Set
 
 import numpy as np
 
-from ..rays import Circle, ranges
+from ..rays import Circle, ranges, to_circle
 from ..site import PANELS, START, WALLS, Pose
 from .base import WheeledBase, noisy_ranges
 from .causes import TrialScene
 from .contacts import Contacts
+from .extra_causes import SLACK_TYRE, STEAM, scattered
 from .gauge import painted
 from .hall_log import HallLog
 from .people import Walker
@@ -26,7 +27,7 @@ class InspectionWorld:
     def __init__(self, scene: TrialScene) -> None:
         self.scene = scene
         self.time_s = 0.0
-        self.base = WheeledBase(START, scene.wet)
+        self.base = WheeledBase(START, scene.wet, scene.veer)
         self.reported: Dict[int, float] = {}  # bar, by the number of the panel
         self.contacts = Contacts()
         self.log = HallLog(scene)
@@ -71,6 +72,8 @@ class InspectionWorld:
             ('wet_floor', self.scene.wet is not None),
             ('glare', self._sunlight() is not None),
             ('low_battery', self.battery_is_low),
+            (SLACK_TYRE, self.scene.veer != 0.0),
+            (STEAM, self._steam() is not None),
         ):
             if there:
                 kinds.add(kind)
@@ -80,12 +83,29 @@ class InspectionWorld:
         """(n,) m along each of BEAMS, as the laser scanner tells it."""
         pose: Pose = self.base.pose
         exact = ranges(pose, BEAMS + pose[2], WALLS, self.people)
+        steam = self._steam()
+        if steam is not None:
+            exact = scattered(exact, to_circle(pose, BEAMS + pose[2], steam), self._rng)
         return np.minimum(noisy_ranges(exact, self._rng), SCANNER_RANGE)
 
     def image(self) -> np.ndarray:
         """(h, w, 3) uint8 RGB: what the camera sees."""
         base = self.base
-        return view(base.pose, base.twist, self._fronts, self.people, self._sunlight(), self._rng)
+        return view(
+            base.pose,
+            base.twist,
+            self._fronts,
+            self.people,
+            self._sunlight(),
+            self._rng,
+            self._steam(),
+        )
+
+    def _steam(self) -> Optional[Circle]:
+        plume = self.scene.plume
+        if plume is None or not plume.begins_s <= self.time_s < plume.ends_s:
+            return None
+        return plume.x, plume.y, plume.radius
 
     def _sunlight(self) -> Optional[Sunlight]:
         glare = self.scene.glare

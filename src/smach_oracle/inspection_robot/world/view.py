@@ -20,6 +20,9 @@ PANEL_DEPTH = 0.03  # m that a panel stands off its wall
 GLARE_WIDTH = math.radians(20)  # beyond that angle the sunlight misses the camera (sigma)
 _COLUMNS = np.arctan2(0.5 * WIDTH - (np.arange(WIDTH) + 0.5), FOCAL)  # rad, to the left
 _ROWS = np.arange(HEIGHT)[:, None] + 0.5 - 0.5 * HEIGHT  # px below the middle
+STEAM_HEIGHT = 2.2  # m
+SEES_INTO_STEAM = 0.25  # m, from where a share of 1/e of the light still comes
+_WHITE_STEAM = (222.0, 224.0, 226.0)
 _LEGS, _SHIRT, _SKIN = (52, 58, 78), (196, 116, 48), (205, 160, 130)
 
 
@@ -42,11 +45,13 @@ def view(
     people: Sequence[Circle],
     light: Optional[Sunlight],
     rng: np.random.Generator,
+    steam: Optional[Circle] = None,
 ) -> np.ndarray:
     """(HEIGHT, WIDTH, 3) uint8 RGB.
 
     :param pose: of the camera, which looks forward, level.
     :param fronts: what is painted on each panel, by its number.
+    :param steam: outline of a plume, seen from above.
     """
     angles = _COLUMNS + pose[2]
     walls = to_walls(pose, angles, WALLS) * np.cos(_COLUMNS)  # m along the optical axis
@@ -56,6 +61,8 @@ def view(
     for person in sorted(people, key=lambda each: -_distance(pose, each)):
         _stand(image, to_circle(pose, angles, person) * np.cos(_COLUMNS), walls)
     bright = image.astype(np.float32)
+    if steam is not None:
+        bright = _misted(bright, pose, angles, steam, walls)
     if light is not None:
         bright += _glare(pose, light)
     bright = _blurred(bright, twist, float(walls[WIDTH // 2]))
@@ -124,6 +131,20 @@ def _stand(image: np.ndarray, near: np.ndarray, walls: np.ndarray) -> None:
     for low, high, colour in ((0.0, 0.85, _LEGS), (0.85, 1.45, _SHIRT), (1.45, BODY_HEIGHT, _SKIN)):
         below, above = (FOCAL * (CAMERA_HEIGHT - height) / safe for height in (low, high))
         image[seen & (_ROWS < below) & (_ROWS >= above)] = colour
+
+
+def _misted(
+    image: np.ndarray, pose: Pose, angles: np.ndarray, steam: Circle, walls: np.ndarray
+) -> np.ndarray:
+    """Return the image with a plume before it: the deeper one looks into it, the less is left."""
+    along = (steam[0] - pose[0]) * np.cos(angles) + (steam[1] - pose[1]) * np.sin(angles)
+    aside = (steam[0] - pose[0]) * np.sin(angles) - (steam[1] - pose[1]) * np.cos(angles)
+    half = np.sqrt(np.maximum(0.0, steam[2] ** 2 - aside**2))
+    near = np.maximum(along - half, 0.0)
+    deep = np.maximum(0.0, np.minimum(along + half, walls / np.cos(_COLUMNS)) - near)
+    top = FOCAL * (CAMERA_HEIGHT - STEAM_HEIGHT) / np.maximum(near * np.cos(_COLUMNS), 0.1)
+    share = np.where(_ROWS >= top, -np.expm1(-deep / SEES_INTO_STEAM), 0.0)[..., None]
+    return np.asarray(image + share * (np.array(_WHITE_STEAM) - image), np.float32)
 
 
 def _glare(pose: Pose, light: Sunlight) -> np.ndarray:
