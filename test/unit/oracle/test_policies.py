@@ -3,6 +3,7 @@ a machine.
 """
 
 import itertools
+import json
 import os
 import subprocess
 import sys
@@ -393,3 +394,39 @@ def test_the_pure_parts_need_no_smach(module):
     code = 'import sys, smach_oracle.oracle.{}; sys.exit("smach" in sys.modules)'.format(module)
     environment = dict(os.environ, PYTHONPATH=os.path.join(ROOT, 'src'))
     assert subprocess.call([sys.executable, '-c', code], env=environment) == 0
+
+
+def test_a_history_goes_on_as_it_was_told():
+    """S has failed, then T, which an expert takes back after the program was stopped."""
+    history = History(10)
+    history.visited(Visit('A', '', VisitResult.SUCCESS), False)
+    for state in 'ST':
+        history.failed(state, 0)
+        history.visited(Visit(state, '', VisitResult.FAILURE), False)
+    again = History(10)
+    told = json.loads(json.dumps(history.told()))
+    again.take_over(history.latest(), 3, told, lambda label: True)
+    assert again.told() == history.told()
+    again.supersede('T', 'ok', False)
+    assert again.failure_context('S', 'INIT', 0) == history.failure_context(
+        'S', 'INIT', 0
+    )._replace(failed_last=True, failing_since=True)
+    assert not again.context_since('S', 'INIT', 0).failed_last
+    again.take_over((), 0, told, lambda label: label != 'T')
+    assert not again.failing_since('S', 0), 'the latest failure is of a state that is gone'
+
+
+@pytest.mark.parametrize('told', [[None, None, None, 1], [None], [None, None, None, ['S']]])
+def test_a_history_that_cannot_be_read_is_refused(told):
+    with pytest.raises(ValueError, match='history'):
+        History(10).take_over((), 0, told, lambda label: True)
+
+
+def test_what_earlier_versions_have_told_of_a_history_is_read():
+    """The latest failure, and the one before it, or none."""
+    history = History(10)
+    told = ['S', 'A', None, ['S', 0, 'A', True], [None, 0, None, False]]
+    history.take_over((), 0, told, lambda label: True)
+    assert history.failing_since('S', 0)
+    assert not history.context_since('S', 'INIT', 0).failed_last
+    assert history.succeeded_before('S', 0) == 'A'

@@ -10,20 +10,20 @@ come in, so no walk over the chain is ever needed.
 
 from collections import deque
 from itertools import islice
-from typing import Callable, Deque, Iterable, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Deque, Iterable, NamedTuple, Optional, Tuple
 
 from ..decision.policy import FailureContext
 from .visits import Visit, VisitResult
 
 
-class _Streak(NamedTuple):
-    """The failures of one state, one after the other, without a success in between.
+class _Failed(NamedTuple):
+    """A failure of a state.
 
     `anchor`: the state that a step back leads to while it keeps failing. None means the initial
     state.
     """
 
-    state: Optional[str]
+    state: Optional[str]  # None where it is not there any more
     successes: int  # of that state in all, when it failed
     anchor: Optional[str]
     anchored: bool  # whether `anchor` was looked up in this execution's chain
@@ -43,14 +43,16 @@ class _CountedVisits(Deque[Visit]):
         self.added = 0
 
 
-# state of the latest visit without preconditions, those of the latest successes, two streaks
-Told = Tuple[Optional[str], Optional[str], Optional[str], _Streak, _Streak]
-_NO_STREAK = _Streak(None, 0, None, False)
+# state of the latest visit without preconditions, those of the latest successes, and the latest
+# failures, the last one first
+Told = Tuple[Any, ...]
+_NONE_FAILED = _Failed(None, 0, None, False)
+_MOST_FAILURES = 10  # of which experts may take back one after the other
 SUCCESS = VisitResult.SUCCESS  # looked up once
 
 
 class History:
-    """Visits of one execution of a container, and its latest failure of the trial.
+    """Visits of one execution of a container, and its latest failures of the trial.
 
     `visits`: the latest `length` visits, oldest first. `unconditioned`: state of the latest visit
     that has no preconditions. `succeeded`, `succeeded_other`: the latest successful state, and the
@@ -62,13 +64,12 @@ class History:
         self.unconditioned: Optional[str] = None
         self.succeeded: Optional[str] = None
         self.succeeded_other: Optional[str] = None
-        self._streak = _NO_STREAK
-        self._before = _NO_STREAK
+        self._failures: Deque[_Failed] = deque(maxlen=_MOST_FAILURES)  # oldest first
 
     def begin_trial(self) -> None:
         """Forget everything."""
+        self._failures.clear()
         self.begin_execution()
-        self._streak = self._before = _NO_STREAK
 
     def begin_execution(self) -> None:
         """Forget the chain.
@@ -78,8 +79,9 @@ class History:
         """
         self.visits.clear()
         self.unconditioned = self.succeeded = self.succeeded_other = None
-        if self._streak.anchored:
-            self._streak = self._streak._replace(anchor=None, anchored=False)
+        if self._failures:
+            kept = [each._replace(anchor=None, anchored=False) for each in self._failures]
+            self._failures = deque(kept, maxlen=_MOST_FAILURES)
 
     def resize(self, length: int) -> None:
         """Keep the latest `length` visits from now on."""
@@ -119,7 +121,7 @@ class History:
         return FailureContext(
             state,
             initial,
-            self._streak.state == state,
+            self._latest_failure().state == state,
             self.failing_since(state, successes),
             self.unconditioned,
             self.succeeded_before(state, successes),
@@ -127,11 +129,26 @@ class History:
 
     def context_since(self, state: str, initial: str, successes: int) -> FailureContext:
         """Return what the visits said about the latest failure of `state`, which is noted."""
-        streak = self._before if self._streak.state == state else self._streak
-        return self.failure_context(state, initial, successes)._replace(
-            failed_last=streak.state == state,
-            failing_since=streak.state == state and streak.successes == successes,
+        context = self.failure_context(state, initial, successes)
+        before = self._latest_failure(1)
+        failed_last = context.failed_last and before.state == state
+        own = self._failure_of(state)
+        if own is not None:
+            context = context._replace(succeeded_before=own.anchor)
+        return context._replace(
+            failed_last=failed_last, failing_since=failed_last and before.successes == successes
         )
+
+    def recalls_failure_of(self, state: str) -> bool:
+        """Whether the latest failure of `state` is among those that are remembered."""
+        return self._failure_of(state) is not None
+
+    def _latest_failure(self, back: int = 0) -> _Failed:
+        """Return the latest failure, or that one before it."""
+        return self._failures[-1 - back] if back < len(self._failures) else _NONE_FAILED
+
+    def _failure_of(self, state: str) -> Optional[_Failed]:
+        return next((each for each in reversed(self._failures) if each.state == state), None)
 
     def keeps_failing(self, state: str) -> bool:
         """Whether `state` has failed more than once since it succeeded."""
@@ -143,7 +160,8 @@ class History:
 
         `successes`: its number of successes in all.
         """
-        return self._streak.state == state and self._streak.successes == successes
+        latest = self._latest_failure()
+        return latest.state == state and latest.successes == successes
 
     def succeeded_before(self, state: str, successes: int) -> Optional[str]:
         """Return the other state that succeeded last before `state` began to fail.
@@ -153,8 +171,9 @@ class History:
 
         :param successes: number of successes of `state` in all.
         """
-        if self.failing_since(state, successes) and self._streak.anchored:
-            return self._streak.anchor
+        latest = self._latest_failure()
+        if latest.anchored and self.failing_since(state, successes):
+            return latest.anchor
         return self.succeeded if self.succeeded != state else self.succeeded_other
 
     def failed(self, state: str, successes: int) -> None:
@@ -163,13 +182,15 @@ class History:
         A step back keeps its goal while the state keeps failing.
         """
         anchor = self.succeeded_before(state, successes)
-        self._before = self._streak
-        self._streak = _Streak(state, successes, anchor, True)
+        self._failures.append(_Failed(state, successes, anchor, True))
 
     def supersede(self, state: str, outcome: str, has_preconditions: bool) -> None:
         """Count the latest failure of `state` as neither: an expert did its work."""
-        if self._streak.state == state:
-            self._streak = self._before
+        failure = self._failure_of(state)
+        if failure is not None:
+            self._failures = deque(
+                (each for each in self._failures if each is not failure), maxlen=_MOST_FAILURES
+            )
         self.count_superseded(state, outcome, has_preconditions)
 
     def count_superseded(self, state: str, outcome: str, has_preconditions: bool) -> None:
@@ -190,8 +211,7 @@ class History:
             self.unconditioned,
             self.succeeded,
             self.succeeded_other,
-            self._streak,
-            self._before,
+            *reversed(self._failures),
         )
 
     def take_over(
@@ -208,15 +228,15 @@ class History:
             return label if label is not None and has(label) else None
 
         try:
-            *labels, streak, before = told
-            self.unconditioned, self.succeeded, self.succeeded_other = map(there, labels)
-            streaks = [_Streak(*each) for each in (streak, before)]
-        except TypeError as err:
+            self.unconditioned, self.succeeded, self.succeeded_other = map(there, told[:3])
+            failures = [_Failed(*each) for each in reversed(told[3:])]
+        except (TypeError, ValueError) as err:
             raise ValueError('that is no history: {}'.format(err)) from err
         self.visits = _CountedVisits(visits, maxlen=self.visits.maxlen)
         self.visits.added = number
-        self._streak, self._before = (
-            each._replace(state=there(each.state), anchor=there(each.anchor)) for each in streaks
+        self._failures.clear()
+        self._failures.extend(
+            each._replace(state=there(each.state), anchor=there(each.anchor)) for each in failures
         )
 
     def latest(self) -> Tuple[Visit, ...]:

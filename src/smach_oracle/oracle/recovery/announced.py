@@ -63,7 +63,7 @@ def _context(node: TreeNode, failed: StateRecord, before: Tuple[Visit, ...]) -> 
     states = (node.record(visit.state) for visit in reversed(before) if node.has(visit.state))
     unconditioned = next((each.label for each in states if not each.has_preconditions), None)
     context = context._replace(unconditioned=unconditioned)
-    if node.records.history.failing_since(failed.label, failed.totals[0]):
+    if node.records.history.recalls_failure_of(failed.label):
         return context
     succeeded = (
         visit.state
