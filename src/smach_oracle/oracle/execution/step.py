@@ -167,10 +167,10 @@ class Step:
         if error is not None:
             self._warn_raised(error, 'left')
         node.records.visit_ended(record, told, departure.result_of(node))
-        if departure.arrives_at is not node:
-            return self._advance(told, Route(leaving_outcome(node), False), facts=LEFT)
         if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
             recall_preempts(states_of(self._machine)[record.label])
+        if departure.arrives_at is not node:
+            return self._advance(told, Route(leaving_outcome(node), False), facts=LEFT)
         failure = Failure(
             record.label,
             FailureKind.TIME_LIMIT,
