@@ -209,6 +209,9 @@ def _decide_above(
         if above.jump_path is not None
         else None
     )
+    if recovery.is_over():  # by a preempt while its preconditions ran
+        record.take_back_failure()
+        return None
     if above.jump_path is None or way is None:
         record.take_back_failure()
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
