@@ -31,6 +31,12 @@ def test_the_executive_and_the_model_go_the_same_way(first):
     assert asked and sum(each.model.cross_jumps for each in found), 'there was something to see'
 
 
+@pytest.mark.parametrize('seed', [700225, 701767, 703495, 723326, 723721])
+def test_trees_in_which_they_once_went_different_ways(seed):
+    found = compare(draw(seed, SHAPE), IS_UPSTREAM)
+    assert found.is_fine, found.report()
+
+
 def test_a_tree_that_is_preempted_at_any_moment_ends_and_runs_again():
     wrong = [text for seed in range(40) for text in disturb(draw(seed))]
     assert wrong == []

@@ -241,6 +241,13 @@ class MachinePart(Part, Recovering):
         intended = self.settings_of(label).intended_outcomes
         return outcome in intended or self.child(label).ended_as_meant
 
+    def has_stopped_early(self, label: str, outcome: Optional[str]) -> bool:
+        """Whether a state that has ended so, an Iterator, has failed or was left."""
+        if outcome in (None, 'preempted'):
+            return True
+        failed = self.failure_of(label, outcome, False)
+        return failed is not None and not self._is_meant(label, outcome)
+
     def _reported(self, label: str, outcome: Any, failed: Optional[Failed]) -> Optional[Failed]:
         """The earlier failure of another state that the end of this one reports."""
         if self._winds_down() or self.child(label).settled or self._is_meant(label, outcome):
@@ -304,6 +311,15 @@ class MachinePart(Part, Recovering):
         was_asked = self._preempted is not None and self._preempted is self.current
         if self.current is not None and not (was_asked and self.run.is_upstream):
             self._pass_preempt_on()  # upstream's engine asks a state once in a visit
+
+    def preempt_up_to(self, level: Any) -> None:
+        """A preempt has come to a level above while this oracle waited for its decision."""
+        part = self
+        while part is not level:
+            part.flag = True
+            part._preempted = part.current
+            part.parent._preempted = part
+            part = part.parent
 
     def _winds_down(self) -> bool:
         """Whether a preempt is under way, or who has obeyed one, the innermost, is to end."""

@@ -17,6 +17,13 @@ class Visit(NamedTuple):
     result: str
 
 
+class Failure(NamedTuple):
+    """One failure of a state, and the prose's goal of a step back from it."""
+
+    label: str
+    goal: Optional[str]  # None: the container is executed again since
+
+
 class Kept(NamedTuple):
     """A failure after which the author's own way was kept."""
 
@@ -79,17 +86,15 @@ class Remembered:
         self.recoveries: Dict[str, int] = {}
         self.fallbacks: Dict[str, int] = {}
         self.visits_of: Dict[str, int] = {}
-        self._failures: List[str] = []  # labels, of this trial
+        self._failures: List[Failure] = []  # of this trial
         self._since: List[Visit] = []  # visits of this trial
-        self._goal: Optional[str] = None
-        self._goal_of: Optional[str] = None
         self.begin_execution()
 
     def begin_execution(self) -> None:
         """Forget the chain of visits."""
         self.chain: List[Visit] = []
         self._kept: List[Kept] = []
-        self._goal = None
+        self._failures = [failure._replace(goal=None) for failure in self._failures]
 
     # -- visits
 
@@ -106,16 +111,16 @@ class Remembered:
 
     def fails(self, label: str) -> None:
         """Count a failure, before its visit is added."""
-        self._keep_goal(label)
+        goal = self._goal_of(label)
         self._overcome(label)
-        self._failures.append(label)
+        self._failures.append(Failure(label, goal))
         self._results[label].learn(True)
         self.ended(label, FAILURE)
 
     def supersede(self, label: str) -> None:
         """Take the latest failure, of this state, back out."""
         self._results[label].take_back()
-        latest = max(place for place, failed in enumerate(self._failures) if failed == label)
+        latest = max(place for place, each in enumerate(self._failures) if each.label == label)
         del self._failures[latest]
         self._overcome(label)
         for visits in (self.chain, self._since):
@@ -140,7 +145,7 @@ class Remembered:
         latest = self._kept[-1]
         if any(teller != label for teller in latest.told_by):
             return None
-        is_latest = self._failures[-1] == latest.label
+        is_latest = self._failures[-1].label == latest.label
         return latest._replace(continuous=latest.continuous and is_latest)
 
     def reports(self, label: str) -> None:
@@ -167,7 +172,7 @@ class Remembered:
 
     def is_continuous(self, policy: str, label: str) -> bool:
         """Whether a failure of `label` now would be a continuous one."""
-        if not self._failures or self._failures[-1] != label:
+        if not self._failures or self._failures[-1].label != label:
             return False
         return policy == 'algorithm1' or not self._succeeded_since_it_failed(label)
 
@@ -180,18 +185,17 @@ class Remembered:
     def step_back_target(self, policy: str, label: str) -> str:
         """Where a step back from the failure that was counted last goes to."""
         if policy == 'prose':
-            return self._goal or self._initial
+            return self._failures[-1].goal or self._initial
         for visit in reversed(self.chain[:-1]):
             if visit.label not in self._conditioned:
                 return visit.label
         return self._initial
 
-    def _keep_goal(self, label: str) -> None:
+    def _goal_of(self, label: str) -> str:
         """The prose's goal: it is kept while failures of a state are continuous."""
-        if self._goal is not None and self._goal_of == label and self.is_continuous('prose', label):
-            return
-        self._goal_of = label
-        self._goal = next(
+        if self.is_continuous('prose', label) and self._failures[-1].goal is not None:
+            return self._failures[-1].goal
+        return next(
             (
                 visit.label
                 for visit in reversed(self.chain)

@@ -75,13 +75,8 @@ class Model:
         """The oracle goes to a state: an Iterator that has failed or was left goes on there."""
         for part in machine.children():
             if isinstance(part, IteratorPart):
-                outcome = part.ended_with
                 part.ask_to_go_on(
-                    part.label == target
-                    and (
-                        outcome in (None, 'preempted')
-                        or machine.failure_of(part.label, outcome, False) is not None
-                    )
+                    part.label == target and machine.has_stopped_early(part.label, part.ended_with)
                 )
 
     def forget_rests_below(self, part: Part) -> None:

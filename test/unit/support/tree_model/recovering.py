@@ -185,6 +185,8 @@ class Recovering:
             and (self.memory.failure_class(failed.label) != 'HIGH')
         ):
             yield from self._ask_above(failed)
+            if self.flag:
+                return self._preempted_ending(failed)
         reply = self._ask_expert(failed, decision.written)
         if reply is None:
             return self._fall_back(failed, decision.written)
@@ -198,7 +200,11 @@ class Recovering:
             outer = level.failed_as(inner.label, ending)
             if outer is None:
                 return
+            was_asked = level.flag  # and has obeyed that
             decision = yield from level.decide_tentatively(outer)
+            if level.flag and not was_asked:  # while a precondition ran
+                self.preempt_up_to(level)
+                return
             if decision.action != 'ask':
                 self._count_recovery(failed.label)
                 level._count_recovery(inner.label)
