@@ -339,7 +339,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     except (BagError, OSError) as err:
         return report_error('compare_variants', err)
     sys.stdout.write(format_comparison(rows))
-    told = verdicts(rows) + undecided(rows)
-    if told:
-        sys.stdout.write('\n'.join(['Hypotheses (doc/protocol.md)', *told]) + '\n')
+    sys.stdout.write(verdicts_text(rows))
     return 0
+
+
+def verdicts_text(rows: Sequence[TrialRow]) -> str:
+    """Return the verdicts on the hypotheses as a text, '' where rows decide none."""
+    told = verdicts(rows) + undecided(rows)
+    return '\n'.join(['Hypotheses (doc/protocol.md)', *told]) + '\n' if told else ''

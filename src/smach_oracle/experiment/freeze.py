@@ -114,12 +114,26 @@ def last_freeze(root: Path) -> Freeze:
 
     :raises ExperimentError: where there is none, or it was abandoned.
     """
-    path = root / LOG
-    rows = list(csv.DictReader(path.open(encoding='utf-8'))) if path.exists() else []
-    if not rows or rows[-1]['what'] != FROZEN:
+    holding = standing_freezes(root)
+    if not holding or _logged(root)[-1]['what'] != FROZEN:
         raise ExperimentError('{}: no freeze holds'.format(LOG))
-    last = rows[-1]
-    return Freeze(last['commit'], last['protocol_sha256'], int(last['first_seed']))
+    return holding[-1]
+
+
+def standing_freezes(root: Path) -> List[Freeze]:
+    """Return the freezes of the log that were not abandoned, in its order."""
+    rows = _logged(root)
+    abandoned = {row['first_seed'] for row in rows if row['what'] == ABANDONED}
+    return [
+        Freeze(row['commit'], row['protocol_sha256'], int(row['first_seed']))
+        for row in rows
+        if row['what'] == FROZEN and row['first_seed'] not in abandoned
+    ]
+
+
+def _logged(root: Path) -> List[Dict[str, str]]:
+    path = root / LOG
+    return list(csv.DictReader(path.open(encoding='utf-8'))) if path.exists() else []
 
 
 def checkout() -> Path:

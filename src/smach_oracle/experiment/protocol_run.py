@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import BagError
-from smach_oracle.analysis.comparison import format_comparison
+from smach_oracle.analysis.comparison import format_comparison, verdicts_text
 from smach_oracle.analysis.drawing.command import draw_all, find_rows
 from smach_oracle.analysis.trial_rows import TrialRow, read_rows
 from smach_oracle.packages import lacking
@@ -103,6 +103,7 @@ def compared(output: Path) -> List[str]:
         '{}\n\n{}'.format(kind.capitalize(), format_comparison(rows))
         for kind, rows in found.items()
     ]
+    texts += filter(None, [verdicts_text([row for rows in found.values() for row in rows])])
     try:
         paths = draw_all(found, output / FIGURES)
     except OSError as err:

@@ -14,6 +14,7 @@ from smach_oracle.experiment.freeze import (
     frozen_seeds,
     last_freeze,
     run_freeze,
+    standing_freezes,
 )
 from smach_oracle.experiment.plan import ExperimentError
 
@@ -108,6 +109,20 @@ def test_every_freeze_is_logged_and_an_abandoned_one_too(root):
     assert {(row['commit'], int(row['first_seed'])) for row in rows} == {
         (first.commit, first.first_seed)
     }
+
+
+def test_the_freezes_that_were_not_abandoned_stand_in_their_order(root):
+    run_freeze(root, FROZEN, 'the first')
+    first = last_freeze(root)
+    run_freeze(root, ABANDONED, 'a fault')
+    assert standing_freezes(root) == []
+    seconds = []
+    for words in ('two', 'three'):
+        (root / 'doc/protocol.md').write_text(PAGE + words)
+        commit(root)
+        run_freeze(root, FROZEN, words)
+        seconds.append(last_freeze(root))
+    assert standing_freezes(root) == seconds and first not in seconds
 
 
 def test_a_freeze_says_why(root):

@@ -8,32 +8,57 @@ from house import ROOT
 from smach_oracle.analysis.drawing.command import find_rows, tables_page
 from smach_oracle.analysis.pairing import COMPARED, on_common_seeds
 from smach_oracle.analysis.trial_rows import read_rows
-from smach_oracle.experiment.freeze import last_freeze
+from smach_oracle.experiment.freeze import standing_freezes
 from smach_oracle.experiment.protocols import ALL, ProtocolChoice, parts_of
 
-TRIALS = ROOT / 'doc/trials'
+TRIALS = ROOT / 'doc/trials/fourth'  # of the fourth freeze
+FIFTH = ROOT / 'doc/trials/fifth'  # of the fifth, which is under way
 PAGE = (ROOT / 'doc/results.md').read_text(encoding='utf-8')
 TABLES = (ROOT / 'doc/results_tables.md').read_text(encoding='utf-8')
-PARTS = parts_of(ALL, ProtocolChoice(last_freeze(ROOT).blocks(), 15.0))
+OF_FOURTH, OF_FIFTH = (freeze.blocks() for freeze in standing_freezes(ROOT))
+PARTS = parts_of(ALL, ProtocolChoice(OF_FOURTH, 15.0))
+PARTS_OF_FIFTH = [
+    part
+    for protocol in ('fifth', 'fifth_extension')
+    for part in parts_of(protocol, ProtocolChoice(OF_FIFTH, 15.0))
+]
 
 
-@pytest.mark.parametrize('part', PARTS, ids=lambda part: part.name)
-def test_each_part_has_all_its_trials_on_the_seeds_of_the_freeze(part):
-    plan, path = part.plan, TRIALS / part.name / 'results.csv'
-    found = [(row.variant, row.replicate, row.seed) for row in read_rows(path)]
-    planned = {
+def trials_of(part):
+    """The trials that a part plans: variant, replicate and seed."""
+    plan = part.plan
+    return {
         (variant.name, replicate, plan.first_seed(replicate) + number)
         for variant in plan.variants
         for replicate in range(plan.replicates)
         for number in range(plan.trials)
     }
-    assert len(set(found)) == len(found) and set(found) == planned
+
+
+@pytest.mark.parametrize('part', PARTS, ids=lambda part: part.name)
+def test_each_part_has_all_its_trials_on_the_seeds_of_the_freeze(part):
+    path = TRIALS / part.name / 'results.csv'
+    found = [(row.variant, row.replicate, row.seed) for row in read_rows(path)]
+    assert len(set(found)) == len(found) and set(found) == trials_of(part)
 
 
 def test_no_other_rows_lie_there():
     assert {path.parent.name for path in TRIALS.rglob('results.csv')} == {
         part.name for part in PARTS
     }
+
+
+@pytest.mark.parametrize('part', PARTS_OF_FIFTH, ids=lambda part: part.name)
+def test_what_is_there_of_the_fifth_freeze_is_of_its_seeds(part):
+    path = FIFTH / part.name / 'results.csv'
+    rows = read_rows(path) if path.exists() else []
+    found = [(row.variant, row.replicate, row.seed) for row in rows]
+    assert len(set(found)) == len(found) and set(found) <= trials_of(part)
+
+
+def test_rows_of_the_fifth_freeze_are_of_its_parts():
+    names = {path.parent.name for path in FIFTH.rglob('results.csv')}
+    assert names <= {part.name for part in PARTS_OF_FIFTH}
 
 
 def test_the_page_of_tables_is_made_of_the_rows():
