@@ -1,0 +1,92 @@
+"""Failures that experts take back, or that come in between, before a later state reports one."""
+
+import pytest
+from machines import FakeExpert, Scripted, Watched, supersede
+from reporting_machines import BAD, made, reporting
+
+from smach_oracle.oracle.records.events import EventKind
+
+
+@pytest.mark.parametrize('superseded', [1, 2])
+def test_a_failure_that_an_expert_takes_back_meanwhile_makes_no_other_one_continuous(superseded):
+    """WORK has failed once. It is MODERATE, of which the policy asks where that is continuous."""
+    stows = [
+        ('STOW{}'.format(number), Scripted('failed', outcomes=('stowed', 'failed')))
+        for number in range(superseded)
+    ]
+    after = [label for label, _ in stows[1:]] + ['REPORT']
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        between=[
+            (label, state, {'stowed': target}) for (label, state), target in zip(stows, after)
+        ],
+        expert=FakeExpert(*[supersede('stowed')] * superseded),
+        settings={
+            'policy': 'algorithm1',
+            'states': {'WORK': {'prior': 0.5}, 'STOW*': {'max_recoveries': 0}},
+        },
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('ask', '')] * superseded + [('step_back', 'LOOK')]
+    assert [event.continuous for event in machine.of(EventKind.DECISION)][-1] is False
+
+
+def test_failures_that_experts_take_back_one_after_the_other_are_all_forgotten():
+    """REPORT reports SECOND, and FIRST once an expert has done the work of that."""
+    ends = {'said': 'failed', 'end': 'done'}
+    states = [
+        ('LOOK', Scripted(outcomes=('seen',)), {'seen': 'FIRST'}),
+        ('FIRST', Scripted('failed', outcomes=BAD), {'ok': 'SECOND', 'failed': 'SECOND'}),
+        ('SECOND', Scripted('failed', outcomes=BAD), {'ok': 'REPORT', 'failed': 'REPORT'}),
+        ('REPORT', Scripted('said', 'said', 'end', outcomes=('said', 'end')), ends),
+    ]
+    machine = Watched(
+        made(states),
+        expert=FakeExpert(supersede('ok')),
+        settings={
+            'policy': 'algorithm1',
+            'states': {'FIRST': {'prior': 0.5}, 'SECOND': {'max_recoveries': 0}},
+        },
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('ask', ''), ('step_back', 'LOOK')]
+
+
+def test_another_failure_meanwhile_moves_no_goal_of_a_state_that_keeps_failing():
+    """WORK has failed twice. DRIVE has succeeded in between, after LOOK, which the goal is."""
+    work = Scripted(RuntimeError('jammed'), 'failed', outcomes=BAD)
+    stow = Scripted('failed', outcomes=('stowed', 'failed'))
+    machine = Watched(
+        made(
+            [
+                (
+                    'LOOK',
+                    Scripted('seen', 'far', outcomes=('seen', 'far')),
+                    {'seen': 'WORK', 'far': 'DRIVE'},
+                ),
+                ('DRIVE', Scripted(outcomes=('there',)), {'there': 'WORK'}),
+                ('WORK', work, {'ok': 'done', 'failed': 'STOW'}),
+                ('STOW', stow, {'stowed': 'REPORT', 'failed': 'STOW'}),
+                ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+            ]
+        ),
+        preconditions={'WORK': [lambda ud: False]},
+        settings={'memory': 100, 'policy': 'prose'},
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('step_back', 'LOOK')] * 2
+
+
+def test_a_superseded_state_is_the_latest_one_before_the_next():
+    states = [
+        ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'PLACE', 'failed': 'REPORT'}),
+        ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+        ('PLACE', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'failed'}),
+    ]
+    machine = Watched(
+        made(states),
+        expert=FakeExpert(supersede('ok')),
+        settings={'policy': 'algorithm1', 'states': {'WORK': {'max_recoveries': 0}}},
+    )
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('ask', ''), ('step_back', 'WORK')]
