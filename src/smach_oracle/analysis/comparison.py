@@ -2,9 +2,10 @@
 
 Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
 cost for a trial and for a robot hour. Prints the best that any variant did in each trial that all
-ran (hindsight), beside what each did there. Prints McNemar's exact test of the interventions, of
-`default` against each other variant, or of each two. Where there are rows of its variants, prints
-the verdicts on the hypotheses of doc/protocol.md. Exit code: 0, or 2 if there was nothing to read.
+ran (hindsight), beside what each did there. Prints McNemar's exact test of the trials in which
+a person was needed, of `default` against each other variant, or of each two. Where there are rows
+of its variants, prints the verdicts on the hypotheses of doc/protocol.md. Exit code: 0, or 2 if
+there was nothing to read.
 """
 
 import argparse
@@ -28,7 +29,7 @@ from .pairing import (
     pairs_to_test,
 )
 from .reading import report_error
-from .trial_counter import ended_otherwise
+from .trial_counter import EXPERT_ANSWERED, PERSON_NEEDED, ended_otherwise
 from .trial_rows import LOST, TrialRow, read_rows
 
 SECONDS_PER_HOUR = 3600.0
@@ -51,8 +52,9 @@ class Group(NamedTuple):
 
 SHARES: Tuple[Tuple[str, Happened], ...] = (
     ('true success', lambda row: row.succeeded),
-    ('interventions', lambda row: row.intervened),
+    (PERSON_NEEDED, lambda row: row.intervened),
     ('a question asked', lambda row: row.questions > 0),
+    (EXPERT_ANSWERED, lambda row: row.answered > 0),
     ('recovered', lambda row: row.recovered),
     ('with attempts', lambda row: row.attempts > 0),
     ('false success', lambda row: row.ending == 'success' and not row.succeeded),
@@ -89,7 +91,7 @@ class Costs(NamedTuple):
     damage: Optional[float]  # things that came to harm in any trial, for each true success
     damage_done: Optional[float]  # of these, in a trial of true success
     completion_s: Optional[float]  # median time of a true success
-    trials_between: Optional[float]  # trials an intervention. None means there was none
+    trials_between: Optional[float]  # trials for each that needed a person. None: none did
     hours_between: Optional[float]
 
 
@@ -126,7 +128,7 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
     known of all others.
     """
     ended = [row for row in rows if row.ending != LOST]
-    asked, interventions = sum(row.questions for row in rows), sum(row.intervened for row in rows)
+    asked, needed = sum(row.questions for row in rows), sum(row.intervened for row in rows)
     hours = robot_hours(ended)
     expert_s = _total(ended, lambda row: row.expert_s)
     done = [row for row in ended if row.succeeded]
@@ -142,8 +144,8 @@ def costs_of(rows: Sequence[TrialRow]) -> Costs:
         _ratio(_total(ended, lambda row: row.damage), len(done)),
         _ratio(_total(done, lambda row: row.damage), len(done)),
         statistics.median(times) if times else None,
-        _ratio(len(rows), interventions),
-        _ratio(hours, interventions),
+        _ratio(len(rows), needed),
+        _ratio(hours, needed),
     )
 
 
@@ -238,7 +240,7 @@ def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
     for name, mine in found.items():
         true, needed = shares_of(mine)[:2]
         lines.append(
-            '    {:<24}{:>7.1%} true success {:>7.1%} interventions'.format(
+            '    {:<24}{:>7.1%} true success {:>7.1%} person needed'.format(
                 name, true.share, needed.share
             )
         )
@@ -291,8 +293,8 @@ _COSTS = (
     'damage for each completed task',
     'damage in a completed task',
     's to completion, median',
-    'trials between interventions',
-    'robot hours between interventions',
+    'trials per person needed',
+    'robot hours per person needed',
 )
 
 
@@ -306,7 +308,7 @@ def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
         counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
         if sum(counts):
             lines.append(
-                '  interventions, {} against {}: {} trials under {} alone, {} under {} alone, '
+                '  person needed, {} against {}: {} trials under {} alone, {} under {} alone, '
                 'of {} that both ran; McNemar p = {:.3g}'.format(
                     first,
                     second,

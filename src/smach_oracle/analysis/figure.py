@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from .trial_counter import TrialEnding, ended_otherwise
+from .trial_counter import EXPERT_ANSWERED, TrialEnding, ended_otherwise
 from .trials import TrialSummary
 
 COLUMN_IN = {1: 3.5, 2: 7.16}  # widths of one and of two columns of an IEEE paper
@@ -162,7 +162,7 @@ def _draw_events(axes: Any, variant: VariantSeries, axes_width_pt: float) -> Non
     bar_pt = min(4.0, max(1.0, 0.7 * axes_width_pt / max(1, len(variant.trials))))
     for sign, colour, label, number in (
         (1, BLUE, 'oracle recoveries', lambda trial: trial.recoveries),
-        (-1, VERMILLION, 'expert assists', lambda trial: trial.answered),
+        (-1, VERMILLION, 'expert answers', lambda trial: trial.answered),
     ):
         bars = [(x, number(trial)) for x, trial in zip(variant.x, variant.trials) if number(trial)]
         axes.vlines(
@@ -196,7 +196,7 @@ def _draw_events(axes: Any, variant: VariantSeries, axes_width_pt: float) -> Non
 def _draw_needed(axes: Any, variants: Dict[bool, VariantSeries], legend_columns: int) -> None:
     series = (
         (True, BLUE, '-', 1.8, 'with an oracle recovery', lambda trial: trial.recoveries > 0),
-        (True, VERMILLION, '-', 1.8, 'with an expert assist', lambda trial: trial.answered > 0),
+        (True, VERMILLION, '-', 1.8, EXPERT_ANSWERED, lambda trial: trial.answered > 0),
         (
             True,
             BLACK,

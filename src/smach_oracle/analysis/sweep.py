@@ -1,10 +1,11 @@
 """Count how often the expert was asked, by the oracle's memory and policy.
 
 Prints for each setting in how many trials the expert was asked, in how many the oracle recovered,
-and how many truly succeeded. Intervals of 95% are over trials and, if there are several, over
-replicates. Draws interventions as a function of the memory N (paper, section IV-A: "since this
-memory is a tunable parameter, the frequency of expert intervention can be set"). Exit code: 0, all
-bags were read; 1, some were skipped; 2, there was nothing to count.
+how many truly succeeded, and how many needed a person. Intervals of 95% are over trials and, if
+there are several, over replicates. Draws the share of trials with a question over the memory N
+(paper, section IV-A: "since this memory is a tunable parameter, the frequency of expert
+intervention can be set"). Exit code: 0, all bags were read; 1, some were skipped; 2, there was
+nothing to count.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from smach_oracle.oracle.settings.paths import path_of
 from .bag_events import BagError
 from .reading import report_error, report_skipped
 from .table import over_replicates, percent
+from .trial_counter import PERSON_NEEDED
 from .trials import load_trials
 from .variants import (
     ENDED_IN_FAILURE,
@@ -42,6 +44,8 @@ class SweepPoint(NamedTuple):
     recovered: Count
     failed: Count
     true_success: Optional[Count]
+    needed: Count  # of a person, at least where `unjudged` is above 0
+    unjudged: int = 0
 
 
 def find_points(variants: Sequence[VariantTrials]) -> List[SweepPoint]:
@@ -63,6 +67,8 @@ def find_points(variants: Sequence[VariantTrials]) -> List[SweepPoint]:
                 counts.of(RECOVERIES),
                 counts.of(ENDED_IN_FAILURE),
                 truth,
+                counts.of(PERSON_NEEDED),
+                counts.unjudged,
             )
         )
     return sorted(points, key=lambda point: (point.experiment, point.label, point.memory or 0))
@@ -93,7 +99,7 @@ def format_points(points: Sequence[SweepPoint]) -> str:
         lines += [
             '',
             '{}, {}'.format(experiment, label),
-            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format(
+            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{:<29}{}'.format(
                 'memory N',
                 'trials',
                 'expert asked (95% interval)',
@@ -101,6 +107,7 @@ def format_points(points: Sequence[SweepPoint]) -> str:
                 'oracle recovered',
                 'failed',
                 'true success',
+                PERSON_NEEDED,
             ),
         ]
         lines += [_line(point) for point in chosen]
@@ -112,7 +119,7 @@ def _parts(points: Sequence[SweepPoint]) -> List[Tuple[str, str]]:
 
 
 def _line(point: SweepPoint) -> str:
-    return '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{}'.format(
+    return '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{:<29}{}'.format(
         '?' if point.memory is None else point.memory,
         point.trials,
         _with_interval(point.asked),
@@ -120,6 +127,7 @@ def _line(point: SweepPoint) -> str:
         _with_interval(point.recovered),
         '{:.1f}%'.format(100 * point.failed.share),
         'unknown' if point.true_success is None else _with_interval(point.true_success),
+        ('at least ' if point.unjudged else '') + _with_interval(point.needed),
     ).rstrip()
 
 
@@ -128,7 +136,7 @@ def _with_interval(count: Count) -> str:
 
 
 def save_figure(points: Sequence[SweepPoint], stem: str) -> List[str]:
-    """Draw interventions over memory to `stem`.svg and `stem`.png, and return the paths.
+    """Draw questions over memory to `stem`.svg and `stem`.png, and return the paths.
 
     :raises OSError: where a file cannot be written.
     """

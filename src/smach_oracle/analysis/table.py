@@ -6,12 +6,13 @@ Definitions: doc/statistics.md.
 import csv
 import json
 from collections import Counter
-from typing import IO, Any, Dict, List, Optional, Sequence
+from typing import IO, Any, Dict, List, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import BY_NAME_VERSION, FORMER_RULE, RULE
 
 from .bag_events import SkippedBag
 from .causes import cause_rows, format_causes
+from .trial_counter import EXPERT_ANSWERED, PERSON_NEEDED
 from .trials import TrialSummary
 from .truth import Truth
 from .variants import (
@@ -26,6 +27,7 @@ from .variants import (
 )
 
 _INDENTED = (ANSWERED, NOT_ANSWERED)
+_WORDS = {ANSWERED: EXPERT_ANSWERED}  # of a count in text
 
 
 def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary] = ()) -> str:
@@ -45,7 +47,7 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
         'Variant',
         'Trials',
         'Oracle recoveries',
-        'Expert interventions',
+        'Expert answered',
         'Ended in failure',
     ]
     names = [RECOVERIES, ANSWERED, ENDED_IN_FAILURE]
@@ -53,7 +55,9 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
         headings, names = headings + ['Other end'], names + [OTHER_END]
     if any(variant.truth_known for variant in variants):
         headings, names = headings + ['True success'], names + [TRUE_SUCCESS]
-    rows = [headings]
+    headings, names = headings + ['Person needed'], names + [PERSON_NEEDED]
+    above, below = zip(*(_in_two_lines(heading) for heading in headings))
+    rows = [list(above), list(below)]
     for variant in variants:
         shares = [_share(variant, name) for name in names]
         rows.append([variant.experiment, variant.name, str(variant.trials)] + shares)
@@ -69,11 +73,32 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
     return [
         'Shared autonomy statistics: trials in which each happened at least once',
         rule,
-        lines[0],
+        *lines[:2],
         rule,
-        *lines[1:],
+        *lines[2:],
         rule,
+        *_what_columns_mean(variants),
     ]
+
+
+def _in_two_lines(heading: str) -> Tuple[str, str]:
+    above, _, below = heading.rpartition(' ')
+    return above, below
+
+
+def _what_columns_mean(variants: Sequence[VariantCounts]) -> List[str]:
+    lines = [
+        'Expert answered: a question, at least. The paper\'s column "expert interventions".',
+        'Person needed: a question was asked, or the trial did not truly end in success.',
+    ]
+    unjudged = sum(variant.unjudged for variant in variants)
+    if unjudged:
+        lines += [
+            '  At least: no judge saw {} trial{} that ended with neither a failure nor a '
+            'question.'.format(unjudged, 's' if unjudged > 1 else ''),
+            '  How many of them are false successes is not known.',
+        ]
+    return lines
 
 
 def _share(variant: VariantCounts, name: str) -> str:
@@ -98,6 +123,12 @@ def _variant_lines(variant: VariantCounts) -> List[str]:
         heading + ('   over replicates' if several else ''),
     ]
     lines += [_count_line(count) for count in variant.counts]
+    if variant.unjudged:
+        lines.append(
+            '    at least: how many false successes are among {} others is not known'.format(
+                variant.unjudged
+            )
+        )
     if 0 < variant.truth_known < variant.trials:
         lines.append(
             '  how a trial truly ended is known of {} of {}'.format(
@@ -123,7 +154,12 @@ def _count_line(count: Count) -> str:
     events = '' if count.events is None else str(count.events)
     over = over_replicates(count)
     return '  {:<26}{:>8}{:>8.1f}%   {:<16}{:>8}   {}'.format(
-        indent + count.name, count.trials, 100 * count.share, percent(count.interval), events, over
+        indent + _WORDS.get(count.name, count.name),
+        count.trials,
+        100 * count.share,
+        percent(count.interval),
+        events,
+        over,
     ).rstrip()
 
 
@@ -172,8 +208,13 @@ def as_data(
 
 
 def _variant_data(variant: VariantCounts) -> Dict[str, Any]:
-    """Return plain data, with `arm` and `runs`, the older names of `variant` and `trials`."""
-    data = dict(variant._asdict(), counts=[item._asdict() for item in variant.counts])
+    """Return plain data, with `arm` and `runs`, the older names of `variant` and `trials`.
+
+    The count `answered` is there as `expert answered`, too.
+    """
+    counts = [item._asdict() for item in variant.counts]
+    counts += [dict(item, name=_WORDS[item['name']]) for item in counts if item['name'] in _WORDS]
+    data = dict(variant._asdict(), counts=counts)
     name = data.pop('name')
     return dict(data, variant=name, arm=name, runs=variant.trials)
 
@@ -190,6 +231,8 @@ def _trial_data(trial: TrialSummary) -> Dict[str, Any]:
         settings=dict(trial.settings),
         cause=trial.cause._asdict() if trial.cause else None,
         truth=trial.truth._asdict() if trial.truth else None,
+        expert_answered=trial.answered > 0,
+        person_needed=trial.person_needed,
     )
 
 
@@ -237,6 +280,8 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             'down_s',
             'wrong_object',
             'damage',
+            'expert_answered',
+            'person_needed',
         ]
     )
     for trial in trials:
@@ -249,6 +294,7 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             + world
             + [trial.unwell_s, trial.resumed, trial.down_s]
             + _harm(truth)
+            + [trial.answered > 0, '' if trial.person_needed is None else trial.person_needed]
         )
 
 

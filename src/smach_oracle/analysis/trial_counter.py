@@ -16,6 +16,9 @@ from smach_oracle.oracle.settings.failure_rule import (
     rule_after,
 )
 
+# the same words in every table and figure
+EXPERT_ANSWERED = 'expert answered'  # a question at least: the paper's "expert interventions"
+PERSON_NEEDED = 'person needed'  # a question was asked, or the trial did not truly succeed
 AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
 

@@ -48,6 +48,26 @@ class TrialSummary(NamedTuple):
         """Whether the machine ended in success, by its outcome."""
         return self.ending is TrialEnding.SUCCESS
 
+    @property
+    def truly_succeeded(self) -> Optional[bool]:
+        """Whether machine and judge say success, of the object that was meant.
+
+        Where the machine's outcome says neither success nor failure, the judge alone says it. None:
+        nobody has judged it, and the machine does not say that it failed.
+        """
+        if self.ending not in (TrialEnding.SUCCESS, TrialEnding.OTHER):
+            return False
+        if self.truth is None:
+            return None
+        return self.truth.success and not self.truth.wrong_object
+
+    @property
+    def person_needed(self) -> Optional[bool]:
+        """Whether a question was asked, or the trial did not truly succeed. None: not known."""
+        if self.questions:
+            return True
+        return None if self.truly_succeeded is None else not self.truly_succeeded
+
 
 class Trials(NamedTuple):
     """All that was found in some folders."""

@@ -7,7 +7,7 @@ the oracle.
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .intervals import Interval, replicate_interval, wilson_interval
-from .trial_counter import TrialEnding
+from .trial_counter import PERSON_NEEDED, TrialEnding
 from .trials import TrialSummary
 
 KINDS = ((True, 'with oracle'), (False, 'without oracle'), (None, 'variant unknown'))
@@ -70,6 +70,7 @@ class VariantCounts(NamedTuple):
     truth_known: int = 0  # trials whose true end a world has recorded
     resumed: int = 0  # trials that went on after their program was stopped
     down_s: float = 0.0  # in which it did not run, all together
+    unjudged: int = 0  # trials of which nobody knows whether a person was needed
 
     def of(self, name: str) -> Count:
         """Return the count of that name."""
@@ -202,6 +203,9 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
             make_count(name, _found(holds), known, _by_replicate(known))
             for name, holds in _BY_TRUTH
         ]
+    counts.append(
+        make_count(PERSON_NEEDED, lambda trial: trial.person_needed is True, trials, parts)
+    )
     return VariantCounts(
         variant.experiment,
         variant.name,
@@ -213,6 +217,7 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
         len(known),
         sum(1 for trial in trials if trial.resumed),
         sum(trial.down_s for trial in trials),
+        sum(trial.person_needed is None for trial in trials),
     )
 
 

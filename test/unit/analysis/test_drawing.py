@@ -94,7 +94,7 @@ def test_the_main_figure_has_each_share_with_its_interval_and_hides_none():
     ]
     heights = sorted(y for _, y in points)
     assert len(points) == 8 and min(later - y for y, later in zip(heights, heights[1:])) > 0.1
-    x, _, (segments,) = errorbars(axes)['intervention']
+    x, _, (segments,) = errorbars(axes)['person needed']
     assert x[0] == pytest.approx(40.0)
     assert segments[0][:, 0] == pytest.approx([100 * end for end in wilson_interval(4, 10)])
 
@@ -120,20 +120,20 @@ def test_the_bound_stands_beside_each_variant_on_the_same_seeds_alone():
     assert axes.get_title('left') == 'Pick and place, 10 seeds that all ran'
     assert [tick.get_text() for tick in axes.get_yticklabels()][-1] == 'hindsight'
     shares = [float(bars.lines[0].get_xdata()[0]) for bars in axes.containers]
-    assert shares[1::4] == [20.0, 10.0, 30.0, 10.0], 'interventions'
+    assert shares[1::4] == [20.0, 10.0, 30.0, 10.0], 'person needed'
     tables = cells_of(format_tables(rows))
-    assert tables[1]['interventions'] == [
+    assert tables[1]['person needed'] == [
         '60.0% (39% to 78%)',
         '55.0% (34% to 74%)',
         '30.0% (11% to 60%)',
     ]
-    assert tables[0]['variant'][:3] == ['trials', 'true success', 'interventions']
+    assert tables[0]['variant'][:3] == ['trials', 'true success', 'person needed']
     assert [tables[0][name][:3] for name in ('bare', 'ladder')] == [
         ['20', '50.0% (30% to 70%)', '60.0% (39% to 78%)'],
         ['10', '100.0% (72% to 100%)', '30.0% (11% to 60%)'],
     ]
     bounded = next(table for table in tables if 'hindsight' in table.get('', ()))
-    assert [cell.split()[0] for cell in bounded['interventions']] == [
+    assert [cell.split()[0] for cell in bounded['person needed']] == [
         '20.0%',
         '10.0%',
         '30.0%',
@@ -177,7 +177,7 @@ def test_the_hours_have_events_counts_and_learned_rates():
     with rc_context(STYLE):
         events, needed, rates = draw_hours(rows).axes
     assert len(events.patches) == 1, 'the light of one trial: that of another never came'
-    curve = next(line for line in needed.lines if line.get_label() == 'intervention')
+    curve = next(line for line in needed.lines if line.get_label() == 'person needed')
     assert curve.get_ydata()[-1] == 2 and curve.get_xdata()[-1] == 4.5
     assert [line.get_label() for line in rates.lines] == ['PICK', 'PLACE']
 
@@ -205,7 +205,7 @@ def test_a_lost_trial_is_among_the_hours():
     assert list(next(line for line in events.lines if line.get_label() == 'lost').get_xdata()) == [
         2.0
     ]
-    curve = next(line for line in needed.lines if line.get_label() == 'intervention')
+    curve = next(line for line in needed.lines if line.get_label() == 'person needed')
     assert list(curve.get_xdata()[curve.get_ydata() == 1])[0] == 2.0
 
 
@@ -214,14 +214,14 @@ def test_the_main_table_has_a_line_for_each_figure_and_a_column_for_each_variant
         format_tables(rows_of('bare', 0) + rows_of('default', 2, attempts=1, expert_s=6.0))
     )[1]
     assert told[''] == ['bare', 'default'] and told['trials'] == ['10', '10']
-    assert told['interventions'][1] == '20.0% (6% to 51%)'
+    assert told['person needed'][1] == '20.0% (6% to 51%)'
     assert [
         told[name][1]
         for name in (
             'attempts a trial',
             'expert s a trial',
             'expert s a robot hour',
-            'trials between interventions',
+            'trials per person needed',
             's to completion, median',
         )
     ] == ['1', '6', '360', '5', '60']
@@ -246,13 +246,13 @@ def test_over_replicates_stand_the_smallest_and_the_largest_share():
         for number, asked in enumerate((1, 4, 2))
         for row in rows_of('default', asked)
     ]
-    share = next(each for each in shares_of(rows) if each.name == 'interventions')
+    share = next(each for each in shares_of(rows) if each.name == 'person needed')
     assert share.over_replicates == (0.1, 0.4)
     assert shares_of(rows[:10])[0].over_replicates is None
     told = cells_of(format_tables(rows + rows_of('ladder', 0)))[1]
-    assert told['interventions, replicates'] == ['10.0% to 40.0% (0% to 61%)', '-']
+    assert told['person needed, replicates'] == ['10.0% to 40.0% (0% to 61%)', '-']
     assert 'replicates 10.0% to 40.0%' in format_comparison(rows)
-    assert 'interventions, replicates' not in format_tables(rows[:10])
+    assert 'person needed, replicates' not in format_tables(rows[:10])
 
 
 def test_the_main_figure_has_a_bar_from_the_smallest_to_the_largest_replicate():

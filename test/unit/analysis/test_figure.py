@@ -69,7 +69,7 @@ def test_the_steps_end_at_the_tables_counts():
         'failed, without oracle': 10,
         'failed, with oracle': 1,
         'with an oracle recovery': 10,
-        'with an expert assist': 3,
+        'expert answered': 3,
     }
 
 
@@ -113,7 +113,7 @@ def test_text_is_large_enough_for_print():
 @pytest.mark.parametrize(
     'recovers, expected',
     [
-        (True, {'with an oracle recovery', 'with an expert assist', 'failed, with oracle'}),
+        (True, {'with an oracle recovery', 'expert answered', 'failed, with oracle'}),
         (False, {'failed, without oracle'}),
     ],
 )
@@ -129,7 +129,7 @@ def test_a_single_trial_can_be_drawn():
     assert {max(line.get_ydata()) for line in lines(drawn.axes[1]).values()} <= {0, 1}
     assert set(lines(drawn.axes[1])) == {
         'with an oracle recovery',
-        'with an expert assist',
+        'expert answered',
         'failed, with oracle',
     }
 

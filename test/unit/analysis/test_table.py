@@ -138,6 +138,8 @@ def test_the_papers_table_comes_out_of_the_papers_counts():
         '(4.0%)',
         '0',
         '(0.0%)',
+        '6',
+        '(4.0%)',
     ]
 
 
@@ -243,8 +245,8 @@ def test_what_the_machine_says_is_held_against_what_the_world_says():
     assert (counts, variant.truth_known) == ([2, 1, 1], 4)
     assert variant.of(TRUE_SUCCESS).share == 0.5, 'of those in which it is known'
     text = table.format_text([variant], trials)
-    assert 'True success' in text and 'how a trial truly ended is known of 4 of 5' in text
-    assert 'True success' not in table.format_text(count_variants([trial(0)]))
+    assert TRUE_SUCCESS in text and 'how a trial truly ended is known of 4 of 5' in text
+    assert TRUE_SUCCESS not in table.format_text(count_variants([trial(0)]))
 
 
 def test_trials_are_counted_by_what_the_world_was_given():
@@ -257,7 +259,9 @@ def test_trials_are_counted_by_what_the_world_was_given():
         ],
     )
     rows = {
-        line.split()[0]: line.split()[1:] for line in text.splitlines() if line.startswith('  ')
+        line.split()[0]: line.split()[1:]
+        for line in text.partition('trials by what')[2].splitlines()
+        if line.startswith('  ')
     }
     assert rows == {
         'cause': ['trials', 'failed', 'recovered', 'asked', 'succeeded', 'true', 'success'],
@@ -351,3 +355,63 @@ def test_replicates_that_all_agree_are_given_no_interval_without_width():
     assert (
         rows['failures of states'].endswith('%') and 'all alike' not in rows['failures of states']
     )
+
+
+@pytest.mark.parametrize(
+    'fields, said, judged, needed',
+    [
+        ({}, TrialEnding.SUCCESS, True, False),
+        ({'questions': 1}, TrialEnding.SUCCESS, True, True),
+        ({}, TrialEnding.SUCCESS, False, True),
+        ({}, TrialEnding.FAILURE, True, True),
+        ({}, TrialEnding.OTHER, True, False),
+        ({}, TrialEnding.OTHER, None, None),
+        ({}, TrialEnding.SUCCESS, None, None),
+        ({'questions': 1}, TrialEnding.SUCCESS, None, True),
+        ({}, TrialEnding.FAILURE, None, True),
+        ({}, TrialEnding.UNFINISHED, None, True),
+    ],
+)
+def test_a_person_was_needed_where_asked_or_not_truly_successful(fields, said, judged, needed):
+    truth = None if judged is None else told(0, True, judged).truth
+    assert trial(0, ending=said, truth=truth, **fields).person_needed is needed
+
+
+def test_another_object_than_the_one_that_was_meant_needs_a_person():
+    judged = told(0, True, True)
+    assert judged.person_needed is False
+    wrong = judged._replace(truth=judged.truth._replace(wrong_object='can'))
+    assert wrong.person_needed is True
+
+
+def test_without_a_judge_the_table_says_that_false_successes_are_not_known():
+    trials = [trial(0), trial(1), trial(2, questions=1, answered=1)]
+    (variant,) = count_variants(trials)
+    assert (variant.of('person needed').trials, variant.unjudged) == (1, 2)
+    text = table.format_text([variant])
+    assert 'At least: no judge saw 2 trials' in text and 'among 2 others is not known' in text
+    judged = table.format_text(count_variants([told(0, True, True)]))
+    assert 'At least:' not in judged and 'at least:' not in judged and 'Person needed: ' in judged
+
+
+def test_the_same_words_are_added_to_json_and_csv_and_the_old_names_stay():
+    trials = [trial(0), trial(1, questions=1, answered=1)]
+    target = io.StringIO()
+    table.write_json(target, count_variants(trials), trials, [])
+    data = json.loads(target.getvalue())
+    counts = {item['name']: item['trials'] for item in data['groups'][0]['counts']}
+    assert (counts['answered'], counts['expert answered'], counts['person needed']) == (1, 1, 1)
+    assert [row['person_needed'] for row in data['trials']] == [None, True]
+    assert [row['expert_answered'] for row in data['trials']] == [False, True]
+    target = io.StringIO()
+    table.write_csv(target, trials)
+    rows = list(csv.DictReader(io.StringIO(target.getvalue())))
+    assert [(row['answered'], row['expert_answered'], row['person_needed']) for row in rows] == [
+        ('0', 'False', ''),
+        ('1', 'True', 'True'),
+    ]
+
+
+def test_table_one_fits_a_terminal_of_100_columns():
+    text = table.format_text(count_variants([told(number, True, True) for number in range(100)]))
+    assert max(map(len, text.splitlines())) <= 100

@@ -330,9 +330,9 @@ def test_the_command_compares_all_variants(tmp_path, capsys):
     assert comparison.main([str(path)]) == 0
     text = capsys.readouterr().out
     assert 'prose (10 trials, 2 replicates)' in text and HINDSIGHT in text
-    assert 'interventions, bare against prose: 10 trials under bare alone, 0 under prose' in text
+    assert 'person needed, bare against prose: 10 trials under bare alone, 0 under prose' in text
     assert 'McNemar p = 0.00195' in text
-    assert 'interventions        10  100.0% (72.2% to 100.0%)' in text
+    assert 'person needed        10  100.0% (72.2% to 100.0%)' in text
 
 
 def test_the_command_says_where_there_is_nothing(tmp_path, capsys):

@@ -106,6 +106,26 @@ def numbers(text: str) -> List[float]:
     return [float(number) for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.]*[/_])', text)]
 
 
+def without_person_needed(text: str) -> str:
+    """A text of figures without those of `person needed`, which version 0.1 did not print."""
+    of_it = ('person needed', 'at least:', 'Person needed:', 'Expert answered:')
+    lines, oracles = [], False
+    for line in text.splitlines():
+        if line.strip().startswith('At least:') or line.strip().startswith(of_it):
+            continue
+        if line.startswith('  How many of them'):
+            continue
+        oracles = oracles and bool(line) or line.endswith('person needed')
+        if oracles:
+            line = re.sub(r' +(at least )?[\d.]+% \([^)]*\)$', '', line)
+        lines.append(line)
+    rules = [place for place, line in enumerate(lines) if line and not line.strip('-')]
+    if len(rules) == 3:  # Table I, of which it is the last column
+        for place in range(rules[1] + 1, rules[2]):
+            lines[place] = re.sub(r' +\d+ \([\d.]+%\)$', '', lines[place])
+    return '\n'.join(lines)
+
+
 def lacking(held: Any, now: Any, where: str = '') -> Iterator[str]:
     """Yield each difference. Further keys, and further rows with a name, do not count."""
     if isinstance(held, dict):

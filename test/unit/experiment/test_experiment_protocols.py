@@ -298,7 +298,7 @@ def test_the_one_command_compares_all_variants_and_draws_figures_and_tables(run,
     code, told = run('--jobs', '3', draws=True)
     assert code == 0
     for name in ('bare', 'restart', 'ladder', 'always_ask'):
-        assert 'interventions, default against {}: '.format(name) in told
+        assert 'person needed, default against {}: '.format(name) in told
     names = {path.name for path in (tmp_path / 'figures').iterdir()}
     assert names == {'tables.md'} | {
         stem + end

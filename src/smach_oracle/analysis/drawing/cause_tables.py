@@ -7,6 +7,7 @@ from ..intervals import wilson_interval
 from ..lasting.causes_log import causes_in
 from ..lasting.checks import OPEN_ENDED, TrialCheck, checks_of
 from ..pairing import BARE, COMPARED, RESTART, on_common_seeds
+from ..trial_counter import PERSON_NEEDED
 from ..trial_rows import TrialRow
 from .markdown import titled
 
@@ -47,16 +48,16 @@ def _of_variant(title: str, rows: Sequence[TrialRow]) -> str:
         )
     return titled(
         title,
-        ['cause', 'class', 'trials', 'with a failure', 'interventions', 'true success'],
+        ['cause', 'class', 'trials', 'with a failure', PERSON_NEEDED, 'true success'],
         lines,
         ['A trial with two causes is in two lines. In parentheses: a 95% Wilson interval.'],
     )
 
 
 def by_class(title: str, variants: Rows) -> List[str]:
-    """Return a table of the interventions under the variants that are compared, by class of cause.
+    """Return a table of the trials that needed a person, by class of cause.
 
-    It is of the trials that all of them ran. Empty where one of them is missing.
+    It is of the trials that all variants that are compared ran. Empty where one of them is missing.
     """
     if any(name not in variants for name in COMPARED):
         return []
@@ -84,7 +85,7 @@ def by_class(title: str, variants: Rows) -> List[str]:
             )
     return [
         titled(
-            title + ': interventions by cause',
+            title + ': person needed, by cause',
             ['trials', 'number', *COMPARED],
             lines,
             [

@@ -15,6 +15,7 @@ from ..comparison import SECONDS_PER_HOUR
 from ..figure import BLACK, BLUE, VERMILLION
 from ..lasting.causes_log import causes_in
 from ..sweep_figure import GREEN
+from ..trial_counter import PERSON_NEEDED
 from ..trial_rows import LOST, TrialRow
 from .looks import Happened, legend_above, panels
 from .titles import tasks_of, title_of
@@ -23,7 +24,7 @@ USUAL = StateSettings()
 HEIGHT_IN = 5.6
 CURVES: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('oracle recovered', BLUE, '-', lambda row: row.recovered),
-    ('intervention', VERMILLION, '--', lambda row: row.intervened),
+    (PERSON_NEEDED, VERMILLION, '--', lambda row: row.intervened),
     ('not a true success', BLACK, ':', lambda row: not row.succeeded),
 )
 LIGHT = {'glare': '#F0E442', 'dim_light': '#BBBBBB'}  # behind the events of trials with such light

@@ -9,13 +9,14 @@ from ..comparison import by_variant, with_hindsight
 from ..figure import BLACK, BLUE, VERMILLION
 from ..pairing import HINDSIGHT
 from ..sweep_figure import GREEN
+from ..trial_counter import PERSON_NEEDED
 from ..trial_rows import TrialRow
 from .looks import Happened, Percent, legend_above, panels
 from .titles import tasks_of, title_of
 
 SHOWN: Tuple[Tuple[str, str, str, Happened], ...] = (
     ('true success', BLUE, 'o', lambda row: row.succeeded),
-    ('intervention', VERMILLION, 's', lambda row: row.intervened),
+    (PERSON_NEEDED, VERMILLION, 's', lambda row: row.intervened),
     ('question', BLACK, 'd', lambda row: row.questions > 0),
     ('recovered', GREEN, '^', lambda row: row.recovered),
 )

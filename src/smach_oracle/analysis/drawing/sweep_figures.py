@@ -12,7 +12,7 @@ from .policies import memory_of, policy_of
 from .titles import tasks_of, title_of, variants_of
 
 Shown = Tuple[str, Happened]
-INTERVENTIONS: Shown = ('Interventions (% of trials)', lambda row: row.intervened)
+NEEDED: Shown = ('Person needed (% of trials)', lambda row: row.intervened)
 QUESTIONS: Shown = ('With a question (% of trials)', lambda row: row.questions > 0)
 SUCCESS: Shown = ('True success (% of trials)', lambda row: row.succeeded)
 HEIGHT_IN = 4.0
@@ -21,10 +21,10 @@ ASIDE_FACTOR = 1.04  # of a memory, likewise
 
 
 def draw_persistence(rows: Sequence[TrialRow]) -> Figure:
-    """Draw interventions above true success, a panel for each task."""
+    """Draw where a person was needed above true success, a panel for each task."""
     return _draw(
         rows,
-        (INTERVENTIONS, SUCCESS),
+        (NEEDED, SUCCESS),
         lambda row: row.variant,
         lambda row: None if row.lasting_share is None else 100 * row.lasting_share,
         'Share of causes that last (%)',

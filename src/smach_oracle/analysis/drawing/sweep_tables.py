@@ -20,7 +20,7 @@ def format_sweeps(kind: str, rows: Sequence[TrialRow]) -> str:
 
 
 def _differences(rows: Sequence[TrialRow]) -> List[str]:
-    """Tell the interventions of the default less those of restart, at each share."""
+    """Tell how often the default needed a person, less how often restart did, at each share."""
     lines: Dict[str, List[List[str]]] = {}
     for (task, share, _), mine in groups_of(rows).items():
         variants = by_variant(mine)
@@ -44,7 +44,7 @@ def _differences(rows: Sequence[TrialRow]) -> List[str]:
     heads = ['causes that last', 'pairs', 'default', 'restart', 'default less restart']
     return [
         titled(
-            title_of(task) + ': interventions, paired by seed',
+            title_of(task) + ': person needed, paired by seed',
             heads,
             lines[task],
             [

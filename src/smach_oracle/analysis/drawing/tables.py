@@ -14,6 +14,7 @@ from ..comparison import (
     with_hindsight,
 )
 from ..pairing import HINDSIGHT, paired_counts, pairs_to_test
+from ..trial_counter import EXPERT_ANSWERED, PERSON_NEEDED
 from ..trial_rows import TrialRow
 from .cause_tables import by_cause, by_class, by_log
 from .markdown import titled
@@ -21,15 +22,16 @@ from .titles import tasks_of, title_of
 
 SHARES = (
     'true success',
-    'interventions',
+    PERSON_NEEDED,
     'a question asked',
+    EXPERT_ANSWERED,
     'recovered',
     'with attempts',
     'false success',
     'lost or hung',
 )
 OTHER_END = 'other end'  # there only where a variant has some
-OVER_REPLICATES = ('true success', 'interventions', 'a question asked', 'recovered')
+OVER_REPLICATES = ('true success', PERSON_NEEDED, 'a question asked', 'recovered')
 # of Costs, and what it is called
 COSTS: Tuple[Tuple[str, str], ...] = (
     ('wrong_objects', 'trials with a wrong object'),
@@ -41,14 +43,14 @@ COSTS: Tuple[Tuple[str, str], ...] = (
     ('expert_s', 'expert s a trial'),
     ('expert_s_per_hour', 'expert s a robot hour'),
     ('completion_s', 's to completion, median'),
-    ('trials_between', 'trials between interventions'),
-    ('hours_between', 'robot hours between interventions'),
+    ('trials_between', 'trials per person needed'),
+    ('hours_between', 'robot hours per person needed'),
 )
-SUMMARY = ('true success', 'interventions', 'a question asked', 'recovered')
+SUMMARY = ('true success', PERSON_NEEDED, 'a question asked', 'recovered')
 # of Costs, in the summary
 SUMMED_UP = ('damage', 'expert_s', 'completion_s')
 COMPARING = ('main', 'persistence', 'extra')
-SAME_SEEDS = ('true success', 'interventions', 'a question asked')
+SAME_SEEDS = ('true success', PERSON_NEEDED, 'a question asked')
 
 
 def format_tables(rows: Sequence[TrialRow], kind: str = 'main') -> str:
@@ -140,7 +142,7 @@ def _completion(variants: Dict[str, List[TrialRow]]) -> List[List[str]]:
 
 
 def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
-    """Tell McNemar's exact test of the interventions."""
+    """Tell McNemar's exact test of the trials that needed a person."""
     lines = []
     for first, second in pairs_to_test(list(variants)):
         counts = paired_counts(variants[first], variants[second], lambda row: row.intervened)
@@ -156,7 +158,7 @@ def _tests(title: str, variants: Dict[str, List[TrialRow]]) -> List[str]:
     return (
         [
             titled(
-                title + ': interventions, paired by seed',
+                title + ': person needed, paired by seed',
                 heads,
                 lines,
                 [

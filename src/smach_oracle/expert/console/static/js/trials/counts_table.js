@@ -7,7 +7,7 @@ import { duration, percent } from '../page/format.js';
 
 const OTHER_END = 'Other end'; // the outcome says neither success nor failure
 const COLUMNS = ['Experiment', 'Variant', 'Trials', 'Failures', 'Oracle recoveries', 'Questions',
-  'Expert interventions', 'Ended in failure', OTHER_END, 'Waited until well'];
+  'Expert answered', 'Ended in failure', OTHER_END, 'Waited until well'];
 
 /**
  * @param {string} caption
