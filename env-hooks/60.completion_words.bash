@@ -9,7 +9,8 @@ scripted_operator what_if'
 _smach_oracle_words() {
   case $1 in
     'bag_statistics')
-      echo '--columns --csv --failing-outcomes --figure --help --json --version --x-axis -h' ;;
+      echo '--by-state --columns --csv --failing-outcomes --figure --help --json --version
+--x-axis -h' ;;
     'bag_statistics --columns')
       echo '1 2' ;;
     'bag_statistics --x-axis')

@@ -15,6 +15,8 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from . import table
 from .bag_events import BagError
+from .by_state.rows import VariantStates, by_variant, rows_of, write_csv_files
+from .by_state.text import format_states
 from .reading import report_error, report_skipped
 from .trials import Trials, TrialSummary, load_trials
 from .variants import VariantCounts, count_variants, time_series
@@ -25,11 +27,14 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = _parse(argv)
     try:
         listed = args.failing_outcomes
-        found = load_trials(args.folders, FailureRule(tuple(listed)) if listed else None)
+        rule = FailureRule(tuple(listed)) if listed else None
+        found = load_trials(args.folders, rule, args.by_state)
         variants = count_variants(found.trials)
+        states = by_variant(found.trials, found.states) if args.by_state else None
         sys.stdout.write(table.format_text(variants, found.trials))
+        sys.stdout.write(format_states(states or []))
         code = report_skipped(found.skipped)
-        _write_files(args, found, variants)
+        _write_files(args, found, variants, states)
     except (BagError, ImportError, OSError) as err:
         return report_error('bag_statistics', err)
     return code
@@ -72,6 +77,12 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     )
     parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
     parser.add_argument(
+        '--by-state',
+        action='store_true',
+        help='print what happened in each state: visits, failures and why, the ways on, questions, '
+        'and what they cost. --json and --csv then write it, too',
+    )
+    parser.add_argument(
         '--failing-outcomes',
         nargs='+',
         metavar='NAME',
@@ -81,13 +92,21 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def _write_files(args: argparse.Namespace, found: Trials, variants: List[VariantCounts]) -> None:
+def _write_files(
+    args: argparse.Namespace,
+    found: Trials,
+    variants: List[VariantCounts],
+    states: Optional[List[VariantStates]],
+) -> None:
     if args.json:
         with open(args.json, 'w', encoding='utf-8') as target:
-            table.write_json(target, variants, found.trials, found.skipped)
+            more = {} if states is None else {'by_state': rows_of(states)}
+            table.write_json(target, variants, found.trials, found.skipped, more)
     if args.csv:
         with open(args.csv, 'w', encoding='utf-8', newline='') as target:
             table.write_csv(target, found.trials)
+        if states is not None:
+            write_csv_files(args.csv, states)
     if args.figure:
         _write_figures(args, found.trials)
 

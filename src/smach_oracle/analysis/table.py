@@ -6,7 +6,7 @@ Definitions: doc/statistics.md.
 import csv
 import json
 from collections import Counter
-from typing import IO, Any, Dict, List, Optional, Sequence, Tuple
+from typing import IO, Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import BY_NAME_VERSION, FORMER_RULE, RULE
 
@@ -241,9 +241,12 @@ def write_json(
     variants: Sequence[VariantCounts],
     trials: Sequence[TrialSummary],
     skipped: Sequence[SkippedBag],
+    more: Optional[Mapping[str, Any]] = None,
 ) -> None:
-    """Write everything as one JSON object."""
-    json.dump(as_data(variants, trials, skipped), target, indent=1, sort_keys=True)
+    """Write everything as one JSON object. `more`: further keys of it."""
+    json.dump(
+        dict(as_data(variants, trials, skipped), **(more or {})), target, indent=1, sort_keys=True
+    )
     target.write('\n')
 
 

@@ -7,6 +7,8 @@ from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 
 from .bag_events import BagError, RecordedCause, SkippedBag
+from .by_state.follower import states_of
+from .by_state.state_counts import StatesOfTrials
 from .reading import read_bags
 from .trial_counter import TrialCounter, TrialEnding
 from .truth import Truth, TruthFiles
@@ -74,12 +76,16 @@ class Trials(NamedTuple):
 
     trials: List[TrialSummary]  # in the order of their beginning
     skipped: List[SkippedBag]
+    states: Mapping[str, StatesOfTrials] = {}  # by trial id, where they were asked for
 
 
-def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Trials:
+def load_trials(
+    places: Sequence[str], rule: Optional[FailureRule] = None, by_state: bool = False
+) -> Trials:
     """Read all bags in folders and below. Those that cannot be used are listed with the reason.
 
     :param rule: for all trials. None means that each is counted by the rule of its record.
+    :param by_state: count what happened in each state, too.
 
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.
@@ -98,7 +104,11 @@ def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Tr
             )
         )
     trials = gathered.summaries(rule)
-    return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
+    return Trials(
+        sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)),
+        skipped,
+        gathered.states(rule) if by_state else {},
+    )
 
 
 class _TrialEvents:
@@ -124,6 +134,12 @@ class _TrialEvents:
             truth = truths.of(trial.replicate, cause.seed if cause else None)
             found.append(trial._replace(cause=cause, truth=truth))
         return found
+
+    def states(self, rule: Optional[FailureRule]) -> Dict[str, StatesOfTrials]:
+        return {
+            trial_id: states_of([by_number[seq] for seq in sorted(by_number)], rule)
+            for trial_id, by_number in self.events.items()
+        }
 
 
 def summarise(

@@ -140,10 +140,10 @@ class Decisions:
     def _gone(self, jump: Event) -> Optional[GoneWay]:
         data: Mapping[str, Any] = jump.data if isinstance(jump.data, Mapping) else {}
         left = str(data.get(JUMPED_FROM, ''))
-        failed = _split(left) if left else key_of(jump)
+        failed = split_path(left) if left else key_of(jump)
         if jump.by:
             self._open.pop(failed, None)
-            return GoneWay(failed, _way_of_person(jump, failed, str(data.get(JUMPED_TO, ''))))
+            return GoneWay(failed, entered_way(jump, failed, str(data.get(JUMPED_TO, ''))))
         if 'way' not in data:
             return None
         way = str(data['way'])
@@ -156,14 +156,19 @@ class Decisions:
         return GoneWay(found[-1], way, self._open.pop(found[-1]))
 
 
-def _split(path: str) -> Key:
+def split_path(path: str) -> Key:
+    """Return the container and the state of the path of a state."""
     container, _, state = path.rpartition('/')
     return container, state
 
 
-def _way_of_person(jump: Event, failed: Key, entered: str) -> str:
-    """Return the key of the way that a person has chosen, as a menu of the state names it."""
-    container, label = _split(entered) if entered else (jump.path, jump.target)
+def entered_way(jump: Event, failed: Key, entered: str) -> str:
+    """Return the key of the way that enters where a JUMP leads, as a menu of the state names it.
+
+    `failed`: the state from which it goes on. `entered`: the path of the entered state, if it is
+    below the target.
+    """
+    container, label = split_path(entered) if entered else (jump.path, jump.target)
     if container != failed[0]:
         return key_of_way('/' + '/'.join((container, label)).partition('/')[2], '')
     return key_of_way(label, failed[1])

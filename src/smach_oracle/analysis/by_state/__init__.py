@@ -1,0 +1,1 @@
+"""What happened in each state, what recoveries cost, and what the expert did."""
