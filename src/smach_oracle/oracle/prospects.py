@@ -8,7 +8,7 @@ from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .decision.ways import WayKind
 from .machine.nesting import nodes_of
-from .machine.places import TreePlace, direct_levels_at_rest, name_of
+from .machine.places import TreePlace, direct_levels, name_of
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
@@ -189,7 +189,7 @@ def _before(node: TreeNode, label: str, unguarded: Unguarded) -> Iterator[Tuple[
     """
     crosses = node.in_force.policy.goes_by_ways or node.settings.step_back_across
     is_allowed = True
-    for level in direct_levels_at_rest(node) if crosses else (node,):
+    for level in direct_levels(node, at_rest=True) if crosses else (node,):
         is_allowed = is_allowed and level.settings_of(label).on_retry == ALLOW
         drawn = unguarded.transitions(level) if is_allowed else {}
         allowed = leading_to(level, (label,), drawn=drawn)
@@ -209,7 +209,7 @@ def _kinds(node: TreeNode, settings: StateSettings, before: Sequence[str]) -> It
         yield WayKind.PREPARE
     if before:
         yield WayKind.STEP_BACK
-    levels = direct_levels_at_rest(node)
+    levels = direct_levels(node, at_rest=True)
     for kind, level in ((WayKind.START, node), (WayKind.TOP, levels[-1])):
         start = name_of(TreePlace(level, initial_label_of(level.machine)), node)
         if start in before and (kind is WayKind.START or len(levels) > 1):

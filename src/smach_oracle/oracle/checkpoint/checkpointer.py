@@ -307,10 +307,9 @@ class Checkpointer:
         They are those around the failed state, whose container the machine may have left.
         """
         path, _, label = str((jump.data or {}).get(JUMPED_FROM, '')).rpartition('/')
-        around: Optional[TreeNode] = self._known_node(path, label) or node
-        while around is not None:
-            yield from self._facts_of(around).streaks()
-            around = around.parent
+        failed = self._known_node(path, label) or node
+        for each in (failed, *failed.around()):
+            yield from self._facts_of(each).streaks()
 
     def _not_begun_below(self, path: str) -> Iterator[Fact]:
         """Yield that what is in a container or state has not begun in this visit of it."""

@@ -1,7 +1,7 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 
 import time
-from typing import Iterator, List, Mapping, NamedTuple, Optional, Sequence, Tuple, cast
+from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple, cast
 
 import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
@@ -282,7 +282,7 @@ class _Setting:
 
         That is the next item of an Iterator, or a state of the container or of one above it.
         """
-        around = [*_up_from(node), node.top()]
+        around = [node, *node.around()]
         self._resumed.ask_before_next(
             around + inside,
             _why(self._resumption),
@@ -412,13 +412,6 @@ class _Setting:
         ]
         state = states_of(node.machine).get(label)
         return inside if inside and _is_wrapped_through(state) else None
-
-
-def _up_from(node: TreeNode) -> Iterator[TreeNode]:
-    """Yield a container and those above it, but the top one."""
-    while node.parent is not None:
-        yield node
-        node = node.parent
 
 
 def _is_wrapped_through(state: object) -> bool:

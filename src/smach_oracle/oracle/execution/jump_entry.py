@@ -116,9 +116,8 @@ def jump_path_for(place: TreePlace) -> JumpPath:
 
     It is that from its own container where none runs.
     """
-    sent: Optional[TreeNode] = place.node
-    while sent is not None and not is_executing(sent.machine):
-        sent = sent.parent
+    around = (place.node, *place.node.around())
+    sent = next((each for each in around if is_executing(each.machine)), None)
     way = jump_path_to(sent, place) if sent is not None else None
     return way or JumpPath((), place.node, (place,))
 

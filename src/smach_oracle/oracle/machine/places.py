@@ -86,25 +86,18 @@ def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
             yield each
 
 
-def direct_levels(node: TreeNode) -> List[TreeNode]:
+def direct_levels(node: TreeNode, at_rest: bool = False) -> List[TreeNode]:
     """Return a container and its levels up to a Concurrence or an Iterator, innermost first.
 
     What runs in the other branches, and what is done of the items, belongs to others.
+
+    `at_rest`: those that they would be, whatever runs.
     """
     levels = [node]
-    for above in levels_above(node):
+    for above in node.around() if at_rest else levels_above(node):
         if not is_direct(levels[-1]):
             break
         levels.append(above)
-    return levels
-
-
-def direct_levels_at_rest(node: TreeNode) -> List[TreeNode]:
-    """Return those that they would be, whatever runs."""
-    levels = [node]
-    while is_direct(node) and node.parent is not None:
-        node = node.parent
-        levels.append(node)
     return levels
 
 
@@ -252,26 +245,19 @@ def _where_it_is(node: TreeNode, name: str) -> str:
     return 'in other containers there is ' + ', '.join(sorted(paths)) if paths else ''
 
 
-def _node_and_above(node: TreeNode) -> List[TreeNode]:
-    """Return a container and all wrapped ones around it."""
-    found = [node]
-    while found[-1].parent is not None:
-        found.append(found[-1].parent)
-    return found
-
-
 def _is_around(place: TreePlace, node: TreeNode) -> bool:
     return any(
         each.parent is place.node and each.labels_from_parent[0] == place.label
-        for each in _node_and_above(node)
+        for each in (node, *node.around())
     )
 
 
 def _is_in_iterator(place: TreePlace, node: TreeNode) -> bool:
     """Whether an Iterator lies between a place and what is around both."""
-    common, inner = _node_and_above(node), place.node
-    while inner.parent is not None and not any(inner is each for each in common):
-        if any(isinstance(link.outer_container, smach.Iterator) for link in links_to(inner)):
-            return True
-        inner = inner.parent
-    return False
+    common = (node, *node.around())
+    return any(
+        isinstance(link.outer_container, smach.Iterator)
+        for each in (place.node, *place.node.around())
+        if each not in common
+        for link in links_to(each)
+    )

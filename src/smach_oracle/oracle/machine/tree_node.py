@@ -131,9 +131,16 @@ class TreeNode:
             node = node.parent
         return node
 
+    def around(self) -> Iterator['TreeNode']:
+        """Yield the wrapped containers above this one, the innermost first."""
+        above = self.parent
+        while above is not None:
+            yield above
+            above = above.parent
+
     def has_running_ancestor(self) -> bool:
         """Whether a wrapped container above this one is being executed."""
-        above = self.parent
+        above = self.parent  # each execution asks: a plain loop takes the least time
         while above is not None:
             if is_executing(above.machine):
                 return True
@@ -142,11 +149,7 @@ class TreeNode:
 
     def running_around(self) -> Iterator['TreeNode']:
         """Yield the wrapped containers above this one that are being executed."""
-        above = self.parent
-        while above is not None:
-            if is_executing(above.machine):
-                yield above
-            above = above.parent
+        return (above for above in self.around() if is_executing(above.machine))
 
     def start_from_above(self, take: bool = False) -> str:
         """Return the state in which a container around this one has it begin, '' for none.
@@ -185,12 +188,7 @@ class TreeNode:
 
     def runs_beside_others(self) -> bool:
         """Whether a Concurrence or an Iterator is around it."""
-        node = self
-        while node.parent is not None:
-            if node.runs_in_branch:
-                return True
-            node = node.parent
-        return False
+        return any(each.runs_in_branch for each in (self, *self.around()) if each.parent)
 
     def wraps(self, below: Labels) -> bool:
         """Whether what these labels below this container lead to has an oracle of its own."""
