@@ -24,7 +24,6 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..errors import SettingsError
 from ..machine.nesting import children_of
-from ..machine.tree_node import TreeNode
 from ..smach_private import (
     final_outcomes_of,
     initial_label_in,
@@ -46,17 +45,16 @@ class Structure(NamedTuple):
     description: str
 
 
-def structure_of(top: TreeNode) -> Structure:
+def structure_of(machine: smach.Container, meta: str) -> Structure:
     """Return the structure of a tree.
 
     It has every container with its states, their classes, outcomes and keys, and its transitions.
-    Settings and the meta state are none of it.
+    Settings are not part of it, and neither is the meta state.
+
+    :param meta: the label of the meta state, '' where no oracle recovers.
     """
     described = {
-        path: _container(container, meta)
-        for path, container, meta in _containers(
-            top.machine, '', top.settings.oracle_label if top.tree.recover else ''
-        )
+        path: _container(container, meta) for path, container in _containers(machine, '', meta)
     }
     text = json.dumps(described, sort_keys=True, separators=(',', ':'))
     return Structure(
@@ -120,8 +118,8 @@ def _shown(value: object) -> str:
 
 def _containers(
     container: smach.Container, path: str, meta: str
-) -> Iterator[Tuple[str, smach.Container, str]]:
-    yield path, container, meta
+) -> Iterator[Tuple[str, smach.Container]]:
+    yield path, container
     for label, state in sorted(_states(container, meta).items()):
         if isinstance(state, smach.Container):
             yield from _containers(state, '{}/{}'.format(path, label) if path else label, meta)
@@ -197,16 +195,22 @@ class ChangedScript(NamedTuple):
 
 
 def changed_script(
-    top: TreeNode, store: StoreFile, trial: StoredTrial, tree: StoredTree, now: Structure
+    name: str,
+    names: Mapping[str, str],
+    store: StoreFile,
+    trial: StoredTrial,
+    tree: StoredTree,
+    now: Structure,
 ) -> ChangedScript:
     """Return how a script differs from the one of a stored trial.
 
+    :param name: that of the machine.
+    :param names: the setting `resume_map`.
     :raises SettingsError: where `resume_map` names a state that was not there, or is not.
     """
     before = str(tree.whole.get(STRUCTURE) or trial.structure)
-    names = top.settings.resume_map
     if before == now.id:
-        _name_unknown(top, names, store, now)
+        _name_unknown(name, names, store, now)
         return ChangedScript(before, [], {}, None)
     described = store.description(before)
     changes = differences(described, now.description)
@@ -217,27 +221,25 @@ def changed_script(
         _check(old, old, known, 'a state of the machine that was stopped')
         _check(old, new, present, 'a state of the machine')
     return ChangedScript(
-        before, changes, names, Renaming(top.name, names, renaming.containers_of(described))
+        before, changes, names, Renaming(name, names, renaming.containers_of(described))
     )
 
 
-def _name_unknown(
-    top: TreeNode, names: Mapping[str, str], store: StoreFile, now: Structure
-) -> None:
+def _name_unknown(name: str, names: Mapping[str, str], store: StoreFile, now: Structure) -> None:
     """Warn of states of a map of no effect that neither this script has, nor one of before."""
     if not names:
         return
     known = set(renaming.states_of(now.description)).union(
         *(
             renaming.states_of(store.description(each))
-            for each in {trial.structure for trial in store.trials(top.name)}
+            for each in {trial.structure for trial in store.trials(name)}
         )
     )
     for path in sorted({path for pair in names.items() for path in pair}.difference(known)):
         smach.logwarn(
             '{}: resume_map names {!r}, which is not a state of the machine, and was '
             'not one before; there are {}'.format(
-                top.path, path, ', '.join(sorted(renaming.states_of(now.description)))
+                name, path, ', '.join(sorted(renaming.states_of(now.description)))
             )
         )
 

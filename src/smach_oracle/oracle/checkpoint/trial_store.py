@@ -85,7 +85,8 @@ class TrialStore:
         except BaseException:
             self._lock.release()
             raise
-        self._structure = structure_of(top)
+        meta = settings.oracle_label if top.tree.recover else ''
+        self._structure = structure_of(top.machine, meta)
 
     def to_resume(self) -> Optional[Resumption]:
         """Return the trial that goes on, None where a new one begins.
@@ -194,7 +195,8 @@ class TrialStore:
         }
         if earlier:
             tree = read_tree(self._store, trial.number, CODECS, earlier)
-        changed = changed_script(self._top, self._store, trial, tree, self._structure)
+        names = self._top.settings.resume_map
+        changed = changed_script(self._top.name, names, self._store, trial, tree, self._structure)
         if changed.renaming is not None:
             tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
         marks = marks_now(
