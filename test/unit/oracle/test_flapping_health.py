@@ -10,16 +10,8 @@ SETTLE_S = 0.5
 FLAPS_FOR_S = 20.0
 
 
-class FakeTeller:
-    """A fake container that keeps what it tells."""
-
-    path = 'SM_ROOT'
-
-    def __init__(self):
-        self.told = []
-
-    def emit(self, kind, **fields):
-        self.told.append((kind, fields))
+def tell_nobody(kind, **fields):
+    """Have no observers."""
 
 
 @pytest.fixture
@@ -48,7 +40,7 @@ def watch_of(function):
 def test_a_function_that_flaps_is_waited_for_until_it_holds(clock, hertz, share):
     until_s = clock.now() + FLAPS_FOR_S
     watch = watch_of(flapping(clock, hertz, share, until_s))
-    assert watch.wait_until_well(FakeTeller(), 'A', 'failed', 'off', Scope(clock=clock))
+    assert watch.wait_until_well(tell_nobody, 'SM_ROOT/A', 'failed', 'off', Scope(clock=clock))
     # up to one settle time before the end of the flapping it may be well by chance
     assert until_s + SETTLE_S - 1.0 / hertz <= clock.now() <= until_s + SETTLE_S + 0.3
 
@@ -65,6 +57,6 @@ def test_a_robot_that_is_well_is_asked_no_more_often_than_it_takes(clock, settle
     watch = HealthWatch(lambda: asked.append(clock.now()) is None)
     watch.use((), settle_s)
     began_s = clock.now()
-    assert watch.wait_until_well(FakeTeller(), 'A', 'failed', 'off', Scope(clock=clock))
+    assert watch.wait_until_well(tell_nobody, 'SM_ROOT/A', 'failed', 'off', Scope(clock=clock))
     assert settle_s <= clock.now() - began_s < settle_s + 0.2
     assert 20 <= len(asked) <= most

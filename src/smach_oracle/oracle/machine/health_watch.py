@@ -2,7 +2,7 @@
 
 import random
 import threading
-from typing import TYPE_CHECKING, Callable, List, Optional, Sequence, Set, Tuple
+from typing import Callable, List, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -18,9 +18,6 @@ from ..settings.health import (
 )
 from .health_ports import HealthFunctionPort, HealthPort
 
-if TYPE_CHECKING:
-    from .tree_node import TreeNode
-
 LOOK_PERIOD_S = 0.1  # how often the ports are asked during a wait
 # A function knows only how the robot is at this moment. It is asked so often in the settle time,
 # at irregular moments, so that a robot that is well at every other moment is not taken as well.
@@ -28,16 +25,17 @@ LOOKS_IN_SETTLE_TIME = 50
 SHORTEST_LOOK_S = 0.002
 FAILED = 'failed'  # what has happened to a state that waits
 
+Tell = Callable[..., None]  # tells the observers of a kind of event, with its fields
 # makes a port for topics and diagnostics
 ListenToHealth = Callable[[Sequence[HealthCondition]], Optional[HealthPort]]
 
 
 class _UnwellPhase:
-    """The time from the first container that waits to the last. `teller` is the first's."""
+    """The time from the first state that waits to the last. `tell` is of the first one."""
 
-    def __init__(self, teller: 'TreeNode', state: str, why: str, clock: Clock) -> None:
-        self.teller = teller
-        self.state = state
+    def __init__(self, tell: Tell, place: str, why: str, clock: Clock) -> None:
+        self.tell = tell
+        self.place = place
         self.why = why
         self.clock = clock
         self.since_s = clock.now()
@@ -136,18 +134,18 @@ class HealthWatch:
                 return why
             scope.wait(max(0.0, min(self._until_next_look_s(), until_s - now())))
 
-    def wait_until_well(
-        self, teller: 'TreeNode', state: str, what: str, why: str, scope: Scope
-    ) -> bool:
+    def wait_until_well(self, tell: Tell, place: str, what: str, why: str, scope: Scope) -> bool:
         """Wait until the robot has been well for the settle time.
 
         The first who waits gives the notice, for the whole tree. It is ended once.
 
-        :param what: happened to `state`, or is about to. The log says it.
+        :param tell: tells the observers of what befalls the state.
+        :param place: path of the state.
+        :param what: happened to it, or is about to. The log says it.
         :param why: the robot is not well.
         :returns: False where `scope` has ended the wait.
         """
-        phase = self._join(teller, state, what, why, scope.clock)
+        phase = self._join(tell, place, what, why, scope.clock)
         looked_s = scope.clock.now()
         try:
             while scope.reason is None:
@@ -168,15 +166,12 @@ class HealthWatch:
         mean_s = max(SHORTEST_LOOK_S, self._settle_s / LOOKS_IN_SETTLE_TIME)
         return min(LOOK_PERIOD_S, mean_s) * random.uniform(0.2, 1.8)
 
-    def _join(
-        self, teller: 'TreeNode', state: str, what: str, why: str, clock: Clock
-    ) -> _UnwellPhase:
-        place = '{}/{}'.format(teller.path, state)
+    def _join(self, tell: Tell, place: str, what: str, why: str, clock: Clock) -> _UnwellPhase:
         with self._lock:
             phase = self._phase
             is_first = phase is None
             if phase is None:
-                phase = self._phase = _UnwellPhase(teller, state, why, clock)
+                phase = self._phase = _UnwellPhase(tell, place, why, clock)
             phase.waiting += 1
             phase.states.add(place)
             if is_first:
@@ -185,7 +180,7 @@ class HealthWatch:
                         place, what, why, '; no failure is counted' if what == FAILED else ''
                     )
                 )
-                teller.emit(EventKind.HEALTH_WAIT_START, state=state, text=why)
+                tell(EventKind.HEALTH_WAIT_START, text=why)
             else:
                 smach.loginfo('{} {}; it waits, too'.format(place, what))
         return phase
@@ -222,10 +217,9 @@ class HealthWatch:
             if outcome == 'well'
             else 'the wait for the robot to be well was ended after {:.1f} s'
         ).format(waited_s)
-        smach.loginfo('{}/{}: {}'.format(phase.teller.path, phase.state, text))
-        phase.teller.emit(
+        smach.loginfo('{}: {}'.format(phase.place, text))
+        phase.tell(
             EventKind.HEALTH_WAIT_END,
-            state=phase.state,
             outcome=outcome,
             text=text,
             data={'waited_s': round(waited_s, 3), 'states': sorted(phase.states)},

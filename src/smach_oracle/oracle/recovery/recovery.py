@@ -140,7 +140,7 @@ class Recovery:
         """Log what the operator should know of this failure, and tell the observers."""
         self.node.warn(text, self.record.label)
 
-    def tell(self, kind: EventKind, **fields: str) -> None:
+    def tell(self, kind: EventKind, **fields: Any) -> None:
         """Tell the observers of a step that is about the failed state."""
         if self.node.events.observers:
             self.node.emit(kind, self.record.label, **fields)
@@ -219,9 +219,8 @@ class Recovery:
         """Wait until the robot is well. Return False where something has ended the recovery."""
         node = self.node
         with standing_still(node.execution.runs_around), self.budget.work_time.paused():
-            is_well = node.tree.health.wait_until_well(
-                node, self.record.label, what, why, self._in_time()
-            )
+            place = '{}/{}'.format(node.path, self.record.label)
+            is_well = node.tree.health.wait_until_well(self.tell, place, what, why, self._in_time())
         return is_well and not self.is_over()
 
     def _in_time(self) -> Scope:
