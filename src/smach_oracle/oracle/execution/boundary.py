@@ -68,7 +68,8 @@ def before_step(node: TreeNode) -> Optional[Stop]:
         return stop_left_behind(node)
     was_preempted = node.machine.preempt_requested()
     if was_preempted:
-        _heed_preempt(node)
+        with _locked(node):
+            _pass_preempt_on(node)
     elif not node.engine.attentive:
         return None  # nor was the state drawn after `preempted`
     is_drawn = node.records.take_drawn()
@@ -76,11 +77,6 @@ def before_step(node: TreeNode) -> Optional[Stop]:
         return None
     with _locked(node):
         return _pass(node, was_preempted, is_drawn)
-
-
-def _heed_preempt(node: TreeNode) -> None:
-    with _locked(node):
-        _pass_preempt_on(node)
 
 
 def _pass_preempt_on(node: TreeNode) -> None:

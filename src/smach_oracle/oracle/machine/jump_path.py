@@ -152,13 +152,9 @@ def hand_up(
     :param into: where they are written, by keys of the container above.
     :returns: the keys written there.
     """
-    found = set()
-    for key in link.inner_container.get_registered_output_keys():
-        if key in written and key in data_of(link.inner_container.userdata):
-            named = link.remapping.get(key, key)
-            into[named] = data_of(link.inner_container.userdata)[key]
-            found.add(named)
-    return found
+    outputs = link.inner_container.get_registered_output_keys()
+    pairs = ((key, link.remapping.get(key, key)) for key in outputs)
+    return _hand_over(link.inner_container, pairs, written, into)
 
 
 def hand_on(
@@ -169,11 +165,22 @@ def hand_on(
     :param into: where it is written, by keys of the container below.
     :returns: the keys written there.
     """
-    found = set()
-    for key, named in _inputs(link):
-        if named in written and named in data_of(link.outer_container.userdata):
-            into[key] = data_of(link.outer_container.userdata)[named]
-            found.add(key)
+    pairs = ((named, key) for key, named in _inputs(link))
+    return _hand_over(link.outer_container, pairs, written, into)
+
+
+def _hand_over(
+    container: smach.Container,
+    pairs: Iterable[Tuple[str, str]],
+    written: Set[str],
+    into: Union[UserdataGate, smach.UserData],
+) -> Set[str]:
+    """Hand over keys of a container that were written, each by its name there and its new one."""
+    data, found = data_of(container.userdata), set()
+    for key, new in pairs:
+        if key in written and key in data:
+            into[new] = data[key]
+            found.add(new)
     return found
 
 

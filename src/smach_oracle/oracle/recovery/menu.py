@@ -158,7 +158,8 @@ def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
     below = node_of(state) if isinstance(state, smach.StateMachine) else None
     inner = {} if below is None else dict.fromkeys(visit.state for visit in _visits_of(below))
     if below is None or not any(map(below.has, inner)):
-        yield name, any(_has_ended_well(visit, place.label) for visit in _visits_of(place.node))
+        visits = (visit for visit in _visits_of(place.node) if visit.state == place.label)
+        yield name, any(visit.result is VisitResult.SUCCESS for visit in visits)
         return
     for label in filter(below.has, inner):
         yield from _entered_in(TreePlace(below, label), '{}/{}'.format(name, label))
@@ -166,10 +167,6 @@ def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
 
 def _visits_of(node: TreeNode) -> List[Visit]:
     return list(node.records.history.visits)
-
-
-def _has_ended_well(visit: Visit, label: str) -> bool:
-    return visit.state == label and visit.result is VisitResult.SUCCESS
 
 
 def _minutes_of_visit(node: TreeNode) -> float:
