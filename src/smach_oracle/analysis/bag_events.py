@@ -1,14 +1,29 @@
-"""Finds bags, and reads the executive's events and the worlds' causes with rosbags, without ROS."""
+"""Finds bags, and reads the executive's events and the worlds' causes, without ROS."""
 
 import contextlib
 import json
 import math
 import os
 import stat
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from operator import attrgetter, itemgetter
+from typing import (
+    Any,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+    cast,
+)
 
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
+
+from .indexed_bag import IndexedBag, NotPlain
+from .quick_decoding import STAMP_NS, STAMP_S, MessageDecoder
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
@@ -20,9 +35,16 @@ MENDING = (
     '`rosbag reindex` on it keeps what lies before the damage; named .bag.active, the next '
     'recorder in this folder saves what can be read behind it, too'
 )
+NO_EVENTS = 'no events of the executive in it'
 _MAGIC = b'#ROSBAG V2.0'
 _EVENTS = '/oracle/events'
+_WRAP = 2**32
 _KINDS = {int(kind): kind for kind in EventKind}
+# fields that are taken of a message, in this order
+_TAKEN = {
+    EVENT_TYPE: (STAMP_S, STAMP_NS, *Event._fields),
+    CAUSE_TYPE: ('seed', 'task', 'kinds', 'details'),
+}
 
 
 class BagError(OracleError):
@@ -43,6 +65,35 @@ class RecordedCause(NamedTuple):
     task: str
     kinds: Tuple[str, ...]  # none: a benign world
     details: Tuple[str, ...]
+
+
+class _Taker:
+    """Takes what is wanted of the messages of a definition."""
+
+    def __init__(self, msgtype: str, definition: str) -> None:
+        """:raises NotPlain: where rosbags is to read them."""
+        self._decode = MessageDecoder(definition)
+        names = self._decode.names
+        missing = [name for name in _TAKEN[msgtype] if name not in names]
+        if missing:
+            raise NotPlain('no field {}'.format(missing[0]))
+        self._pick = itemgetter(*map(names.index, _TAKEN[msgtype]))
+
+    def __call__(self, data: bytes) -> Sequence[Any]:
+        """Return it.
+
+        :raises NotPlain: where the message is not as its definition says.
+        """
+        return cast(Sequence[Any], self._pick(self._decode(data)))
+
+
+class _Message(NamedTuple):
+    """A message of one of the two types."""
+
+    msgtype: str
+    topic: str
+    stamp: int  # ns, at which it was recorded
+    taken: Sequence[Any]  # what is taken of it: see _TAKEN
 
 
 class BagContent(NamedTuple):
@@ -99,11 +150,15 @@ class MessageStores:
         """Read one message of a connection. A damaged one raises whatever rosbags raises."""
         definition = connection.msgdef
         text = getattr(definition, 'data', definition)  # a string before rosbags 0.10
-        if text not in self._stores:
+        return self.store_of(text, connection.msgtype).deserialize_ros1(data, connection.msgtype)
+
+    def store_of(self, definition: str, msgtype: str) -> Any:
+        """Return what reads messages of a definition. A damaged one raises what rosbags raises."""
+        if definition not in self._stores:
             store = self._typesys.get_typestore(self._typesys.Stores.EMPTY)
-            store.register(self._typesys.get_types_from_msg(text, connection.msgtype))
-            self._stores[text] = store
-        return self._stores[text].deserialize_ros1(data, connection.msgtype)
+            store.register(self._typesys.get_types_from_msg(definition, msgtype))
+            self._stores[definition] = store
+        return self._stores[definition]
 
 
 class EventReader:
@@ -118,6 +173,7 @@ class EventReader:
 
         self._open = Reader
         self._stores = MessageStores()
+        self._takers: Dict[str, _Taker] = {}  # by message definition
         self._most_events = most_events
 
     def read(self, path: str) -> BagContent:
@@ -141,31 +197,59 @@ class EventReader:
             raise BagError(why_unreadable(path, _words(err))) from err
 
     def _read(self, path: str) -> BagContent:
+        try:
+            return self._content_of(self._quickly(path))
+        except NotPlain:  # rosbags reads it, or says what is wrong with it
+            return self._content_of(self._by_rosbags(path))
+
+    def _quickly(self, path: str) -> Iterator[_Message]:
+        """Yield the messages of a bag that is sound and plain.
+
+        :raises NotPlain: where rosbags is to read it.
+        """
+        with IndexedBag(path) as bag:
+            _check_types(each.msgtype for each in bag.connections.values())
+            for stamp, connection, data in bag.messages(EVENT_TYPE, CAUSE_TYPE):
+                take = self._takers.get(connection.msgdef)
+                if take is None:
+                    self._stores.store_of(connection.msgdef, connection.msgtype)
+                    take = _Taker(connection.msgtype, connection.msgdef)
+                    self._takers[connection.msgdef] = take
+                yield _Message(connection.msgtype, connection.topic, stamp, take(data))
+
+    def _by_rosbags(self, path: str) -> Iterator[_Message]:
+        with self._open(path) as reader:
+            _check_types(item.msgtype for item in reader.connections)
+            connections = [
+                item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)
+            ]
+            for item, stamp, data in reader.messages(connections):
+                message = self._stores.read(item, data)
+                told = attrgetter(*_TAKEN[item.msgtype])(message)
+                yield _Message(item.msgtype, item.topic, stamp, told)
+
+    def _content_of(self, messages: Iterable[_Message]) -> BagContent:
         events: List[Event] = []
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
         causes: List[Tuple[int, RecordedCause]] = []
         nodes: Dict[str, str] = {}
         stamps: List[float] = []
-        with self._open(path) as reader:
-            connections = [
-                item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)
-            ]
-            if not any(item.msgtype == EVENT_TYPE for item in connections):
-                raise BagError('no events of the executive in it')
-            for item, stamp, data in reader.messages(connections):
-                message = self._stores.read(item, data)
-                if item.msgtype == CAUSE_TYPE:
-                    causes.append((stamp, _recorded_cause(message)))
-                else:
-                    events.append(_event(message))
-                    ends[message.trial_id] = stamp
-                    told = message.header.stamp
-                    stamps.append(told.sec + told.nanosec / 1e9)
-                    nodes[message.trial_id] = (
-                        item.topic[: -len(_EVENTS)] if item.topic.endswith(_EVENTS) else ''
-                    )
-                if len(events) > self._most_events:
-                    raise BagError('it has more than {:g} events'.format(self._most_events))
+        for msgtype, topic, stamp, taken in messages:
+            if msgtype == CAUSE_TYPE:
+                seed, task, kinds, details = taken
+                cause = RecordedCause(int(seed), task, tuple(kinds), tuple(details))
+                causes.append((stamp, cause))
+            else:
+                second, rest, kind, *fields, data = taken
+                kind = _KINDS.get(kind, kind)  # a later release may know more kinds
+                event = Event._make([kind, *fields, json.loads(data) if data else None])
+                events.append(event)
+                ends[event.trial_id] = stamp
+                # rosbags takes these numbers for signed ones
+                stamps.append(second % _WRAP + rest % _WRAP / 1e9)
+                nodes[event.trial_id] = topic[: -len(_EVENTS)] if topic.endswith(_EVENTS) else ''
+            if len(events) > self._most_events:
+                raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own
             ends[max(ends, key=lambda trial_id: ends[trial_id])] = max(
                 [stamp for stamp, _ in causes], default=0
@@ -179,6 +263,11 @@ class EventReader:
         )
 
 
+def _check_types(types: Iterable[str]) -> None:
+    if EVENT_TYPE not in types:
+        raise BagError(NO_EVENTS)
+
+
 def why_unreadable(path: str, why: str) -> str:
     """Say why a bag cannot be read, and what may save it where it is one."""
     with contextlib.suppress(OSError), open(path, 'rb') as source:
@@ -189,34 +278,6 @@ def why_unreadable(path: str, why: str) -> str:
 
 def _latest(causes: Sequence[Tuple[int, RecordedCause]], end: int) -> Optional[RecordedCause]:
     return next((cause for stamp, cause in reversed(causes) if stamp <= end), None)
-
-
-def _recorded_cause(message: Any) -> RecordedCause:
-    return RecordedCause(
-        int(message.seed), message.task, tuple(message.kinds), tuple(message.details)
-    )
-
-
-def _event(message: Any) -> Event:
-    kind = _KINDS.get(message.kind, message.kind)  # a later release may know more kinds
-    return Event(
-        kind,
-        message.trial_id,
-        message.seq,
-        message.wall_time,
-        message.path,
-        message.state,
-        message.outcome,
-        message.target,
-        message.failure_kind,
-        message.failure_class,
-        message.rate,
-        message.continuous,
-        message.query_id,
-        message.by,
-        message.text,
-        json.loads(message.data) if message.data else None,
-    )
 
 
 def _words(err: Exception) -> str:
