@@ -139,17 +139,17 @@ def has_attribute(thing: object, name: str) -> bool:
     return inspect.getattr_static(thing, name, _MISSING) is not _MISSING
 
 
-def attribute_of(thing: object, name: str, default: object = None) -> object:
+def attribute_of(thing: object, name: str) -> object:
     """Return an attribute that an object or its class has.
 
-    :param default: returned where there is none, and where the attribute is a property that raises.
+    It is None where there is none, and where the attribute is a property that raises.
     """
     if not has_attribute(thing, name):
-        return default
+        return None
     try:
         return getattr(thing, name)
     except Exception:  # a property of a user's
-        return default
+        return None
 
 
 def name_of(function: object) -> str:

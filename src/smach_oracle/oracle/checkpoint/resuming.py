@@ -151,8 +151,7 @@ class EntryPoint:
 
 def _down_to(node: TreeNode, path: str) -> Sequence[TreePlace]:
     """Return the way down from a container to a place to which a jump was under way."""
-    place = next((each for each in places_of(node) if each.path == path), None)
-    way = None if place is None else jump_path_to(node, place)
+    way = jump_path_to(node, next((each for each in places_of(node) if each.path == path), None))
     return way.entered_places[1:] if way is not None and way.meeting_node is node else ()
 
 
@@ -219,8 +218,7 @@ def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
 
     :raises SettingsError: where there is no such state.
     """
-    place = place_named(top, path)
-    way = None if place is None else jump_path_to(top, place)
+    way = jump_path_to(top, place_named(top, path))
     if way is None:
         raise SettingsError(
             'on_resume',
@@ -336,7 +334,7 @@ class _Setting:
         """Send the machine to where the state stands now that was under way in a container."""
         top = node.top()
         place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
-        way = None if place is None else jump_path_to(top, place)
+        way = jump_path_to(top, place)
         # others may run next to it, which would be left
         if place is None or way is None or node.runs_beside_others():
             self._ask_at_beginning(node, stored, stored.label)

@@ -26,7 +26,7 @@ def same_place(path: str, label: str) -> StatePlace:
 
 
 def marks_now(
-    latest: StoredTree, tree: StoredTree, place_of: Callable[[str, str], StatePlace] = same_place
+    latest: StoredTree, tree: StoredTree, place_of: Callable[[str, str], StatePlace]
 ) -> Marks:
     """Return the marks with which a trial goes on.
 

@@ -122,7 +122,7 @@ def jump_path_for(place: TreePlace) -> JumpPath:
     return way or JumpPath((), place.node, (place,))
 
 
-def prospect_of(place: TreePlace, written: Tuple[str, ...] = ()) -> Prospect:
+def prospect_of(place: TreePlace, written: Tuple[str, ...]) -> Prospect:
     """Return what comes of sending the machine to a place.
 
     :param written: userdata keys that are written for it.
@@ -155,8 +155,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     has come in between may prevent it. A warning tells so.
     """
     label = current_label_of(node.machine)
-    place = place_at(node, jump.container, jump.state)
-    way = jump_path_to(node, place) if place is not None else None
+    way = jump_path_to(node, place_at(node, jump.container, jump.state))
     why_not = _why_not(way, jump)
     if way is None or why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)

@@ -53,11 +53,13 @@ class JumpPath(NamedTuple):
         return frozenset(watch.written_in(self.meeting_node.machine))
 
 
-def jump_path_to(node: TreeNode, place: TreePlace) -> Optional[JumpPath]:
+def jump_path_to(node: TreeNode, place: Optional[TreePlace]) -> Optional[JumpPath]:
     """Return the way from a container that is being executed to a place.
 
-    None means there is none.
+    None means there is none. There is none where `place` is None.
     """
+    if place is None:
+        return None
     if place.node is node:
         return JumpPath((), node, (place,))
     levels = [node, *levels_above(node)]

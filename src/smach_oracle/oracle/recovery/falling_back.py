@@ -62,8 +62,7 @@ def fallback_in_short(recovery: Recovery) -> str:
 def _jump_path_back(recovery: Recovery) -> Optional[JumpPath]:
     """Return the way to the place that `on_no_answer` names, None where there is none."""
     node = recovery.node
-    place = place_named(node, node.settings.on_no_answer[1])
-    return jump_path_to(node, place) if place is not None else None
+    return jump_path_to(node, place_named(node, node.settings.on_no_answer[1]))
 
 
 def _why_not(recovery: Recovery, way: Optional[JumpPath]) -> str:

@@ -21,7 +21,7 @@ Drawn = Mapping[str, Mapping[str, Optional[str]]]  # target by state and outcome
 _MOST_VISITED = 64  # states, to which a step back may lead
 
 
-def visited_before(node: TreeNode, label: str, since: int = 0) -> Tuple[str, ...]:
+def visited_before(node: TreeNode, label: str, since: int) -> Tuple[str, ...]:
     """Return the states that were visited before a state, the latest first, by name.
 
     They are those from which its author's transitions lead to it. Where it has succeeded before,

@@ -279,8 +279,7 @@ def _obey(recovery: Recovery, answer: Answer) -> Verdict:
     for key, value in (answer.outputs or {}).items():
         watch.gate[remapping.get(key, key)] = value
     if answer.kind is AnswerKind.GOTO:
-        place = place_at(node, answer.container, answer.state)
-        way = jump_path_to(node, place) if place is not None else None
+        way = jump_path_to(node, place_at(node, answer.container, answer.state))
         if way is None:  # an answer that was checked has one
             named = '{}/{}'.format(answer.container or node.path, answer.state)
             raise smach.InvalidStateError('there is no way to ' + named)
