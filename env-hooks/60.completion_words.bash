@@ -9,8 +9,10 @@ scripted_operator what_if'
 _smach_oracle_words() {
   case $1 in
     'bag_statistics')
-      echo '--by-state --columns --csv --failing-outcomes --figure --help --json --version
---x-axis -h' ;;
+      echo '--by --by-state --columns --csv --failing-outcomes --figure --help --json
+--version --x-axis -h' ;;
+    'bag_statistics --by')
+      echo 'folder node host version settings day' ;;
     'bag_statistics --columns')
       echo '1 2' ;;
     'bag_statistics --x-axis')

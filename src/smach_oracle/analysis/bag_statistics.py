@@ -8,7 +8,7 @@ import argparse
 import os
 import re
 import sys
-from typing import List, Optional, Sequence
+from typing import Any, Dict, List, Optional, Sequence
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
@@ -17,8 +17,10 @@ from . import table
 from .bag_events import BagError
 from .by_state.rows import VariantStates, by_variant, rows_of, write_csv_files
 from .by_state.text import format_states
+from .comparing.groups import BY, TrialGroup, groups_by
+from .comparing.report import format_groups, groups_data
 from .reading import report_error, report_skipped
-from .trials import Trials, TrialSummary, load_trials
+from .trials import Trials, TrialSummary, load_by_state, load_trials
 from .variants import VariantCounts, count_variants, time_series
 
 
@@ -28,13 +30,20 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     try:
         listed = args.failing_outcomes
         rule = FailureRule(tuple(listed)) if listed else None
-        found = load_trials(args.folders, rule, args.by_state)
+        states = None
+        if args.by_state:
+            found, by_trial = load_by_state(args.folders, rule)
+            states = by_variant(found.trials, by_trial)
+        else:
+            found = load_trials(args.folders, rule)
         variants = count_variants(found.trials)
-        states = by_variant(found.trials, found.states) if args.by_state else None
         sys.stdout.write(table.format_text(variants, found.trials))
         sys.stdout.write(format_states(states or []))
+        groups = groups_by(args.by, found.trials, args.folders) if args.by else None
+        if groups is not None:
+            sys.stdout.write(format_groups(args.by, groups))
         code = report_skipped(found.skipped)
-        _write_files(args, found, variants, states)
+        _write_files(args, found, variants, states, groups)
     except (BagError, ImportError, OSError) as err:
         return report_error('bag_statistics', err)
     return code
@@ -77,6 +86,12 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     )
     parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
     parser.add_argument(
+        '--by',
+        choices=BY,
+        help='compare the trials of each experiment by this, with tests: paired where their seeds '
+        'pair, else not. Several FOLDERs are the groups of --by folder',
+    )
+    parser.add_argument(
         '--by-state',
         action='store_true',
         help='print what happened in each state: visits, failures and why, the ways on, questions, '
@@ -97,10 +112,13 @@ def _write_files(
     found: Trials,
     variants: List[VariantCounts],
     states: Optional[List[VariantStates]],
+    groups: Optional[List[TrialGroup]],
 ) -> None:
     if args.json:
         with open(args.json, 'w', encoding='utf-8') as target:
-            more = {} if states is None else {'by_state': rows_of(states)}
+            more: Dict[str, Any] = {} if states is None else {'by_state': rows_of(states)}
+            if groups is not None:
+                more['compared'] = groups_data(args.by, groups)
             table.write_json(target, variants, found.trials, found.skipped, more)
     if args.csv:
         with open(args.csv, 'w', encoding='utf-8', newline='') as target:

@@ -103,6 +103,7 @@ def _summary(fields: Dict[str, Any]) -> TrialSummary:
             bags=(),
             failures_by_state=tuple((name, count) for name, count in fields['failures_by_state']),
             settings=tuple((name, value) for name, value in fields['settings']),
+            origin=tuple((name, value) for name, value in fields['origin']),
             rule=rule_in({RULE: fields['rule']}) or FORMER_RULE,
         )
     )

@@ -24,6 +24,7 @@ from .variants import (
     TRUE_SUCCESS,
     Count,
     VariantCounts,
+    find_variants,
 )
 
 _INDENTED = (ANSWERED, NOT_ANSWERED)
@@ -42,9 +43,18 @@ def format_text(variants: Sequence[VariantCounts], trials: Sequence[TrialSummary
 
 
 def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
+    return [
+        'Shared autonomy statistics: trials in which each happened at least once',
+        *group_table(variants, 'Variant'),
+        *_what_columns_mean(variants),
+    ]
+
+
+def group_table(variants: Sequence[VariantCounts], what: str) -> List[str]:
+    """Return the lines of a table with a row for each variant. `what`: heads their names."""
     headings = [
         'Experiment',
-        'Variant',
+        what,
         'Trials',
         'Oracle recoveries',
         'Expert answered',
@@ -70,15 +80,7 @@ def _paper_table(variants: Sequence[VariantCounts]) -> List[str]:
         for row in rows
     ]
     rule = '-' * (sum(widths) + 2 * (len(widths) - 1))
-    return [
-        'Shared autonomy statistics: trials in which each happened at least once',
-        rule,
-        *lines[:2],
-        rule,
-        *lines[2:],
-        rule,
-        *_what_columns_mean(variants),
-    ]
+    return [rule, *lines[:2], rule, *lines[2:], rule]
 
 
 def _in_two_lines(heading: str) -> Tuple[str, str]:
@@ -200,14 +202,14 @@ def as_data(
 ) -> Dict[str, Any]:
     """Return all of it as plain data, for JSON."""
     return {
-        'groups': [_variant_data(variant) for variant in variants],
+        'groups': [variant_data(variant) for variant in variants],
         'causes': [dict(row._asdict(), arm=row.variant) for row in cause_rows(trials)],
         'trials': [_trial_data(trial) for trial in trials],
         'skipped': [item._asdict() for item in skipped],
     }
 
 
-def _variant_data(variant: VariantCounts) -> Dict[str, Any]:
+def variant_data(variant: VariantCounts) -> Dict[str, Any]:
     """Return plain data, with `arm` and `runs`, the older names of `variant` and `trials`.
 
     The count `answered` is there as `expert answered`, too.
@@ -229,6 +231,7 @@ def _trial_data(trial: TrialSummary) -> Dict[str, Any]:
         ending=trial.ending.value,
         failures_by_state=dict(trial.failures_by_state),
         settings=dict(trial.settings),
+        origin=dict(trial.origin),
         cause=trial.cause._asdict() if trial.cause else None,
         truth=trial.truth._asdict() if trial.truth else None,
         expert_answered=trial.answered > 0,
@@ -266,6 +269,8 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             'resumed',
             'down_s',
             'rule',
+            'node',
+            'origin',
         )
     ]
     writer = csv.writer(target, lineterminator='\n')
@@ -285,11 +290,21 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             'damage',
             'expert_answered',
             'person_needed',
+            'variant',
+            'node',
+            'folder',
+            'host',
+            'version',
         ]
     )
+    names = {
+        trial.trial_id: variant.name
+        for variant in find_variants(trials)
+        for trial in variant.trials
+    }
     for trial in trials:
         data = _trial_data(trial)
-        cause, truth = trial.cause, trial.truth
+        cause, truth, origin = trial.cause, trial.truth, dict(trial.origin)
         world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
         world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
         writer.writerow(
@@ -298,6 +313,8 @@ def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
             + [trial.unwell_s, trial.resumed, trial.down_s]
             + _harm(truth)
             + [trial.answered > 0, '' if trial.person_needed is None else trial.person_needed]
+            + [names.get(trial.trial_id, ''), trial.node, trial.replicate]
+            + [origin.get('host', ''), origin.get('version', '')]
         )
 
 

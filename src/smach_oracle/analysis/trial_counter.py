@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Protocol, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import JUMPED_FROM, TrialEnd, ended_by, last_stored
+from smach_oracle.oracle.records.facts import JUMPED_FROM, ORIGIN, TrialEnd, ended_by, last_stored
 from smach_oracle.oracle.settings.failure_rule import (
     FORMER_RULE,
     EndMeaning,
@@ -100,6 +100,14 @@ class TrialCounter:
         """Return the oracle's settings, sorted, or () where they are not recorded."""
         stated = self._start.get('settings')
         return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
+
+    @property
+    def origin(self) -> Tuple[Tuple[str, str], ...]:
+        """Return where it ran, sorted, or () where that is not recorded."""
+        stated = self._start.get(ORIGIN)
+        if not isinstance(stated, Mapping):
+            return ()
+        return tuple(sorted((str(key), str(value)) for key, value in stated.items()))
 
     @property
     def duration_s(self) -> float:

@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Seq
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 
-from .bag_events import BagError, RecordedCause, SkippedBag
+from .bag_events import BagContent, BagError, RecordedCause, SkippedBag
 from .by_state.follower import states_of
 from .by_state.state_counts import StatesOfTrials
 from .reading import read_bags
@@ -39,6 +39,9 @@ class TrialSummary(NamedTuple):
     resumed: int = 0  # how often it went on after its program was stopped
     down_s: float = 0.0  # of `duration_s`: in which its program did not run
     rule: FailureRule = FORMER_RULE  # by which its end is a success or a failure
+    node: str = ''  # whose it is, by the topic of its events. '' means not known
+    # where it ran: version, host, digests. Sorted, or () where that is not recorded
+    origin: Tuple[Tuple[str, str], ...] = ()
 
     @property
     def replicate(self) -> str:
@@ -76,26 +79,40 @@ class Trials(NamedTuple):
 
     trials: List[TrialSummary]  # in the order of their beginning
     skipped: List[SkippedBag]
-    states: Mapping[str, StatesOfTrials] = {}  # by trial id, where they were asked for
 
 
-def load_trials(
-    places: Sequence[str], rule: Optional[FailureRule] = None, by_state: bool = False
-) -> Trials:
+class TrialsByState(NamedTuple):
+    """All that was found in some folders, and what happened in the states of each trial."""
+
+    found: Trials
+    states: Mapping[str, StatesOfTrials]  # by trial id
+
+
+def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Trials:
     """Read all bags in folders and below. Those that cannot be used are listed with the reason.
 
     :param rule: for all trials. None means that each is counted by the rule of its record.
-    :param by_state: count what happened in each state, too.
 
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.
     """
-    gathered = _TrialEvents()
     skipped: List[SkippedBag] = []
+    return _trials_in(_gathered(places, skipped), rule, skipped)
+
+
+def load_by_state(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsByState:
+    """Read the same, and count what happened in the states of each trial. As `load_trials`."""
+    skipped: List[SkippedBag] = []
+    gathered = _gathered(places, skipped)
+    return TrialsByState(_trials_in(gathered, rule, skipped), gathered.states(rule))
+
+
+def _gathered(places: Sequence[str], skipped: List[SkippedBag]) -> '_TrialEvents':
+    gathered = _TrialEvents()
     count = 0
     for path, content in read_bags(places, skipped):
         count += 1
-        gathered.add(path, content.events, content.causes)
+        gathered.add(path, content)
     if not gathered.events:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
         raise BagError(
@@ -103,12 +120,14 @@ def load_trials(
                 ', '.join(places), count + len(skipped), reasons
             )
         )
+    return gathered
+
+
+def _trials_in(
+    gathered: '_TrialEvents', rule: Optional[FailureRule], skipped: List[SkippedBag]
+) -> Trials:
     trials = gathered.summaries(rule)
-    return Trials(
-        sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)),
-        skipped,
-        gathered.states(rule) if by_state else {},
-    )
+    return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
 
 
 class _TrialEvents:
@@ -118,12 +137,14 @@ class _TrialEvents:
         self.events: Dict[str, Dict[int, Event]] = {}
         self._bags: Dict[str, Dict[str, None]] = {}
         self._causes: Dict[str, RecordedCause] = {}
+        self._nodes: Dict[str, str] = {}
 
-    def add(self, path: str, events: Iterable[Event], causes: Mapping[str, RecordedCause]) -> None:
-        for event in events:
+    def add(self, path: str, content: BagContent) -> None:
+        for event in content.events:
             self.events.setdefault(event.trial_id, {})[event.seq] = event
             self._bags.setdefault(event.trial_id, {})[path] = None
-        self._causes.update(causes)
+        self._causes.update(content.causes)
+        self._nodes.update(content.nodes)
 
     def summaries(self, rule: Optional[FailureRule]) -> List[TrialSummary]:
         truths = TruthFiles()
@@ -132,7 +153,9 @@ class _TrialEvents:
             trial = summarise(list(by_number.values()), tuple(self._bags[trial_id]), rule)
             cause = self._causes.get(trial_id)
             truth = truths.of(trial.replicate, cause.seed if cause else None)
-            found.append(trial._replace(cause=cause, truth=truth))
+            found.append(
+                trial._replace(cause=cause, truth=truth, node=self._nodes.get(trial_id, ''))
+            )
         return found
 
     def states(self, rule: Optional[FailureRule]) -> Dict[str, StatesOfTrials]:
@@ -169,6 +192,7 @@ def summarise(
         resumed=counter.resumed,
         down_s=counter.down_s,
         rule=counter.rule,
+        origin=counter.origin,
     )
 
 

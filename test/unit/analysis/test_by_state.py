@@ -12,7 +12,7 @@ from smach_oracle.analysis.by_state.follower import states_of
 from smach_oracle.analysis.by_state.rows import FILES, VariantStates, costs_of, rows_of
 from smach_oracle.analysis.by_state.state_counts import StatesOfTrials
 from smach_oracle.analysis.by_state.text import format_states
-from smach_oracle.analysis.trials import load_trials
+from smach_oracle.analysis.trials import load_by_state
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 
@@ -193,10 +193,10 @@ def test_the_costs_of_nothing_are_not_known():
 
 
 def test_the_counts_of_old_bags_are_those_of_the_trials():
-    found = load_trials([str(OLD_BAGS)], None, by_state=True)
-    assert len(found.states) == len(found.trials) > 10
+    found, by_trial = load_by_state([str(OLD_BAGS)])
+    assert len(by_trial) == len(found.trials) > 10
     for trial in found.trials:
-        states = found.states[trial.trial_id].states
+        states = by_trial[trial.trial_id].states
         failed = {name: counts.failures for name, counts in states.items() if counts.failures}
         assert failed == dict(trial.failures_by_state)
         assert sum(counts.questions for counts in states.values()) == trial.questions

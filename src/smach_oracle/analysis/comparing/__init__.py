@@ -1,0 +1,1 @@
+"""Groups of your own trials, compared: by folder, node, host, version, settings or day."""
