@@ -2,9 +2,12 @@
 the machine did.
 """
 
+import socket
+
 import pytest
 
 import smach
+from smach_oracle import __version__
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import load_trials
 from smach_oracle.oracle import OracleContainer
@@ -62,6 +65,11 @@ def run_trials(folder, failures, recover=True, expert=None):
         outcomes.append(machine.execute())
     assert recorder.close(20.0)
     return outcomes, load_trials([str(folder)]).trials
+
+
+def test_a_trial_names_the_host_and_the_version_on_which_it_began(tmp_path):
+    _, (trial,) = run_trials(tmp_path, [0])
+    assert dict(trial.origin) == {'host': socket.gethostname(), 'version': __version__}
 
 
 def test_recoveries_of_a_low_failure_state_are_counted(tmp_path):

@@ -15,7 +15,7 @@ COMMON = 'smach_common'  # what the rooms and the stand-ins share
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': {'smach_common.foreign', 'forking', 'store'},
+    'oracle': {'smach_common.foreign', 'forking', 'store', '__version__'},
     'store': {'smach_common.foreign', 'forking'},  # no ROS, no SMACH
     'ros': {
         'oracle.asking',

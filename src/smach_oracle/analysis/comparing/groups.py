@@ -57,7 +57,6 @@ VALUES: Mapping[str, Callable[[TrialSummary], str]] = {
     'version': _origin('version'),
     'settings': _settings,
     'day': day_of,
-    'script': _origin('script'),
     'rule of failures': lambda trial: str(trial.rule),
 }
 BY = ('folder', 'node', 'host', 'version', 'settings', 'day')

@@ -3,10 +3,12 @@
 Also what one execution of any container begins and ends.
 """
 
+import socket
 import time
 from typing import Callable, Dict, List, Optional
 
 import smach
+from smach_oracle import __version__
 from smach_oracle.forking import in_child
 
 from ..checkpoint.resuming import tell_resumed
@@ -18,7 +20,7 @@ from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
-from ..records.facts import ENDED_BY, TrialEnd
+from ..records.facts import ENDED_BY, ORIGIN, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
@@ -93,6 +95,7 @@ class ContainerRun(Execution):
                     'recovers': node.tree.recover,
                     'settings': _settings(node),
                     RULE: node.in_force.rule.as_data(),
+                    ORIGIN: {'host': socket.gethostname(), 'version': __version__},
                 },
             )
         else:
