@@ -22,8 +22,8 @@ from typing import (
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
 
-from .indexed_bag import IndexedBag, NotPlain
-from .quick_decoding import STAMP_NS, STAMP_S, MessageDecoder
+from .plain_bags.decoding import STAMP_NS, STAMP_S, MessageDecoder
+from .plain_bags.indexed_bag import IndexedBag, NotPlain
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'

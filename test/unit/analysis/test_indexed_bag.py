@@ -12,8 +12,8 @@ from std_msgs.msg import Bool, Header, String
 
 from smach_oracle.analysis import bag_events
 from smach_oracle.analysis.bag_events import CAUSE_TYPE, EVENT_TYPE, BagError, EventReader
-from smach_oracle.analysis.indexed_bag import IndexedBag, NotPlain
-from smach_oracle.analysis.quick_decoding import MessageDecoder
+from smach_oracle.analysis.plain_bags.decoding import MessageDecoder
+from smach_oracle.analysis.plain_bags.indexed_bag import IndexedBag, NotPlain
 from smach_oracle.msg import OracleEvent, TrialCause
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.recorder import TrialRecorder
@@ -46,7 +46,7 @@ class ByQuickWay(EventReader):
 
 
 def told_by(reader, path):
-    """All that a reader tells of a bag, or why it cannot."""
+    """What a reader says about a bag, or why it cannot."""
     try:
         return repr(reader.read(str(path)))
     except BagError as err:

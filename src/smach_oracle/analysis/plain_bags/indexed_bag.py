@@ -28,7 +28,7 @@ class NotPlain(Exception):
     """The bag has something that is not read here."""
 
 
-class BagConnection(NamedTuple):
+class PlainConnection(NamedTuple):
     """A topic, and the type of its messages."""
 
     order: int  # among those of the bag
@@ -41,11 +41,11 @@ class BagMessage(NamedTuple):
     """A message as it was recorded."""
 
     stamp: int  # ns
-    connection: BagConnection
+    connection: PlainConnection
     data: bytes
 
 
-class _Record(NamedTuple):
+class _RawRecord(NamedTuple):
     fields: Mapping[bytes, bytes]
     start: int  # of its data, in the bytes that it was read from
     end: int
@@ -65,7 +65,7 @@ class IndexedBag:
         :raises NotPlain: where rosbags is to read it.
         :raises OSError: where it cannot be opened.
         """
-        self.connections: Dict[int, BagConnection] = {}
+        self.connections: Dict[int, PlainConnection] = {}
         self._chunks: List[_Chunk] = []
         self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         try:
@@ -124,7 +124,7 @@ class IndexedBag:
             record = _record(tail, at, _CONNECTION)
             number = _number(record, b'conn')
             about = _fields(tail, record.start, record.end)
-            self.connections[number] = BagConnection(
+            self.connections[number] = PlainConnection(
                 len(self.connections),
                 record.fields[b'topic'].decode(),
                 about[b'type'].decode().replace('/', '/msg/'),
@@ -144,7 +144,7 @@ class IndexedBag:
             raise NotPlain('the index is not the end of it')
 
     def _messages_in(
-        self, chunk: _Chunk, end: int, wanted: Mapping[int, BagConnection]
+        self, chunk: _Chunk, end: int, wanted: Mapping[int, PlainConnection]
     ) -> Iterator[BagMessage]:
         """Yield the messages of a chunk. Its index comes behind it, up to `end`."""
         if end - chunk.place > _LARGEST_CHUNK:
@@ -179,7 +179,7 @@ def _plain() -> Iterator[None]:
         raise NotPlain(str(err)) from err
 
 
-def _record(data: bytes, at: int, kind: int) -> _Record:
+def _record(data: bytes, at: int, kind: int) -> _RawRecord:
     """Return the record that begins at a place.
 
     :raises NotPlain: where it is of another kind, or cut off.
@@ -192,7 +192,7 @@ def _record(data: bytes, at: int, kind: int) -> _Record:
     (size,) = _SIZE.unpack_from(data, start)
     if start + 4 + size > len(data):
         raise NotPlain('a record is cut off')
-    return _Record(fields, start + 4, start + 4 + size)
+    return _RawRecord(fields, start + 4, start + 4 + size)
 
 
 def _fields(data: bytes, at: int, end: int) -> Dict[bytes, bytes]:
@@ -207,7 +207,7 @@ def _fields(data: bytes, at: int, end: int) -> Dict[bytes, bytes]:
     return found
 
 
-def _opened(record: _Record, data: bytes) -> bytes:
+def _opened(record: _RawRecord, data: bytes) -> bytes:
     """Return the content of a chunk. It has the length that the chunk tells."""
     size = _number(record, b'size')
     if size > _LARGEST_CHUNK:
@@ -222,7 +222,7 @@ def _opened(record: _Record, data: bytes) -> bytes:
     return data
 
 
-def _number(record: _Record, name: bytes) -> int:
+def _number(record: _RawRecord, name: bytes) -> int:
     (number,) = _SIZE.unpack(record.fields[name])
     return int(number)
 
