@@ -26,8 +26,10 @@ Errors that you may catch, in addition to those of the executive in `smach_oracl
 
 from typing import Any
 
+from .release import VERSION
+
 __all__ = ['OracleContainer']
-__version__ = '0.2.0'  # as in package.xml
+__version__ = VERSION
 
 
 def __getattr__(name: str) -> Any:

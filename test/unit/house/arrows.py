@@ -15,7 +15,7 @@ COMMON = 'smach_common'  # what the rooms and the stand-ins share
 MESSAGES = {'msg', 'srv'}  # built from ours by catkin
 # room, or module of the top: the other rooms, packages and modules that it may import
 ARROWS: Dict[str, Set[str]] = {
-    'oracle': {'smach_common.foreign', 'forking', 'store', '__version__'},
+    'oracle': {'smach_common.foreign', 'forking', 'release', 'store'},
     'store': {'smach_common.foreign', 'forking'},  # no ROS, no SMACH
     'ros': {
         'oracle.asking',
@@ -107,12 +107,13 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.unwrap',
         'ros',
     },
-    '__init__': {'oracle.OracleContainer', 'ros.container'},
+    '__init__': {'oracle.OracleContainer', 'release', 'ros.container'},
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'documentation': set(),
     'forking': set(),
     'packages': set(),
+    'release': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
 TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))

@@ -8,8 +8,8 @@ import time
 from typing import Callable, Dict, List, Optional
 
 import smach
-from smach_oracle import __version__
 from smach_oracle.forking import in_child
+from smach_oracle.release import VERSION
 
 from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
@@ -95,7 +95,7 @@ class ContainerRun(Execution):
                     'recovers': node.tree.recover,
                     'settings': _settings(node),
                     RULE: node.in_force.rule.as_data(),
-                    ORIGIN: {'host': socket.gethostname(), 'version': __version__},
+                    ORIGIN: {'host': socket.gethostname(), 'version': VERSION},
                 },
             )
         else:
