@@ -38,8 +38,13 @@ class _Connection(NamedTuple):
 
 
 def _lock(fd: int) -> None:
+    """Lock a file that was just made.
+
+    A recorder that starts locks each file for a moment, to see whether its writer is alive. It lets
+    an empty one go, so this waits for it and for nobody else.
+    """
     try:
-        fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(fd, fcntl.LOCK_EX)
     except OSError as err:
         if err.errno not in _NO_LOCKS_HERE:
             raise

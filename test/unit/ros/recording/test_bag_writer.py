@@ -4,6 +4,7 @@ import errno
 import fcntl
 import os
 import subprocess
+import threading
 
 import pytest
 import rosbag
@@ -82,6 +83,27 @@ def test_a_bag_that_exists_is_never_overwritten(tmp_path):
     with pytest.raises(FileExistsError):
         BagWriter(str(path))
     assert path.read_bytes() == b'precious'
+
+
+def test_a_recorder_that_looks_at_a_new_bag_for_a_moment_costs_nothing(tmp_path, monkeypatch):
+    path, looked = str(tmp_path / 'a.bag.active'), threading.Event()
+    real = fcntl.flock
+
+    def locked_meanwhile(fd, how):
+        with open(path, 'rb') as other:  # as a recorder that starts has it
+            real(other.fileno(), fcntl.LOCK_EX)
+            looker = threading.Timer(0.1, lambda: (looked.set(), real(held, fcntl.LOCK_UN)))
+            held = os.dup(other.fileno())
+        looker.start()
+        monkeypatch.undo()
+        real(fd, how)
+        assert looked.is_set()
+        looker.join()
+        os.close(held)
+
+    monkeypatch.setattr(fcntl, 'flock', locked_meanwhile)
+    BagWriter(path).close()
+    assert recover_folder(str(tmp_path), quiet, pytest.fail) == []
 
 
 def test_latched_topics_are_marked_so_that_rosbag_play_latches_them(tmp_path):
