@@ -92,8 +92,13 @@ def test_a_recorder_that_looks_at_a_new_bag_for_a_moment_costs_nothing(tmp_path,
     def locked_meanwhile(fd, how):
         with open(path, 'rb') as other:  # as a recorder that starts has it
             real(other.fileno(), fcntl.LOCK_EX)
-            looker = threading.Timer(0.1, lambda: (looked.set(), real(held, fcntl.LOCK_UN)))
             held = os.dup(other.fileno())
+
+        def let_go():
+            looked.set()
+            real(held, fcntl.LOCK_UN)
+
+        looker = threading.Timer(0.1, let_go)  # nothing tells that somebody waits for a lock
         looker.start()
         monkeypatch.undo()
         real(fd, how)
