@@ -46,6 +46,8 @@ _TAKEN = {
     CAUSE_TYPE: ('seed', 'task', 'kinds', 'details'),
 }
 
+_PICKS = {msgtype: attrgetter(*names) for msgtype, names in _TAKEN.items()}
+
 
 class BagError(OracleError):
     """A bag cannot be used. The text says why."""
@@ -225,8 +227,7 @@ class EventReader:
             ]
             for item, stamp, data in reader.messages(connections):
                 message = self._stores.read(item, data)
-                told = attrgetter(*_TAKEN[item.msgtype])(message)
-                yield _Message(item.msgtype, item.topic, stamp, told)
+                yield _Message(item.msgtype, item.topic, stamp, _PICKS[item.msgtype](message))
 
     def _content_of(self, messages: Iterable[_Message]) -> BagContent:
         events: List[Event] = []

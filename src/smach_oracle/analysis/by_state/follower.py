@@ -1,13 +1,12 @@
 """Counts what happened in the states of one trial, from its events. Pure."""
 
-from typing import Dict, Iterable, List, Mapping, Optional
+from typing import Dict, Iterable, List, Optional
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import JUMPED_FROM
 from smach_oracle.oracle.records.way_results import failure_text_key
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
-from ..replaying.followed import Key, Visits, key_of, split_path
+from ..replaying.followed import Key, Visits, key_of, left_by
 from ..trial_counter import TrialCounter, TrialEnding
 from .questions import Questions
 from .recoveries import Recoveries
@@ -104,8 +103,4 @@ class _Follower:
 
 
 def _left_by(event: Event) -> Optional[Key]:
-    if event.kind not in (EventKind.JUMP, EventKind.GIVE_UP):
-        return None
-    data = event.data if isinstance(event.data, Mapping) else {}
-    left = str(data.get(JUMPED_FROM, ''))
-    return split_path(left) if left else key_of(event)
+    return left_by(event) if event.kind in (EventKind.JUMP, EventKind.GIVE_UP) else None

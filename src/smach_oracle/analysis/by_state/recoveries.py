@@ -5,7 +5,7 @@ from typing import Dict, List, Mapping, Optional, Set, Tuple
 
 from smach_oracle.oracle.decision.ways import WayKind, way_in_words
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import JUMPED_FROM, JUMPED_TO
+from smach_oracle.oracle.records.facts import JUMPED_TO
 
 from ..replaying.followed import (
     Decisions,
@@ -14,7 +14,7 @@ from ..replaying.followed import (
     entered_way,
     is_act_of_person,
     key_of,
-    split_path,
+    left_by,
 )
 from .state_counts import StatesOfTrials, WayCount
 
@@ -111,8 +111,7 @@ class Recoveries:
     def _jump(self, event: Event, now_s: float) -> None:
         gone = self._decisions.take(event)
         data = event.data if isinstance(event.data, Mapping) else {}
-        left = str(data.get(JUMPED_FROM, ''))
-        key = split_path(left) if left else key_of(event)
+        key = left_by(event)
         if key in self._superseded:
             self._superseded.discard(key)
             return

@@ -107,6 +107,7 @@ def _share(number: int, of: int) -> str:
 
 def groups_data(by: str, groups: Sequence[TrialGroup]) -> Dict[str, Any]:
     """Return all of it as plain data, for JSON."""
+    pairs = compared(by, groups)
     return {
         'by': by,
         'groups': [dict(variant_data(counts), group=counts.name) for counts in _counts(groups)],
@@ -117,7 +118,7 @@ def groups_data(by: str, groups: Sequence[TrialGroup]) -> Dict[str, Any]:
                 first_group=pair.first.name,
                 second_group=pair.second.name,
             )
-            for pair in compared(by, groups)
+            for pair in pairs
             for test in pair.tests
         ],
         'warnings': [
@@ -127,7 +128,7 @@ def groups_data(by: str, groups: Sequence[TrialGroup]) -> Dict[str, Any]:
                 'second_group': pair.second.name,
                 'differ_in': pair.differ_in,
             }
-            for pair in compared(by, groups)
+            for pair in pairs
             if pair.differ_in
         ],
     }

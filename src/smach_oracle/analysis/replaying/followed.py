@@ -139,8 +139,7 @@ class Decisions:
 
     def _gone(self, jump: Event) -> Optional[GoneWay]:
         data: Mapping[str, Any] = jump.data if isinstance(jump.data, Mapping) else {}
-        left = str(data.get(JUMPED_FROM, ''))
-        failed = split_path(left) if left else key_of(jump)
+        left, failed = str(data.get(JUMPED_FROM, '')), left_by(jump)
         if jump.by:
             self._open.pop(failed, None)
             return GoneWay(failed, entered_way(jump, failed, str(data.get(JUMPED_TO, ''))))
@@ -160,6 +159,13 @@ def split_path(path: str) -> Key:
     """Return the container and the state of the path of a state."""
     container, _, state = path.rpartition('/')
     return container, state
+
+
+def left_by(jump: Event) -> Key:
+    """Return the state that a JUMP or a GIVE_UP leaves: the failed one, which may be below."""
+    data: Mapping[str, Any] = jump.data if isinstance(jump.data, Mapping) else {}
+    left = str(data.get(JUMPED_FROM, ''))
+    return split_path(left) if left else key_of(jump)
 
 
 def entered_way(jump: Event, failed: Key, entered: str) -> str:
