@@ -10,7 +10,7 @@ Errors that you may catch, in addition to those of the executive in `smach_oracl
     |     +-- QuestionRefusedError: a server does not take a question (ros.expert.open_questions)
     +-- BagError: a bag cannot be used (analysis.bag_events)
     |     +-- BagReadError: of several bags, this one cannot be used (analysis.bag_worker)
-    +-- BagFormatError: the bytes are no bag (ros.recording.bag_format)
+    +-- BagFormatError: the bytes are no bag (bag_format)
     +-- FaultError (also a ValueError): a fault does not fit the machine (testing.errors)
     +-- InterfaceGoalError (also a ValueError): a goal cannot end so (interfaces.interface_goal)
     +-- ServerGoneError: a server is not reached or does not answer (ros.service_calls)

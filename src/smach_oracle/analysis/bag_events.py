@@ -19,6 +19,7 @@ from typing import (
     cast,
 )
 
+from smach_oracle.bag_format import MAGIC
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
 
@@ -36,7 +37,6 @@ MENDING = (
     'recorder in this folder saves what can be read behind it, too'
 )
 NO_EVENTS = 'no events of the executive in it'
-_MAGIC = b'#ROSBAG V2.0'
 _EVENTS = '/oracle/events'
 _WRAP = 2**32
 _KINDS = {int(kind): kind for kind in EventKind}
@@ -272,7 +272,7 @@ def _check_types(types: Iterable[str]) -> None:
 def why_unreadable(path: str, why: str) -> str:
     """Say why a bag cannot be read, and what may save it where it is one."""
     with contextlib.suppress(OSError), open(path, 'rb') as source:
-        if source.read(len(_MAGIC)) == _MAGIC:
+        if source.read(len(MAGIC)) == MAGIC:
             return 'cut off, or damaged: {}; {}'.format(why, MENDING)
     return 'damaged, or no bag: {}'.format(why)
 

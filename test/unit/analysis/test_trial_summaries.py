@@ -10,6 +10,7 @@ import rosbag
 from fake_trials import FakeMachine
 from std_msgs.msg import String
 
+from smach_oracle import bag_format
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
 from smach_oracle.analysis.table import format_text, write_csv
 from smach_oracle.analysis.trial_counter import TrialEnding
@@ -17,7 +18,6 @@ from smach_oracle.analysis.trials import load_trials, summarise
 from smach_oracle.analysis.variants import count_variants
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind, FailureKind
 from smach_oracle.ros.recorder import TrialRecorder
-from smach_oracle.ros.recording import bag_format
 from smach_oracle.ros.recording.bag_writer import BagWriter
 
 

@@ -31,6 +31,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.operator_hand',
         'oracle.OracleContainer',
         'oracle.oracle_of',
+        'bag_format',
         'forking',
         'packages',
         'smach_common',
@@ -38,6 +39,7 @@ ARROWS: Dict[str, Set[str]] = {
     },
     'geometry': set(),
     'analysis': {
+        'bag_format',
         'oracle.decision',
         'oracle.errors',
         'oracle.records',
@@ -110,6 +112,7 @@ ARROWS: Dict[str, Set[str]] = {
     '__init__': {'oracle.OracleContainer', 'release', 'ros.container'},
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
+    'bag_format': {'oracle.errors'},
     'documentation': set(),
     'forking': set(),
     'packages': set(),
@@ -141,6 +144,7 @@ ROS_FREE = [
     'simulation/scenes',
     'inspection_robot/world',
     'inspection_robot/robot',
+    'bag_format',
     'commands',
     'forking',
     'packages',

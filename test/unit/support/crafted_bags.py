@@ -2,8 +2,8 @@
 
 import bz2
 
+from smach_oracle import bag_format
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.ros.recording import bag_format
 from smach_oracle.ros.recording.event_packing import EVENT_TYPE, pack_event
 
 STAMP = (1_700_000_000, 0)

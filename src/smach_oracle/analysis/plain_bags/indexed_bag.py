@@ -12,15 +12,31 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple, Type
 
-MAGIC = b'#ROSBAG V2.0\n'
-_BAG, _CHUNK, _CHUNK_INFO, _CONNECTION = 3, 5, 6, 7  # kinds of records
-_SIZE, _LONG = struct.Struct('<I'), struct.Struct('<Q')
-_ENTRY = struct.Struct('<III')  # of an index: s, ns, place in the chunk
-_COUNT = struct.Struct('<II')  # of a chunk: connection, number of messages
-_TIME_FIELD, _TIME = b'\x0d\x00\x00\x00time=', struct.Struct('<II')
-_CONNECTION_FIELD = b'\x09\x00\x00\x00conn='
-_IS_MESSAGE, _IS_INDEX = b'\x04\x00\x00\x00op=\x02', b'\x04\x00\x00\x00op=\x04'
-_HEADER_SIZE = 4117  # bytes, to which the magic and the header of a bag are filled up
+from smach_oracle.bag_format import (
+    BAG_HEADER_END,
+    COUNT_ENTRY,
+    INDEX_ENTRY,
+    MAGIC,
+    OP_BAG_HEADER,
+    OP_CHUNK,
+    OP_CHUNK_INFO,
+    OP_CONNECTION,
+    OP_INDEX,
+    OP_MESSAGE,
+    STAMP,
+    UINT32,
+    UINT64,
+    BagFormatError,
+    Fields,
+    parse_fields,
+    uint32_field,
+)
+
+# parts of headers, as they stand in most files
+_TIME_FIELD, _CONNECTION_FIELD = b'\x0d\x00\x00\x00time=', b'\x09\x00\x00\x00conn='
+_IS_MESSAGE, _IS_INDEX = (
+    b'\x04\x00\x00\x00op=' + bytes((kind,)) for kind in (OP_MESSAGE, OP_INDEX)
+)
 _LARGEST_CHUNK = 1 << 24  # bytes. Larger ones do not come into memory as a whole
 
 
@@ -46,7 +62,7 @@ class BagMessage(NamedTuple):
 
 
 class _RawRecord(NamedTuple):
-    fields: Mapping[bytes, bytes]
+    fields: Fields
     start: int  # of its data, in the bytes that it was read from
     end: int
 
@@ -113,29 +129,30 @@ class IndexedBag:
         return data
 
     def _read_index(self) -> None:
-        begin = os.pread(self._file, _HEADER_SIZE, 0)
+        begin = os.pread(self._file, BAG_HEADER_END, 0)
         if not begin.startswith(MAGIC):
             raise NotPlain('no bag of version 2.0')
-        fields = _record(begin, len(MAGIC), _BAG).fields
-        (self._index_place,) = _LONG.unpack(fields[b'index_pos'])
+        fields = _record(begin, len(MAGIC), OP_BAG_HEADER).fields
+        (self._index_place,) = UINT64.unpack(fields['index_pos'])
         tail = self._part(self._index_place, os.fstat(self._file).st_size)
         at = 0
-        for _ in range(*_SIZE.unpack(fields[b'conn_count'])):
-            record = _record(tail, at, _CONNECTION)
-            number = _number(record, b'conn')
-            about = _fields(tail, record.start, record.end)
+        for _ in range(uint32_field(fields, 'conn_count')):
+            record = _record(tail, at, OP_CONNECTION)
+            number = uint32_field(record.fields, 'conn')
+            about = parse_fields(tail[record.start : record.end])
             self.connections[number] = PlainConnection(
                 len(self.connections),
-                record.fields[b'topic'].decode(),
-                about[b'type'].decode().replace('/', '/msg/'),
-                about[b'message_definition'].decode(),
+                record.fields['topic'].decode(),
+                about['type'].decode().replace('/', '/msg/'),
+                about['message_definition'].decode(),
             )
             at = record.end
-        for _ in range(*_SIZE.unpack(fields[b'chunk_count'])):
-            record = _record(tail, at, _CHUNK_INFO)
-            (place,) = _LONG.unpack(record.fields[b'chunk_pos'])
+        for _ in range(uint32_field(fields, 'chunk_count')):
+            record = _record(tail, at, OP_CHUNK_INFO)
+            (place,) = UINT64.unpack(record.fields['chunk_pos'])
             counts = {
-                conn: count for conn, count in _COUNT.iter_unpack(tail[record.start : record.end])
+                conn: count
+                for conn, count in COUNT_ENTRY.iter_unpack(tail[record.start : record.end])
             }
             self._chunks.append(_Chunk(place, counts))
             at = record.end
@@ -150,17 +167,17 @@ class IndexedBag:
         if end - chunk.place > _LARGEST_CHUNK:
             raise NotPlain('a large chunk')
         whole = self._part(chunk.place, end)
-        record = _record(whole, 0, _CHUNK)
+        record = _record(whole, 0, OP_CHUNK)
         data = _opened(record, whole[record.start : record.end])
         left, at = dict(chunk.counts), record.end
         while at < len(whole):
             name, start, at = _index(whole, at)
-            (number,) = _SIZE.unpack(name[-4:])
-            if left.pop(number, 0) * _ENTRY.size != at - start:
+            (number,) = UINT32.unpack(name[-4:])
+            if left.pop(number, 0) * INDEX_ENTRY.size != at - start:
                 raise NotPlain('an index has another length')
             if number in wanted:
-                for second, rest, place in _ENTRY.iter_unpack(whole[start:at]):
-                    message = _message(data, place, name, _TIME_FIELD + _TIME.pack(second, rest))
+                for second, rest, place in INDEX_ENTRY.iter_unpack(whole[start:at]):
+                    message = _message(data, place, name, _TIME_FIELD + STAMP.pack(second, rest))
                     yield BagMessage(second * 10**9 + rest, wanted[number], message)
         if left:
             raise NotPlain('an index is missing')
@@ -175,7 +192,7 @@ def _plain() -> Iterator[None]:
         raise
     except (ArithmeticError, EOFError, LookupError, MemoryError, OSError, ValueError) as err:
         raise NotPlain(repr(err)) from err
-    except struct.error as err:
+    except (BagFormatError, struct.error) as err:
         raise NotPlain(str(err)) from err
 
 
@@ -184,35 +201,23 @@ def _record(data: bytes, at: int, kind: int) -> _RawRecord:
 
     :raises NotPlain: where it is of another kind, or cut off.
     """
-    (length,) = _SIZE.unpack_from(data, at)
+    (length,) = UINT32.unpack_from(data, at)
     start = at + 4 + length
-    fields = _fields(data, at + 4, start)
-    if fields[b'op'] != bytes([kind]):
+    fields = parse_fields(data[at + 4 : start])
+    if fields['op'] != bytes([kind]):
         raise NotPlain('a record of another kind')
-    (size,) = _SIZE.unpack_from(data, start)
+    (size,) = UINT32.unpack_from(data, start)
     if start + 4 + size > len(data):
         raise NotPlain('a record is cut off')
     return _RawRecord(fields, start + 4, start + 4 + size)
 
 
-def _fields(data: bytes, at: int, end: int) -> Dict[bytes, bytes]:
-    found: Dict[bytes, bytes] = {}
-    while at < end:
-        (length,) = _SIZE.unpack_from(data, at)
-        at += 4 + length
-        name, equals, value = data[at - length : at].partition(b'=')
-        if at > end or not equals:
-            raise NotPlain('a field is cut off')
-        found[name] = value
-    return found
-
-
 def _opened(record: _RawRecord, data: bytes) -> bytes:
     """Return the content of a chunk. It has the length that the chunk tells."""
-    size = _number(record, b'size')
+    size = uint32_field(record.fields, 'size')
     if size > _LARGEST_CHUNK:
         raise NotPlain('a large chunk')
-    compression = record.fields[b'compression']
+    compression = record.fields['compression']
     if compression == b'bz2':
         data = bz2.BZ2Decompressor().decompress(data, size + 1)
     elif compression != b'none':
@@ -222,22 +227,17 @@ def _opened(record: _RawRecord, data: bytes) -> bytes:
     return data
 
 
-def _number(record: _RawRecord, name: bytes) -> int:
-    (number,) = _SIZE.unpack(record.fields[name])
-    return int(number)
-
-
 def _index(data: bytes, at: int) -> Tuple[bytes, int, int]:
     """Return the field that names the connection of an index record, and where its data is.
 
     Most records of a bag are such. Its fields are numbers, so no other value looks like a name.
     """
-    (length,) = _SIZE.unpack_from(data, at)
+    (length,) = UINT32.unpack_from(data, at)
     start = at + 4 + length
     header = data[at + 4 : start]
     found = header.find(_CONNECTION_FIELD)
-    (size,) = _SIZE.unpack_from(data, start)
-    name = header[found : found + len(_CONNECTION_FIELD) + _SIZE.size]
+    (size,) = UINT32.unpack_from(data, start)
+    name = header[found : found + len(_CONNECTION_FIELD) + UINT32.size]
     if found < 0 or _IS_INDEX not in header or start + 4 + size > len(data):
         raise NotPlain('no index behind a chunk')
     return name, start + 4, start + 4 + size
@@ -249,10 +249,10 @@ def _message(data: bytes, at: int, connection: bytes, time: bytes) -> bytes:
     :param connection: the field of its header that names it.
     :param time: the field that tells its time.
     """
-    (length,) = _SIZE.unpack_from(data, at)
+    (length,) = UINT32.unpack_from(data, at)
     start = at + 4 + length
     header = data[at + 4 : start]
-    (size,) = _SIZE.unpack_from(data, start)
+    (size,) = UINT32.unpack_from(data, start)
     message = data[start + 4 : start + 4 + size]
     sound = connection in header and time in header and _IS_MESSAGE in header
     if not sound or len(message) != size:

@@ -11,8 +11,9 @@ from typing import Any, Dict, List, NamedTuple, Optional, Tuple
 
 import roslib.message
 
-from . import bag_format
-from .bag_format import BagFormatError, Fields
+from smach_oracle import bag_format
+from smach_oracle.bag_format import BagFormatError, Fields
+
 from .bag_writer import MessageType
 from .event_packing import EARLIER_MD5S, EVENT_TYPE, PACKED_MD5, event_number
 

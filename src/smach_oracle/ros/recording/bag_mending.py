@@ -7,9 +7,10 @@ import os
 import zlib
 from typing import BinaryIO, Callable, Dict, List, NamedTuple, Optional
 
-from . import bag_format
+from smach_oracle import bag_format
+from smach_oracle.bag_format import BagFormatError, Stamp
+
 from .bag_contents import BagConnection, Connections, is_readable
-from .bag_format import BagFormatError, Stamp
 from .bag_salvage import Found, Salvage
 from .bag_writer import MAX_CHUNK_BYTES, BagWriter
 from .event_packing import event_number

@@ -15,10 +15,10 @@ import re
 import time
 from typing import BinaryIO, Callable, List, NamedTuple, Optional
 
+from smach_oracle import bag_format
+from smach_oracle.bag_format import BagFormatError
 from smach_oracle.forking import unlock
 
-from . import bag_format
-from .bag_format import BagFormatError
 from .bag_mending import Saved, contents, mend, read_back
 
 ACTIVE_SUFFIX, DAMAGED_SUFFIX = '.bag.active', '.bag.damaged'

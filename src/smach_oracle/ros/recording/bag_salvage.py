@@ -8,8 +8,8 @@ passed over: whoever saves the messages makes new ones. Opens no file, needs no 
 import os
 from typing import BinaryIO, Iterator, NamedTuple, Optional
 
-from . import bag_format
-from .bag_format import BagFormatError, Fields
+from smach_oracle import bag_format
+from smach_oracle.bag_format import BagFormatError, Fields
 
 _FIRST_FIELD = bag_format.UINT32.pack(4) + b'op='  # with which every header of ours begins
 _LONGEST_HEADER = 65536  # bytes. A topic's name is its longest part

@@ -13,10 +13,9 @@ import fcntl
 import os
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
+from smach_oracle import bag_format
+from smach_oracle.bag_format import ChunkInfo, Stamp
 from smach_oracle.forking import in_child, let_go_of, unlock
-
-from . import bag_format
-from .bag_format import ChunkInfo, Stamp
 
 MAX_CHUNK_BYTES = 768 * 1024  # rosbag's own figure
 

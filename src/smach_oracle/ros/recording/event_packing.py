@@ -9,12 +9,12 @@ from typing import Callable, Optional
 
 import genpy
 
+from smach_oracle.bag_format import Stamp
 from smach_oracle.msg import OracleEvent
 from smach_oracle.oracle.records.events import Event
 
 from .. import event_messages
 from ..sendable_text import sendable_text
-from .bag_format import Stamp
 from .bag_writer import MessageType
 
 # Of the definition that `_pack_directly` is written for. With any other, events go through the

@@ -6,9 +6,9 @@ from typing import Callable, List, NamedTuple, Optional, Tuple, Union
 
 import genpy
 
+from smach_oracle.bag_format import Stamp
 from smach_oracle.oracle.records.events import Event
 
-from .bag_format import Stamp
 from .bag_writer import MessageType
 
 LATE_POLL_S = 0.02

@@ -7,9 +7,9 @@ from typing import Callable, Dict, Optional
 
 import genpy
 
+from smach_oracle.bag_format import Stamp
 from smach_oracle.oracle.records.events import Event
 
-from .bag_format import Stamp
 from .bag_repair import ACTIVE_SUFFIX, free_name
 from .bag_writer import MAX_CHUNK_BYTES, BagWriter, MessageType
 from .event_packing import EVENT_TYPE, pack_event, serialise

@@ -10,17 +10,17 @@ import rosbag
 from recorded import STRING, messages, quiet, string_data, texts_in, write
 from rosbags.rosbag1 import Reader
 
+from smach_oracle import bag_format
 from smach_oracle.analysis.bag_events import MessageStores
+from smach_oracle.bag_format import BAG_HEADER_END
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource
 from smach_oracle.ros.recorder import TrialRecorder
 from smach_oracle.ros.recording import (
-    bag_format,
     bag_mending,
     bag_repair,
     bag_writer,
     trial_bags,
 )
-from smach_oracle.ros.recording.bag_format import BAG_HEADER_END
 from smach_oracle.ros.recording.bag_repair import recover_folder
 from smach_oracle.ros.recording.bag_writer import BagWriter
 from smach_oracle.ros.recording.event_packing import EVENT_TYPE, pack_event
