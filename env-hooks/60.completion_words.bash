@@ -1,10 +1,9 @@
 # The words of 61.completion. Written by write_completion.py.
-_smach_oracle_commands='bag_statistics compare_oracles compare_variants draw_results expert_console
-expert_query_server expert_terminal inspection_inspector inspection_navigator
-inspection_world joy_teleoperation learn manipulation_interface oracle_disk
-oracle_run oracle_state perception_interface pr2_film pr2_manipulation
-pr2_perception pr2_world run_trials same_trials scripted_expert
-scripted_operator what_if'
+_smach_oracle_commands='bag_statistics compare expert_console expert_query_server expert_terminal
+inspection_inspector inspection_navigator inspection_world joy_teleoperation
+learn manipulation_interface oracle_disk oracle_run oracle_state
+perception_interface pr2_film pr2_manipulation pr2_perception pr2_world
+run_trials scripted_expert scripted_operator'
 
 _smach_oracle_words() {
   case $1 in
@@ -17,12 +16,21 @@ _smach_oracle_words() {
       echo '1 2' ;;
     'bag_statistics --x-axis')
       echo 'trials time' ;;
-    'compare_oracles')
-      echo '--figure --help --version -h' ;;
-    'compare_variants')
-      echo '--help --version -h' ;;
-    'draw_results')
-      echo '--help --version -h' ;;
+    'compare')
+      echo '--help --version -h figures oracles same_trials variants what_if' ;;
+    'compare figures')
+      echo '--help --output -h' ;;
+    'compare oracles')
+      echo '--figure --help --wide -h' ;;
+    'compare same_trials')
+      echo '--help -h' ;;
+    'compare variants')
+      echo '--help -h' ;;
+    'compare what_if')
+      echo '--help --high-from --json --memory --moderate-from --policy --prior -h' ;;
+    'compare what_if --policy')
+      echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
+retry step_back' ;;
     'expert_console')
       echo '--help --version -h' ;;
     'expert_query_server')
@@ -102,16 +110,9 @@ learned prose random restart retry step_back one_line:algorithm1
 one_line:always_ask one_line:any_way one_line:escalating one_line:ladder
 one_line:learned one_line:prose one_line:random one_line:restart one_line:retry
 one_line:step_back' ;;
-    'same_trials')
-      echo '--help --version -h' ;;
     'scripted_expert')
       echo '--help --version -h' ;;
     'scripted_operator')
       echo '--help --version -h' ;;
-    'what_if')
-      echo '--help --high-from --json --memory --moderate-from --policy --prior --version -h' ;;
-    'what_if --policy')
-      echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
-retry step_back' ;;
   esac
 }

@@ -34,17 +34,23 @@ def told(parser, *args, **kwargs):
     raise SystemExit(0)
 
 argparse.ArgumentParser.parse_args = argparse.ArgumentParser.parse_known_args = told
-sys.argv[:] = [sys.argv[1], 'x']
+sys.argv[:] = [*sys.argv[1:], 'x']
 runpy.run_path(sys.argv[0], run_name='__main__')
 """
 
 
-def ask(script: Path) -> Dict[str, Any]:
-    """The options and works that a command's parser knows."""
+def ask(script: Path, *work: str) -> Dict[str, Any]:
+    """The options and works that the parser of a command, or of one of its works, knows."""
     told = subprocess.run(
-        [sys.executable, '-c', ASK, str(script)], stdout=subprocess.PIPE, check=True, timeout=120
+        [sys.executable, '-c', ASK, str(script), *work],
+        stdout=subprocess.PIPE,
+        check=True,
+        timeout=120,
     ).stdout
     found: Dict[str, Any] = json.loads(told.decode().splitlines()[-1])
+    for name, below in found['works'].items():
+        if not below['options']:  # the command loads no work before it is named
+            found['works'][name] = ask(script, *work, name)
     return found
 
 
@@ -67,12 +73,17 @@ def folded(words: str) -> str:
     return '\n'.join(textwrap.wrap(words, 80, break_long_words=False, break_on_hyphens=False))
 
 
+def _is_offered(script: bytes) -> bool:
+    """Whether it is a command, by its present name."""
+    return script.startswith(b'#!/usr/bin/env python3') and b'run_renamed(' not in script
+
+
 def text() -> str:
     """The whole file."""
     scripts = [
         path
         for path in sorted(SCRIPTS.iterdir())
-        if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')
+        if path.is_file() and _is_offered(path.read_bytes())
     ]
     with ThreadPoolExecutor(2) as pool:
         found = list(pool.map(ask, scripts))

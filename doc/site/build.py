@@ -69,10 +69,11 @@ def api_page() -> str:
     return '\n'.join(lines)
 
 
-def help_of(script: Path) -> str:
-    """Return what a command prints at --help."""
+def help_of(command: str) -> str:
+    """Return what a command, or a subcommand, prints at --help."""
+    script, *subcommand = command.split()
     run = subprocess.run(
-        [sys.executable, str(script), '--help'],
+        [sys.executable, str(ROOT / 'scripts' / script), *subcommand, '--help'],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         check=False,
@@ -81,30 +82,30 @@ def help_of(script: Path) -> str:
     text = re.sub(r'\nMore: .*\n', '', run.stdout.decode())  # the page below, by a path of here
     if run.returncode:
         raise SystemExit(
-            '{} --help ends with exit code {}:\n{}'.format(script, run.returncode, text)
+            '{} --help ends with exit code {}:\n{}'.format(command, run.returncode, text)
         )
     return text
 
 
 def commands_page() -> str:
     """The page of the commands, each with its help."""
-    scripts = [
-        path
-        for path in sorted((ROOT / 'scripts').iterdir())
-        if path.is_file() and path.read_bytes().startswith(b'#!/usr/bin/env python3')
+    names = [
+        name
+        for name in sorted(PAGES)
+        if 'run_renamed(' not in (ROOT / 'scripts' / name.split()[0]).read_text('utf-8')
     ]
     with ThreadPoolExecutor(2) as pool:
-        helps = list(pool.map(help_of, scripts))
+        helps = list(pool.map(help_of, names))
     lines = [
         '# Commands',
         '',
         'Run them with `rosrun smach_oracle NAME`. `--help` prints this.',
         '',
     ]
-    for script, text in zip(scripts, helps):
-        page = PAGES[script.name] + '.md'
+    for name, text in zip(names, helps):
+        page = PAGES[name] + '.md'
         lines += [
-            '## ' + script.name,
+            '## ' + name,
             '',
             '```text',
             text.rstrip(),

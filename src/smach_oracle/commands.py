@@ -5,12 +5,12 @@ import os
 import sys
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Iterator, NoReturn, TextIO
+from typing import Iterator, List, NoReturn, Optional, TextIO
 
 from smach_oracle import __version__
-from smach_oracle.documentation import page_of
+from smach_oracle.documentation import PAGES, page_of
 
-HELP = (['-h'], ['--help'])
+HELP, VERSION = (['-h'], ['--help']), ['--version']
 VERSION_HELP = """
 without any other option:
   --version             print the version and exit
@@ -64,20 +64,36 @@ class _Printed(io.TextIOWrapper):
 
 def _watched(stream: TextIO) -> TextIO:
     """The stream in `_Printed`, unless a program has replaced it by one of its own."""
-    return _Printed(stream) if isinstance(stream, io.TextIOWrapper) else stream
+    wrap = isinstance(stream, io.TextIOWrapper) and not isinstance(stream, _Printed)
+    return _Printed(stream) if wrap else stream
 
 
-def run(module: str) -> None:
+def run_renamed(module: str, new: str, *options: str) -> None:
+    """Run a command by its older name: as `run`, after a line on standard error.
+
+    :param new: its new name, with the subcommand.
+    :param options: in front of those that were given.
+    """
+    old = os.path.basename(sys.argv[0])
+    if _asked(VERSION) is None:
+        sys.stderr = _watched(sys.stderr)
+        sys.stderr.write('{0}: is now `{1}`: rosrun smach_oracle {1}\n'.format(old, new))
+    run(module, [*options, *sys.argv[1:]], old)
+
+
+def run(module: str, *arguments: object) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
-    The process ends with the code that it returns. `--version` alone prints the version. Below its
-    --help are a line about that and the page that has more.
+    The process ends with the code that it returns. `--version` alone, or behind a subcommand,
+    prints the version. Below its --help are a line about that and the page that has more.
 
     Where a package is missing that the module imports, one line says which, and what installs it.
+
+    :param arguments: of its `main`.
     """
-    if sys.argv[1:] == ['--version']:
-        told = '{} of smach_oracle {}\n'.format(os.path.basename(sys.argv[0]), __version__)
-        sys.stdout.write(told)
+    asked = _asked(VERSION)
+    if asked is not None:
+        sys.stdout.write('{} of smach_oracle {}\n'.format(asked, __version__))
         return
     if module.startswith(PRINTING) or sys.argv[1:2] in HELP:
         sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
@@ -93,12 +109,25 @@ def run(module: str) -> None:
         sys.exit(LACKING)
     try:
         with _more_below_the_help():
-            code = main()
+            code = main(*arguments)
     finally:
         if isinstance(sys.stdout, _Printed):
             sys.stdout.flush()
     if code:
         sys.exit(code)
+
+
+def _asked(*options: List[str]) -> Optional[str]:
+    """Return the command, with its subcommand, where such an option stands right behind it.
+
+    None: it does not. Nothing else may follow `--version`.
+    """
+    command, rest = os.path.basename(sys.argv[0]), sys.argv[1:]
+    subcommand = ' '.join([command, *rest[:1]])
+    if subcommand in PAGES:
+        command, rest = subcommand, rest[1:]
+    told = rest if VERSION in options else rest[:1]
+    return command if told in options else None
 
 
 @contextmanager
@@ -110,7 +139,8 @@ def _more_below_the_help() -> Iterator[None]:
     try:
         yield
     except SystemExit as end:
-        page = page_of(os.path.basename(sys.argv[0])) if sys.argv[1:2] in HELP else None
+        asked = _asked(*HELP)
+        page = None if asked is None else page_of(asked)
         if page is not None and not end.code:
             sys.stdout.write(VERSION_HELP + '\nMore: {}\n'.format(page))
         raise

@@ -3,9 +3,15 @@
 from pathlib import Path
 from typing import Optional
 
-# command: page of doc/
+# command, or command and subcommand: page of doc/
 PAGES = {
     'bag_statistics': 'statistics',
+    'compare': 'comparing',
+    'compare figures': 'comparing_experiments',
+    'compare oracles': 'comparing',
+    'compare same_trials': 'comparing_experiments',
+    'compare variants': 'comparing',
+    'compare what_if': 'comparing',
     'compare_oracles': 'comparing',
     'compare_variants': 'comparing',
     'draw_results': 'comparing',

@@ -323,10 +323,13 @@ def _tests(variants: Dict[str, List[TrialRow]]) -> List[str]:
     return ['\n'.join(lines) + '\n'] if lines else []
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command, and return its exit code."""
+def main(argv: Optional[Sequence[str]] = None, command: str = 'compare variants') -> int:
+    """Run the command, and return its exit code.
+
+    :param command: its name in messages.
+    """
     parser = argparse.ArgumentParser(
-        prog='compare_variants',
+        prog=command,
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -339,7 +342,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         if not rows:
             raise BagError('{}: no trials in it'.format(', '.join(args.files)))
     except (BagError, OSError) as err:
-        return report_error('compare_variants', err)
+        return report_error(command, err)
     sys.stdout.write(format_comparison(rows))
     sys.stdout.write(verdicts_text(rows))
     return 0

@@ -11,7 +11,7 @@ nothing to count.
 import argparse
 import os
 import sys
-from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -89,28 +89,37 @@ def _label(variant: VariantTrials, variants: Sequence[VariantTrials]) -> str:
     )
 
 
-def format_points(points: Sequence[SweepPoint]) -> str:
-    """Return a table for each experiment and label."""
+# what a table shows of a point behind its memory and trials, each with the width of its column
+_ASKED, _OVER, _RECOVERED, _FAILED, _TRUE = (
+    'expert asked (95% interval)',
+    'over replicates',
+    'oracle recovered',
+    'failed',
+    'true success',
+)
+_WIDE = ({_ASKED: 29, _OVER: 20, _RECOVERED: 29, _FAILED: 10, _TRUE: 29, PERSON_NEEDED: 0},)
+_NARROW = (
+    {_ASKED: 29, _OVER: 17, PERSON_NEEDED: 0},  # 100 columns with the longest numbers
+    {_RECOVERED: 29, _TRUE: 29, _FAILED: 0},
+)
+
+
+def format_points(points: Sequence[SweepPoint], wide: bool = False) -> str:
+    """Return for each experiment and label two tables of at most 100 columns, or one wide one."""
     lines: List[str] = []
     for experiment, label in _parts(points):
         chosen = [
             point for point in points if (point.experiment, point.label) == (experiment, label)
         ]
-        lines += [
-            '',
-            '{}, {}'.format(experiment, label),
-            '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{:<29}{}'.format(
-                'memory N',
-                'trials',
-                'expert asked (95% interval)',
-                'over replicates',
-                'oracle recovered',
-                'failed',
-                'true success',
-                PERSON_NEEDED,
-            ),
-        ]
-        lines += [_line(point) for point in chosen]
+        lines += ['', '{}, {}'.format(experiment, label)]
+        for columns in _WIDE if wide else _NARROW:
+            lines.append(_row('memory N', 'trials', {name: name for name in columns}, columns))
+            lines += [
+                _row(
+                    '?' if each.memory is None else each.memory, each.trials, _cells(each), columns
+                )
+                for each in chosen
+            ]
     return '\n'.join(lines[1:]) + '\n'
 
 
@@ -118,17 +127,23 @@ def _parts(points: Sequence[SweepPoint]) -> List[Tuple[str, str]]:
     return list(dict.fromkeys((point.experiment, point.label) for point in points))
 
 
-def _line(point: SweepPoint) -> str:
-    return '  {:>8}{:>8}   {:<29}{:<20}{:<29}{:<10}{:<29}{}'.format(
-        '?' if point.memory is None else point.memory,
-        point.trials,
-        _with_interval(point.asked),
-        over_replicates(point.asked).strip(),
-        _with_interval(point.recovered),
-        '{:.1f}%'.format(100 * point.failed.share),
-        'unknown' if point.true_success is None else _with_interval(point.true_success),
-        ('at least ' if point.unjudged else '') + _with_interval(point.needed),
-    ).rstrip()
+def _row(
+    memory: object, trials: object, cells: Mapping[str, str], columns: Mapping[str, int]
+) -> str:
+    told = ''.join('{:<{}}'.format(cells[name], width) for name, width in columns.items())
+    return '  {:>8}{:>8}   {}'.format(memory, trials, told).rstrip()
+
+
+def _cells(point: SweepPoint) -> Dict[str, str]:
+    true = point.true_success
+    return {
+        _ASKED: _with_interval(point.asked),
+        _OVER: over_replicates(point.asked).strip(),
+        _RECOVERED: _with_interval(point.recovered),
+        _FAILED: '{:.1f}%'.format(100 * point.failed.share),
+        _TRUE: 'unknown' if true is None else _with_interval(true),
+        PERSON_NEEDED: ('at least ' if point.unjudged else '') + _with_interval(point.needed),
+    }
 
 
 def _with_interval(count: Count) -> str:
@@ -156,10 +171,13 @@ def by_label(points: Sequence[SweepPoint]) -> Dict[str, List[SweepPoint]]:
     return series
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command, and return its exit code."""
+def main(argv: Optional[Sequence[str]] = None, command: str = 'compare oracles') -> int:
+    """Run the command, and return its exit code.
+
+    :param command: its name in messages.
+    """
     parser = argparse.ArgumentParser(
-        prog='compare_oracles',
+        prog=command,
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -173,6 +191,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     parser.add_argument(
         '--figure', metavar='OUT', type=path_of, help='write the figure to OUT.svg and OUT.png'
     )
+    parser.add_argument(
+        '--wide',
+        action='store_true',
+        help='one table of 150 columns in place of two of at most 100',
+    )
     args = parser.parse_args(argv)
     try:
         found = load_trials(args.folders)
@@ -180,9 +203,9 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         points = find_points(find_variants(found.trials))
         if not points:
             raise BagError('no trials with an oracle in {}'.format(', '.join(args.folders)))
-        sys.stdout.write(format_points(points))
+        sys.stdout.write(format_points(points, args.wide))
         for path in save_figure(points, args.figure) if args.figure else []:
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
     except (BagError, OSError, ImportError) as err:
-        return report_error('compare_oracles', err)
+        return report_error(command, err)
     return code

@@ -56,7 +56,7 @@ class TrialRow(NamedTuple):
     wall_s: Optional[float] = None  # of the machine, that the trial took
     hour: Optional[float] = None  # of a world that goes on, at which it began
     left: str = ''  # how it left a world that goes on, as JSON
-    # those below are not in rows of older versions. doc/comparing.md describes them
+    # those below are not in rows of older versions. doc/comparing_experiments.md describes them
     cause_log: str = ''  # the world's log of the causes, as JSON
     tries: str = ''  # of the states that failed, in the world's time, as JSON
     memory: Optional[int] = None  # of the oracle, results of a state

@@ -98,10 +98,13 @@ def _first_difference(ours: Sequence[TrialStep], theirs: Sequence[TrialStep]) ->
     return '{} and {} steps'.format(len(ours), len(theirs))
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command, and return its exit code."""
+def main(argv: Optional[Sequence[str]] = None, command: str = 'compare same_trials') -> int:
+    """Run the command, and return its exit code.
+
+    :param command: its name in messages.
+    """
     parser = argparse.ArgumentParser(
-        prog='same_trials',
+        prog=command,
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -113,13 +116,11 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     try:
         first, second = (load_trial_steps(folder, skipped) for folder in args.folders)
     except (BagError, ImportError) as err:
-        return report_error('same_trials', err)
+        return report_error(command, err)
     code = report_skipped(skipped)
     common = set(first) & set(second)
     if not common:
-        return report_error(
-            'same_trials', 'no trial of the same experiment, variant and seed in both'
-        )
+        return report_error(command, 'no trial of the same experiment, variant and seed in both')
     found = differences(first, second)
     for text in found:
         sys.stdout.write(text + '\n')

@@ -189,10 +189,13 @@ def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
     }
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command, and return its exit code."""
+def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if') -> int:
+    """Run the command, and return its exit code.
+
+    :param command: its name in messages.
+    """
     parser = argparse.ArgumentParser(
-        prog='what_if', description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=command, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
         'folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it'
@@ -216,7 +219,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     try:
         replicates = load_replicates(args.folders, skipped)
     except (BagError, ImportError) as err:
-        return report_error('what_if', err)
+        return report_error(command, err)
     replayed = []
     for folder, trials in sorted(replicates.items()):
         try:
@@ -235,10 +238,10 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         try:
             write_json(args.json, {'folders': replayed, 'skipped': plain(skipped)})
         except OSError as err:
-            return report_error('what_if', err)
+            return report_error(command, err)
     if not replayed:
         return report_error(
-            'what_if',
+            command,
             '{}: no trials with an oracle that could be replayed'.format(', '.join(args.folders)),
         )
     return code

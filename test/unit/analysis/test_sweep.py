@@ -49,7 +49,7 @@ def test_each_oracle_is_a_point_in_the_order_of_its_memory():
 
 
 def test_the_table_shows_shares_with_intervals():
-    text = sweep.format_points(points())
+    text = sweep.format_points(points(), wide=True)
     assert text.splitlines()[1].split()[:3] == ['memory', 'N', 'trials']
     assert 'PICK_AND_PLACE, algorithm1\n' in text and 'PICK_AND_PLACE, prose\n' in text
     row = next(
@@ -57,6 +57,20 @@ def test_the_table_shows_shares_with_intervals():
     )
     assert row.split()[:6] == ['2', '10', '50.0%', '(23.7', 'to', '76.3%)']
     assert row.split()[-7:-3] == ['unknown', 'at', 'least', '50.0%']
+
+
+def test_the_narrow_tables_say_the_same_in_at_most_100_columns():
+    trials = [
+        trial(number, questions=1, settings=(('memory', 100000), ('policy', 'prose')), bags=(bag,))
+        for number, bag in enumerate(['a/1.bag', 'a/2.bag', 'b/3.bag'])
+    ]
+    found = sweep.find_points(find_variants(trials))
+    narrow, wide = (sweep.format_points(found, each) for each in (False, True))
+    assert max(map(len, narrow.splitlines())) <= 100 < max(map(len, wide.splitlines()))
+    first, rest = '  memory N  trials   ', '100.0% (43.9 to 100.0%)'
+    assert sum(line.startswith(first) for line in narrow.splitlines()) == 2
+    assert narrow.count(rest) == wide.count(rest) == 2
+    assert set(narrow.split()) == set(wide.split())
 
 
 def test_other_settings_that_differ_are_in_the_label():

@@ -47,6 +47,9 @@ def offered(words, function='_smach_oracle_rosrun', before=':'):
         ('rosrun smach_oracle bag_statistics bags --js', '--json'),
         ('rosrun smach_oracle bag_statistics --x-axis ti', 'time'),
         ('rosrun smach_oracle run_trials --task pick', 'pick_and_place'),
+        ('rosrun smach_oracle compare wh', 'what_if'),
+        ('rosrun smach_oracle compare what_if bags --js', '--json'),
+        ('rosrun smach_oracle comp', 'compare'),
     ],
 )
 def test_one_word_is_offered(words, first):
@@ -54,7 +57,7 @@ def test_one_word_is_offered(words, first):
 
 
 def test_a_command_by_its_path_is_completed_too():
-    assert offered('scripts/what_if --json', '_smach_oracle_direct') == ['--json']
+    assert offered('scripts/learn --expl', '_smach_oracle_direct') == ['--explain']
 
 
 def test_the_words_of_a_command_with_works_are_offered():

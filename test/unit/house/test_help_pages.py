@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from house import ROOT
 
+from smach_oracle.analysis.compare_command.dispatch import SUBCOMMANDS
 from smach_oracle.documentation import PAGES, page_of
 
 CODE = 'lib/python3/dist-packages/smach_oracle/documentation.py'
@@ -25,7 +26,7 @@ def test_every_command_has_a_page():
         for path in (ROOT / 'scripts').iterdir()
         if path.read_text().startswith('#!/usr/bin/env python3')
     }
-    assert set(PAGES) == commands
+    assert set(PAGES) == commands | {'compare ' + name for name in SUBCOMMANDS}
 
 
 @pytest.mark.parametrize('command', sorted(PAGES))
@@ -38,6 +39,11 @@ def test_the_help_ends_with_the_version_and_a_page_that_is_there():
     assert any(line.split()[:1] == ['--version'] for line in lines)
     more, path = lines[-1].split()
     assert more == 'More:' and Path(path).is_file() and Path(path).stem == 'survive'
+
+
+def test_the_help_of_a_subcommand_ends_with_its_own_page():
+    path = printed(str(ROOT / 'scripts/compare'), 'figures', '--help').splitlines()[-1].split()[1]
+    assert Path(path).stem == PAGES['compare figures'] != PAGES['compare']
 
 
 def test_a_script_under_oracle_run_has_its_own_help(tmp_path):

@@ -11,6 +11,7 @@ import pytest
 from catkin_pkg.changelog import get_changelog_from_path
 
 from smach_oracle import __version__, commands
+from smach_oracle.analysis.compare_command.dispatch import SUBCOMMANDS
 
 ROOT = Path(__file__).resolve().parents[3]
 COMMANDS = sorted(
@@ -19,6 +20,16 @@ COMMANDS = sorted(
     if b'python3' in path.read_bytes().split(b'\n')[0]
 )
 BAGS = 'test/data/v0_1/trials'
+LOADED = """
+import runpy, sys
+sys.argv = {0!r}
+try:
+    runpy.run_path(sys.argv[0], run_name='__main__')
+except SystemExit as end:
+    assert not end.code
+sys.stderr.write(' '.join(sys.modules))
+"""
+ROWS = 'doc/trials/fourth/drink_retrieval_persistence_0/results.csv'
 
 
 def run(line, **more):
@@ -69,7 +80,8 @@ def test_a_command_tells_the_version_without_ros(command):
     [
         'bag_statistics ' + BAGS,
         'bag_statistics --help',
-        'what_if ' + BAGS,
+        'compare what_if ' + BAGS,
+        'compare --help',
         'learn --help',
         'oracle_disk --keep-gb 1 ' + BAGS,
         'run_trials --plan --protocol all',
@@ -88,11 +100,76 @@ def test_a_command_whose_reader_has_gone_ends_without_a_word(line, what_of_it):
     assert told.stdout == '{}\n'.format(commands.NO_READER)
 
 
-@pytest.mark.parametrize('line', ['compare_variants none.csv', 'draw_results none out'])
+@pytest.mark.parametrize('line', ['compare variants none.csv', 'compare figures none --output out'])
 def test_a_file_that_is_not_there_is_named_in_plain_words(line):
     told = run('{} scripts/{}'.format(sys.executable, line))
-    assert told.stderr.startswith('{}: {}: '.format(*line.split()[:2])), told.stderr
+    assert told.stderr.startswith('{} {}: {}: '.format(*line.split()[:3])), told.stderr
     assert 'Errno' not in told.stderr and told.returncode == 2
+
+
+@pytest.mark.parametrize('subcommand', sorted(SUBCOMMANDS))
+def test_a_subcommand_tells_the_version_too(subcommand):
+    told = run('{} scripts/compare {} --version'.format(sys.executable, subcommand))
+    assert told.stdout == 'compare {} of smach_oracle {}\n'.format(subcommand, __version__)
+    assert told.returncode == 0
+
+
+def loaded_for(*words):
+    """The modules that a command has loaded at its end."""
+    told = run(
+        '{} -c "$CODE"'.format(sys.executable),
+        env=dict(os.environ, CODE=LOADED.format(['scripts/' + words[0], *words[1:]])),
+    )
+    assert told.returncode == 0, told.stderr
+    return set(told.stderr.split())
+
+
+def test_the_help_of_compare_loads_no_subcommand():
+    loaded = loaded_for('compare', '--help')
+    assert 'smach_oracle.analysis.compare_command.dispatch' in loaded
+    assert not loaded & {'smach_oracle.analysis.' + each.module for each in SUBCOMMANDS.values()}
+    assert 'smach_oracle.analysis.bag_events' not in loaded
+
+
+@pytest.mark.parametrize('subcommand', sorted(SUBCOMMANDS))
+def test_the_help_of_a_subcommand_loads_no_package_for_bags_or_figures(subcommand):
+    loaded = loaded_for('compare', subcommand, '--help')
+    assert 'smach_oracle.analysis.' + SUBCOMMANDS[subcommand].module in loaded
+    assert not loaded & {'rosbags', 'matplotlib', 'numpy'}
+
+
+@pytest.mark.parametrize(
+    'old, new, options',
+    [
+        ('compare_oracles', 'compare oracles --wide', BAGS),
+        ('what_if', 'compare what_if', BAGS + ' --memory 2'),
+        ('same_trials', 'compare same_trials', 2 * ' test/data/v0_1/experiment'),
+        ('compare_variants', 'compare variants', ROWS),
+        ('compare_variants', 'compare variants', 'none.csv'),
+        ('draw_results', 'compare figures', 'none out'),
+        ('what_if', 'compare what_if', '--no-such-option'),
+    ],
+)
+def test_an_older_name_does_the_same_and_names_the_new_one(old, new, options):
+    ours = run('{} scripts/{} {}'.format(sys.executable, new, options))
+    theirs = run('{} scripts/{} {}'.format(sys.executable, old, options))
+    assert (theirs.returncode, theirs.stdout) == (ours.returncode, ours.stdout)
+    first, *errors = theirs.stderr.splitlines(True)
+    word = ' '.join(new.split()[:2])
+    assert first == '{0}: is now `{1}`: rosrun smach_oracle {1}\n'.format(old, word)
+    # a usage is folded by the length of the name
+    assert ''.join(errors).replace(old, word).split() == ours.stderr.split()
+
+
+def test_every_older_name_is_of_a_subcommand_that_is_there():
+    calls = [
+        re.search(
+            r"run_renamed\('([\w.]+)', 'compare (\w+)'", (ROOT / 'scripts' / name).read_text()
+        )
+        for name in COMMANDS
+    ]
+    found = {each.group(2): each.group(1) for each in calls if each}
+    assert found == {name: 'analysis.' + each.module for name, each in SUBCOMMANDS.items()}
 
 
 def test_catkins_own_tools_read_the_change_log():

@@ -15,7 +15,14 @@ SCRIPTS = Path(__file__).resolve().parents[3] / 'scripts'
 COMMANDS = sorted(
     path.name for path in SCRIPTS.iterdir() if b'python3' in path.read_bytes().split(b'\n')[0]
 )
-WITH_BAGS = ['bag_statistics', 'compare_oracles', 'learn', 'run_trials', 'same_trials', 'what_if']
+WITH_BAGS = [
+    'bag_statistics',
+    'compare oracles',
+    'compare same_trials',
+    'compare what_if',
+    'learn',
+    'run_trials',
+]
 WITH_BODIES = [
     ('pr2_world', 'pybullet'),
     ('pr2_film', 'pybullet'),
@@ -26,12 +33,13 @@ WITH_BODIES = [
 
 
 def run(folder, command, missing, *arguments):
-    """Run a command with packages hidden from it."""
+    """Run a command, such as 'learn' or 'compare oracles', with packages hidden from it."""
+    script, *subcommand = command.split()
     hide = 'import sys\nfor name in {!r}: sys.modules[name] = None\n'.format(missing)
     (folder / 'sitecustomize.py').write_text(hide)
     path = os.pathsep.join([str(folder), os.environ.get('PYTHONPATH', '')])
     return subprocess.run(
-        [sys.executable, str(SCRIPTS / command), *arguments],
+        [sys.executable, str(SCRIPTS / script), *subcommand, *arguments],
         timeout=60,
         cwd=str(folder),
         env=dict(os.environ, PYTHONPATH=path, ROS_MASTER_URI='http://localhost:1'),
@@ -46,7 +54,7 @@ def run(folder, command, missing, *arguments):
 )
 def test_the_missing_package_is_told_in_one_line(tmp_path, command, package):
     folders = {
-        'same_trials': ['.', '.'],
+        'compare same_trials': ['.', '.'],
         'run_trials': ['--output', 'out'],
         'pr2_film': ['robot.png'],
     }

@@ -1,8 +1,8 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
 FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
-needed. OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg, extra.svg,
-each with a PNG, and tables.md, as far as there are rows of them.
+needed. The folder OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg,
+extra.svg, each with a PNG, and tables.md, as far as there are rows of them.
 """
 
 import argparse
@@ -42,7 +42,7 @@ def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
 def tables_page(found: Mapping[str, Sequence[TrialRow]]) -> str:
     """Return a page of Markdown with the tables of all figures."""
     parts = [
-        '# Tables of the experiment\n\nThe command `draw_results` has made this page from the '
+        '# Tables of the experiment\n\nThe command `compare figures` has made this page from the '
         'rows of {:,} trials.\n'.format(sum(map(len, found.values())))
     ]
     for kind, rows in found.items():
@@ -81,19 +81,27 @@ def draw_all(found: Mapping[str, Sequence[TrialRow]], output: Path) -> List[Path
     return paths
 
 
-def main(argv: Optional[Sequence[str]] = None) -> int:
-    """Run the command, and return its exit code."""
+def main(argv: Optional[Sequence[str]] = None, command: str = 'compare figures') -> int:
+    """Run the command, and return its exit code.
+
+    :param command: its name in messages.
+    """
     parser = argparse.ArgumentParser(
-        prog='draw_results',
+        prog=command,
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument('folder', metavar='FOLDER', type=path_of)
-    parser.add_argument('output', metavar='OUT', type=path_of)
+    parser.add_argument('folder', metavar='FOLDER', type=path_of, help='with rows below it')
+    parser.add_argument('former', metavar='OUT', nargs='?', type=path_of, help=argparse.SUPPRESS)
+    parser.add_argument(
+        '--output', metavar='OUT', type=path_of, help='folder of the figures and tables'
+    )
     args = parser.parse_args(argv)
+    if (args.output is None) == (args.former is None):
+        parser.error('name the folder of the figures once: --output OUT')
     try:
-        for path in draw_all(find_rows(Path(args.folder)), Path(args.output)):
+        for path in draw_all(find_rows(Path(args.folder)), Path(args.output or args.former)):
             sys.stdout.write('{}\n'.format(path))
     except (BagError, OSError, ImportError) as err:
-        return report_error('draw_results', err)
+        return report_error(command, err)
     return 0

@@ -1,0 +1,1 @@
+"""The command `compare`: its subcommands, and what each of them reads. Pure."""
