@@ -25,7 +25,9 @@ _smach_oracle_words() {
     'compare same_trials')
       echo '--help -h' ;;
     'compare variants')
-      echo '--help -h' ;;
+      echo '--by --help -h' ;;
+    'compare variants --by')
+      echo 'file folder node host version settings day' ;;
     'compare what_if')
       echo '--help --high-from --json --memory --moderate-from --policy --prior -h' ;;
     'compare what_if --policy')

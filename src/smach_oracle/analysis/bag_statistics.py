@@ -17,6 +17,7 @@ from . import table
 from .bag_events import BagError
 from .by_state.rows import VariantStates, by_variant, rows_of, write_csv_files
 from .by_state.text import format_states
+from .compare_command.inputs import instead_of_bags
 from .comparing.groups import BY, TrialGroup, groups_by
 from .comparing.report import format_groups, groups_data
 from .reading import report_error, report_skipped
@@ -45,7 +46,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         code = report_skipped(found.skipped)
         _write_files(args, found, variants, states, groups)
     except (BagError, ImportError, OSError) as err:
-        return report_error('bag_statistics', err)
+        return report_error('bag_statistics', instead_of_bags(err, args.folders))
     return code
 
 

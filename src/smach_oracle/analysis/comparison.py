@@ -1,11 +1,14 @@
-"""Compare variants that ran the same trials, from the rows that an experiment has kept.
+"""Compare variants trial by trial, from CSV files: no bag is needed.
 
-Each row is one trial. Prints for each variant the shares of trials with their intervals, and its
-cost for a trial and for a robot hour. Prints the best that any variant did in each trial that all
-ran (hindsight), beside what each did there. Prints McNemar's exact test of the trials in which
-a person was needed, of `default` against each other variant, or of each two. Where there are rows
-of its variants, prints the verdicts on the hypotheses of doc/protocol.md. Exit code: 0, or 2 if
-there was nothing to read.
+Of files that `bag_statistics FOLDER --csv OUT` has written it prints a table of the groups, and
+tests of each two: --by says what makes a group. They are paired where each trial has a seed.
+
+Of results.csv, the rows that an experiment of run_trials has kept, it prints for each variant the
+shares of trials with their intervals, and its cost for a trial and for a robot hour. It prints the
+best that any variant did in each trial that all ran (hindsight), beside what each did there. It
+prints McNemar's exact test of the trials in which a person was needed, of `default` against each
+other variant, or of each two. Where there are rows of its variants, it prints the verdicts on the
+hypotheses of doc/protocol.md. Exit code: 0, or 2 if there was nothing to read.
 """
 
 import argparse
@@ -17,6 +20,8 @@ from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
+from .compare_command.inputs import InputKind, csv_kind
+from .compare_command.statistics_csv import BY_OF_CSV, compared_files
 from .intervals import Interval, replicate_interval, wilson_interval
 from .judging.hypotheses import undecided, verdicts
 from .pairing import (
@@ -334,10 +339,25 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare variants'
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        'files', nargs='+', metavar='FILE', type=path_of, help='results.csv of an experiment'
+        'files',
+        nargs='+',
+        metavar='FILE',
+        type=path_of,
+        help='of bag_statistics --csv, or results.csv of an experiment: all of one kind',
+    )
+    parser.add_argument(
+        '--by',
+        choices=BY_OF_CSV,
+        help='compare the trials in files of bag_statistics by this (default: file, or settings '
+        'where there is one FILE)',
     )
     args = parser.parse_args(argv)
     try:
+        if csv_kind(args.files) is InputKind.STATISTICS:
+            sys.stdout.write(compared_files(args.files, args.by))
+            return 0
+        if args.by:
+            raise BagError('--by: rows of run_trials are compared by variant')
         rows = [row for name in args.files for row in read_rows(Path(name))]
         if not rows:
             raise BagError('{}: no trials in it'.format(', '.join(args.files)))

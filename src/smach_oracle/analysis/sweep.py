@@ -16,6 +16,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
+from .compare_command.inputs import instead_of_bags
 from .reading import report_error, report_skipped
 from .table import over_replicates, percent
 from .trial_counter import PERSON_NEEDED
@@ -207,5 +208,5 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare oracles')
         for path in save_figure(points, args.figure) if args.figure else []:
             sys.stdout.write('Figure: {}\n'.format(os.path.abspath(path)))
     except (BagError, OSError, ImportError) as err:
-        return report_error(command, err)
+        return report_error(command, instead_of_bags(err, args.folders))
     return code

@@ -13,6 +13,7 @@ from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
+from .compare_command.inputs import instead_of_bags
 from .reading import read_bags, report_error, report_skipped
 from .trials import summarise
 
@@ -116,11 +117,12 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare same_tria
     try:
         first, second = (load_trial_steps(folder, skipped) for folder in args.folders)
     except (BagError, ImportError) as err:
-        return report_error(command, err)
+        return report_error(command, instead_of_bags(err, args.folders))
     code = report_skipped(skipped)
     common = set(first) & set(second)
     if not common:
-        return report_error(command, 'no trial of the same experiment, variant and seed in both')
+        none = BagError('no trial of the same experiment, variant and seed in both')
+        return report_error(command, instead_of_bags(none, args.folders))
     found = differences(first, second)
     for text in found:
         sys.stdout.write(text + '\n')

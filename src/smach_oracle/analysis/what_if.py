@@ -28,6 +28,7 @@ from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
+from .compare_command.inputs import instead_of_bags
 from .reading import plain, report_error, report_skipped, write_json
 from .replaying.checks import beginnings, that_count
 from .replaying.replay import NOT_KNOWN, STAYS, Replay, ReplayedDecision, conditioned, policy_of
@@ -219,7 +220,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
     try:
         replicates = load_replicates(args.folders, skipped)
     except (BagError, ImportError) as err:
-        return report_error(command, err)
+        return report_error(command, instead_of_bags(err, args.folders))
     replayed = []
     for folder, trials in sorted(replicates.items()):
         try:
@@ -240,8 +241,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
         except OSError as err:
             return report_error(command, err)
     if not replayed:
-        return report_error(
-            command,
-            '{}: no trials with an oracle that could be replayed'.format(', '.join(args.folders)),
-        )
+        places = ', '.join(args.folders)
+        none = BagError('{}: no trials with an oracle that could be replayed'.format(places))
+        return report_error(command, instead_of_bags(none, args.folders))
     return code

@@ -14,12 +14,12 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence
 from smach_oracle.oracle.settings.paths import path_of
 
 from ..bag_events import BagError
+from ..compare_command.inputs import ROWS_FILE, folder_of_rows, no_rows_in
 from ..reading import report_error
 from ..trial_rows import TrialRow, read_rows
 from .sweep_tables import format_sweeps
 from .tables import format_tables
 
-ROWS = 'results.csv'
 KINDS = ('main', 'persistence', 'memory', 'continuous', 'extra')
 
 
@@ -30,12 +30,12 @@ def find_rows(folder: Path) -> Dict[str, List[TrialRow]]:
     :raises OSError: where one cannot be read.
     """
     found: Dict[str, List[TrialRow]] = {}
-    for path in sorted(folder.rglob(ROWS)):
+    for path in sorted(folder.rglob(ROWS_FILE)):
         kind = next((each for each in KINDS[1:] if each in path.parent.name), KINDS[0])
         found.setdefault(kind, []).extend(read_rows(path))
     found = {kind: found[kind] for kind in KINDS if found.get(kind)}
     if not found:
-        raise BagError('{}: no {} with trials in it'.format(folder, ROWS))
+        raise no_rows_in(str(folder))
     return found
 
 
@@ -100,7 +100,8 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare figures')
     if (args.output is None) == (args.former is None):
         parser.error('name the folder of the figures once: --output OUT')
     try:
-        for path in draw_all(find_rows(Path(args.folder)), Path(args.output or args.former)):
+        found = find_rows(folder_of_rows(args.folder))
+        for path in draw_all(found, Path(args.output or args.former)):
             sys.stdout.write('{}\n'.format(path))
     except (BagError, OSError, ImportError) as err:
         return report_error(command, err)

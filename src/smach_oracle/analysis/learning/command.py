@@ -20,6 +20,7 @@ from smach_oracle.oracle.records.rates_format import write_learned
 from smach_oracle.oracle.settings.paths import path_of
 
 from ..bag_events import BagError, SkippedBag
+from ..compare_command.inputs import instead_of_bags
 from ..reading import report_error, report_skipped
 from ..trials import load_replicates
 from .record import MachineRecord, read_record, states_named
@@ -60,7 +61,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             write_learned(args.output, record.learned, record.rule)
     except (BagError, ImportError, OSError) as err:
         report_skipped(skipped)
-        return report_error(NAME, err)
+        return report_error(NAME, instead_of_bags(err, args.folders))
     sys.stdout.write('\n'.join(lines) + '\n')
     return report_skipped(skipped)
 
