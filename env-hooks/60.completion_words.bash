@@ -21,7 +21,7 @@ _smach_oracle_words() {
     'compare figures')
       echo '--help --output -h' ;;
     'compare oracles')
-      echo '--figure --help --wide -h' ;;
+      echo '--failing-outcomes --figure --help --wide -h' ;;
     'compare same_trials')
       echo '--help -h' ;;
     'compare variants')
@@ -48,7 +48,7 @@ retry step_back' ;;
     'joy_teleoperation')
       echo '--help --version -h' ;;
     'learn')
-      echo '--explain --help --output --version -h' ;;
+      echo '--explain --help --rates-file --version -h' ;;
     'manipulation_interface')
       echo '--help --version -h' ;;
     'oracle_disk')
@@ -91,12 +91,10 @@ retry step_back' ;;
     'pr2_world')
       echo '--help --version -h' ;;
     'run_trials')
-      echo '--abandon-freeze --answer-delay --arms --benign --estimator --extra-causes
---freeze --frozen --help --high-from --hours --hung-after --jobs --lasting
+      echo '--abandon-freeze --answer-delay --benign --estimator --extra-causes --freeze
+--frozen --help --high-from --hours --hung-after --jobs --lasting
 --max-recoveries --memory --moderate-from --output --plan --policy --prior
 --protocol --replicates --seed --task --trials --variants --version -h' ;;
-    'run_trials --arms')
-      echo 'both with without' ;;
     'run_trials --estimator')
       echo 'exponential window' ;;
     'run_trials --policy')

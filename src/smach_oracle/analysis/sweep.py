@@ -13,6 +13,7 @@ import os
 import sys
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
@@ -193,13 +194,21 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare oracles')
         '--figure', metavar='OUT', type=path_of, help='write the figure to OUT.svg and OUT.png'
     )
     parser.add_argument(
+        '--failing-outcomes',
+        nargs='+',
+        metavar='NAME',
+        help='outcomes of a trial that are failures, whole or as a suffix; all others are then '
+        'successes (default: each trial is counted by the rule that its record names)',
+    )
+    parser.add_argument(
         '--wide',
         action='store_true',
         help='one table of 150 columns in place of two of at most 100',
     )
     args = parser.parse_args(argv)
     try:
-        found = load_trials(args.folders)
+        listed = args.failing_outcomes
+        found = load_trials(args.folders, FailureRule(tuple(listed)) if listed else None)
         code = report_skipped(found.skipped)
         points = find_points(find_variants(found.trials))
         if not points:

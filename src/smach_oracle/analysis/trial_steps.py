@@ -110,7 +110,11 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare same_tria
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        'folders', nargs=2, metavar='FOLDER', type=path_of, help='with bags in it or below it'
+        'folders',
+        nargs=2,
+        metavar='FOLDER',
+        type=path_of,
+        help='with bags in it or below it; or a bag',
     )
     args = parser.parse_args(argv)
     skipped: List[SkippedBag] = []

@@ -199,7 +199,11 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
         prog=command, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        'folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it'
+        'folders',
+        nargs='+',
+        metavar='FOLDER',
+        type=path_of,
+        help='with bags in it or below it; or a bag',
     )
     parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
     parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')

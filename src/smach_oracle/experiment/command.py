@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis import bag_statistics
+from smach_oracle.analysis.compare_command.renamed_option import RenamedOption
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import SettingsError
@@ -57,24 +58,6 @@ OVERRIDES = (
     ('prior', float, 'failure rate that a state starts with'),
     ('max_recoveries', int, 'recoveries per state and trial, before the expert is asked'),
 )
-
-
-class _RenamedOption(argparse.Action):
-    """An option under its older name, which still works but warns on standard error."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: object,
-        option_string: Optional[str] = None,
-    ) -> None:
-        """Warn, and take the value."""
-        print(
-            '{}: {} is now called --{}'.format(parser.prog, option_string, self.dest),
-            file=sys.stderr,
-        )
-        setattr(namespace, self.dest, values)
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -139,8 +122,8 @@ def make_parser() -> argparse.ArgumentParser:
         nargs=1,
         choices=BOTH,
         default=argparse.SUPPRESS,
-        action=_RenamedOption,
-        help='the older name of --variants',
+        action=RenamedOption,
+        help=argparse.SUPPRESS,
     )
     parser.add_argument(
         '--policy',

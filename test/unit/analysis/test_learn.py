@@ -101,7 +101,7 @@ def test_a_machine_begins_with_what_was_learned_and_has_what_it_would_have_learn
     record(tmp_path / 'bags', run_hidden(machine, 40))
     model = tmp_path / 'model.json'
     capsys.readouterr()
-    assert command.main([str(tmp_path / 'bags'), '--output', str(model)]) == 0
+    assert command.main([str(tmp_path / 'bags'), '--rates-file', str(model)]) == 0
     assert capsys.readouterr().out.startswith('# TOP: 40 trials, ')
     again = hidden_machine(rates_file=str(model))
     again.execute()  # nothing fails in it: no arm hides the picture
@@ -245,7 +245,7 @@ def test_folders_without_bags_are_refused(tmp_path, capsys):
 def test_records_without_menus_are_refused(tmp_path, capsys):
     record(tmp_path, run(5, **KEPT))
     capsys.readouterr()
-    err = refused([str(tmp_path), '--output', str(tmp_path / 'model.json')], capsys)
+    err = refused([str(tmp_path), '--rates-file', str(tmp_path / 'model.json')], capsys)
     assert 'no decision there has a menu' in err and 'escalating' in err
     assert not (tmp_path / 'model.json').exists()
 
@@ -279,9 +279,11 @@ def test_a_file_that_is_there_stays_and_one_that_cannot_be_written_is_told(tmp_p
     capsys.readouterr()
     (tmp_path / 'model.json').write_text('mine')
     bags = str(tmp_path / 'bags')
-    err = refused([bags, '--output', str(tmp_path / 'model.json')], capsys)
+    err = refused([bags, '--rates-file', str(tmp_path / 'model.json')], capsys)
     assert 'is there already' in err and (tmp_path / 'model.json').read_text() == 'mine'
-    assert 'No such file' in refused([bags, '--output', str(tmp_path / 'no' / 'm.json')], capsys)
+    assert 'No such file' in refused(
+        [bags, '--rates-file', str(tmp_path / 'no' / 'm.json')], capsys
+    )
 
 
 def test_a_state_that_is_not_there_is_told(tmp_path, capsys):
@@ -295,8 +297,15 @@ def test_a_state_that_is_not_there_is_told(tmp_path, capsys):
 def test_the_file_is_a_rates_file_of_the_known_format(tmp_path):
     record(tmp_path / 'bags', run_hidden(hidden_machine(), 20))
     model = tmp_path / 'model.json'
-    assert command.main([str(tmp_path / 'bags'), '--output', str(model)]) == 0
+    assert command.main([str(tmp_path / 'bags'), '--rates-file', str(model)]) == 0
     content = json.loads(model.read_text())
     assert content['format'] == 'smach_oracle rates' and content['version'] == 1
     assert set(content['containers']['']) == {'MOVE_ARMS_ASIDE', 'DETECT', 'PLACE'}
     assert content['containers']['']['DETECT']['ways']
+
+
+def test_the_older_name_of_the_option_still_works(tmp_path, capsys):
+    model = tmp_path / 'model.json'
+    model.write_text('mine')
+    err = refused([str(tmp_path), '--output', str(model)], capsys)
+    assert 'learn: --output is now called --rates-file\n' in err and 'is there already' in err

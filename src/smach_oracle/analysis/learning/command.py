@@ -3,7 +3,7 @@
 The trials are of one machine, under a policy that goes by ways: escalating, any_way or learned. The
 rates of its states and what their ways have led to go to a file, with which a machine begins:
 
-    rosrun smach_oracle learn bags --output model.json
+    rosrun smach_oracle learn bags --rates-file model.json
 
 The setting `rates_file: model.json` has it go on from there.
 
@@ -21,6 +21,7 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from ..bag_events import BagError, SkippedBag
 from ..compare_command.inputs import instead_of_bags
+from ..compare_command.renamed_option import RenamedOption
 from ..reading import report_error, report_skipped
 from ..trials import load_replicates
 from .record import MachineRecord, read_record, states_named
@@ -36,10 +37,25 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         prog=NAME, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        'folders', nargs='+', metavar='FOLDER', type=path_of, help='with bags in it or below it'
+        'folders',
+        nargs='+',
+        metavar='FOLDER',
+        type=path_of,
+        help='with bags in it or below it; or a bag',
     )
     parser.add_argument(
-        '--output', metavar='OUT', type=path_of, help='write what was learned: a rates file'
+        '--rates-file',
+        metavar='OUT',
+        type=path_of,
+        help='write what was learned to this file, which must not be there yet',
+    )
+    parser.add_argument(
+        '--output',
+        dest='rates_file',
+        type=path_of,
+        default=argparse.SUPPRESS,
+        action=RenamedOption,
+        help=argparse.SUPPRESS,
     )
     parser.add_argument(
         '--explain',
@@ -51,14 +67,14 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     args = parser.parse_args(argv)
     skipped: List[SkippedBag] = []
     try:
-        if args.output and os.path.exists(args.output):
+        if args.rates_file and os.path.exists(args.rates_file):
             raise BagError(
-                '{}: is there already. Name another file, or remove it'.format(args.output)
+                '{}: is there already. Name another file, or remove it'.format(args.rates_file)
             )
         record = _read(args.folders, skipped)
         lines = _told(record, args.explain)
-        if args.output:
-            write_learned(args.output, record.learned, record.rule)
+        if args.rates_file:
+            write_learned(args.rates_file, record.learned, record.rule)
     except (BagError, ImportError, OSError) as err:
         report_skipped(skipped)
         return report_error(NAME, instead_of_bags(err, args.folders))
