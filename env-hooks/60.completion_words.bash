@@ -29,7 +29,7 @@ _smach_oracle_words() {
     'compare variants --by')
       echo 'file folder node host version settings day' ;;
     'compare what_if')
-      echo '--help --high-from --json --memory --moderate-from --policy --prior -h' ;;
+      echo '--help --high-from --json --memory --moderate-from --policy --prior --wide -h' ;;
     'compare what_if --policy')
       echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
 retry step_back' ;;

@@ -19,6 +19,7 @@ folders were skipped; 2, nothing could be replayed.
 import argparse
 import itertools
 import sys
+import textwrap
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
 from smach_oracle.oracle.decision.policies import POLICIES
@@ -40,6 +41,8 @@ from .trials import load_replicates, summarise
 SAME = 'same'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)
 GIVES_UP = 'would give up'  # a column of its own, where some would
+_HEAD, _ANOTHER = 'settings', 'trials with another'  # of the table
+_WIDTH = 100
 NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 
 
@@ -133,42 +136,91 @@ def _outcome(recorded: Event, tried: ReplayedDecision) -> str:
     return 'would recover' if recorded.outcome in STAYS else 'recovers otherwise'
 
 
-def format_tried_settings(rows: Sequence[TriedSettings]) -> str:
-    """Return a line for each oracle that was tried."""
+def format_tried_settings(rows: Sequence[TriedSettings], wide: bool = False) -> str:
+    """Return a line for each oracle that was tried, of at most 100 columns unless it is wide."""
     names = [
         ', '.join('{} {}'.format(*item) for item in row.settings.items()) or 'as recorded'
         for row in rows
     ]
     columns = OUTCOMES + ((GIVES_UP,) if any(row.counts[GIVES_UP] for row in rows) else ())
-    width = max(len(name) for name in names + ['settings'])
+    table = _wide_table(names, rows, columns) if wide else _narrow_table(names, rows, columns)
+    notes = _notes(names, rows)
+    if not wide:
+        notes = [
+            line for note in notes for line in textwrap.wrap(note, _WIDTH, subsequent_indent='    ')
+        ]
+    return '\n'.join(table + notes) + '\n'
+
+
+def _wide_table(
+    names: Sequence[str], rows: Sequence[TriedSettings], columns: Sequence[str]
+) -> List[str]:
+    width = max(map(len, [*names, _HEAD]))
     lines = [
-        '{:<{}}  decisions'.format('settings', width)
+        '{:<{}}  decisions'.format(_HEAD, width)
         + ''.join('{:>20}'.format(name) for name in columns)
-        + '   trials with another'
+        + '   '
+        + _ANOTHER
     ]
     for name, row in zip(names, rows):
-        lines.append(
-            '{:<{}}  {:>9}'.format(name, width, sum(row.counts.values()))
-            + ''.join('{:>20}'.format(row.counts[outcome]) for outcome in columns)
-            + '   {} of {}'.format(row.other_trials, row.trials)
-        )
+        numbers = ''.join('{:>20}'.format(row.counts[outcome]) for outcome in columns)
+        lines.append(_line(name, width, row, numbers))
+    return lines
+
+
+def _narrow_table(
+    names: Sequence[str], rows: Sequence[TriedSettings], columns: Sequence[str]
+) -> List[str]:
+    """Return a table with headings in two lines. A name that is too long has a line of its own."""
+    words = [('', *name.split(' ', 1))[-2:] for name in columns]
+    widths = [2 + max(map(len, each)) for each in words]
+    above, below = (
+        ''.join('{:>{}}'.format(each[line], size) for each, size in zip(words, widths))
+        for line in (0, 1)
+    )
+    with_another = _ANOTHER.rsplit(' ', 1)
+    rest = len('  decisions') + sum(widths) + 3 + max(map(len, with_another))
+    width = min(max(map(len, [*names, _HEAD])), _WIDTH - rest)
+    lines = [
+        '{:<{}}  {:>9}{}   {}'.format('', width, '', above, with_another[0]),
+        '{:<{}}  {:>9}{}   {}'.format(_HEAD, width, 'decisions', below, with_another[1]),
+    ]
     for name, row in zip(names, rows):
-        if row.without_menu:
-            lines.append(
-                '{}: not known for {} decisions, which another policy made without a menu'.format(
-                    name, row.without_menu
-                )
-            )
+        if len(name) > width:
+            lines.append(name)
+            name = ''
+        numbers = ''.join(
+            '{:>{}}'.format(row.counts[outcome], size) for outcome, size in zip(columns, widths)
+        )
+        lines.append(_line(name, width, row, numbers))
+    return lines
+
+
+def _line(name: str, width: int, row: TriedSettings, numbers: str) -> str:
+    return '{:<{}}  {:>9}{}   {} of {}'.format(
+        name, width, sum(row.counts.values()), numbers, row.other_trials, row.trials
+    )
+
+
+def _notes(names: Sequence[str], rows: Sequence[TriedSettings]) -> List[str]:
+    """Return what stands below the table."""
+    notes = [
+        '{}: not known for {} decisions, which another policy made without a menu'.format(
+            name, row.without_menu
+        )
+        for name, row in zip(names, rows)
+        if row.without_menu
+    ]
     for name, row in zip(names, rows):
         if row.streaks is not None:
-            lines += ['{}: {}'.format(name, each) for each in findings_in_words(row.streaks)]
+            notes += ['{}: {}'.format(name, each) for each in findings_in_words(row.streaks)]
     if rows[0].programs > 1:
-        lines.append(
+        notes.append(
             'at least {} programs, each of which began with nothing learned'.format(
                 rows[0].programs
             )
         )
-    return '\n'.join(lines) + '\n'
+    return notes
 
 
 def as_data(folder: str, rows: Sequence[TriedSettings]) -> Dict[str, Any]:
@@ -212,13 +264,16 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
             '--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try'
         )
     parser.add_argument(
+        '--wide', action='store_true', help='lines of 150 columns and more in place of 100'
+    )
+    parser.add_argument(
         '--json', metavar='OUT', type=path_of, help='write the tables and what was skipped as JSON'
     )
     args = parser.parse_args(argv)
     varied = {
         name: values
         for name, values in vars(args).items()
-        if name not in ('folders', 'json') and values
+        if name not in ('folders', 'json', 'wide') and values
     }
     skipped: List[SkippedBag] = []
     try:
@@ -236,7 +291,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
         except OracleError as err:
             skipped.append(SkippedBag(folder, str(err)))
         else:
-            sys.stdout.write('{}\n{}'.format(folder, format_tried_settings(rows)))
+            sys.stdout.write('{}\n{}'.format(folder, format_tried_settings(rows, args.wide)))
             replayed.append(as_data(folder, rows))
     code = report_skipped(skipped)
     if args.json:

@@ -317,6 +317,8 @@ def main(argv: Optional[List[str]] = None) -> int:
         return freeze_seeds(args)
     output = (args.output or Path(time.strftime('trials-%Y%m%d-%H%M%S'))).resolve()
     try:
+        if output.is_file():
+            raise ExperimentError('--output: {}: a file; allowed: a folder'.format(output))
         if args.only_plan:
             parts = chosen_parts(args) if args.protocol else [Part('', args.plan)]
             print(plan_text(parts, args.output, args.jobs))

@@ -78,8 +78,12 @@ def test_a_file_without_the_later_columns_can_be_compared(capsys):
 @pytest.mark.parametrize(
     'old, new, words',
     [
-        (',success,', ',splendid,', "ending: 'splendid' is not allowed"),
-        (',True,', ',Yes,', "recovers: 'Yes' is not allowed"),
+        (
+            ',success,',
+            ',splendid,',
+            "ending: 'splendid' is not allowed; allowed: success, failure, ",
+        ),
+        (',True,', ',Yes,', "recovers: 'Yes' is not allowed; allowed: True, False, or"),
         ('recovers', 'recover', 'no column recovers'),
     ],
 )

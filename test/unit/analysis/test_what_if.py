@@ -256,7 +256,7 @@ def test_the_command(tmp_path, capsys):
         what_if.main([str(tmp_path), '--memory', '1', '10', '--policy', 'prose', 'algorithm1']) == 0
     )
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == str(tmp_path) and len(lines) == 6
+    assert lines[0] == str(tmp_path) and len(lines) == 7
     row = next(line for line in lines if line.startswith('memory 10, policy prose'))
     assert row.split()[4] == row.split()[5] and row.endswith('   0 of 40'), 'as recorded'
     assert what_if.main([str(tmp_path / 'nowhere')]) == 2
@@ -272,7 +272,7 @@ def test_the_tables_as_json_are_those_that_are_printed(tmp_path, capsys):
         )
         == 0
     )
-    lines = capsys.readouterr().out.splitlines()[2:]
+    lines = capsys.readouterr().out.splitlines()[3:]
     told = json.loads((tmp_path / 'out.json').read_text())
     (folder,) = told['folders']
     assert folder['folder'] == str(tmp_path / 'bags') and told['skipped'] == []
@@ -328,8 +328,23 @@ def test_the_column_of_those_who_give_up_is_there_where_some_do():
         compare(recorded, settings)
         for settings in ({'policy': 'always_ask'}, {'policy': 'retry', 'policy.times': 0})
     ]
-    assert what_if.GIVES_UP in what_if.format_tried_settings(rows)
-    assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1])
+    assert what_if.GIVES_UP in what_if.format_tried_settings(rows, wide=True)
+    assert what_if.GIVES_UP not in what_if.format_tried_settings(rows[:1], wide=True)
+    assert 'give up' in what_if.format_tried_settings(rows)
+
+
+def test_the_table_says_the_same_in_at_most_100_columns():
+    recorded = run(60, **KEPT)
+    rows = [
+        compare(recorded, settings)
+        for settings in (
+            {'policy': 'retry', 'policy.times': 0},
+            {'policy': 'escalating', 'memory': 20, 'moderate_from': 0.25, 'high_from': 0.75},
+        )
+    ]
+    narrow, wide = (what_if.format_tried_settings(rows, each) for each in (False, True))
+    assert max(map(len, narrow.splitlines())) <= 100 < max(map(len, wide.splitlines()))
+    assert sorted(narrow.split()) == sorted(wide.split())
 
 
 # -- policies that go by ways

@@ -110,6 +110,16 @@ def test_the_output_may_be_in_the_home_folder(
     assert parse(['--output', '~/trials', '--answer-delay', '3600']).output == tmp_path / 'trials'
 
 
+@pytest.mark.parametrize('more', [[], ['--plan']])
+def test_a_file_in_place_of_the_folder_is_told_with_what_is_allowed(
+    tmp_path: Path, more: list, capsys: pytest.CaptureFixture
+) -> None:
+    (tmp_path / 'trials.csv').write_text('mine')
+    assert main(['--output', str(tmp_path / 'trials.csv'), *more]) == 1
+    assert 'trials.csv: a file; allowed: a folder' in capsys.readouterr().err
+    assert (tmp_path / 'trials.csv').read_text() == 'mine'
+
+
 @pytest.mark.parametrize('task, trials', [('pick_and_place', 150), ('drink_retrieval', 100)])
 def test_the_default_experiment_is_the_papers(task: str, trials: int) -> None:
     plan = parse(['--task', task]).plan

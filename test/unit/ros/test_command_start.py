@@ -142,12 +142,12 @@ def test_the_help_of_a_subcommand_loads_no_package_for_bags_or_figures(subcomman
     'old, new, options',
     [
         ('compare_oracles', 'compare oracles --wide', BAGS),
-        ('what_if', 'compare what_if', BAGS + ' --memory 2'),
+        ('what_if', 'compare what_if --wide', BAGS + ' --memory 2'),
         ('same_trials', 'compare same_trials', 2 * ' test/data/v0_1/experiment'),
         ('compare_variants', 'compare variants', ROWS),
         ('compare_variants', 'compare variants', 'none.csv'),
         ('draw_results', 'compare figures', 'none out'),
-        ('what_if', 'compare what_if', '--no-such-option'),
+        ('what_if', 'compare what_if --wide', '--no-such-option'),
     ],
 )
 def test_an_older_name_does_the_same_and_names_the_new_one(old, new, options):

@@ -58,6 +58,13 @@ _COLUMNS: Mapping[str, Callable[[str], Any]] = {
 }
 _OF_WORLD: Mapping[str, Callable[[str], Any]] = {'seed': int, 'true_success': _flag}
 
+_ALLOWED: Mapping[Callable[[str], Any], str] = {
+    _flag: 'True, False, or nothing',
+    float: 'a number',
+    int: 'a whole number',
+    TrialEnding: ', '.join(ending.value for ending in TrialEnding),
+}
+
 
 def read_statistics(path: str) -> List[CsvTrial]:
     """Return the trials of a CSV of bag_statistics.
@@ -85,7 +92,9 @@ def _parsed(path: str, number: int, cells: Mapping[str, Optional[str]]) -> CsvTr
             found[name] = None if name in _OF_WORLD and not text else kind(text)
         except (ValueError, KeyError) as err:
             raise BagError(
-                '{} row {}: {}: {!r} is not allowed'.format(path, number, name, text)
+                '{} row {}: {}: {!r} is not allowed; allowed: {}'.format(
+                    path, number, name, text, _ALLOWED[kind]
+                )
             ) from err
     told = {name: text or '' for name, text in cells.items() if isinstance(text, str)}
     seed, success = (found.pop(name) for name in _OF_WORLD)
