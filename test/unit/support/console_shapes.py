@@ -15,6 +15,12 @@ from geometry_msgs.msg import PointStamped, Vector3
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 
+from smach_oracle.analysis.graphs.container_graph import (
+    ContainerGraph,
+    GraphEdge,
+    GraphLayout,
+    drawing,
+)
 from smach_oracle.expert.console.answering import teleoperation
 from smach_oracle.expert.console.answering.driving_control import DrivingControl, DrivingSession
 from smach_oracle.expert.console.answering.interface_commands import marked_view
@@ -25,12 +31,6 @@ from smach_oracle.expert.console.answering.precondition_sections import status_v
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view
-from smach_oracle.expert.console.graphs.container_graph import (
-    ContainerGraph,
-    GraphEdge,
-    GraphLayout,
-    drawing,
-)
 from smach_oracle.expert.console.robots.down_machines import DownMachines
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.sensors import sample_handlers

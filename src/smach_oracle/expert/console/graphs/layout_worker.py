@@ -2,18 +2,16 @@
 
 import queue
 import shutil
-import subprocess
 import threading
 from collections import OrderedDict
 from typing import Callable, Dict, List, Optional
 
 import rospy
 
+from smach_oracle.analysis.graphs.container_graph import GraphLayout
+from smach_oracle.analysis.graphs.dot import DOT_LIMIT_S, LayoutError, lay_out
 from smach_oracle.ros.log.said_once import warn_once
 
-from .container_graph import GraphLayout, read_layout
-
-DOT_LIMIT_S = 20.0
 _REMEMBERED = 200
 
 Done = Callable[[], None]
@@ -83,15 +81,7 @@ class LayoutWorker:
 
     def _lay_out(self, text: str) -> Optional[GraphLayout]:
         try:
-            result = subprocess.run(
-                [str(self._command), '-Tjson0'],
-                input=text.encode(),
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                timeout=self._limit_s,
-                check=True,
-            )
-            return read_layout(result.stdout.decode('utf-8', 'replace'))
-        except (OSError, ValueError, subprocess.SubprocessError) as err:
+            return lay_out(text, str(self._command), self._limit_s)
+        except LayoutError as err:
             warn_once('dot could not lay a state graph out; it is shown as a list: {}'.format(err))
             return None

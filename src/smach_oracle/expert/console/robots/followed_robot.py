@@ -4,11 +4,7 @@ import threading
 from typing import Any, Dict, FrozenSet, List, Optional
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
-
-from ..feeds.control_view import MachineView, control_view
-from ..feeds.views import number, rates_view
-from ..graphs.container_graph import (
+from smach_oracle.analysis.graphs.container_graph import (
     ContainerGraph,
     GraphEdge,
     dot_text,
@@ -17,6 +13,10 @@ from ..graphs.container_graph import (
     shares,
     structure_from_counts,
 )
+from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
+
+from ..feeds.control_view import MachineView, control_view
+from ..feeds.views import number, rates_view
 from ..graphs.layout_worker import LayoutWorker
 from ..web.sections import PageSections
 from .same_machine import Source

@@ -4,23 +4,16 @@ import json
 import threading
 import time
 from collections import OrderedDict
-from typing import Any, Counter, Dict, List, Sequence, Set, Tuple
+from typing import Any, Dict, List, Sequence, Set, Tuple
 
 from sensor_msgs.msg import CompressedImage
 
-from smach_oracle.analysis.bag_machines import FailureImage, RecordedMachines
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.analysis.bag_machines import FailureImage
+from smach_oracle.analysis.graphs.container_graph import ContainerGraph, dot_text, drawing
+from smach_oracle.analysis.graphs.recorded import graph_from_events, recorded_graphs
 from smach_oracle.ros.log.said_once import warn_once
 
 from ..feeds.views import event_view
-from ..graphs.container_graph import (
-    ContainerGraph,
-    GraphEdge,
-    dot_text,
-    drawing,
-    make_structure,
-    structure_from_counts,
-)
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.question_images import ImageStore, image_view, stored_images
 from .bag_catalogue import BagCatalogue, BagTrial, RecordedTrialError
@@ -65,7 +58,7 @@ class RecordedTrials:
         read = self._catalogue.replayed(trial, MOST_EVENTS)
         if read.problem:
             warn_once('Machines in {} cannot be read: {}'.format(trial.summary.bags, read.problem))
-        containers, events = _structures(read.machines), read.events
+        containers, events = recorded_graphs(read.machines), read.events
         structures = {
             path: containers.get(path) or graph_from_events(path, events)
             for path in sorted({event.path for event in events if event.path})[:200]
@@ -100,27 +93,3 @@ class RecordedTrials:
             ]
             found[path] = drawing(structure, layout, nested)
         return found
-
-
-def _structures(machines: RecordedMachines) -> Dict[str, ContainerGraph]:
-    """Containers by path."""
-    return {
-        path: make_structure(
-            path, graph.children, [GraphEdge(*edge) for edge in graph.edges], graph.outcomes
-        )
-        for path, graph in machines.containers.items()
-    }
-
-
-def graph_from_events(path: str, events: Sequence[Event]) -> ContainerGraph:
-    """Return a container as its transitions show it, where the bag has no structure."""
-    taken: Counter[Tuple[str, str, str]] = Counter()
-    labels: Dict[str, None] = {}
-    for event in events:
-        if event.path == path and event.kind == EventKind.STATE_START:
-            labels[event.state] = None
-        elif event.path == path and event.kind == EventKind.TRANSITION:
-            taken[(event.state, event.outcome, event.target)] += 1
-    return structure_from_counts(
-        path, list(labels), [[*edge, times, 0.0] for edge, times in taken.items()]
-    )

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from smach_oracle.expert.console.graphs.container_graph import (
+from smach_oracle.analysis.graphs.container_graph import (
     GraphEdge,
     dot_text,
     drawing,

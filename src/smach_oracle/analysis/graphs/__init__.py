@@ -1,0 +1,1 @@
+"""Containers as graphs, from structures or from transitions, laid out by dot."""
