@@ -14,6 +14,8 @@ setup(
             include=['smach_common', 'smach_common.*', 'smach_oracle', 'smach_oracle.*'],
         ),
         package_dir={'': 'src'},
-        package_data={'': ['*.yaml', 'static/*.*', 'static/*/*.*', 'static/js/*/*.*']},
+        package_data={
+            '': ['*.yaml', 'templates/*.*', 'static/*.*', 'static/*/*.*', 'static/js/*/*.*']
+        },
     )
 )

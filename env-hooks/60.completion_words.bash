@@ -8,7 +8,7 @@ run_trials scripted_expert scripted_operator'
 _smach_oracle_words() {
   case $1 in
     'bag_statistics')
-      echo '--by --by-state --columns --csv --failing-outcomes --figure --help --json
+      echo '--by --by-state --columns --csv --failing-outcomes --figure --help --html --json
 --version --x-axis -h' ;;
     'bag_statistics --by')
       echo 'folder node host version settings day' ;;

@@ -8,21 +8,29 @@ import argparse
 import os
 import re
 import sys
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
+from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
 from . import table
 from .bag_events import BagError
+from .by_state.follower import states_of
 from .by_state.rows import VariantStates, by_variant, rows_of, write_csv_files
+from .by_state.state_counts import StatesOfTrials
 from .by_state.text import format_states
 from .compare_command.inputs import instead_of_bags
 from .comparing.groups import BY, TrialGroup, groups_by
 from .comparing.report import format_groups, groups_data
 from .reading import report_error, report_skipped
-from .trials import Trials, TrialSummary, load_by_state, load_trials
+from .trials import Trials, TrialSummary, load_by_state, load_trials, load_with_events
 from .variants import VariantCounts, count_variants, time_series
+
+# the trials, the events of each for a report, and what happened in the states of each
+_Loaded = Tuple[
+    Trials, Optional[Mapping[str, Sequence[Event]]], Optional[Mapping[str, StatesOfTrials]]
+]
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -31,12 +39,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     try:
         listed = args.failing_outcomes
         rule = FailureRule(tuple(listed)) if listed else None
-        states = None
-        if args.by_state:
-            found, by_trial = load_by_state(args.folders, rule)
-            states = by_variant(found.trials, by_trial)
-        else:
-            found = load_trials(args.folders, rule)
+        found, events, by_trial = _load(args, rule)
+        states = None if by_trial is None else by_variant(found.trials, by_trial)
         variants = count_variants(found.trials)
         sys.stdout.write(table.format_text(variants, found.trials))
         sys.stdout.write(format_states(states or []))
@@ -45,9 +49,23 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             sys.stdout.write(format_groups(args.by, groups))
         code = report_skipped(found.skipped)
         _write_files(args, found, variants, states, groups)
+        if events is not None:
+            _write_report(args, rule, found, events, groups)
     except (BagError, ImportError, OSError) as err:
         return report_error('bag_statistics', instead_of_bags(err, args.folders))
     return code
+
+
+def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
+    if args.html:
+        found, events = load_with_events(args.folders, rule)
+        if not args.by_state:
+            return found, events, None
+        return found, events, {key: states_of(each, rule) for key, each in events.items()}
+    if args.by_state:
+        found, by_trial = load_by_state(args.folders, rule)
+        return found, None, by_trial
+    return load_trials(args.folders, rule), None, None
 
 
 def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
@@ -84,6 +102,13 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         metavar='OUT',
         type=path_of,
         help='write the table, all trials and the skipped bags as JSON',
+    )
+    parser.add_argument(
+        '--html',
+        metavar='OUT',
+        type=path_of,
+        help='write a report to hand in: one page with all tables, those by state among them, '
+        'figures, graphs, and what each word means',
     )
     parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
     parser.add_argument(
@@ -128,6 +153,28 @@ def _write_files(
             write_csv_files(args.csv, states)
     if args.figure:
         _write_figures(args, found.trials)
+
+
+def _write_report(
+    args: argparse.Namespace,
+    rule: Optional[FailureRule],
+    found: Trials,
+    events: Mapping[str, Sequence[Event]],
+    groups: Optional[List[TrialGroup]],
+) -> None:
+    from .reporting.contents import (
+        ReportOptions,
+    )  # Jinja2 and matplotlib: only where they are wanted
+    from .reporting.page import write_report
+
+    write_report(
+        args.html,
+        found,
+        events,
+        ReportOptions(args.folders, rule, args.by or '', args.x_axis),
+        groups,
+    )
+    sys.stdout.write('Report: {}\n'.format(os.path.abspath(args.html)))
 
 
 def _write_figures(args: argparse.Namespace, trials: Sequence[TrialSummary]) -> None:

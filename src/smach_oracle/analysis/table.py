@@ -166,19 +166,24 @@ def _count_line(count: Count) -> str:
 
 
 def _rules(trials: Sequence[TrialSummary]) -> str:
-    """Return the rules by which failures were told, where the trials have several."""
+    lines = rules_of(trials)
+    return '\n'.join(['', lines[0], *('  ' + line for line in lines[1:]), '']) if lines else ''
+
+
+def rules_of(trials: Sequence[TrialSummary]) -> List[str]:
+    """Return the rules by which failures were told, a line each, where the trials have several."""
     counts = Counter(trial.rule for trial in trials)
     if len(counts) < 2 and not any(rule.is_of_later_version for rule in counts):
-        return ''
-    lines = ['', 'These trials told failures by different rules. Each is counted by its own:']
+        return []
+    lines = ['These trials told failures by different rules. Each is counted by its own:']
     if len(counts) < 2:
-        lines = ['', 'A later version of smach_oracle has recorded these trials:']
+        lines = ['A later version of smach_oracle has recorded these trials:']
     for rule, number in sorted(counts.items(), key=lambda each: str(each[0])):
         note = ''
         if rule.is_of_later_version:
             note = ' (not known here: counted as version {})'.format(BY_NAME_VERSION)
-        lines.append('  {:>6} {}{}'.format(number, rule, note))
-    return '\n'.join(lines) + '\n'
+        lines.append('{:>6} {}{}'.format(number, rule, note))
+    return lines
 
 
 def over_replicates(count: Count) -> str:

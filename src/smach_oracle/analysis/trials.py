@@ -88,6 +88,13 @@ class TrialsByState(NamedTuple):
     states: Mapping[str, StatesOfTrials]  # by trial id
 
 
+class TrialsWithEvents(NamedTuple):
+    """All that was found in some folders, and the events of each trial."""
+
+    found: Trials
+    events: Mapping[str, List[Event]]  # by trial id, in the order of their numbers
+
+
 def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Trials:
     """Read all bags in folders and below. Those that cannot be used are listed with the reason.
 
@@ -105,6 +112,13 @@ def load_by_state(places: Sequence[str], rule: Optional[FailureRule] = None) -> 
     skipped: List[SkippedBag] = []
     gathered = _gathered(places, skipped)
     return TrialsByState(_trials_in(gathered, rule, skipped), gathered.states(rule))
+
+
+def load_with_events(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsWithEvents:
+    """Read the same, and keep the events. As `load_trials`."""
+    skipped: List[SkippedBag] = []
+    gathered = _gathered(places, skipped)
+    return TrialsWithEvents(_trials_in(gathered, rule, skipped), gathered.in_order())
 
 
 def _gathered(places: Sequence[str], skipped: List[SkippedBag]) -> '_TrialEvents':
@@ -161,6 +175,12 @@ class _TrialEvents:
     def states(self, rule: Optional[FailureRule]) -> Dict[str, StatesOfTrials]:
         return {
             trial_id: states_of([by_number[seq] for seq in sorted(by_number)], rule)
+            for trial_id, by_number in self.events.items()
+        }
+
+    def in_order(self) -> Dict[str, List[Event]]:
+        return {
+            trial_id: [by_number[seq] for seq in sorted(by_number)]
             for trial_id, by_number in self.events.items()
         }
 

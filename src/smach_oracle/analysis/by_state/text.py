@@ -13,7 +13,7 @@ from .state_counts import ANSWERS, NO_ANSWERS, StateCounts, StatesOfTrials, WayC
 _WIDTH = 100
 _NAME = 38  # of a state or a way
 _SHOWN = 5  # reasons of a state
-_ANSWER_WORDS = {
+ANSWER_WORDS = {
     'goto': 'go to a state',
     'supersede': 'did its work',
     'interface': 'interface',
@@ -92,14 +92,15 @@ def _state(name: str, counts: StateCounts) -> List[str]:
         lines.append('    {:<{}}{:>6}'.format('nothing', _NAME + 6, counts.not_recovered))
     if counts.questions:
         answers = [
-            '{} {}'.format(_ANSWER_WORDS.get(answer, answer), counts.answers[answer])
-            for answer in _answers_of(counts)
+            '{} {}'.format(ANSWER_WORDS.get(answer, answer), counts.answers[answer])
+            for answer in answers_of(counts)
         ]
         lines.append('    {} asked: {}'.format(_times(counts.questions), ', '.join(answers)))
     return lines
 
 
-def _answers_of(counts: StateCounts) -> List[str]:
+def answers_of(counts: StateCounts) -> List[str]:
+    """Return the answers that questions about a state had, the known ones first."""
     known = [answer for answer in ANSWERS + NO_ANSWERS if counts.answers.get(answer)]
     return known + sorted(set(counts.answers) - set(ANSWERS + NO_ANSWERS))
 

@@ -1,0 +1,1 @@
+"""A report on recorded trials: one page that needs nothing else."""
