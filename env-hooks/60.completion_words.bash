@@ -11,7 +11,7 @@ _smach_oracle_words() {
       echo '--by --by-state --columns --csv --failing-outcomes --figure --help --html --json
 --version --x-axis -h' ;;
     'bag_statistics --by')
-      echo 'folder node host version settings day' ;;
+      echo 'folder node host version settings script day' ;;
     'bag_statistics --columns')
       echo '1 2' ;;
     'bag_statistics --x-axis')
@@ -27,7 +27,7 @@ _smach_oracle_words() {
     'compare variants')
       echo '--by --help -h' ;;
     'compare variants --by')
-      echo 'file folder node host version settings day' ;;
+      echo 'file folder node host version settings script day' ;;
     'compare what_if')
       echo '--help --high-from --json --memory --moderate-from --policy --prior --wide -h' ;;
     'compare what_if --policy')

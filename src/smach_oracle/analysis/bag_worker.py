@@ -104,6 +104,7 @@ def _summary(fields: Dict[str, Any]) -> TrialSummary:
             failures_by_state=tuple((name, count) for name, count in fields['failures_by_state']),
             settings=tuple((name, value) for name, value in fields['settings']),
             origin=tuple((name, value) for name, value in fields['origin']),
+            inputs=tuple((name, value) for name, value in fields['inputs']),
             rule=rule_in({RULE: fields['rule']}) or FORMER_RULE,
         )
     )

@@ -12,9 +12,9 @@ from smach_oracle.oracle.settings.failure_rule import BY_NAME_VERSION, FORMER_RU
 
 from .bag_events import SkippedBag
 from .causes import cause_rows, format_causes
+from .recorded.trial_line import TrialLine, trial_lines
 from .trial_counter import EXPERT_ANSWERED, PERSON_NEEDED
 from .trials import TrialSummary
-from .truth import Truth
 from .variants import (
     ANSWERED,
     ENDED_IN_FAILURE,
@@ -24,7 +24,6 @@ from .variants import (
     TRUE_SUCCESS,
     Count,
     VariantCounts,
-    find_variants,
 )
 
 _INDENTED = (ANSWERED, NOT_ANSWERED)
@@ -237,6 +236,7 @@ def _trial_data(trial: TrialSummary) -> Dict[str, Any]:
         failures_by_state=dict(trial.failures_by_state),
         settings=dict(trial.settings),
         origin=dict(trial.origin),
+        inputs=dict(trial.inputs),
         cause=trial.cause._asdict() if trial.cause else None,
         truth=trial.truth._asdict() if trial.truth else None,
         expert_answered=trial.answered > 0,
@@ -260,71 +260,7 @@ def write_json(
 
 def write_csv(target: IO[str], trials: Sequence[TrialSummary]) -> None:
     """Write one line a trial, for a spreadsheet or for your own statistics."""
-    plain = [
-        name
-        for name in TrialSummary._fields
-        if name
-        not in (
-            'failures_by_state',
-            'bags',
-            'settings',
-            'cause',
-            'truth',
-            'unwell_s',
-            'resumed',
-            'down_s',
-            'rule',
-            'node',
-            'origin',
-        )
-    ]
     writer = csv.writer(target, lineterminator='\n')
-    writer.writerow(
-        plain
-        + [
-            'seed',
-            'causes',
-            'true_success',
-            'why',
-            'sim_s',
-            'wall_s',
-            'unwell_s',
-            'resumed',
-            'down_s',
-            'wrong_object',
-            'damage',
-            'expert_answered',
-            'person_needed',
-            'variant',
-            'node',
-            'folder',
-            'host',
-            'version',
-        ]
-    )
-    names = {
-        trial.trial_id: variant.name
-        for variant in find_variants(trials)
-        for trial in variant.trials
-    }
-    for trial in trials:
-        data = _trial_data(trial)
-        cause, truth, origin = trial.cause, trial.truth, dict(trial.origin)
-        world = [cause.seed, ' '.join(cause.kinds)] if cause else ['', '']
-        world += [truth.success, truth.why, truth.sim_s, truth.wall_s] if truth else [''] * 4
-        writer.writerow(
-            ['' if data[name] is None else data[name] for name in plain]
-            + world
-            + [trial.unwell_s, trial.resumed, trial.down_s]
-            + _harm(truth)
-            + [trial.answered > 0, '' if trial.person_needed is None else trial.person_needed]
-            + [names.get(trial.trial_id, ''), trial.node, trial.replicate]
-            + [origin.get('host', ''), origin.get('version', '')]
-        )
-
-
-def _harm(truth: Optional[Truth]) -> List[Any]:
-    """The wrong object, and how often something came to harm, or '' where that is not known."""
-    if truth is None or truth.damage is None:
-        return ['', '']
-    return [truth.wrong_object, len(truth.damage)]
+    writer.writerow(TrialLine._fields)
+    for line in trial_lines(trials):
+        writer.writerow(['' if value is None else value for value in line])

@@ -8,7 +8,14 @@ from enum import Enum
 from typing import Any, Dict, Mapping, Optional, Protocol, Set, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.facts import JUMPED_FROM, ORIGIN, TrialEnd, ended_by, last_stored
+from smach_oracle.oracle.records.facts import (
+    INPUTS,
+    JUMPED_FROM,
+    ORIGIN,
+    TrialEnd,
+    ended_by,
+    last_stored,
+)
 from smach_oracle.oracle.settings.failure_rule import (
     FORMER_RULE,
     EndMeaning,
@@ -108,6 +115,15 @@ class TrialCounter:
         if not isinstance(stated, Mapping):
             return ()
         return tuple(sorted((str(key), str(value)) for key, value in stated.items()))
+
+    @property
+    def inputs(self) -> Tuple[Tuple[str, Any], ...]:
+        """Return the plain values of the userdata with which it began, sorted.
+
+        It is () where there were none, or where they are not recorded.
+        """
+        stated = self._start.get(INPUTS)
+        return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
     @property
     def duration_s(self) -> float:

@@ -1,12 +1,23 @@
 """Summaries of trials, made from the events in bags (definitions: doc/statistics.md)."""
 
 import os
-from typing import Any, Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import (
+    Any,
+    Dict,
+    Iterable,
+    Iterator,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Sequence,
+    Tuple,
+)
 
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 
-from .bag_events import BagContent, BagError, RecordedCause, SkippedBag
+from .bag_events import BagContent, BagError, EventReader, RecordedCause, SkippedBag
 from .by_state.follower import states_of
 from .by_state.state_counts import StatesOfTrials
 from .reading import read_bags
@@ -42,6 +53,8 @@ class TrialSummary(NamedTuple):
     node: str = ''  # whose it is, by the topic of its events. '' means not known
     # where it ran: version, host, digests. Sorted, or () where that is not recorded
     origin: Tuple[Tuple[str, str], ...] = ()
+    # plain values of the userdata with which it began, sorted, or () where they are not recorded
+    inputs: Tuple[Tuple[str, Any], ...] = ()
 
     @property
     def replicate(self) -> str:
@@ -213,7 +226,34 @@ def summarise(
         down_s=counter.down_s,
         rule=counter.rule,
         origin=counter.origin,
+        inputs=counter.inputs,
     )
+
+
+def events_of(trials: Iterable[TrialSummary]) -> Iterator[Tuple[TrialSummary, List[Event]]]:
+    """Yield some trials, each with its events in order. Their bags are read again for that.
+
+    The trials come in their order, but those of the same bags together.
+
+    :raises BagError: where a bag cannot be read any more.
+    """
+    reader = EventReader()
+    by_bags: Dict[Tuple[str, ...], List[TrialSummary]] = {}
+    for trial in trials:
+        by_bags.setdefault(trial.bags, []).append(trial)
+    for bags, of_these in by_bags.items():
+        by_number: Dict[str, Dict[int, Event]] = {trial.trial_id: {} for trial in of_these}
+        for path in bags:
+            try:
+                content = reader.read(path)
+            except BagError as err:
+                raise BagError('{}: {}'.format(path, err)) from err
+            for event in content.events:
+                if event.trial_id in by_number:
+                    by_number[event.trial_id][event.seq] = event
+        for trial in of_these:
+            events = by_number[trial.trial_id]
+            yield trial, [events[seq] for seq in sorted(events)]
 
 
 def load_replicates(

@@ -11,7 +11,7 @@ from smach_oracle.analysis import bag_statistics
 from smach_oracle.analysis.comparing.group_tests import (
     difference_interval,
     fisher_exact,
-    pairs_of,
+    pairing_of,
     share_tests,
 )
 from smach_oracle.analysis.comparing.groups import (
@@ -71,7 +71,8 @@ def test_trials_with_the_same_seeds_are_paired():
     one = [told(number, number > 2, True) for number in range(10)]
     other = [told(number, True, True) for number in range(2, 14)]
     first, second = groups(('a', one), ('b', other))
-    assert len(pairs_of(first, second)) == 8
+    pairing = pairing_of(first, second)
+    assert (pairing.by, len(pairing.pairs)) == ('seed', 8)
     failed = next(test for test in share_tests(first, second) if test.name == 'ended in failure')
     assert failed.is_paired and (failed.first, failed.first_of, failed.second) == (1, 8, 0)
     assert failed.p_value == 1.0
@@ -83,8 +84,45 @@ def test_trials_with_the_same_seeds_are_paired():
 def test_trials_without_seeds_or_with_a_seed_twice_are_not_paired(twice):
     one = [told(3, False, True), told(3, False, True)] if twice else [trial(0), trial(1)]
     first, second = groups(('a', one), ('b', [told(3, True, True)]))
-    assert pairs_of(first, second) == []
+    assert pairing_of(first, second) == ('', [])
     assert not any(test.is_paired for test in share_tests(first, second))
+
+
+def with_inputs(number, **inputs):
+    return trial(number, inputs=tuple(sorted(inputs.items())))
+
+
+def test_trials_that_began_with_the_same_inputs_are_paired():
+    rooms = ['kitchen', 'hall', 'office', 'attic']
+    one = [with_inputs(number, room=room) for number, room in enumerate(rooms)]
+    other = [with_inputs(number, room=room) for number, room in enumerate(rooms[1:] + ['cellar'])]
+    first, second = groups(('a', one), ('b', other))
+    by, pairs = pairing_of(first, second)
+    assert by == 'inputs'
+    assert [(ours.inputs, theirs.inputs) for ours, theirs in pairs] == [
+        ((('room', room),),) * 2 for room in rooms[1:]
+    ]
+    text = format_groups('folder', [first, second])
+    assert "3 pairs by inputs, 2 trials left out: McNemar's exact test" in text
+
+
+@pytest.mark.parametrize(
+    'inputs', [({'n': 1}, {'n': 1}), ({'n': 1}, {}), ({'n': 1}, {'n': 2})], ids=repr
+)
+def test_inputs_pair_nothing_where_a_trial_has_none_or_the_same_or_none_is_in_both(inputs):
+    first, second = groups(
+        ('a', [with_inputs(number, **each) for number, each in enumerate(inputs)]),
+        ('b', [with_inputs(7, n=7)]),
+    )
+    assert pairing_of(first, second) == ('', [])
+
+
+def test_seeds_pair_before_inputs():
+    one, other = (
+        [told(number, True, True)._replace(inputs=(('n', number % 2),)) for number in range(4)]
+        for _ in range(2)
+    )
+    assert pairing_of(*groups(('a', one), ('b', other))).by == 'seed'
 
 
 def test_true_success_is_tested_where_a_judge_saw_trials_of_both():
@@ -150,8 +188,8 @@ def test_settings_are_named_by_those_that_differ():
     assert names == ['with oracle', 'with oracle, settings b']
 
 
-def test_hosts_and_versions_come_from_the_start_of_the_trial():
-    origin = (('host', 'arm'), ('version', '0.2.0'))
+def test_host_version_and_script_come_from_the_start_of_the_trial():
+    origin = (('host', 'arm'), ('version', '0.2.0'), ('script', 'fetch.py 0a1b'))
     trials = [trial(0, origin=origin), trial(1)]
     for by, name in origin:
         assert [group.name for group in groups_by(by, trials, [])] == [name, NOT_RECORDED]

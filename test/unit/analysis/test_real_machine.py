@@ -67,9 +67,12 @@ def run_trials(folder, failures, recover=True, expert=None):
     return outcomes, load_trials([str(folder)]).trials
 
 
-def test_a_trial_names_the_host_and_the_version_on_which_it_began(tmp_path):
+def test_a_trial_names_where_and_with_what_it_began(tmp_path):
     _, (trial,) = run_trials(tmp_path, [0])
-    assert dict(trial.origin) == {'host': socket.gethostname(), 'version': __version__}
+    origin = dict(trial.origin)
+    assert (origin['host'], origin['version']) == (socket.gethostname(), __version__)
+    assert {'python', 'engine', 'settings'} <= origin.keys()
+    assert dict(trial.inputs) == {}
 
 
 def test_recoveries_of_a_low_failure_state_are_counted(tmp_path):

@@ -360,9 +360,9 @@ def test_down_time_is_in_the_table_and_in_the_csv():
     text = io.StringIO()
     write_csv(text, [trial])
     header, row = text.getvalue().splitlines()
-    added = ',expert_answered,person_needed,variant,node,folder,host,version'
+    added = ',expert_answered,person_needed,variant,node,folder,host,version,script,inputs'
     assert header.endswith('unwell_s,resumed,down_s,wrong_object,damage' + added)
-    assert row.endswith(',1,7.5,,,False,,with oracle,,,,')
+    assert row.endswith(',1,7.5,,,False,,with oracle,,,,,,')
     told = format_text(count_variants([trial, trial]))
     assert '2 trials were resumed after their program was stopped; it was down for 15 s' in told
 

@@ -52,6 +52,7 @@ PINNED = {
     'pybullet': 'pybullet',
     'rosbags': 'rosbags',
 }
+OPTIONAL = {'pandas'}  # a user asks for it by its own call
 STDLIB = getattr(sys, 'stdlib_module_names', frozenset())
 
 without_stdlib_names = pytest.mark.skipif(
@@ -275,7 +276,7 @@ def test_everything_that_is_imported_is_set_up_on_debian():
     used = {name.split('.')[0] for path in python_files('src') for _, name in imports(path)}
     missing = {
         name
-        for name in used - STDLIB - STAND_INS - {COMMON, 'smach_oracle'}
+        for name in used - STDLIB - STAND_INS - OPTIONAL - {COMMON, 'smach_oracle'}
         if PINNED.get(name, 'python3-' + name.replace('_', '-')) not in there
     }
     assert not missing

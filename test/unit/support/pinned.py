@@ -10,7 +10,7 @@ FOLDER = Path(__file__).resolve().parents[2] / 'data/pinned'
 SECONDS = re.compile(r'(?:under )?\d+(?:\.\d+)?(?:e-\d+)? s\b')
 ADDRESS = re.compile(r' at 0x[0-9a-f]+')
 # settings are held elsewhere, and how long something took is never the same
-NOT_HELD = ('settings', 'failure_rule', 'origin')
+NOT_HELD = ('settings', 'failure_rule', 'origin', 'inputs')
 
 
 def held(name):

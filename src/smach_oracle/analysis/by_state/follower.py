@@ -1,6 +1,6 @@
 """Counts what happened in the states of one trial, from its events. Pure."""
 
-from typing import Dict, Iterable, List, Optional
+from typing import Dict, Iterable, List, NamedTuple, Optional
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 from smach_oracle.oracle.records.way_results import failure_text_key
@@ -9,15 +9,39 @@ from smach_oracle.oracle.settings.failure_rule import FailureRule
 from ..replaying.followed import Key, Visits, key_of, left_by
 from ..trial_counter import TrialCounter, TrialEnding
 from .questions import Questions
-from .recoveries import Recoveries
-from .state_counts import StatesOfTrials
+from .recoveries import FollowedWay, Recoveries
+from .state_counts import Reason, StatesOfTrials
 
 _KINDS = {int(each): each.name.lower() for each in FailureKind}
 _ENDED_WELL = {TrialEnding.SUCCESS: True, TrialEnding.FAILURE: False}
 
 
+class TimedEvent(NamedTuple):
+    """An event, and when it came: s since the trial began, without those in which it was down."""
+
+    now_s: float
+    event: Event
+
+
+class FollowedTrial(NamedTuple):
+    """What happened in the states of one trial: the counts, and one by one."""
+
+    counts: StatesOfTrials
+    failures: List[TimedEvent]  # its FAILURE events that count
+    decisions: List[TimedEvent]  # its DECISION events
+    ways: List[FollowedWay]  # in the order in which their results were clear
+
+
 def states_of(events: Iterable[Event], rule: Optional[FailureRule] = None) -> StatesOfTrials:
     """Count the states of one trial, whose events come in the order of their numbers."""
+    return follow(events, rule).counts
+
+
+def follow(events: Iterable[Event], rule: Optional[FailureRule] = None) -> FollowedTrial:
+    """Return what happened in the states of one trial. `rule`: as in `load_trials`.
+
+    :param events: in the order of their numbers.
+    """
     follower = _Follower(rule)
     for event in events:
         follower.take(event)
@@ -33,6 +57,8 @@ class _Follower:
         self._questions = Questions(self._found)
         self._recoveries = Recoveries(self._found)
         self._visits = Visits()
+        self._failures: List[TimedEvent] = []
+        self._decisions: List[TimedEvent] = []
         self._now_s = 0.0
         self._wall_s: Optional[float] = None
         self._entered_s: Dict[Key, float] = {}
@@ -54,15 +80,17 @@ class _Follower:
         self._recoveries.take(event, self._now_s)
         if event.kind == EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
             self._fail(event)
+        elif event.kind == EventKind.DECISION:
+            self._decisions.append(TimedEvent(self._now_s, event))
         self._questions.take(event, self._now_s, _left_by(event))
 
-    def end(self) -> StatesOfTrials:
+    def end(self) -> FollowedTrial:
         for key in list(self._entered_s):
             self._leave(key)
         self._questions.end(self._now_s)
         self._recoveries.end(self._now_s, _ENDED_WELL.get(self._counter.ending))
         self._found.robot_s = self._now_s
-        return self._found
+        return FollowedTrial(self._found, self._failures, self._decisions, self._recoveries.ways)
 
     def _go_on(self, event: Event) -> None:
         if self._wall_s is not None and event.kind != EventKind.RESUMED:
@@ -89,17 +117,23 @@ class _Follower:
             self._found.of('/'.join(key)).seconds += self._now_s - since_s
 
     def _fail(self, event: Event) -> None:
-        key, kind = key_of(event), _KINDS.get(event.failure_kind, str(event.failure_kind))
-        text = failure_text_key(event.failure_kind, event.outcome, event.text)
+        self._failures.append(TimedEvent(self._now_s, event))
+        key, reason = key_of(event), reason_of(event)
         reasons = self._found.of('/'.join(key)).reasons
-        reason = (kind, event.outcome, text)
         reasons[reason] = reasons.get(reason, 0) + 1
-        self._recoveries.failed(key)
+        self._recoveries.failed(event)
         if key not in self._failing:
             self._failing.append(key)
 
     def _end_failing(self, keys: List[Key]) -> None:
         self._failing = [key for key in self._failing if key not in keys]
+
+
+def reason_of(failure: Event) -> Reason:
+    """Return why a state failed: the kind, the outcome, and the text without its numbers."""
+    kind = _KINDS.get(failure.failure_kind, str(failure.failure_kind))
+    text = failure_text_key(failure.failure_kind, failure.outcome, failure.text)
+    return kind, failure.outcome, text
 
 
 def _left_by(event: Event) -> Optional[Key]:

@@ -1,7 +1,6 @@
 """Follows how one trial went on from failures, and what came of it. Pure."""
 
-from dataclasses import dataclass
-from typing import Dict, List, Mapping, Optional, Set, Tuple
+from typing import Dict, List, Mapping, NamedTuple, Optional, Set, Tuple
 
 from smach_oracle.oracle.decision.ways import WayKind, way_in_words
 from smach_oracle.oracle.records.events import Event, EventKind
@@ -16,21 +15,34 @@ from ..replaying.followed import (
     key_of,
     left_by,
 )
-from .state_counts import StatesOfTrials, WayCount
+from .state_counts import StatesOfTrials
 
 EXPERT = 'expert: '  # begins the words of what the expert chose
 _DID_WORK = EXPERT + 'did its work'
 _INTERFACE = EXPERT + 'interface '
 
 
-@dataclass
-class _Going:
+class FollowedWay(NamedTuple):
+    """A way that was gone from a failed state, and what came of it.
+
+    Times are s since the trial began, without those in which its program did not run.
+    """
+
+    key: Key  # of the failed state
+    words: str
+    since_s: float
+    until_s: float  # at which it was clear what came of it
+    helped: Optional[bool]  # None: not known
+    by_expert: bool
+    failure: Optional[int]  # number of the FAILURE that it follows first, None where none
+    decision: Optional[int]  # number of the DECISION that led to it, None where none
+
+
+class _Going(NamedTuple):
     """A way that was gone, and whose result is not known yet."""
 
-    count: WayCount
-    since_s: float
+    way: FollowedWay
     watched: Key  # the state whose next result counts
-    by_expert: bool
 
 
 class Recoveries:
@@ -38,10 +50,14 @@ class Recoveries:
 
     def __init__(self, found: StatesOfTrials) -> None:
         self._found = found
+        self.ways: List[FollowedWay] = []  # whose results are clear, in the order in which they are
         self._visits = Visits()
         self._decisions = Decisions()
         self._going: List[_Going] = []
-        self._unhandled: Set[Key] = set()  # states that have failed, and nothing was tried yet
+        # failed states for which nothing was tried yet: the number of the FAILURE
+        self._unhandled: Dict[Key, int] = {}
+        # number of the last DECISION about a state or a container since its last failure
+        self._decided: Dict[Key, int] = {}
         self._prepared: Set[Key] = set()  # preconditions were run after the decision
         # that the expert chose, by state: the name, and when
         self._interfaces: Dict[Key, Tuple[str, float]] = {}
@@ -55,7 +71,9 @@ class Recoveries:
             self._settle(now_s, succeeded, [each for each in self._going if each.watched == key])
         if event.kind == EventKind.FAILURE:
             self._unhandled_again(key)
+            self._decided.pop(key, None)
         elif event.kind == EventKind.DECISION:
+            self._decided[key] = event.seq
             self._prepared.discard(key)
         elif event.kind == EventKind.PRECONDITION_START:
             self._prepared.add(key)
@@ -79,18 +97,18 @@ class Recoveries:
         for key in list(self._unhandled):
             self._unhandled_again(key)
         for going in list(self._going):
-            is_known = going.by_expert or succeeded is False
+            is_known = going.way.by_expert or succeeded is False
             self._settle(now_s, succeeded if is_known else None, [going])
 
     def _unhandled_again(self, key: Key) -> None:
         """Note that a state has failed, or that the trial ends, as nothing has come of it yet."""
         if key in self._unhandled:
             self._found.of('/'.join(key)).not_recovered += 1
-            self._unhandled.discard(key)
+            del self._unhandled[key]
 
-    def failed(self, key: Key) -> None:
-        """Note that a failure of a state counts."""
-        self._unhandled.add(key)
+    def failed(self, failure: Event) -> None:
+        """Note a failure that counts."""
+        self._unhandled[key_of(failure)] = failure.seq
 
     def _asked_again(self, key: Key, now_s: float) -> None:
         """Settle an interface after which the same question is put again."""
@@ -121,13 +139,18 @@ class Recoveries:
         elif key in self._prepared and way == WayKind.AGAIN.value:
             way = WayKind.PREPARE.value
         by_expert = is_act_of_person(event)
+        decision = None
         if by_expert:
             self._settle(now_s, None, list(self._going))
+        elif gone is not None and gone.decision is not None:
+            decision = gone.decision.seq
+        else:
+            decision = self._decided.pop(key, self._decided.pop(key_of(event), None))
         words = way_in_words(way)
         name, since_s = self._interfaces.pop(key, ('', None))
         if by_expert:
             words = _INTERFACE + name if name else EXPERT + words.replace('going back', 'going')
-        self._go(key, words, now_s, key, by_expert, since_s)
+        self._go(key, words, now_s, key, by_expert, since_s, decision)
 
     def _go(
         self,
@@ -137,17 +160,22 @@ class Recoveries:
         watched: Key,
         by_expert: bool,
         since_s: Optional[float] = None,
+        decision: Optional[int] = None,
     ) -> None:
-        self._unhandled.discard(key)
+        failure = self._unhandled.pop(key, None)
         self._settle(now_s, None, [each for each in self._going if each.watched == watched])
-        count = self._found.of('/'.join(key)).way(words)
-        self._going.append(_Going(count, now_s if since_s is None else since_s, watched, by_expert))
+        began_s = now_s if since_s is None else since_s
+        way = FollowedWay(key, words, began_s, began_s, None, by_expert, failure, decision)
+        self._going.append(_Going(way, watched))
 
     def _settle(self, now_s: float, helped: Optional[bool], chosen: List[_Going]) -> None:
         for going in chosen:
             self._going.remove(going)
-            for count in [going.count] + [self._found.choices] * going.by_expert:
-                count.helped += helped is True
-                count.in_vain += helped is False
-                count.not_known += helped is None
-                count.seconds += now_s - going.since_s
+            way = going.way._replace(until_s=now_s, helped=helped)
+            self.ways.append(way)
+            count = self._found.of('/'.join(way.key)).way(way.words)
+            for each in [count] + [self._found.choices] * way.by_expert:
+                each.helped += helped is True
+                each.in_vain += helped is False
+                each.not_known += helped is None
+                each.seconds += way.until_s - way.since_s

@@ -1,1 +1,1 @@
-"""Groups of your own trials, compared: by folder, node, host, version, settings or day."""
+"""Groups of your own trials, compared: by folder, node, settings and more."""

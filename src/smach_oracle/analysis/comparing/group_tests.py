@@ -1,4 +1,4 @@
-"""Tests of shares between two groups of trials: paired by seed where that is possible. Pure."""
+"""Tests of shares between two groups of trials, which pair by seed or inputs. Pure."""
 
 import math
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
@@ -33,6 +33,20 @@ class ShareTest(NamedTuple):
     p_value: float  # two-sided
     is_paired: bool  # McNemar's test, else Fisher's
     is_bound: bool = False  # the shares are lower bounds: nobody has judged some trials
+
+
+class Pairing(NamedTuple):
+    """The trials of two groups that did the same, two by two."""
+
+    by: str  # one of PAIRED_BY. '' means that they do not pair
+    pairs: List[Tuple[TrialSummary, TrialSummary]]
+
+
+# what two trials have in common that pair
+PAIRED_BY: Tuple[Tuple[str, Callable[[TrialSummary], object]], ...] = (
+    ('seed', lambda trial: trial.cause and (trial.cause.seed,)),
+    ('inputs', lambda trial: trial.inputs),
+)
 
 
 def fisher_exact(first: int, first_of: int, second: int, second_of: int) -> float:
@@ -76,23 +90,25 @@ def difference_interval(first: int, first_of: int, second: int, second_of: int) 
     )
 
 
-def seeds_of(group: TrialGroup) -> Optional[Dict[int, TrialSummary]]:
-    """Return the trials by their seeds. None where one has no seed, or two have the same."""
-    found = {trial.cause.seed: trial for trial in group.trials if trial.cause is not None}
-    return found if len(found) == len(group.trials) else None
+def pairing_of(first: TrialGroup, second: TrialGroup) -> Pairing:
+    """Return the trials that pair: by the first of PAIRED_BY that each trial has one of its own."""
+    for by, key_of in PAIRED_BY:
+        one, other = _by_key(first, key_of), _by_key(second, key_of)
+        common = one.keys() & other.keys()
+        if common:
+            return Pairing(by, [(one[key], other[key]) for key in one if key in common])
+    return Pairing('', [])
 
 
-def pairs_of(first: TrialGroup, second: TrialGroup) -> List[Tuple[TrialSummary, TrialSummary]]:
-    """Return the trials with the same seed in both groups, none where seeds do not pair them."""
-    one, other = seeds_of(first), seeds_of(second)
-    if one is None or other is None:
-        return []
-    return [(one[seed], other[seed]) for seed in sorted(set(one) & set(other))]
+def _by_key(group: TrialGroup, key_of: Callable[[TrialSummary], object]) -> Dict[str, TrialSummary]:
+    """Return the trials by their keys. None where one has no key, or two have the same."""
+    found = {repr(key): trial for trial in group.trials for key in [key_of(trial)] if key}
+    return found if len(found) == len(group.trials) else {}
 
 
 def share_tests(first: TrialGroup, second: TrialGroup) -> List[ShareTest]:
     """Return a test of each of TESTED that is known of trials of both groups."""
-    pairs = pairs_of(first, second)
+    pairs = pairing_of(first, second).pairs
     tests = []
     for name, happened in TESTED:
         test = (

@@ -56,10 +56,14 @@ VALUES: Mapping[str, Callable[[TrialSummary], str]] = {
     'host': _origin('host'),
     'version': _origin('version'),
     'settings': _settings,
+    'script': _origin('script'),
     'day': day_of,
+    'engine': _origin('engine'),
+    'python': _origin('python'),
+    'ros': _origin('ros'),
     'rule of failures': lambda trial: str(trial.rule),
 }
-BY = ('folder', 'node', 'host', 'version', 'settings', 'day')
+BY = ('folder', 'node', 'host', 'version', 'settings', 'script', 'day')
 
 
 def groups_by(by: str, trials: Sequence[TrialSummary], places: Sequence[str]) -> List[TrialGroup]:

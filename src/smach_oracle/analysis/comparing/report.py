@@ -6,7 +6,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from ..table import group_table, variant_data
 from ..variants import VariantCounts, count_variant
-from .group_tests import ShareTest, pairs_of, share_tests
+from .group_tests import Pairing, ShareTest, pairing_of, share_tests
 from .groups import TrialGroup, other_differences
 
 MOST_GROUPS = 6  # of an experiment, each two of which are tested. With more, the first and each
@@ -17,7 +17,7 @@ class PairOfGroups(NamedTuple):
 
     first: TrialGroup
     second: TrialGroup
-    pairs: int  # trials with the same seed in both. 0: they are not paired
+    pairing: Pairing
     tests: List[ShareTest]
     differ_in: List[str]
 
@@ -31,7 +31,7 @@ def compared(by: str, groups: Sequence[TrialGroup]) -> List[PairOfGroups]:
                 PairOfGroups(
                     first,
                     second,
-                    len(pairs_of(first, second)),
+                    pairing_of(first, second),
                     share_tests(first, second),
                     other_differences(by, first, second),
                 )
@@ -63,12 +63,12 @@ def _counts(groups: Sequence[TrialGroup]) -> List[VariantCounts]:
 
 
 def _pair(pair: PairOfGroups) -> List[str]:
-    first, second = pair.first, pair.second
-    left = len(first.trials) + len(second.trials) - 2 * pair.pairs
+    first, second, pairs = pair.first, pair.second, len(pair.pairing.pairs)
+    left = len(first.trials) + len(second.trials) - 2 * pairs
     how = "not paired: Fisher's exact test, and Newcombe's interval"
-    if pair.pairs:
-        how = "{} pairs by seed{}: McNemar's exact test, and Newcombe's interval".format(
-            pair.pairs, ', {} trials left out'.format(left) if left else ''
+    if pairs:
+        how = "{} pairs by {}{}: McNemar's exact test, and Newcombe's interval".format(
+            pairs, pair.pairing.by, ', {} trials left out'.format(left) if left else ''
         )
     lines = [
         '',

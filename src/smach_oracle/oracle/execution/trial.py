@@ -3,13 +3,11 @@
 Also what one execution of any container begins and ends.
 """
 
-import socket
 import time
 from typing import Callable, Dict, List, Optional
 
 import smach
 from smach_oracle.forking import in_child
-from smach_oracle.release import VERSION
 
 from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
@@ -20,13 +18,14 @@ from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
-from ..records.facts import ENDED_BY, ORIGIN, TrialEnd
+from ..records.facts import ENDED_BY, INPUTS, ORIGIN, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
 from ..settings.failure_rule import RULE
 from ..smach_private import initial_label_of, states_of
 from .jump_entry import may_start_over
+from .origin import inputs_of, origin_of
 from .unknown_ends import tell_unknown_ends
 from .wrapping import adopt, bring_up_to_date
 
@@ -95,7 +94,8 @@ class ContainerRun(Execution):
                     'recovers': node.tree.recover,
                     'settings': _settings(node),
                     RULE: node.in_force.rule.as_data(),
-                    ORIGIN: {'host': socket.gethostname(), 'version': VERSION},
+                    ORIGIN: origin_of(node.settings),
+                    INPUTS: inputs_of(node.machine.userdata),
                 },
             )
         else:

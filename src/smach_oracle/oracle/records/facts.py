@@ -17,8 +17,8 @@ JUMPED_TO = 'to'  # key in the data of JUMP: path of the state, where it is in a
 # key in the data of TRANSITION: state, kind, outcome and text of an earlier failure that the
 # state has reported, and from which the oracle now recovers
 TAKEN_UP = 'taken_up'
-# key in the data of TRIAL_START: the host, and the version of smach_oracle, on which it began
-ORIGIN = 'origin'
+# keys in the data of TRIAL_START: where and with what it began, and plain values of its userdata
+ORIGIN, INPUTS = 'origin', 'inputs'
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
 BRANCHES = 'branches'  # key in the data of CONTAINER_START: states that have oracles of their own
 LAST_SEQ = 'last_seq'  # key in the data of RESUMED: number of the last event that was stored

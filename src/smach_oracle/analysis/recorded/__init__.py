@@ -1,0 +1,1 @@
+"""Recorded trials for a notebook: `smach_oracle.analysis.read`, and rows of what happened."""
