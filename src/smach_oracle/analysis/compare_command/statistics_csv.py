@@ -1,6 +1,7 @@
 """Trials from the CSV of `bag_statistics --csv`, compared without their bags."""
 
 import csv
+import json
 import os
 from typing import (
     Any,
@@ -108,9 +109,20 @@ def _parsed(path: str, number: int, cells: Mapping[str, Optional[str]]) -> CsvTr
         cause=None if seed is None else RecordedCause(seed, '', (), ()),
         truth=None if success is None else _truth(seed or 0, success, told),
         node=told.get('node', ''),
-        origin=tuple((name, told[name]) for name in ('host', 'version') if told.get(name)),
+        origin=tuple(
+            (name, told[name]) for name in ('host', 'version', 'script') if told.get(name)
+        ),
+        inputs=_inputs(told.get('inputs', '')),
     )
     return CsvTrial(path, variant, folder, trial)
+
+
+def _inputs(text: str) -> Tuple[Tuple[str, Any], ...]:
+    try:
+        found = json.loads(text) if text else {}
+    except ValueError:
+        return ()
+    return tuple(sorted(found.items())) if isinstance(found, dict) else ()
 
 
 def _truth(seed: int, success: bool, told: Mapping[str, str]) -> Truth:

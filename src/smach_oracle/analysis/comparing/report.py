@@ -6,7 +6,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from ..table import group_table, variant_data
 from ..variants import VariantCounts, count_variant
-from .group_tests import Pairing, ShareTest, pairing_of, share_tests
+from .group_tests import ShareTest, pairing_of, share_tests
 from .groups import TrialGroup, other_differences
 
 MOST_GROUPS = 6  # of an experiment, each two of which are tested. With more, the first and each
@@ -17,7 +17,8 @@ class PairOfGroups(NamedTuple):
 
     first: TrialGroup
     second: TrialGroup
-    pairing: Pairing
+    pairs: int  # trials that are the same in both. 0: they are not paired
+    paired_by: str  # one of PAIRED_BY
     tests: List[ShareTest]
     differ_in: List[str]
 
@@ -27,11 +28,13 @@ def compared(by: str, groups: Sequence[TrialGroup]) -> List[PairOfGroups]:
     found = []
     for _, mine in itertools.groupby(groups, key=lambda group: group.experiment):
         for first, second in _pairs(list(mine)):
+            paired_by, pairs = pairing_of(first, second)
             found.append(
                 PairOfGroups(
                     first,
                     second,
-                    pairing_of(first, second),
+                    len(pairs),
+                    paired_by,
                     share_tests(first, second),
                     other_differences(by, first, second),
                 )
@@ -63,12 +66,12 @@ def _counts(groups: Sequence[TrialGroup]) -> List[VariantCounts]:
 
 
 def _pair(pair: PairOfGroups) -> List[str]:
-    first, second, pairs = pair.first, pair.second, len(pair.pairing.pairs)
+    first, second, pairs = pair.first, pair.second, pair.pairs
     left = len(first.trials) + len(second.trials) - 2 * pairs
     how = "not paired: Fisher's exact test, and Newcombe's interval"
     if pairs:
         how = "{} pairs by {}{}: McNemar's exact test, and Newcombe's interval".format(
-            pairs, pair.pairing.by, ', {} trials left out'.format(left) if left else ''
+            pairs, pair.paired_by, ', {} trials left out'.format(left) if left else ''
         )
     lines = [
         '',

@@ -109,7 +109,7 @@ def failure_ways(events: Iterable[Event], rule: Optional[FailureRule] = None) ->
             name = '/'.join(key_of(event))
             reason = failure_text_key(event.failure_kind, event.outcome, event.text)
             found.failed(name, reason)
-            recoveries.failed(key_of(event))
+            recoveries.failed(event)
             result.followed.setdefault(FailureOf(name, reason), Followed()).failures += 1
         elif event.kind == EventKind.DECISION:
             decision = _CLASSES.get(event.failure_class, str(event.failure_class)), event.outcome
