@@ -43,6 +43,7 @@ def test_each_kind_of_failure_has_its_own_ways():
     assert ways(two) == {'trying it again': (0, 1, 0), 'trying it again after 10 s': (0, 1, 0)}
     assert second == ('TOP/PICK', 'fell_through aborted') and one.failures == 1
     assert ways(one) == {'going back to LOOK': (1, 0, 0)}
+    assert two.decided() == [('revisit', 2)] and one.decided() == [('step_back', 1)]
     assert [words for words, _ in one.rows()] == ['going back to LOOK']
     assert found.actions() == ['revisit', 'step_back'] and sum(found.decisions.values()) == 3
 

@@ -207,7 +207,7 @@ def test_missing_events_and_unknown_truth_stand_at_the_top():
     page = check(page_of(report_on(found, events, ReportOptions(['x']))))
     warnings = page.text[: page.text.index('In short')]
     assert '1 event is missing in 1 trial' in warnings
-    assert 'no judge saw' in warnings and '"person needed" is a lower bound' in warnings
+    assert 'No judge saw 3 trials' in warnings and '"person needed" is a lower bound' in warnings
 
 
 @pytest.mark.parametrize('out', ['missing/r.html', '.'])

@@ -120,7 +120,21 @@ def test_the_charts_tell_the_same_in_trials_and_in_a_unit_that_suits():
     ]
     short = survivals(stretches(series([False, True], duration_s=60.0)))
     assert [each.unit for each in short] == ['trials', 'minutes']
+    brief = survivals(stretches(series([False, True], duration_s=1.0)))
+    assert [each.unit for each in brief] == ['trials', 'seconds']
     assert [each.unit for each in survivals(stretches(series([True], duration_s=0.0)))] == [
         'trials'
     ]
     assert survivals([]) == []
+
+
+@pytest.mark.parametrize(
+    'needed, words',
+    [
+        ([True, True], 'At most half go on beyond 1 trial'),
+        ([False, True], 'At most half go on beyond 2 trials'),
+        ([False, False], 'More than half go on beyond all trials that were seen'),
+    ],
+)
+def test_the_median_in_words(needed, words):
+    assert survivals(stretches(series(needed)))[0].median_in_words == words

@@ -2,8 +2,8 @@
 
 from typing import List, NamedTuple, Sequence, Tuple
 
-WIDTH, HEIGHT = 340.0, 190.0  # of a chart, in units of its view box
-LEFT, RIGHT, TOP, BOTTOM = 42.0, 74.0, 10.0, 36.0  # around its axes
+WIDTH, HEIGHT = 300.0, 178.0  # of a chart, in units of its view box
+LEFT, RIGHT, TOP, BOTTOM = 40.0, 12.0, 10.0, 36.0  # around its axes
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _TICKS = 5
 Corner = Tuple[float, float]  # a length, and a share from 0 to 1
@@ -21,12 +21,13 @@ class Axes(NamedTuple):
 
     first: float
     last: float
+    right: float = WIDTH - RIGHT  # where they end
 
     def x(self, length: float) -> float:
         """Return where a length lies."""
         span = self.last - self.first or 1.0
         inside = min(1.0, max(0.0, (length - self.first) / span))
-        return round(LEFT + inside * (WIDTH - LEFT - RIGHT), 2)
+        return round(LEFT + inside * (self.right - LEFT), 2)
 
     def y(self, share: float) -> float:
         """Return where a share lies."""

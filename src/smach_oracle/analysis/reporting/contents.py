@@ -1,5 +1,6 @@
 """All that a report shows, counted."""
 
+import os
 from collections import Counter
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
@@ -180,7 +181,7 @@ def _chapter(
     own = [each for each in variants if each.experiment == experiment]
     drawer.problem = ''
     graphs = graphs_of(mine, [event for trial in mine for event in events[trial.trial_id]])
-    parts = [_part(each, events, asked.rule, graphs, drawer) for each in own]
+    parts = [_part(each, events, asked, graphs, drawer) for each in own]
     series = time_series(mine)
     return Chapter(
         experiment,
@@ -201,19 +202,19 @@ def _chapter(
 def _part(
     variant: VariantTrials,
     events: EventsOf,
-    rule: Optional[FailureRule],
+    asked: ReportOptions,
     graphs: Sequence[ContainerGraph],
     drawer: Drawer,
 ) -> VariantPart:
     states, ways = StatesOfTrials(), FailureWays()
     preconditions: PreconditionCounts = {}
     for trial in variant.trials:
-        states.add(states_of(events[trial.trial_id], rule))
-        ways.add(failure_ways(events[trial.trial_id], rule))
+        states.add(states_of(events[trial.trial_id], asked.rule))
+        ways.add(failure_ways(events[trial.trial_id], asked.rule))
         add_preconditions(preconditions, precondition_counts(events[trial.trial_id]))
     taken = taken_in(event for trial in variant.trials for event in events[trial.trial_id])
     paths = [graph.path for graph in graphs]
-    rates = [] if variant.recovers is False else _rates(variant, events)
+    rates = [] if variant.recovers is False else _rates(variant, events, asked.places)
     return VariantPart(
         variant,
         count_variant(variant),
@@ -229,7 +230,7 @@ def _part(
     )
 
 
-def _rates(variant: VariantTrials, events: EventsOf) -> List[RatesOfFolder]:
+def _rates(variant: VariantTrials, events: EventsOf, places: Sequence[str]) -> List[RatesOfFolder]:
     folders: Dict[str, List[Sequence[Event]]] = {}
     for trial in variant.trials:
         folders.setdefault(trial.replicate, []).append(events[trial.trial_id])
@@ -237,5 +238,16 @@ def _rates(variant: VariantTrials, events: EventsOf) -> List[RatesOfFolder]:
     for folder in sorted(folders):
         rates = learned_rates(folders[folder], variant.settings)
         if rates is not None:
-            found.append(RatesOfFolder(folder, rates, rate_charts(rates, MOST_RATES)))
+            charts = rate_charts(rates, MOST_RATES)
+            found.append(RatesOfFolder(_below(folder, places), rates, charts))
     return found
+
+
+def _below(folder: str, places: Sequence[str]) -> str:
+    """Return a folder from the one on that is around all places."""
+    try:
+        around = os.path.commonpath([os.path.realpath(place) for place in places])
+    except ValueError:  # none, or no names of files
+        return folder
+    inside = folder.startswith(around.rstrip(os.sep) + os.sep)
+    return os.path.relpath(folder, around) if inside else folder

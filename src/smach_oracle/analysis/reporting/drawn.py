@@ -2,7 +2,7 @@
 
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
-from .charts import Axes, Corner, Tick, stepped
+from .charts import RIGHT, WIDTH, Axes, Corner, Tick, stepped
 from .learned_rates import Bands, LearnedRates, StateRates
 from .survival import (
     Duration,
@@ -12,8 +12,9 @@ from .survival import (
     median_of,
 )
 
-_HOURS_FROM = 2.0  # a longer record is told in hours, else in minutes
-_MINUTES = 60.0
+# units of time: from how many hours on, and how many are in an hour
+_UNITS = ((2.0, 'hours', 1.0), (1 / 30, 'minutes', 60.0), (0.0, 'seconds', 3600.0))
+_NAMES = 78.0  # room for the names of zones
 
 
 class Zone(NamedTuple):
@@ -36,6 +37,7 @@ class Chart(NamedTuple):
     lines: List[Tuple[str, str]]  # path, and class of the style sheet
     marks: List[Corner]  # places, not lengths
     label: str  # for those who cannot see it
+    right: float = WIDTH - RIGHT  # where the axes end
 
 
 class Survival(NamedTuple):
@@ -48,6 +50,14 @@ class Survival(NamedTuple):
     steps: List[SurvivalStep]
     chart: Chart
 
+    @property
+    def median_in_words(self) -> str:
+        """Return what half of the stretches do."""
+        if self.median is None:
+            return 'More than half go on beyond all {} that were seen'.format(self.unit)
+        unit = self.unit[:-1] if self.median == 1 else self.unit
+        return 'At most half go on beyond {:.3g} {}'.format(self.median, unit)
+
 
 def survivals(found: Sequence[PersonFree]) -> List[Survival]:
     """Return the survival in trials, and in the time of the robot."""
@@ -55,7 +65,7 @@ def survivals(found: Sequence[PersonFree]) -> List[Survival]:
         return []
     by_trials = [Duration(float(each.trials), each.is_ended) for each in found]
     longest = max(each.hours for each in found)
-    unit, per_hour = ('hours', 1.0) if longest >= _HOURS_FROM else ('minutes', _MINUTES)
+    unit, per_hour = next((name, number) for least, name, number in _UNITS if longest >= least)
     by_time = [Duration(each.hours * per_hour, each.is_ended) for each in found]
     result = [_survival('trials', by_trials, True)]
     if longest > 0:
@@ -126,7 +136,7 @@ def rate_charts(rates: LearnedRates, most: int) -> List[RateChart]:
 
 
 def _rate_chart(state: StateRates, trials: int, bands: Optional[Bands]) -> RateChart:
-    axes = Axes(1.0, float(max(2, trials)))
+    axes = Axes(1.0, float(max(2, trials)), WIDTH - (_NAMES if bands else RIGHT))
     points = [(float(number), rate) for number, rate in state.points]
     corners = stepped(points[1:], points[0], float(trials))
     rates = [rate for _, rate in points]
@@ -150,6 +160,7 @@ def _rate_chart(state: StateRates, trials: int, bands: Optional[Bands]) -> RateC
             [(axes.line(corners), 'curve')],
             [(axes.x(points[0][0]), axes.y(rates[0]))] if len(points) == 1 else [],
             label,
+            axes.right,
         ),
     )
 

@@ -7,6 +7,7 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
+from smach_oracle.oracle.records.facts import Decider, decided_by
 from smach_oracle.oracle.records.way_results import failure_text_key
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
@@ -37,9 +38,11 @@ class _ByFailure(StatesOfTrials):
     def failed(self, name: str, reason: str) -> None:
         self._latest[name] = reason
 
+    def latest(self, name: str) -> FailureOf:
+        return FailureOf(name, self._latest.get(name, ''))
+
     def of(self, name: str) -> StateCounts:
-        key = FailureOf(name, self._latest.get(name, ''))
-        return self.counts.setdefault(key, StateCounts())
+        return self.counts.setdefault(self.latest(name), StateCounts())
 
 
 @dataclass
@@ -47,8 +50,13 @@ class Followed:
     """The sequel of the failures of one kind."""
 
     failures: int = 0
+    decisions: Dict[str, int] = field(default_factory=Counter)
     nothing: int = 0  # no way was gone
     ways: Dict[str, WayCount] = field(default_factory=dict)  # by words
+
+    def decided(self) -> List[Tuple[str, int]]:
+        """Return the decisions, the most frequent ones first."""
+        return sorted(self.decisions.items(), key=lambda each: (-each[1], each[0]))
 
     def rows(self) -> List[Tuple[str, WayCount]]:
         """Return the ways, the most frequent ones first, and last that nothing was done."""
@@ -72,6 +80,8 @@ class FailureWays:
             own = self.followed.setdefault(key, Followed())
             own.failures += theirs.failures
             own.nothing += theirs.nothing
+            for action, number in theirs.decisions.items():
+                own.decisions[action] = own.decisions.get(action, 0) + number
             for words, count in theirs.ways.items():
                 own.ways.setdefault(words, WayCount()).add(count)
         for decision, number in other.decisions.items():
@@ -114,6 +124,10 @@ def failure_ways(events: Iterable[Event], rule: Optional[FailureRule] = None) ->
         elif event.kind == EventKind.DECISION:
             decision = _CLASSES.get(event.failure_class, str(event.failure_class)), event.outcome
             result.decisions[decision] = result.decisions.get(decision, 0) + 1
+            failed = found.latest('/'.join(key_of(event)))
+            if failed in result.followed and decided_by(event) is not Decider.HELD_BACK:
+                decisions = result.followed[failed].decisions
+                decisions[event.outcome] = decisions.get(event.outcome, 0) + 1
     recoveries.end(now_s, _ENDED_WELL.get(counter.ending))
     for key, counts in found.counts.items():
         followed = result.followed.setdefault(key, Followed())

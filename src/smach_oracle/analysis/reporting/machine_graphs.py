@@ -7,7 +7,7 @@ by the hue alone.
 import math
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.records.events import Event
+from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.short_text import shortened
 
 from ..bag_machines import read_machines
@@ -93,7 +93,26 @@ def graphs_of(trials: Sequence[TrialSummary], events: Sequence[Event]) -> List[C
         if known:
             break
     paths = sorted({event.path for event in events if event.path})[:MOST_GRAPHS]
-    return [known.get(path) or graph_from_events(path, events) for path in paths]
+    return [
+        known.get(path) or _without_oracle(graph_from_events(path, events), events)
+        for path in paths
+    ]
+
+
+def _without_oracle(graph: ContainerGraph, events: Sequence[Event]) -> ContainerGraph:
+    """Return a graph of transitions without the meta state, which looks like an outcome there.
+
+    A container with decisions ends in each of its outcomes, and never in the meta state.
+    """
+    mine = [event for event in events if event.path == graph.path]
+    if not any(event.kind == EventKind.DECISION for event in mine):
+        return graph
+    ends = {event.outcome for event in mine if event.kind == EventKind.CONTAINER_END}
+    edges = tuple(
+        edge for edge in graph.edges if edge.target in graph.states or edge.target in ends
+    )
+    outcomes = tuple(outcome for outcome in graph.outcomes if outcome in ends)
+    return graph._replace(outcomes=outcomes, edges=edges)
 
 
 def _structures(bag: str) -> Dict[str, ContainerGraph]:

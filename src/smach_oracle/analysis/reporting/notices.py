@@ -24,6 +24,7 @@ def warnings_about(
     return [
         *_about_bags(found),
         *(line for variant in variants for line in _about_variant(variant)),
+        *_about_judges(variants),
         *_about_ends(found.trials),
         *_about_origin(found.trials),
         *_about_rates(rates),
@@ -56,14 +57,6 @@ def _about_variant(variant: VariantCounts) -> List[str]:
                 name, variant.truth_known, variant.trials
             )
         )
-    if variant.unjudged:
-        lines.append(
-            '{}: no judge saw {} that ended with neither a failure nor a question. How many of '
-            'them are false successes is not known. So "person needed" is a lower bound, and the '
-            'time without a person an upper one.'.format(
-                name, counted(variant.unjudged, 'trial', 'trials')
-            )
-        )
     if variant.resumed:
         lines.append(
             '{}: {} resumed after the program was stopped. It was down for {:.0f} s in all.'.format(
@@ -71,6 +64,17 @@ def _about_variant(variant: VariantCounts) -> List[str]:
             )
         )
     return lines
+
+
+def _about_judges(variants: Sequence[VariantCounts]) -> List[str]:
+    unjudged = sum(variant.unjudged for variant in variants)
+    if not unjudged:
+        return []
+    return [
+        'No judge saw {} that ended with neither a failure nor a question. How many of them are '
+        'false successes is not known. So "person needed" is a lower bound, and the time without '
+        'a person an upper one.'.format(counted(unjudged, 'trial', 'trials'))
+    ]
 
 
 def _about_ends(trials: Sequence[TrialSummary]) -> List[str]:
