@@ -50,6 +50,17 @@ def test_what_the_end_tells_and_what_is_reproduced_is_the_same(trials):
     )
 
 
+def test_a_program_that_was_started_again_without_its_rates_is_noticed(trials):
+    again = [
+        [each._replace(wall_time=each.wall_time + 1000.0) for each in trial] for trial in trials
+    ]
+    rates = rates_of(without_end(trials + again))
+    assert not rates.has_gaps and rates.trials == 24
+    for each in rates.states:
+        points = dict(each.points)
+        assert points[24] == pytest.approx(points[12])
+
+
 def test_where_neither_is_there_the_recorded_rates_are_taken(trials):
     rates = rates_of(without_end(trials), memory=3)
     assert rates.has_gaps

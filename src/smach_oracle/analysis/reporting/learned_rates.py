@@ -6,7 +6,7 @@ from smach_oracle.oracle.decision.failure_rate import FailureClass, classify, ma
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
 
-from ..replaying.checks import that_count
+from ..replaying.checks import beginnings, that_count
 from ..replaying.followed import Key, key_of
 from ..replaying.replay import Replay
 
@@ -63,12 +63,14 @@ def learned_rates(
     :param trials: of one replicate, in their order, each in the order of its events.
     :param settings: of the oracle.
     """
-    replay = _replay_of(settings)
+    replay, starts = _replay_of(settings), _starts(trials, settings)
     points: Dict[Key, List[Tuple[int, float]]] = {}
     failures: Dict[Key, int] = {}
     is_replayed, has_gaps, differ = replay is not None, False, False
     for number, trial in enumerate(trials, 1):
         rates: Dict[Key, float] = {}
+        if number - 1 in starts:
+            replay = _replay_of(settings)
         for event in that_count(trial):
             key = key_of(event)
             if event.kind == EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
@@ -109,6 +111,14 @@ def _replay_of(settings: Mapping[str, Any]) -> Optional[Replay]:
         return Replay(settings, {})
     except (OracleError, KeyError, TypeError, ValueError):
         return None  # a later version has recorded it, or settings are not told
+
+
+def _starts(trials: Sequence[Sequence[Event]], settings: Mapping[str, Any]) -> List[int]:
+    """Return the numbers of trials that began with nothing learned, as far as the rates tell it."""
+    try:
+        return beginnings(trials, lambda: Replay(settings, {}))
+    except (OracleError, LookupError, TypeError, ValueError):
+        return []  # _agrees() finds where the rates are other ones
 
 
 def _agrees(replay: Optional[Replay], event: Event) -> bool:
