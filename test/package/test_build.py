@@ -121,17 +121,17 @@ def test_launch_files_and_settings_are_installed(installed):
         assert (installed / 'installed/share/smach_oracle/src/smach_oracle/tasks' / name).exists()
 
 
-def test_the_page_of_the_console_is_installed_whole(installed):
-    console = 'smach_oracle/expert/console'
-    sources = installed / 'moved_away/src' / console
-    (target,) = (installed / 'installed/lib').glob('python3*/*-packages/' + console)
-    names = {
-        path.relative_to(sources) for path in (sources / 'static').rglob('*') if path.is_file()
-    }
-    assert names == {
-        path.relative_to(target) for path in (target / 'static').rglob('*') if path.is_file()
-    }
-    assert len(names) > 40
+@pytest.mark.parametrize(
+    'folder, fewest',
+    [('expert/console/static', 41), ('analysis/reporting/templates', 4)],
+)
+def test_files_of_pages_are_all_installed(installed, folder, fewest):
+    place = 'smach_oracle/' + folder
+    sources = installed / 'moved_away/src' / place
+    (target,) = (installed / 'installed/lib').glob('python3*/*-packages/' + place)
+    names = {path.relative_to(sources) for path in sources.rglob('*') if path.is_file()}
+    assert names == {path.relative_to(target) for path in target.rglob('*') if path.is_file()}
+    assert len(names) >= fewest
 
 
 def test_no_file_of_ours_is_where_upstreams_belongs(installed):
