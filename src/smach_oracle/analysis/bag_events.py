@@ -5,6 +5,7 @@ import json
 import math
 import os
 import stat
+from importlib.util import find_spec
 from operator import attrgetter, itemgetter
 from typing import (
     Any,
@@ -24,6 +25,7 @@ from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event, EventKind
 
 from .plain_bags.decoding import STAMP_NS, STAMP_S, MessageDecoder
+from .plain_bags.definition_sum import sum_of
 from .plain_bags.indexed_bag import IndexedBag, NotPlain
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
@@ -122,12 +124,14 @@ def find_bags(places: Sequence[str]) -> List[str]:
         elif not os.path.isdir(place):
             raise BagError('{}: no such folder'.format(place))
         else:
-            found.update((os.path.realpath(path), None) for path in walk_bags(place))
+            # below a real folder all folders are real: links to some are left out
+            for path in walk_bags(os.path.realpath(place)):
+                found[os.path.realpath(path) if os.path.islink(path) else path] = None
     return sorted(found)
 
 
 def walk_bags(folder: str) -> Iterator[str]:
-    """Yield the paths with the name of a bag in a folder and below. Links are left out."""
+    """Yield the paths of bags, by their names, in a folder and below. Not by links to folders."""
     for parent, _, names in os.walk(folder):
         for name in names:
             backup_of = name[: -len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
@@ -171,10 +175,9 @@ class EventReader:
         :param most_events: a bag with more is refused.
         :raises ImportError: where rosbags is missing.
         """
-        from rosbags.rosbag1 import Reader
-
-        self._open = Reader
-        self._stores = MessageStores()
+        if find_spec('rosbags') is None:
+            raise ModuleNotFoundError("No module named 'rosbags'", name='rosbags')
+        self._made_stores: Optional[MessageStores] = None
         self._takers: Dict[str, _Taker] = {}  # by message definition
         self._most_events = most_events
 
@@ -192,7 +195,7 @@ class EventReader:
             if not stat.S_ISREG(os.stat(path).st_mode):  # opening a pipe may wait forever
                 raise BagError('no plain file')
             return self._read(path)
-        except BagError:
+        except (BagError, ImportError):  # a package that only seldom bags need may be missing
             raise
         except Exception as err:
             # a damaged file can make rosbags raise anything, assertions among it
@@ -214,13 +217,22 @@ class EventReader:
             for stamp, connection, data in bag.messages(EVENT_TYPE, CAUSE_TYPE):
                 take = self._takers.get(connection.msgdef)
                 if take is None:
-                    self._stores.store_of(connection.msgdef, connection.msgtype)
+                    if sum_of(connection.msgdef) != connection.md5sum:
+                        self._stores.store_of(connection.msgdef, connection.msgtype)
                     take = _Taker(connection.msgtype, connection.msgdef)
                     self._takers[connection.msgdef] = take
                 yield _Message(connection.msgtype, connection.topic, stamp, take(data))
 
+    @property
+    def _stores(self) -> MessageStores:
+        if self._made_stores is None:
+            self._made_stores = MessageStores()
+        return self._made_stores
+
     def _by_rosbags(self, path: str) -> Iterator[_Message]:
-        with self._open(path) as reader:
+        from rosbags.rosbag1 import Reader  # it takes 30 ms, and most bags do without
+
+        with Reader(path) as reader:
             _check_types(item.msgtype for item in reader.connections)
             connections = [
                 item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)

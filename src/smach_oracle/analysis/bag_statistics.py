@@ -8,7 +8,7 @@ import argparse
 import os
 import re
 import sys
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FailureRule
@@ -16,20 +16,20 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from . import table
 from .bag_events import BagError
-from .by_state.follower import states_of
-from .by_state.rows import VariantStates, by_variant, rows_of, write_csv_files
-from .by_state.state_counts import StatesOfTrials
-from .by_state.text import format_states
-from .compare_command.inputs import instead_of_bags
 from .comparing.groups import BY, TrialGroup, groups_by
-from .comparing.report import format_groups, groups_data
 from .reading import report_error, report_skipped
 from .trials import Trials, TrialSummary, load_by_state, load_trials, load_with_events
 from .variants import VariantCounts, count_variants, time_series
 
+# What an option alone needs is imported where that is there: to import it takes longer than to
+# count a hundred bags.
+if TYPE_CHECKING:
+    from .by_state.rows import VariantStates
+    from .by_state.state_counts import StatesOfTrials
+
 # the trials, the events of each for a report, and what happened in the states of each
 _Loaded = Tuple[
-    Trials, Optional[Mapping[str, Sequence[Event]]], Optional[Mapping[str, StatesOfTrials]]
+    Trials, Optional[Mapping[str, Sequence[Event]]], Optional[Mapping[str, 'StatesOfTrials']]
 ]
 
 
@@ -40,20 +40,36 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         listed = args.failing_outcomes
         rule = FailureRule(tuple(listed)) if listed else None
         found, events, by_trial = _load(args, rule)
-        states = None if by_trial is None else by_variant(found.trials, by_trial)
         variants = count_variants(found.trials)
         sys.stdout.write(table.format_text(variants, found.trials))
-        sys.stdout.write(format_states(states or []))
-        groups = groups_by(args.by, found.trials, args.folders) if args.by else None
-        if groups is not None:
-            sys.stdout.write(format_groups(args.by, groups))
+        states = None if by_trial is None else _print_states(found, by_trial)
+        groups = _print_groups(args, found) if args.by else None
         code = report_skipped(found.skipped)
         _write_files(args, found, variants, states, groups)
         if events is not None:
             _write_report(args, rule, found, events, groups)
     except (BagError, ImportError, OSError) as err:
+        from .compare_command.inputs import instead_of_bags
+
         return report_error('bag_statistics', instead_of_bags(err, args.folders))
     return code
+
+
+def _print_states(found: Trials, by_trial: Mapping[str, 'StatesOfTrials']) -> List['VariantStates']:
+    from .by_state.rows import by_variant
+    from .by_state.text import format_states
+
+    states = by_variant(found.trials, by_trial)
+    sys.stdout.write(format_states(states))
+    return states
+
+
+def _print_groups(args: argparse.Namespace, found: Trials) -> List[TrialGroup]:
+    from .comparing.report import format_groups
+
+    groups = groups_by(args.by, found.trials, args.folders)
+    sys.stdout.write(format_groups(args.by, groups))
+    return groups
 
 
 def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
@@ -61,6 +77,8 @@ def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
         found, events = load_with_events(args.folders, rule)
         if not args.by_state:
             return found, events, None
+        from .by_state.follower import states_of
+
         return found, events, {key: states_of(each, rule) for key, each in events.items()}
     if args.by_state:
         found, by_trial = load_by_state(args.folders, rule)
@@ -137,19 +155,27 @@ def _write_files(
     args: argparse.Namespace,
     found: Trials,
     variants: List[VariantCounts],
-    states: Optional[List[VariantStates]],
+    states: Optional[List['VariantStates']],
     groups: Optional[List[TrialGroup]],
 ) -> None:
     if args.json:
         with open(args.json, 'w', encoding='utf-8') as target:
-            more: Dict[str, Any] = {} if states is None else {'by_state': rows_of(states)}
+            more: Dict[str, Any] = {}
+            if states is not None:
+                from .by_state.rows import rows_of
+
+                more['by_state'] = rows_of(states)
             if groups is not None:
+                from .comparing.report import groups_data
+
                 more['compared'] = groups_data(args.by, groups)
             table.write_json(target, variants, found.trials, found.skipped, more)
     if args.csv:
         with open(args.csv, 'w', encoding='utf-8', newline='') as target:
             table.write_csv(target, found.trials)
         if states is not None:
+            from .by_state.rows import write_csv_files
+
             write_csv_files(args.csv, states)
     if args.figure:
         _write_figures(args, found.trials)
@@ -162,9 +188,7 @@ def _write_report(
     events: Mapping[str, Sequence[Event]],
     groups: Optional[List[TrialGroup]],
 ) -> None:
-    from .reporting.contents import (
-        ReportOptions,
-    )  # Jinja2 and matplotlib: only where they are wanted
+    from .reporting.contents import ReportOptions  # with Jinja2 and matplotlib
     from .reporting.page import write_report
 
     write_report(

@@ -2,7 +2,9 @@
 
 import os
 from typing import (
+    TYPE_CHECKING,
     Any,
+    Callable,
     Dict,
     Iterable,
     Iterator,
@@ -11,18 +13,23 @@ from typing import (
     NamedTuple,
     Optional,
     Sequence,
+    Set,
     Tuple,
+    TypeVar,
 )
 
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 
 from .bag_events import BagContent, BagError, EventReader, RecordedCause, SkippedBag
-from .by_state.follower import states_of
-from .by_state.state_counts import StatesOfTrials
 from .reading import read_bags
 from .trial_counter import TrialCounter, TrialEnding
 from .truth import Truth, TruthFiles
+
+if TYPE_CHECKING:
+    from .by_state.state_counts import StatesOfTrials
+
+Taken = TypeVar('Taken')
 
 
 class TrialSummary(NamedTuple):
@@ -98,7 +105,7 @@ class TrialsByState(NamedTuple):
     """All that was found in some folders, and what happened in the states of each trial."""
 
     found: Trials
-    states: Mapping[str, StatesOfTrials]  # by trial id
+    states: Mapping[str, 'StatesOfTrials']  # by trial id
 
 
 class TrialsWithEvents(NamedTuple):
@@ -116,86 +123,138 @@ def load_trials(places: Sequence[str], rule: Optional[FailureRule] = None) -> Tr
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.
     """
-    skipped: List[SkippedBag] = []
-    return _trials_in(_gathered(places, skipped), rule, skipped)
+    return _load(places, rule, lambda events: None)[0]
 
 
 def load_by_state(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsByState:
     """Read the same, and count what happened in the states of each trial. As `load_trials`."""
-    skipped: List[SkippedBag] = []
-    gathered = _gathered(places, skipped)
-    return TrialsByState(_trials_in(gathered, rule, skipped), gathered.states(rule))
+    from .by_state.follower import states_of  # only where it is asked for: it takes a while
+
+    return TrialsByState(*_load(places, rule, lambda events: states_of(events, rule)))
 
 
 def load_with_events(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsWithEvents:
     """Read the same, and keep the events. As `load_trials`."""
+    return TrialsWithEvents(*_load(places, rule, lambda events: events))
+
+
+def _load(
+    places: Sequence[str], rule: Optional[FailureRule], take: Callable[[List[Event]], Taken]
+) -> Tuple[Trials, Dict[str, Taken]]:
+    """Read the trials, and what is taken of the events of each, by trial id.
+
+    A trial is summed up as soon as its bag is read, and its events are let go.
+    """
     skipped: List[SkippedBag] = []
-    gathered = _gathered(places, skipped)
-    return TrialsWithEvents(_trials_in(gathered, rule, skipped), gathered.in_order())
+    summaries: Dict[str, TrialSummary] = {}
+    taken: Dict[str, Taken] = {}
+    bags = 0
+    spread: Dict[str, Tuple[str, ...]] = {}  # trials that are in several bags, and these
 
+    def add(trial: _TrialOfBags) -> None:
+        summaries[trial.trial_id] = trial.summary(rule)
+        taken[trial.trial_id] = take(trial.events)
 
-def _gathered(places: Sequence[str], skipped: List[SkippedBag]) -> '_TrialEvents':
-    gathered = _TrialEvents()
-    count = 0
     for path, content in read_bags(places, skipped):
-        count += 1
-        gathered.add(path, content)
-    if not gathered.events:
+        bags += 1
+        for trial in _trials_of({path: content}):
+            known = summaries.get(trial.trial_id)
+            if known is None:
+                add(trial)
+            else:
+                spread[trial.trial_id] = (*spread.get(trial.trial_id, known.bags), path)
+    for trial in _read_again(spread):
+        add(trial)
+    if not summaries:
         reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
         raise BagError(
             '{}: nothing was recorded in {} bag(s)\n{}'.format(
-                ', '.join(places), count + len(skipped), reasons
+                ', '.join(places), bags + len(skipped), reasons
             )
         )
-    return gathered
+    found = sorted(
+        _judged(summaries.values()), key=lambda trial: (trial.start_time, trial.trial_id)
+    )
+    return Trials(found, skipped), taken
 
 
-def _trials_in(
-    gathered: '_TrialEvents', rule: Optional[FailureRule], skipped: List[SkippedBag]
-) -> Trials:
-    trials = gathered.summaries(rule)
-    return Trials(sorted(trials, key=lambda trial: (trial.start_time, trial.trial_id)), skipped)
+def _judged(trials: Iterable[TrialSummary]) -> Iterator[TrialSummary]:
+    """Yield the trials, each with its truth."""
+    truths = TruthFiles()
+    for trial in trials:
+        truth = truths.of(trial.replicate, trial.cause.seed if trial.cause else None)
+        yield trial._replace(truth=truth) if truth else trial
 
 
-class _TrialEvents:
-    """The findings about each trial: they may be spread over several bags, or be in several."""
+class _TrialOfBags(NamedTuple):
+    """One trial as some bags tell it."""
 
-    def __init__(self) -> None:
-        self.events: Dict[str, Dict[int, Event]] = {}
-        self._bags: Dict[str, Dict[str, None]] = {}
-        self._causes: Dict[str, RecordedCause] = {}
-        self._nodes: Dict[str, str] = {}
+    trial_id: str
+    bags: Tuple[str, ...]  # that have events of it
+    events: List[Event]  # in the order of their numbers
+    cause: Optional[RecordedCause]
+    node: str
 
-    def add(self, path: str, content: BagContent) -> None:
+    def summary(self, rule: Optional[FailureRule]) -> TrialSummary:
+        trial = summarise(self.events, self.bags, rule)
+        return trial._replace(cause=self.cause, node=self.node)
+
+
+def _trials_of(contents: Mapping[str, BagContent]) -> List[_TrialOfBags]:
+    """Return the trials of some bags, by path. A bag may have many, and a trial may be in many."""
+    events: Dict[str, Dict[int, Event]] = {}
+    bags: Dict[str, Dict[str, None]] = {}
+    causes: Dict[str, RecordedCause] = {}
+    nodes: Dict[str, str] = {}
+    for path, content in contents.items():
         for event in content.events:
-            self.events.setdefault(event.trial_id, {})[event.seq] = event
-            self._bags.setdefault(event.trial_id, {})[path] = None
-        self._causes.update(content.causes)
-        self._nodes.update(content.nodes)
+            events.setdefault(event.trial_id, {})[event.seq] = event
+            bags.setdefault(event.trial_id, {})[path] = None
+        causes.update(content.causes)
+        nodes.update(content.nodes)
+    return [
+        _TrialOfBags(
+            trial_id,
+            tuple(bags[trial_id]),
+            [by_number[seq] for seq in sorted(by_number)],
+            causes.get(trial_id),
+            nodes.get(trial_id, ''),
+        )
+        for trial_id, by_number in events.items()
+    ]
 
-    def summaries(self, rule: Optional[FailureRule]) -> List[TrialSummary]:
-        truths = TruthFiles()
-        found = []
-        for trial_id, by_number in self.events.items():
-            trial = summarise(list(by_number.values()), tuple(self._bags[trial_id]), rule)
-            cause = self._causes.get(trial_id)
-            truth = truths.of(trial.replicate, cause.seed if cause else None)
-            found.append(
-                trial._replace(cause=cause, truth=truth, node=self._nodes.get(trial_id, ''))
-            )
-        return found
 
-    def states(self, rule: Optional[FailureRule]) -> Dict[str, StatesOfTrials]:
-        return {
-            trial_id: states_of([by_number[seq] for seq in sorted(by_number)], rule)
-            for trial_id, by_number in self.events.items()
-        }
+def _read_again(bags_of: Mapping[str, Tuple[str, ...]]) -> Iterator[_TrialOfBags]:
+    """Yield some trials, given the bags of each, which are read again. Those of one bag together.
 
-    def in_order(self) -> Dict[str, List[Event]]:
-        return {
-            trial_id: [by_number[seq] for seq in sorted(by_number)]
-            for trial_id, by_number in self.events.items()
-        }
+    :raises BagError: where a bag cannot be read any more.
+    """
+    reader = EventReader()
+    by_bags: Dict[Tuple[str, ...], Set[str]] = {}
+    for trial_id, bags in bags_of.items():
+        by_bags.setdefault(bags, set()).add(trial_id)
+    for bags, trial_ids in by_bags.items():
+        contents = {}
+        for path in bags:
+            try:
+                contents[path] = reader.read(path)
+            except BagError as err:
+                raise BagError('{}: {}'.format(path, err)) from err
+        for trial in _trials_of(contents):
+            if trial.trial_id in trial_ids:
+                yield trial
+
+
+def events_of(trials: Iterable[TrialSummary]) -> Iterator[Tuple[TrialSummary, List[Event]]]:
+    """Yield some trials, each with its events in order. Their bags are read again for that.
+
+    The trials come in their order, but those of the same bags together.
+
+    :raises BagError: where a bag cannot be read any more.
+    """
+    known = {trial.trial_id: trial for trial in trials}
+    for trial in _read_again({trial_id: each.bags for trial_id, each in known.items()}):
+        yield known[trial.trial_id], trial.events
 
 
 def summarise(
@@ -228,32 +287,6 @@ def summarise(
         origin=counter.origin,
         inputs=counter.inputs,
     )
-
-
-def events_of(trials: Iterable[TrialSummary]) -> Iterator[Tuple[TrialSummary, List[Event]]]:
-    """Yield some trials, each with its events in order. Their bags are read again for that.
-
-    The trials come in their order, but those of the same bags together.
-
-    :raises BagError: where a bag cannot be read any more.
-    """
-    reader = EventReader()
-    by_bags: Dict[Tuple[str, ...], List[TrialSummary]] = {}
-    for trial in trials:
-        by_bags.setdefault(trial.bags, []).append(trial)
-    for bags, of_these in by_bags.items():
-        by_number: Dict[str, Dict[int, Event]] = {trial.trial_id: {} for trial in of_these}
-        for path in bags:
-            try:
-                content = reader.read(path)
-            except BagError as err:
-                raise BagError('{}: {}'.format(path, err)) from err
-            for event in content.events:
-                if event.trial_id in by_number:
-                    by_number[event.trial_id][event.seq] = event
-        for trial in of_these:
-            events = by_number[trial.trial_id]
-            yield trial, [events[seq] for seq in sorted(events)]
 
 
 def load_replicates(

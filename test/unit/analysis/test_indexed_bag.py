@@ -1,20 +1,24 @@
 """Bags that are read by their index, beside the same bags read by rosbags."""
 
+import os
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 import rosbag
 from fake_trials import FakeMachine
 from geometry_msgs.msg import Pose
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, LaserScan
 from std_msgs.msg import Bool, Header, String
 
 from smach_oracle.analysis import bag_events
 from smach_oracle.analysis.bag_events import CAUSE_TYPE, EVENT_TYPE, BagError, EventReader
 from smach_oracle.analysis.plain_bags.decoding import MessageDecoder
+from smach_oracle.analysis.plain_bags.definition_sum import sum_of
 from smach_oracle.analysis.plain_bags.indexed_bag import IndexedBag, NotPlain
-from smach_oracle.msg import OracleEvent, TrialCause
+from smach_oracle.msg import OracleEvent, OracleRates, TrialCause
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.recorder import TrialRecorder
 
@@ -100,8 +104,11 @@ def test_a_bag_without_events_is_refused_as_rosbags_would_be(tmp_path):
 
 
 @pytest.mark.parametrize('seed', range(12))
-def test_a_damaged_bag_is_told_of_as_rosbags_tells(bag, tmp_path, seed):
+@pytest.mark.parametrize('is_large', [False, True])
+def test_a_damaged_bag_is_told_of_as_rosbags_tells(bag, tmp_path, seed, is_large):
     rng = random.Random(seed)
+    if is_large:  # a chunk that is read by pieces
+        write(bag, foreign=True)
     whole, told_of_whole = bag.read_bytes(), told_by(EventReader(), bag)
     for number in range(25):
         content, path = bytearray(whole), tmp_path / '{}.bag'.format(number)
@@ -122,6 +129,68 @@ def test_a_chunk_that_grows_without_end_is_not_unpacked(tmp_path, monkeypatch):
     path.write_bytes(content[:at] + (100).to_bytes(4, 'little') + content[at + 4 :])
     with pytest.raises(NotPlain, match='another length'), IndexedBag(str(path)) as bag:
         bag.messages(EVENT_TYPE)
+
+
+def test_of_a_large_chunk_only_pieces_are_read(tmp_path, monkeypatch):
+    path = write(tmp_path / 'a.bag', foreign=True)
+    read, pread = [], os.pread
+    monkeypatch.setattr(
+        os, 'pread', lambda file, size, at: read.append(size) or pread(file, size, at)
+    )
+    with IndexedBag(str(path)) as bag:
+        sizes = [len(message.data) for message in bag.messages(EVENT_TYPE)]
+    assert len(sizes) == 48 and max(read) < 40000 < path.stat().st_size / 3
+
+
+@pytest.mark.parametrize('size', [3000, 4090, 5000, 70000])
+def test_a_message_of_any_length_is_read_from_a_large_chunk(tmp_path, size):
+    path = tmp_path / 'a.bag'
+    with rosbag.Bag(str(path), 'w') as bag:
+        bag.write('/image', Image(data=bytes(100000)))
+        bag.write('/oracle/events', OracleEvent(kind=1, trial_id='t', path='TOP', text='x' * size))
+        bag.write('/image', Image(data=bytes(100)))
+    assert told_by(ByQuickWay(), path) == told_by(BySlowWay(), path)
+    assert 'x' * size in told_by(ByQuickWay(), path)
+
+
+@pytest.mark.parametrize(
+    'message', [OracleEvent, TrialCause, OracleRates, Header, Bool, Pose, Image, String, LaserScan]
+)
+def test_the_sum_of_a_definition_is_the_one_of_ros(message):
+    assert sum_of(message._full_text) == message._md5sum
+
+
+def test_a_definition_that_is_not_sound_has_another_sum_or_none():
+    rng, text = random.Random(3), OracleEvent._full_text
+    code = [at for at, letter in enumerate(text) if letter.isalnum() and not _is_comment(text, at)]
+    for at in rng.sample(code, 150):
+        letter = rng.choice([each for each in 'abzXY019_/[' if each != text[at]])
+        try:
+            assert sum_of(text[:at] + letter + text[at + 1 :]) != OracleEvent._md5sum
+        except NotPlain:
+            pass
+
+
+def _is_comment(text, at):
+    return '#' in text[text.rfind('\n', 0, at) + 1 : at]
+
+
+@pytest.mark.parametrize(
+    'text', ['string NAME=a', 'Pose pose', 'uint8', 'Pose a\n====\nPose b', 'int8 a\n===\nint8 b']
+)
+def test_a_definition_that_is_seldom_has_no_sum(text):
+    with pytest.raises(NotPlain):
+        sum_of(text)
+
+
+def test_a_bag_whose_definitions_are_sound_is_read_without_rosbags(bag, monkeypatch):
+    script = (
+        'import sys\n'
+        'from smach_oracle.analysis.bag_events import EventReader\n'
+        'assert EventReader().read(sys.argv[1]).events\n'
+        "assert 'rosbags' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, '-c', script, str(bag)], check=True)
 
 
 def test_the_events_are_taken_by_their_names():

@@ -78,15 +78,17 @@ class MessageDecoder:
         at = 0
         try:
             for unpack, size, is_list in self._stretches:
-                *plain, length = unpack(data, at)
+                values += unpack(data, at)
                 at += size
-                values += plain
+                length = values.pop()
                 if is_list:
                     texts, at = _texts(data, at, length)
                     values.append(texts)
-                else:
+                elif length:
                     values.append(data[at : at + length].decode())
                     at += length
+                else:  # as most are
+                    values.append('')
             values += self._last.unpack_from(data, at)
         except (struct.error, UnicodeDecodeError) as err:
             raise NotPlain(str(err)) from err

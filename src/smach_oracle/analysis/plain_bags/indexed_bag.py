@@ -9,8 +9,9 @@ import bz2
 import os
 import struct
 from contextlib import contextmanager
+from functools import partial
 from types import TracebackType
-from typing import Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple, Type
+from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple, Type
 
 from smach_oracle.bag_format import (
     BAG_HEADER_END,
@@ -34,9 +35,13 @@ from smach_oracle.bag_format import (
 
 # parts of headers, as they stand in most files
 _TIME_FIELD, _CONNECTION_FIELD = b'\x0d\x00\x00\x00time=', b'\x09\x00\x00\x00conn='
-_IS_MESSAGE, _IS_INDEX = (
-    b'\x04\x00\x00\x00op=' + bytes((kind,)) for kind in (OP_MESSAGE, OP_INDEX)
+_PLACE_FIELD, _SIZE_FIELD = b'\x12\x00\x00\x00chunk_pos=', b'\x09\x00\x00\x00size='
+_NOT_COMPRESSED = b'\x10\x00\x00\x00compression=none'
+_IS_MESSAGE, _IS_INDEX, _IS_CHUNK, _IS_CHUNK_INFO = (
+    b'\x04\x00\x00\x00op=' + bytes((kind,))
+    for kind in (OP_MESSAGE, OP_INDEX, OP_CHUNK, OP_CHUNK_INFO)
 )
+_AT_ONCE, _PIECE = 1 << 16, 1 << 12  # bytes. Larger chunks are read by pieces
 _LARGEST_CHUNK = 1 << 24  # bytes. Larger ones do not come into memory as a whole
 
 
@@ -51,6 +56,7 @@ class PlainConnection(NamedTuple):
     topic: str
     msgtype: str  # as rosbags writes it: PACKAGE/msg/NAME
     msgdef: str
+    md5sum: str  # of the definition, in hexadecimal digits
 
 
 class BagMessage(NamedTuple):
@@ -145,17 +151,14 @@ class IndexedBag:
                 record.fields['topic'].decode(),
                 about['type'].decode().replace('/', '/msg/'),
                 about['message_definition'].decode(),
+                about['md5sum'].decode(),
             )
             at = record.end
         for _ in range(uint32_field(fields, 'chunk_count')):
-            record = _record(tail, at, OP_CHUNK_INFO)
-            (place,) = UINT64.unpack(record.fields['chunk_pos'])
-            counts = {
-                conn: count
-                for conn, count in COUNT_ENTRY.iter_unpack(tail[record.start : record.end])
-            }
+            place_field, start, at = _found(tail, at, _IS_CHUNK_INFO, _PLACE_FIELD, UINT64.size)
+            (place,) = UINT64.unpack(place_field[-UINT64.size :])
+            counts = {conn: count for conn, count in COUNT_ENTRY.iter_unpack(tail[start:at])}
             self._chunks.append(_Chunk(place, counts))
-            at = record.end
         self._chunks.sort()
         if at != len(tail) or not self._chunks:
             raise NotPlain('the index is not the end of it')
@@ -164,23 +167,54 @@ class IndexedBag:
         self, chunk: _Chunk, end: int, wanted: Mapping[int, PlainConnection]
     ) -> Iterator[BagMessage]:
         """Yield the messages of a chunk. Its index comes behind it, up to `end`."""
-        if end - chunk.place > _LARGEST_CHUNK:
-            raise NotPlain('a large chunk')
-        whole = self._part(chunk.place, end)
-        record = _record(whole, 0, OP_CHUNK)
-        data = _opened(record, whole[record.start : record.end])
-        left, at = dict(chunk.counts), record.end
-        while at < len(whole):
-            name, start, at = _index(whole, at)
-            (number,) = UINT32.unpack(name[-4:])
+        record_at, index = self._opened_chunk(chunk.place, end)
+        left, at = dict(chunk.counts), 0
+        while at < len(index):
+            name, start, at = _found(index, at, _IS_INDEX, _CONNECTION_FIELD, UINT32.size)
+            (number,) = UINT32.unpack(name[-UINT32.size :])
             if left.pop(number, 0) * INDEX_ENTRY.size != at - start:
                 raise NotPlain('an index has another length')
             if number in wanted:
-                for second, rest, place in INDEX_ENTRY.iter_unpack(whole[start:at]):
-                    message = _message(data, place, name, _TIME_FIELD + STAMP.pack(second, rest))
+                for second, rest, place in INDEX_ENTRY.iter_unpack(index[start:at]):
+                    time = _TIME_FIELD + STAMP.pack(second, rest)
+                    message = _message(*record_at(place), name, time)
                     yield BagMessage(second * 10**9 + rest, wanted[number], message)
         if left:
             raise NotPlain('an index is missing')
+
+    def _opened_chunk(
+        self, place: int, end: int
+    ) -> Tuple[Callable[[int], Tuple[bytes, int]], bytes]:
+        """Return what reads a message's record by its place in the chunk, and the chunk's index.
+
+        The record begins at a place of the bytes that are returned. A chunk that is large, such as
+        one with images, is read by pieces.
+        """
+        if end - place > _AT_ONCE:
+            head = self._part(place, place + _PIECE)
+            (length,) = UINT32.unpack_from(head, 0)
+            if _NOT_COMPRESSED in head[4 : 4 + length] and _IS_CHUNK in head[4 : 4 + length]:
+                start, (size,) = place + 8 + length, UINT32.unpack_from(head, 4 + length)
+                if start + size > end or size != uint32_field(
+                    parse_fields(head[4 : 4 + length]), 'size'
+                ):
+                    raise NotPlain('a chunk has another length')
+                piece_at = partial(self._piece, start, start + size)
+                return piece_at, self._part(start + size, end)
+        if end - place > _LARGEST_CHUNK:
+            raise NotPlain('a large chunk')
+        whole = self._part(place, end)
+        data, at = _content(whole)
+        return (lambda place: (data, place)), whole[at:]
+
+    def _piece(self, start: int, end: int, place: int) -> Tuple[bytes, int]:
+        """Return the record at a place of a chunk whose messages stand from `start` to `end`."""
+        piece = self._part(start + place, min(end, start + place + _PIECE))
+        (length,) = UINT32.unpack_from(piece, 0)
+        (size,) = UINT32.unpack_from(piece, 4 + length)
+        if 8 + length + size > len(piece):
+            piece = self._part(start + place, min(end, start + place + 8 + length + size))
+        return piece, 0
 
 
 @contextmanager
@@ -212,6 +246,18 @@ def _record(data: bytes, at: int, kind: int) -> _RawRecord:
     return _RawRecord(fields, start + 4, start + 4 + size)
 
 
+def _content(whole: bytes) -> Tuple[bytes, int]:
+    """Return the messages of a chunk, and where its index begins."""
+    (length,) = UINT32.unpack_from(whole, 0)
+    if _NOT_COMPRESSED in whole[4 : 4 + length]:  # as most are
+        size_field, start, end = _found(whole, 0, _IS_CHUNK, _SIZE_FIELD, UINT32.size)
+        if UINT32.unpack(size_field[-UINT32.size :]) != (end - start,):
+            raise NotPlain('a chunk has another length')
+        return whole[start:end], end
+    record = _record(whole, 0, OP_CHUNK)
+    return _opened(record, whole[record.start : record.end]), record.end
+
+
 def _opened(record: _RawRecord, data: bytes) -> bytes:
     """Return the content of a chunk. It has the length that the chunk tells."""
     size = uint32_field(record.fields, 'size')
@@ -227,20 +273,25 @@ def _opened(record: _RawRecord, data: bytes) -> bytes:
     return data
 
 
-def _index(data: bytes, at: int) -> Tuple[bytes, int, int]:
-    """Return the field that names the connection of an index record, and where its data is.
+def _found(data: bytes, at: int, kind: bytes, name: bytes, size: int) -> Tuple[bytes, int, int]:
+    """Return a field of the record that begins at a place, and where its data is.
 
-    Most records of a bag are such. Its fields are numbers, so no other value looks like a name.
+    It is for records whose fields are numbers: no value looks like a name there.
+
+    :param kind: the field of its header that names the kind of record.
+    :param name: the beginning of the field: its length, its name, and what follows.
+    :param size: of its value, in bytes.
     """
     (length,) = UINT32.unpack_from(data, at)
     start = at + 4 + length
     header = data[at + 4 : start]
-    found = header.find(_CONNECTION_FIELD)
-    (size,) = UINT32.unpack_from(data, start)
-    name = header[found : found + len(_CONNECTION_FIELD) + UINT32.size]
-    if found < 0 or _IS_INDEX not in header or start + 4 + size > len(data):
-        raise NotPlain('no index behind a chunk')
-    return name, start + 4, start + 4 + size
+    found = header.find(name)
+    (content,) = UINT32.unpack_from(data, start)
+    field = header[found : found + len(name) + size]
+    is_whole = len(field) == len(name) + size and start + 4 + content <= len(data)
+    if found < 0 or kind not in header or not is_whole:
+        raise NotPlain('a record of another kind, or cut off')
+    return field, start + 4, start + 4 + content
 
 
 def _message(data: bytes, at: int, connection: bytes, time: bytes) -> bytes:
