@@ -12,6 +12,7 @@ counted, and the exit status is 1 where the ratio is below its limit. Needs no R
 """
 
 import argparse
+import functools
 import os
 import subprocess
 import sys
@@ -99,13 +100,17 @@ def record(folder: Path, bags: int, images: int) -> None:
         others[path] = SmachContainerStructure(path='TOP', children=labels)
     recorder.attach(
         container.events,
-        {topic: lambda message=message: message for topic, message in others.items()},
+        {topic: functools.partial(_same, message) for topic, message in others.items()},
     )
     for number in range(bags):
         trial.update(number=number, tries=0)
         machine.execute()
     if not recorder.close(60.0):
         sys.exit('the recorder did not come to its end')
+
+
+def _same(message: Any) -> Any:
+    return message
 
 
 def take(program: str, *args: str) -> Taken:

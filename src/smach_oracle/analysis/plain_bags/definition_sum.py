@@ -19,7 +19,7 @@ _PLAIN = re.compile(r'u?int(?:8|16|32|64)|float(?:32|64)|bool|byte|char|string|t
 def sum_of(definition: str) -> str:
     """Return the sum of a definition with those of the messages in it, in hexadecimal digits.
 
-    :raises NotPlain: for what is seldom, such as a constant that is a text, and for what is none.
+    :raises NotPlain: for what is seldom, such as a constant that is a text, and for other text.
     """
     first, *others = _BETWEEN.split(definition)
     named: Dict[str, str] = {}
