@@ -34,7 +34,7 @@ class FollowedWay(NamedTuple):
     until_s: float  # at which it was clear what came of it
     helped: Optional[bool]  # None: not known
     by_expert: bool
-    failure: Optional[int]  # number of the FAILURE that it follows first, None where none
+    failure: Optional[int]  # number of the state's last FAILURE, None where none was recorded
     decision: Optional[int]  # number of the DECISION that led to it, None where none
 
 
@@ -54,8 +54,8 @@ class Recoveries:
         self._visits = Visits()
         self._decisions = Decisions()
         self._going: List[_Going] = []
-        # failed states for which nothing was tried yet: the number of the FAILURE
-        self._unhandled: Dict[Key, int] = {}
+        self._failures: Dict[Key, int] = {}  # number of the last FAILURE that counts
+        self._unhandled: Set[Key] = set()  # states that have failed, and nothing was tried yet
         # number of the last DECISION about a state or a container since its last failure
         self._decided: Dict[Key, int] = {}
         self._prepared: Set[Key] = set()  # preconditions were run after the decision
@@ -104,11 +104,12 @@ class Recoveries:
         """Note that a state has failed, or that the trial ends, as nothing has come of it yet."""
         if key in self._unhandled:
             self._found.of('/'.join(key)).not_recovered += 1
-            del self._unhandled[key]
+            self._unhandled.discard(key)
 
     def failed(self, failure: Event) -> None:
         """Note a failure that counts."""
-        self._unhandled[key_of(failure)] = failure.seq
+        self._failures[key_of(failure)] = failure.seq
+        self._unhandled.add(key_of(failure))
 
     def _asked_again(self, key: Key, now_s: float) -> None:
         """Settle an interface after which the same question is put again."""
@@ -162,10 +163,12 @@ class Recoveries:
         since_s: Optional[float] = None,
         decision: Optional[int] = None,
     ) -> None:
-        failure = self._unhandled.pop(key, None)
+        self._unhandled.discard(key)
         self._settle(now_s, None, [each for each in self._going if each.watched == watched])
         began_s = now_s if since_s is None else since_s
-        way = FollowedWay(key, words, began_s, began_s, None, by_expert, failure, decision)
+        way = FollowedWay(
+            key, words, began_s, began_s, None, by_expert, self._failures.get(key), decision
+        )
         self._going.append(_Going(way, watched))
 
     def _settle(self, now_s: float, helped: Optional[bool], chosen: List[_Going]) -> None:
@@ -175,7 +178,4 @@ class Recoveries:
             self.ways.append(way)
             count = self._found.of('/'.join(way.key)).way(way.words)
             for each in [count] + [self._found.choices] * way.by_expert:
-                each.helped += helped is True
-                each.in_vain += helped is False
-                each.not_known += helped is None
-                each.seconds += way.until_s - way.since_s
+                each.note(helped, way.until_s - way.since_s)

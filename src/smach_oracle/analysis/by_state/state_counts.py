@@ -2,7 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Dict, List, Tuple
+from typing import Dict, List, Optional, Tuple
 
 # kind of failure, the outcome that was returned, and both with the text without its numbers
 Reason = Tuple[str, str, str]
@@ -23,6 +23,13 @@ class WayCount:
     def gone(self) -> int:
         """Return how often it was gone."""
         return self.helped + self.in_vain + self.not_known
+
+    def note(self, helped: Optional[bool], seconds: float) -> None:
+        """Count one time. `helped`: None where it is not known."""
+        self.helped += helped is True
+        self.in_vain += helped is False
+        self.not_known += helped is None
+        self.seconds += seconds
 
     def add(self, other: 'WayCount') -> None:
         """Add what other trials had."""

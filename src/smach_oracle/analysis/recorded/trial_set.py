@@ -22,6 +22,7 @@ from smach_oracle.oracle.settings.failure_rule import FailureRule
 
 from ..bag_events import SkippedBag
 from ..by_state.follower import FollowedTrial, follow, reason_of
+from ..by_state.recoveries import FollowedWay
 from ..replaying.followed import key_of
 from ..trials import TrialSummary, events_of, load_trials
 from ..variants import find_variants
@@ -170,7 +171,8 @@ def _add_rows(rows: _Rows, about: Tuple[str, str, str], trial: FollowedTrial) ->
                 counts.lost_visits,
             )
         )
-    after = {way.failure: way for way in trial.ways}
+    # of several ways after one failure, the one that was gone first
+    after = {way.failure: way for way in sorted(trial.ways, key=_began, reverse=True)}
     by_decision = {way.decision: way for way in trial.ways}
     for now_s, event in trial.failures:
         kind, outcome, reason = reason_of(event)
@@ -208,6 +210,10 @@ def _add_rows(rows: _Rows, about: Tuple[str, str, str], trial: FollowedTrial) ->
                 way.until_s - way.since_s if way else None,
             )
         )
+
+
+def _began(way: FollowedWay) -> float:
+    return way.since_s
 
 
 def _state(event: Event) -> str:

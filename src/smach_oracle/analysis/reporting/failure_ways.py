@@ -6,17 +6,14 @@ from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policy import Action
-from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
+from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import Decider, decided_by
-from smach_oracle.oracle.records.way_results import failure_text_key
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
-from ..by_state.recoveries import Recoveries
-from ..by_state.state_counts import StateCounts, StatesOfTrials, WayCount
+from ..by_state.follower import follow, reason_of
+from ..by_state.state_counts import WayCount
 from ..replaying.followed import Key, Visits, key_of
-from ..trial_counter import TrialCounter, TrialEnding
 
-_ENDED_WELL = {TrialEnding.SUCCESS: True, TrialEnding.FAILURE: False}
 _CLASSES = {int(each): each.name for each in FailureClass}
 
 
@@ -25,24 +22,6 @@ class FailureOf(NamedTuple):
 
     state: str  # path
     reason: str  # kind, outcome, and text without its numbers
-
-
-class _ByFailure(StatesOfTrials):
-    """Counts that are kept for each kind of failure of a state, in the place of each state."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._latest: Dict[str, str] = {}  # reason of the latest failure, by state
-        self.counts: Dict[FailureOf, StateCounts] = {}
-
-    def failed(self, name: str, reason: str) -> None:
-        self._latest[name] = reason
-
-    def latest(self, name: str) -> FailureOf:
-        return FailureOf(name, self._latest.get(name, ''))
-
-    def of(self, name: str) -> StateCounts:
-        return self.counts.setdefault(self.latest(name), StateCounts())
 
 
 @dataclass
@@ -74,10 +53,14 @@ class FailureWays:
     # by the class of the failure rate, and the decision
     decisions: Dict[Tuple[str, str], int] = field(default_factory=Counter)
 
+    def of(self, kind: FailureOf) -> Followed:
+        """Return the sequel of one kind of failure."""
+        return self.followed.setdefault(kind, Followed())
+
     def add(self, other: 'FailureWays') -> None:
         """Add what other trials had."""
         for key, theirs in other.followed.items():
-            own = self.followed.setdefault(key, Followed())
+            own = self.of(key)
             own.failures += theirs.failures
             own.nothing += theirs.nothing
             for action, number in theirs.decisions.items():
@@ -109,30 +92,35 @@ def failure_ways(events: Iterable[Event], rule: Optional[FailureRule] = None) ->
 
     A way *helped* as it does by state: what differs is that the kinds of failure stand apart.
     """
-    found, result = _ByFailure(), FailureWays()
-    recoveries, counter = Recoveries(found), TrialCounter(rule)
-    now_s = 0.0
-    for event in events:
-        counter.add(event)
-        recoveries.take(event, now_s)
-        if event.kind == EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
-            name = '/'.join(key_of(event))
-            reason = failure_text_key(event.failure_kind, event.outcome, event.text)
-            found.failed(name, reason)
-            recoveries.failed(event)
-            result.followed.setdefault(FailureOf(name, reason), Followed()).failures += 1
-        elif event.kind == EventKind.DECISION:
-            decision = _CLASSES.get(event.failure_class, str(event.failure_class)), event.outcome
-            result.decisions[decision] = result.decisions.get(decision, 0) + 1
-            failed = found.latest('/'.join(key_of(event)))
-            if failed in result.followed and decided_by(event) is not Decider.HELD_BACK:
-                decisions = result.followed[failed].decisions
-                decisions[event.outcome] = decisions.get(event.outcome, 0) + 1
-    recoveries.end(now_s, _ENDED_WELL.get(counter.ending))
-    for key, counts in found.counts.items():
-        followed = result.followed.setdefault(key, Followed())
-        followed.nothing, followed.ways = counts.not_recovered, counts.ways
+    trial, result = follow(events, rule), FailureWays()
+    kinds = {event.seq: _kind_of(event) for _, event in trial.failures}
+    recovered = {way.failure for way in trial.ways}
+    for seq, kind in kinds.items():
+        followed = result.of(kind)
+        followed.failures += 1
+        followed.nothing += seq not in recovered
+    for way in trial.ways:
+        state = '/'.join(way.key)
+        kind = FailureOf(state, '') if way.failure is None else kinds[way.failure]
+        result.of(kind).ways.setdefault(way.words, WayCount()).note(
+            way.helped, way.until_s - way.since_s
+        )
+    latest: Dict[Key, FailureOf] = {}  # by state
+    for _, event in sorted(trial.failures + trial.decisions, key=lambda each: each.event.seq):
+        if event.kind == EventKind.FAILURE:
+            latest[key_of(event)] = kinds[event.seq]
+            continue
+        decision = _CLASSES.get(event.failure_class, str(event.failure_class)), event.outcome
+        result.decisions[decision] = result.decisions.get(decision, 0) + 1
+        failed = latest.get(key_of(event))
+        if failed is not None and decided_by(event) is not Decider.HELD_BACK:
+            decisions = result.of(failed).decisions
+            decisions[event.outcome] = decisions.get(event.outcome, 0) + 1
     return result
+
+
+def _kind_of(failure: Event) -> FailureOf:
+    return FailureOf('/'.join(key_of(failure)), reason_of(failure)[2])
 
 
 @dataclass
