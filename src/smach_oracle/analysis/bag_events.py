@@ -17,7 +17,6 @@ from typing import (
     Optional,
     Sequence,
     Tuple,
-    cast,
 )
 
 from smach_oracle.bag_format import MAGIC
@@ -48,6 +47,9 @@ _TAKEN = {
     CAUSE_TYPE: ('seed', 'task', 'kinds', 'details'),
 }
 
+# a message of one of the two types: type, topic, time of recording in ns, what is taken of it
+_Message = Tuple[str, str, int, Sequence[Any]]
+_new_tuple = tuple.__new__
 _PICKS = {msgtype: attrgetter(*names) for msgtype, names in _TAKEN.items()}
 
 
@@ -88,16 +90,8 @@ class _Taker:
 
         :raises NotPlain: where the message is not as its definition says.
         """
-        return cast(Sequence[Any], self._pick(self._decode(data)))
-
-
-class _Message(NamedTuple):
-    """A message of one of the two types."""
-
-    msgtype: str
-    topic: str
-    stamp: int  # ns, at which it was recorded
-    taken: Sequence[Any]  # what is taken of it: see _TAKEN
+        taken: Sequence[Any] = self._pick(self._decode(data))
+        return taken
 
 
 class BagContent(NamedTuple):
@@ -221,7 +215,7 @@ class EventReader:
                         self._stores.store_of(connection.msgdef, connection.msgtype)
                     take = _Taker(connection.msgtype, connection.msgdef)
                     self._takers[connection.msgdef] = take
-                yield _Message(connection.msgtype, connection.topic, stamp, take(data))
+                yield connection.msgtype, connection.topic, stamp, take(data)
 
     @property
     def _stores(self) -> MessageStores:
@@ -239,13 +233,13 @@ class EventReader:
             ]
             for item, stamp, data in reader.messages(connections):
                 message = self._stores.read(item, data)
-                yield _Message(item.msgtype, item.topic, stamp, _PICKS[item.msgtype](message))
+                yield item.msgtype, item.topic, stamp, _PICKS[item.msgtype](message)
 
     def _content_of(self, messages: Iterable[_Message]) -> BagContent:
         events: List[Event] = []
         ends: Dict[str, int] = {}  # ns, of the last event of each trial
         causes: List[Tuple[int, RecordedCause]] = []
-        nodes: Dict[str, str] = {}
+        topics: Dict[str, str] = {}
         stamps: List[float] = []
         for msgtype, topic, stamp, taken in messages:
             if msgtype == CAUSE_TYPE:
@@ -253,14 +247,14 @@ class EventReader:
                 cause = RecordedCause(int(seed), task, tuple(kinds), tuple(details))
                 causes.append((stamp, cause))
             else:
-                second, rest, kind, *fields, data = taken
+                second, rest, kind, trial_id, *fields, data = taken
                 kind = _KINDS.get(kind, kind)  # a later release may know more kinds
-                event = Event._make([kind, *fields, json.loads(data) if data else None])
-                events.append(event)
-                ends[event.trial_id] = stamp
+                more = json.loads(data) if data else None
+                events.append(_new_tuple(Event, (kind, trial_id, *fields, more)))
+                ends[trial_id] = stamp
+                topics[trial_id] = topic
                 # rosbags takes these numbers for signed ones
                 stamps.append(second % _WRAP + rest % _WRAP / 1e9)
-                nodes[event.trial_id] = topic[: -len(_EVENTS)] if topic.endswith(_EVENTS) else ''
             if len(events) > self._most_events:
                 raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own
@@ -271,9 +265,13 @@ class EventReader:
         return BagContent(
             events,
             {trial_id: cause for trial_id, cause in found.items() if cause is not None},
-            nodes,
+            {trial_id: _node_of(topic) for trial_id, topic in topics.items()},
             stamps,
         )
+
+
+def _node_of(topic: str) -> str:
+    return topic[: -len(_EVENTS)] if topic.endswith(_EVENTS) else ''
 
 
 def _check_types(types: Iterable[str]) -> None:
