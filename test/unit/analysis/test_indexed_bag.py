@@ -183,14 +183,17 @@ def test_a_definition_that_is_seldom_has_no_sum(text):
         sum_of(text)
 
 
-def test_a_bag_whose_definitions_are_sound_is_read_without_rosbags(bag, monkeypatch):
+def test_a_bag_whose_definitions_are_sound_is_read_without_rosbags(bag):
     script = (
         'import sys\n'
         'from smach_oracle.analysis.bag_events import EventReader\n'
-        'assert EventReader().read(sys.argv[1]).events\n'
-        "assert 'rosbags' not in sys.modules\n"
+        "print(len(EventReader().read(sys.argv[1]).events), 'rosbags' in sys.modules)\n"
     )
-    subprocess.run([sys.executable, '-c', script, str(bag)], check=True)
+    done = subprocess.run(
+        [sys.executable, '-c', script, str(bag)], check=True, stdout=subprocess.PIPE
+    )
+    events, is_loaded = done.stdout.split()
+    assert int(events) > 10 and is_loaded == b'False'
 
 
 def test_the_events_are_taken_by_their_names():
