@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import platform
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 import smach
 from smach_oracle import __version__
 from smach_oracle.oracle import OracleContainer, Settings
+from smach_oracle.oracle.execution import origin
 from smach_oracle.oracle.execution.origin import (
     LONGEST_INPUT,
     MOST_INPUTS,
@@ -49,10 +51,10 @@ def test_a_trial_tells_its_script_and_versions_and_another_script_differs(tmp_pa
     other.write_text(SCRIPT + '# changed')
     first, again, changed = told_by(one), told_by(one), told_by(other)
     assert first['inputs'] == {'room': 'hall'}
-    origin = first['origin']
-    assert (origin['version'], origin['python']) == (__version__, platform.python_version())
-    assert origin == again['origin']
-    name, mark = origin['script'].split()
+    told = first['origin']
+    assert (told['version'], told['python']) == (__version__, platform.python_version())
+    assert told == again['origin']
+    name, mark = told['script'].split()
     assert name == 'fetch.py'
     assert mark not in changed['origin']['script'] and changed['origin']['script'][:8] == 'other.py'
 
@@ -60,6 +62,22 @@ def test_a_trial_tells_its_script_and_versions_and_another_script_differs(tmp_pa
 def test_without_a_script_none_is_named():
     done = subprocess.run([sys.executable, '-c', SCRIPT], check=True, stdout=subprocess.PIPE)
     assert 'script' not in json.loads(done.stdout.splitlines()[-1])['origin']
+
+
+@pytest.mark.parametrize('name', [None, 7, 'nowhere.py', '.', '/dev/null', 'a\0b', 'pipe'])
+def test_a_name_that_is_no_plain_file_is_no_script(monkeypatch, tmp_path, name):
+    os.mkfifo(str(tmp_path / 'pipe'))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys.modules['__main__'], '__file__', name, raising=False)
+    assert origin._script() == ''
+
+
+def test_a_script_whose_name_is_no_text_is_named_as_far_as_it_is(monkeypatch, tmp_path):
+    path = os.fsdecode(os.fsencode(str(tmp_path)) + b'/\xff.py')
+    with open(path, 'w', encoding='ascii') as script:
+        script.write('pass')
+    monkeypatch.setattr(sys.modules['__main__'], '__file__', path, raising=False)
+    assert origin._script().startswith('?.py ')
 
 
 def test_settings_have_the_same_digest_if_they_are_the_same():
@@ -105,7 +123,7 @@ def test_inputs_are_the_plain_values_of_the_userdata():
     userdata = smach.UserData()
     userdata.room, userdata.count, userdata.is_wet, userdata.height = 'hall', 3, True, 0.5
     userdata.long, userdata.none, userdata.places = 'x' * (LONGEST_INPUT + 1), None, [1]
-    userdata.far, userdata.touchy = math.inf, Touchy('a')
+    userdata.far, userdata.touchy, userdata.large = math.inf, Touchy('a'), 10**5000
     assert inputs_of(userdata) == {'room': 'hall', 'count': 3, 'is_wet': True, 'height': 0.5}
 
 

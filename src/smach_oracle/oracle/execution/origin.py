@@ -10,7 +10,7 @@ import socket
 import sys
 from enum import Enum
 from importlib import import_module
-from typing import Any, Dict, Mapping, Optional
+from typing import Any, Dict, Mapping
 
 import smach
 from smach_oracle.release import VERSION
@@ -23,6 +23,7 @@ from ..smach_private import data_of
 DIGITS = 12  # of a digest
 MOST_INPUTS = 20  # keys
 LONGEST_INPUT = 100  # characters
+LARGEST_INPUT = 1 << 63
 _of_settings: WeakIdentityMap[Settings, str] = WeakIdentityMap()
 _of_process: Dict[str, str] = {}
 
@@ -63,7 +64,8 @@ def _is_input(value: object) -> bool:
         return math.isfinite(value)
     if type(value) is str:
         return len(value) <= LONGEST_INPUT
-    return type(value) in (int, bool)
+    # of a larger number Python makes no text
+    return type(value) is bool or (type(value) is int and abs(value) < LARGEST_INPUT)
 
 
 def _process() -> Dict[str, str]:
@@ -89,11 +91,15 @@ def _engine() -> str:
 
 
 def _script() -> str:
-    path: Optional[str] = getattr(sys.modules.get('__main__'), '__file__', None)
+    path = getattr(sys.modules.get('__main__'), '__file__', None)
     try:
-        with open(path or '', 'rb') as source:
-            return '{} {}'.format(os.path.basename(path or ''), _digest(source.read()))
-    except (OSError, TypeError, ValueError):  # as `-c`, or a name that a script has set
+        # none as `-c`, no text where a script has set it, and a pipe may be read once
+        if not isinstance(path, str) or not os.path.isfile(path):
+            return ''
+        name = os.path.basename(path).encode('utf-8', 'replace').decode('utf-8')
+        with open(path, 'rb') as source:
+            return '{} {}'.format(name, _digest(source.read()))
+    except (OSError, ValueError):
         return ''
 
 
