@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import smach
+import smach_oracle.analysis
 import smach_oracle.oracle
 import smach_oracle.testing
 from smach_oracle.oracle.asking import question
@@ -17,6 +18,7 @@ from smach_oracle.oracle.machine import oracle
 from smach_oracle.oracle.records import events, way_results
 from smach_oracle.oracle.settings import failing_outcomes, failure_rule
 
+ROOT = Path(__file__).parents[3]
 FINDER = doctest.DocTestFinder()
 SHOWN = [
     smach_oracle.oracle.OracleContainer,
@@ -35,6 +37,7 @@ SHOWN = [
     failure_rate.ExponentialFailureRate,
     failure_rule.FailureRule,
     way_results.failure_text_key,
+    smach_oracle.analysis.TrialSet,
     smach_oracle.testing.Bench,
     smach_oracle.testing.expert,
     smach_oracle.testing.faults,
@@ -52,7 +55,8 @@ def silent_log():
 
 
 @pytest.mark.parametrize('shown', SHOWN, ids=lambda each: each.__name__)
-def test_an_example_shows_what_it_says(shown):
+def test_an_example_shows_what_it_says(shown, monkeypatch):
+    monkeypatch.chdir(ROOT)  # one reads bags that are held here
     module = inspect.getmodule(inspect.unwrap(shown))
     name = getattr(shown, '__qualname__', shown.__name__)
     (example,) = FINDER.find(shown, name, module=module)[:1]

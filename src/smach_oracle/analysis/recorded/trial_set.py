@@ -55,9 +55,10 @@ class TrialSet(Sequence[TrialSummary]):
         >>> from smach_oracle import analysis
         >>> trials = analysis.read('test/data/v0_1')
         >>> len(trials), trials[0].outcome
-        (2, 'succeeded')
-        >>> [(row.state, row.kind, row.way) for row in trials.failures()]
-        []
+        (20, 'succeeded')
+        >>> failure = trials.failures()[0]
+        >>> failure.state, failure.way, failure.helped
+        ('PICK_AND_PLACE/DETECT_TABLETOP', 'trying it again', True)
     """
 
     def __init__(
