@@ -5,7 +5,7 @@ from house import ROOT, shown, tracked_text
 
 MOST_COLUMNS = 100
 # prose, drawings and data, and what others have written
-FREE = {'.md', '.rst', '.css', '.dot', '.csv', '.urdf'}
+FREE = {'.md', '.rst', '.css', '.dot', '.csv', '.jsonl', '.urdf'}
 RECORDED = ROOT / 'test/data'
 
 
