@@ -116,6 +116,15 @@ def find_variants(trials: Sequence[TrialSummary]) -> List[VariantTrials]:
     return variants
 
 
+def variant_names(trials: Sequence[TrialSummary]) -> Dict[str, str]:
+    """Return the name of the variant of each trial, by trial id."""
+    return {
+        trial.trial_id: variant.name
+        for variant in find_variants(trials)
+        for trial in variant.trials
+    }
+
+
 def _by_settings(
     experiment: str, name: str, recovers: Optional[bool], trials: Sequence[TrialSummary]
 ) -> List[VariantTrials]:

@@ -15,7 +15,7 @@ from test_real_machine import FakeExpert, run_trials
 from smach_oracle import analysis
 from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.recorded import trial_set
-from smach_oracle.analysis.recorded.rows import DecisionOnFailure, FailureOfState, Table, frame_of
+from smach_oracle.analysis.recorded.rows import DecisionOnFailure, FailureOfState, Table
 from smach_oracle.analysis.recorded.trial_line import TrialLine
 from smach_oracle.analysis.table import write_csv
 from smach_oracle.analysis.trials import summarise
@@ -176,11 +176,16 @@ def test_frames_have_a_type_for_each_column(trials):
 
 
 @pytest.mark.parametrize('row_type', [FailureOfState, DecisionOnFailure, TrialLine])
-def test_a_frame_without_rows_has_its_columns(row_type):
+def test_a_frame_without_rows_has_its_columns(trials, row_type):
     pytest.importorskip('pandas')
     frame = Table(row_type, []).to_frame()
     assert list(frame.columns) == list(row_type._fields) and len(frame) == 0
-    assert frame.dtypes.equals(frame_of(row_type, []).dtypes)
+    full = {
+        FailureOfState: trials.failures,
+        DecisionOnFailure: trials.decisions,
+        TrialLine: trials.lines,
+    }[row_type]()
+    assert full and frame.dtypes.equals(full.to_frame().dtypes)
 
 
 def test_neither_pandas_nor_ros_is_needed_to_read(folder):

@@ -126,18 +126,13 @@ class Table(Sequence[Row], Generic[Row]):
 
         :raises ImportError: where pandas is missing.
         """
-        return frame_of(self._row_type, self._rows)
+        import pandas  # it is optional, and takes a while
 
-
-def frame_of(row_type: Type[Row], rows: Sequence[Row]) -> 'pandas.DataFrame':
-    """Return rows as a frame. As `Table.to_frame`."""
-    import pandas  # it is optional, and takes a while
-
-    hints = get_type_hints(row_type)
-    columns: List[Sequence[Any]] = list(zip(*rows)) if rows else [()] * len(hints)
-    return pandas.DataFrame(
-        {
-            name: pandas.Series(column, dtype=_DTYPES.get(hint, 'object'))
-            for (name, hint), column in zip(hints.items(), columns)
-        }
-    )
+        hints = get_type_hints(self._row_type)
+        columns: List[Sequence[Any]] = list(zip(*self._rows)) if self._rows else [()] * len(hints)
+        return pandas.DataFrame(
+            {
+                name: pandas.Series(column, dtype=_DTYPES.get(hint, 'object'))
+                for (name, hint), column in zip(hints.items(), columns)
+            }
+        )

@@ -4,7 +4,7 @@ import json
 from typing import List, NamedTuple, Optional, Sequence
 
 from ..trials import TrialSummary
-from ..variants import find_variants
+from ..variants import variant_names
 
 
 class TrialLine(NamedTuple):
@@ -46,11 +46,7 @@ class TrialLine(NamedTuple):
 
 def trial_lines(trials: Sequence[TrialSummary]) -> List[TrialLine]:
     """Return the lines of some trials, in their order."""
-    names = {
-        trial.trial_id: variant.name
-        for variant in find_variants(trials)
-        for trial in variant.trials
-    }
+    names = variant_names(trials)
     return [_line(trial, names[trial.trial_id]) for trial in trials]
 
 

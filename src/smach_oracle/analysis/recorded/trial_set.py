@@ -25,8 +25,8 @@ from ..by_state.follower import FollowedTrial, follow, reason_of
 from ..by_state.recoveries import FollowedWay
 from ..replaying.followed import key_of
 from ..trials import TrialSummary, events_of, load_trials
-from ..variants import find_variants
-from .rows import DecisionOnFailure, FailureOfState, StateOfTrial, Table, frame_of
+from ..variants import variant_names
+from .rows import DecisionOnFailure, FailureOfState, StateOfTrial, Table
 from .trial_line import TrialLine, trial_lines
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ class TrialSet(Sequence[TrialSummary]):
 
         :raises ImportError: where pandas is missing.
         """
-        return frame_of(TrialLine, trial_lines(self._trials))
+        return self.lines().to_frame()
 
     def states(self) -> Table[StateOfTrial]:
         """Return a row for each state that was entered, or asked about, in each trial.
@@ -132,11 +132,7 @@ class TrialSet(Sequence[TrialSummary]):
 
     def _followed(self) -> _Rows:
         if self._rows is None:
-            names = {
-                trial.trial_id: variant.name
-                for variant in find_variants(self._trials)
-                for trial in variant.trials
-            }
+            names = variant_names(self._trials)
             rows = _Rows([], [], [])
             for trial, events in events_of(self._trials):
                 about = (trial.trial_id, trial.experiment, names[trial.trial_id])
