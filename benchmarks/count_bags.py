@@ -5,10 +5,14 @@
 
 `bag_statistics` and a script of a few lines that reads the same events by rosbag count the same
 bags, each in a process of its own on one core, in turns. Shown are processor seconds, the least of
-the rounds, their ratio, and the peak memory. Next to the events a bag has what oracle_run records
-with them: rates, and structure and status of two containers. With --images each trial begins and
-ends with so many images. With --folder the bags of a folder are counted. With --check 300 bags are
-counted, and the exit status is 1 where the ratio is below its limit. Needs no ROS master.
+the rounds, their ratio, and the peak memory. `bag_statistics` counts them three times: with nothing
+kept, again by what it has kept, and with nothing kept on two cores. The seconds in which one bag is
+counted, most of which are Python's start, are shown, and taken off from those of counting again. Of
+two cores the seconds of the clock are compared: they mean something on an idle machine. Next to the
+events a bag has what oracle_run records with them: rates, and structure and status of two
+containers. With --images each trial begins and ends with so many images. With --folder the bags of
+a folder are counted. With --check 300 bags are counted, and the exit status is 1 where a limit is
+missed. Needs no ROS master.
 """
 
 import argparse
@@ -17,6 +21,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import Any, Dict, List, NamedTuple
 
@@ -31,7 +36,9 @@ from smach_oracle.ros.recorder import TrialRecorder
 
 CHECKED = 300  # bags
 LEAST_RATIO = 2.2  # times as fast as rosbag's API. 2.8 to 3.3 was measured. The aim is 3
+MOST_AGAIN = 0.2  # of the seconds of the first count, both without the start. The aim is 0.1
 EVENTS = '/oracle/events'  # end of the name of a topic
+SETTLED_S = 2.1
 PIXELS = 640 * 480 * 3
 OURS = """
 import sys
@@ -54,7 +61,7 @@ print(dict(ends), dict(failures))
 PEAK = 'VmHWM:'  # in /proc: the peak of the process since it runs its program
 AROUND = """
 import atexit, os
-os.sched_setaffinity(0, {{min(os.sched_getaffinity(0))}})
+os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:{}])
 atexit.register(lambda: print(open('/proc/self/status').read()))
 {}
 """
@@ -64,8 +71,8 @@ class Taken(NamedTuple):
     """The resources that a process took."""
 
     cpu_s: float
+    wall_s: float
     peak_mb: float
-    said: str
 
 
 def record(folder: Path, bags: int, images: int) -> None:
@@ -113,24 +120,29 @@ def _same(message: Any) -> Any:
     return message
 
 
-def take(program: str, *args: str) -> Taken:
-    """Run a program on one core."""
-    script = AROUND.format(program)
-    with tempfile.TemporaryFile('w+') as output:
+def take(program: str, *args: str, cache: str = '', cores: int = 1) -> Taken:
+    """Run a program. `cache`: the user's cache folder. '' means an empty one."""
+    script = AROUND.format(cores, program)
+    with tempfile.TemporaryDirectory() as empty, tempfile.TemporaryFile('w+') as output:
+        began_s = time.monotonic()
         process = subprocess.Popen(
-            [sys.executable, '-c', script, *args], stdout=output, stderr=subprocess.STDOUT
+            [sys.executable, '-c', script, *args],
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            env=dict(os.environ, XDG_CACHE_HOME=cache or empty),
         )
         _, status, used = os.wait4(process.pid, 0)
+        wall_s = time.monotonic() - began_s
         output.seek(0)
         said = output.read()
     if status:
         sys.exit('it failed:\n' + said)
     peak_kb = int(said.rsplit(PEAK, 1)[1].split()[0])
-    return Taken(used.ru_utime + used.ru_stime, peak_kb / 1024.0, said)
+    return Taken(used.ru_utime + used.ru_stime, wall_s, peak_kb / 1024.0)
 
 
-def measure(bags: int, images: int, rounds: int) -> float:
-    """Record so many bags and count them by both. Return how much quicker we are."""
+def measure(bags: int, images: int, rounds: int) -> bool:
+    """Record so many bags and count them. Return whether the limits are kept."""
     with tempfile.TemporaryDirectory() as name:
         record(Path(name), bags, images)
         return compare(Path(name), rounds)
@@ -142,25 +154,41 @@ def topics_of(path: Path) -> List[str]:
         return [each for each in bag.get_type_and_topic_info()[1] if each.endswith(EVENTS)]
 
 
-def compare(folder: Path, rounds: int) -> float:
-    """Count the bags of a folder by both, print what that took, and return the ratio."""
+def compare(folder: Path, rounds: int) -> bool:
+    """Count the bags of a folder, print what that took, and return whether limits are kept."""
     paths = sorted(folder.glob('*.bag'))
     sizes = [path.stat().st_size for path in paths]
     print('{} bags, {:.1f} MB'.format(len(sizes), sum(sizes) / 2**20))
     topics = {each for path in paths[:9] for each in topics_of(path)}
-    taken: Dict[str, List[Taken]] = {'rosbag': [], 'bag_statistics': []}
+    time.sleep(SETTLED_S)  # what was written just now is not kept
+    taken: Dict[str, List[Taken]] = {}
     for _ in range(rounds):
-        taken['rosbag'].append(take(BY_ROSBAG, str(folder), *topics))
-        taken['bag_statistics'].append(take(OURS, str(folder)))
+        with tempfile.TemporaryDirectory() as cache:
+            for what, each in (
+                ('rosbag', take(BY_ROSBAG, str(folder), *topics)),
+                ('one bag', take(OURS, str(paths[0]))),
+                ('bag_statistics', take(OURS, str(folder), cache=cache)),
+                ('again', take(OURS, str(folder), cache=cache)),
+                ('on two cores', take(OURS, str(folder), cores=2)),
+            ):
+                taken.setdefault(what, []).append(each)
     for what, each in taken.items():
         print(
-            '  {:<16}{:>8.2f} s{:>8.0f} MB'.format(
-                what, min(one.cpu_s for one in each), max(one.peak_mb for one in each)
+            '  {:<16}{:>8.2f} s{:>8.2f} s by the clock{:>8.0f} MB'.format(
+                what,
+                min(one.cpu_s for one in each),
+                min(one.wall_s for one in each),
+                max(one.peak_mb for one in each),
             )
         )
-    theirs, ours = (min(one.cpu_s for one in each) for each in taken.values())
-    print('  {:.2f} times as fast'.format(theirs / ours))
-    return theirs / ours
+    theirs, start, ours, again, _ = (min(one.cpu_s for one in each) for each in taken.values())
+    *_, on_one, _, on_two = (min(one.wall_s for one in each) for each in taken.values())
+    share = (again - start) / (ours - start)
+    print(
+        '  {:.2f} times as fast as rosbag; again {:.2f} of it; two cores {:.2f} times as fast as '
+        'one'.format(theirs / ours, share, on_one / on_two)
+    )
+    return theirs / ours >= LEAST_RATIO and share <= MOST_AGAIN
 
 
 def main() -> int:
@@ -176,7 +204,7 @@ def main() -> int:
     parser.add_argument('--check', action='store_true', help='{} bags, and a limit'.format(CHECKED))
     options = parser.parse_args()
     if options.check:
-        return 0 if measure(CHECKED, 0, options.rounds) >= LEAST_RATIO else 1
+        return 0 if measure(CHECKED, 0, options.rounds) else 1
     if options.folder:
         compare(options.folder, options.rounds)
         return 0

@@ -12,9 +12,10 @@ for folder in ('test/rostest', 'test/unit', 'test/unit/analysis', 'test/unit/sup
 from browser import Browser
 from test_report_page import HOSTILE, hostile_trials
 
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.reporting.contents import ReportOptions
 from smach_oracle.analysis.reporting.page import write_report
-from smach_oracle.analysis.trials import Trials, summarise
+from smach_oracle.analysis.trials import Trials
 
 SHEET = 688  # px: A4 without its margins
 TOO_WIDE = """

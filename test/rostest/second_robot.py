@@ -20,7 +20,8 @@ import tornado.ioloop
 import tornado.websocket
 from waiting import wait_for
 
-from smach_oracle.analysis.trials import TrialSummary, load_trials
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.experiment.launching import free_port
 from smach_oracle.inspection_robot.world.causes import draw
 from smach_oracle.msg import ExpertDecision, FailureFrames, OpenQueries, UserdataItem

@@ -13,7 +13,8 @@ import rospkg
 import rospy
 from roslib.packages import find_node
 
-from smach_oracle.analysis.trials import TrialSummary, load_trials
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.simulation.scenes.tabletop_scene import draw
 from smach_oracle.srv import Judge
 

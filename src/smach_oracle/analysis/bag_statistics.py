@@ -17,8 +17,9 @@ from smach_oracle.oracle.settings.paths import path_of
 from . import table
 from .bag_events import BagError
 from .comparing.groups import BY, TrialGroup, groups_by
+from .counting.trial_summary import TrialSummary
 from .reading import report_error, report_skipped
-from .trials import Trials, TrialSummary, load_by_state, load_trials, load_with_events
+from .trials import Trials, load_by_state, load_trials, load_with_events
 from .variants import VariantCounts, count_variants, time_series
 
 # What an option alone needs is imported where that is there: to import it takes longer than to
@@ -81,9 +82,14 @@ def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
 
         return found, events, {key: states_of(each, rule) for key, each in events.items()}
     if args.by_state:
-        found, by_trial = load_by_state(args.folders, rule)
+        found, by_trial = load_by_state(args.folders, rule, _processes())
         return found, None, by_trial
-    return load_trials(args.folders, rule), None, None
+    return load_trials(args.folders, rule, _processes()), None, None
+
+
+def _processes() -> int:
+    """Return how many processes count: one for each core that this one may use."""
+    return len(os.sched_getaffinity(0))
 
 
 def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:

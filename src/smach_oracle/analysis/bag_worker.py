@@ -19,8 +19,8 @@ from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, RULE, rule_in
 
 from .bag_events import BagError, EventReader
 from .bag_machines import FailureImage, RecordedContainer, RecordedMachines, read_machines
+from .counting.trial_summary import TrialSummary, summarise
 from .trial_counter import TrialEnding
-from .trials import TrialSummary, summarise
 
 MOST_TEXT = 4000000  # of all events' texts, in characters
 MOST_IMAGES = 24000000  # bytes, of all failure images of a trial

@@ -2,8 +2,8 @@
 
 from typing import Dict, List, NamedTuple, Sequence
 
+from .counting.trial_summary import TrialSummary
 from .trial_counter import TrialEnding
-from .trials import TrialSummary
 from .variants import find_variants
 
 NO_CAUSE = '(none)'

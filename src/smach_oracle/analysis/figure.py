@@ -7,8 +7,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from .counting.trial_summary import TrialSummary
 from .trial_counter import EXPERT_ANSWERED, TrialEnding, ended_otherwise
-from .trials import TrialSummary
 
 COLUMN_IN = {1: 3.5, 2: 7.16}  # widths of one and of two columns of an IEEE paper
 HEIGHT_IN = {1: 3.5, 2: 3.3}

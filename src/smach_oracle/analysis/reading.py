@@ -14,14 +14,23 @@ from .bag_events import BagContent, BagError, EventReader, SkippedBag, find_bags
 ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
 
 
-def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
-    """Yield path and content of all bags in folders and below. Adds unusable ones to `skipped`.
+def bags_in(places: Sequence[str]) -> List[str]:
+    """Return the paths of all bags in folders and below.
 
     :raises BagError: where a place does not exist, or there are no bags.
     """
     paths = find_bags(places)
     if not paths:
         raise BagError('{}: no bags'.format(', '.join(places)))
+    return paths
+
+
+def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
+    """Yield path and content of all bags in folders and below. Adds unusable ones to `skipped`.
+
+    :raises BagError: where a place does not exist, or there are no bags.
+    """
+    paths = bags_in(places)
     reader = EventReader()
     for path in paths:
         try:

@@ -12,9 +12,9 @@ from smach_oracle.oracle.settings.failure_rule import BY_NAME_VERSION, FORMER_RU
 
 from .bag_events import SkippedBag
 from .causes import cause_rows, format_causes
+from .counting.trial_summary import TrialSummary
 from .recorded.trial_line import TrialLine, trial_lines
 from .trial_counter import EXPERT_ANSWERED, PERSON_NEEDED
-from .trials import TrialSummary
 from .variants import (
     ANSWERED,
     ENDED_IN_FAILURE,

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from .bag_events import BagError
+from .counting.trial_summary import TrialSummary
 from .judging.account import (
     Entry,
     HarmedThing,
@@ -23,7 +24,6 @@ from .judging.account import (
 from .lasting.causes_log import LoggedCause, causes_in, causes_of, causes_text
 from .lasting.tries import StateTry, WorldClock, in_world_time, tries_in, tries_text
 from .trial_counter import TrialEnding
-from .trials import TrialSummary
 from .truth import DAMAGE, SHARED
 
 OLDEST = 23  # columns of the oldest rows that can be read

@@ -14,8 +14,8 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
 from .compare_command.inputs import instead_of_bags
+from .counting.trial_summary import summarise
 from .reading import read_bags, report_error, report_skipped
-from .trials import summarise
 
 SAME, NOT_THE_SAME = 0, 1  # exit codes
 # Who takes a question, and when, is the expert's affair. A warning may be of the network.

@@ -6,9 +6,9 @@ the oracle.
 
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+from .counting.trial_summary import TrialSummary
 from .intervals import Interval, replicate_interval, wilson_interval
 from .trial_counter import PERSON_NEEDED, TrialEnding
-from .trials import TrialSummary
 
 KINDS = ((True, 'with oracle'), (False, 'without oracle'), (None, 'variant unknown'))
 RECOVERIES = 'oracle recoveries'

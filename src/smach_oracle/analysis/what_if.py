@@ -30,13 +30,14 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
 from .compare_command.inputs import instead_of_bags
+from .counting.trial_summary import summarise
 from .reading import plain, report_error, report_skipped, write_json
 from .replaying.checks import beginnings, that_count
 from .replaying.replay import NOT_KNOWN, STAYS, Replay, ReplayedDecision, conditioned, policy_of
 from .replaying.streak_words import findings_as_data, findings_in_words
 from .replaying.streaks import StreakReader
 from .replaying.weighting import Findings, findings_of
-from .trials import load_replicates, summarise
+from .trials import load_replicates
 
 SAME = 'same'
 OUTCOMES = (SAME, 'would ask', 'would recover', 'recovers otherwise', NOT_KNOWN)

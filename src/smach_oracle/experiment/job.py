@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Set, Tuple
 
-from smach_oracle.analysis.trials import TrialSummary
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.truth import SHARED
 from smach_oracle.oracle.decision.policies import POLICIES
 

@@ -3,8 +3,8 @@
 import time
 from typing import IO, List, Sequence
 
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.trial_counter import TrialEnding
-from smach_oracle.analysis.trials import TrialSummary
 
 from .estimate import duration, seconds_left
 from .job import ExperimentJob

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.analysis.bag_events import BagContent, BagError, EventReader, find_bags
+from smach_oracle.analysis.counting.trial_summary import TrialSummary, summarise
 from smach_oracle.analysis.judging.account import Entry, account_of
 from smach_oracle.analysis.lasting.tries import StateTry, tries_of
 from smach_oracle.analysis.trial_counter import TrialEnding
-from smach_oracle.analysis.trials import TrialSummary, summarise
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.rates_format import write_learned

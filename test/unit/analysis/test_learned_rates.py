@@ -3,9 +3,9 @@
 import pytest
 from failing_machines import run
 
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.reporting.drawn import rate_charts
 from smach_oracle.analysis.reporting.learned_rates import Bands, bands_of, learned_rates
-from smach_oracle.analysis.trials import summarise
 from smach_oracle.oracle.records.events import EventKind
 
 

@@ -12,11 +12,12 @@ from test_trial_summaries import story
 from smach_oracle.analysis import bag_statistics, comparison, figure
 from smach_oracle.analysis.bag_events import RecordedCause
 from smach_oracle.analysis.causes import cause_rows, format_causes
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.drawing.tables import format_tables
 from smach_oracle.analysis.table import as_data, format_text, write_csv
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trial_rows import TrialRow, append_rows, read_rows
-from smach_oracle.analysis.trials import load_trials, summarise
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.analysis.truth import Truth
 from smach_oracle.analysis.variants import OTHER_END, count_variants
 from smach_oracle.experiment.progress import describe_trials

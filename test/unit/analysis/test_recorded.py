@@ -14,11 +14,11 @@ from test_real_machine import FakeExpert, run_trials
 
 from smach_oracle import analysis
 from smach_oracle.analysis.bag_events import BagError
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.recorded import trial_set
 from smach_oracle.analysis.recorded.rows import DecisionOnFailure, FailureOfState, Table
 from smach_oracle.analysis.recorded.trial_line import TrialLine
 from smach_oracle.analysis.table import write_csv
-from smach_oracle.analysis.trials import summarise
 
 OLD_BAGS = str(Path(__file__).parents[2] / 'data/v0_1')
 

@@ -14,11 +14,12 @@ from test_by_state import story
 from smach_oracle.analysis import bag_statistics
 from smach_oracle.analysis.bag_events import RecordedCause, SkippedBag
 from smach_oracle.analysis.comparing.groups import groups_by
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.reporting import machine_graphs
 from smach_oracle.analysis.reporting.contents import ReportOptions, report_on
 from smach_oracle.analysis.reporting.inline_svg import for_page
 from smach_oracle.analysis.reporting.page import LONGEST, page_of, shown, write_report
-from smach_oracle.analysis.trials import Trials, summarise
+from smach_oracle.analysis.trials import Trials
 from smach_oracle.oracle.records.events import Event, EventKind
 
 ROOT = Path(__file__).parents[3]

@@ -9,9 +9,9 @@ import pytest
 
 from smach_oracle.analysis import table
 from smach_oracle.analysis.bag_events import RecordedCause, SkippedBag
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.intervals import replicate_interval, t_quantile, wilson_interval
 from smach_oracle.analysis.trial_counter import TrialEnding
-from smach_oracle.analysis.trials import TrialSummary
 from smach_oracle.analysis.truth import Truth
 from smach_oracle.analysis.variants import (
     ANSWERED,

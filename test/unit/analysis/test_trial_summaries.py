@@ -12,9 +12,10 @@ from std_msgs.msg import String
 
 from smach_oracle import bag_format
 from smach_oracle.analysis.bag_events import BagError, EventReader, find_bags
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.table import format_text, write_csv
 from smach_oracle.analysis.trial_counter import TrialEnding
-from smach_oracle.analysis.trials import load_trials, summarise
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.analysis.variants import count_variants
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind, FailureKind
 from smach_oracle.ros.recorder import TrialRecorder

@@ -14,7 +14,7 @@ from typing import Optional
 
 import pytest
 
-from smach_oracle.analysis.trials import summarise
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.experiment import launching
 from smach_oracle.experiment.command import main, parse
 from smach_oracle.experiment.launching import MARK, end_marked, environment_of, free_port, marked

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import pytest
 
 from smach_oracle.analysis.bag_events import RecordedCause
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.lasting.tries import StateTry
 from smach_oracle.analysis.trial_rows import LOST, append_rows, read_rows
-from smach_oracle.analysis.trials import summarise
 from smach_oracle.analysis.truth import Truth
 from smach_oracle.experiment import job as job_module
 from smach_oracle.experiment.command import parse

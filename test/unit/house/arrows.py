@@ -45,6 +45,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.records',
         'oracle.settings',
         'packages',
+        'user_cache',
     },
     'interfaces': {
         'oracle.asking',
@@ -75,6 +76,7 @@ ARROWS: Dict[str, Set[str]] = {
         'ros',
         'geometry',
         'smach_common',
+        'user_cache',
     },
     'simulation': {'oracle.errors', 'oracle.settings', 'ros', 'geometry', 'pr2'},
     'scripted_operator': {
@@ -117,6 +119,7 @@ ARROWS: Dict[str, Set[str]] = {
     'forking': set(),
     'packages': set(),
     'release': set(),
+    'user_cache': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
 TOP = sorted(path.stem for path in PACKAGE.glob('*.py'))
@@ -148,6 +151,7 @@ ROS_FREE = [
     'commands',
     'forking',
     'packages',
+    'user_cache',
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}
 OF_ROS = re.compile(

@@ -5,7 +5,7 @@ import statistics
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
-from ..trials import TrialSummary
+from ..counting.trial_summary import TrialSummary
 from ..variants import find_variants
 from .state_counts import ANSWERS, NO_ANSWERS, StatesOfTrials
 

@@ -19,8 +19,8 @@ from typing import (
 from ..bag_events import BagError, RecordedCause
 from ..comparing.groups import BY, NOT_RECORDED, VALUES, TrialGroup
 from ..comparing.report import format_groups
+from ..counting.trial_summary import TrialSummary
 from ..trial_counter import TrialEnding
-from ..trials import TrialSummary
 from ..truth import Truth
 
 FILE, FOLDER, SETTINGS = 'file', 'folder', 'settings'

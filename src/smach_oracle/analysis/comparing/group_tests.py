@@ -3,10 +3,10 @@
 import math
 from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
+from ..counting.trial_summary import TrialSummary
 from ..intervals import Interval, paired_difference, wilson_interval
 from ..pairing import mcnemar_exact
 from ..trial_counter import EXPERT_ANSWERED, PERSON_NEEDED, TrialEnding
-from ..trials import TrialSummary
 from .groups import TrialGroup
 
 Happened = Callable[[TrialSummary], Optional[bool]]

@@ -4,7 +4,7 @@ import datetime
 import os
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
-from ..trials import TrialSummary
+from ..counting.trial_summary import TrialSummary
 from ..variants import KINDS, VariantTrials
 
 NOT_RECORDED = 'not recorded'

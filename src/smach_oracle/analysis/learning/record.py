@@ -8,12 +8,12 @@ from smach_oracle.oracle.records.rates_format import Containers
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
 from ..bag_events import BagError
+from ..counting.trial_summary import summarise
 from ..replaying.checks import that_count
 from ..replaying.followed import Key, key_of
 from ..replaying.menus import recorded_menu
 from ..replaying.replay import Replay
 from ..replaying.way_reader import WayReader
-from ..trials import summarise
 
 NEEDED = ('estimator', 'memory', 'prior', 'policy', 'moderate_from', 'high_from')  # settings
 WITHOUT_MENUS = (

@@ -3,7 +3,7 @@
 import json
 from typing import List, NamedTuple, Optional, Sequence
 
-from ..trials import TrialSummary
+from ..counting.trial_summary import TrialSummary
 from ..variants import variant_names
 
 

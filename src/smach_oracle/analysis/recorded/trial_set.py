@@ -23,8 +23,9 @@ from smach_oracle.oracle.settings.failure_rule import FailureRule
 from ..bag_events import SkippedBag
 from ..by_state.follower import FollowedTrial, follow, reason_of
 from ..by_state.recoveries import FollowedWay
+from ..counting.trial_summary import TrialSummary
 from ..replaying.followed import key_of
-from ..trials import TrialSummary, events_of, load_trials
+from ..trials import events_of, load_trials
 from ..variants import variant_names
 from .rows import DecisionOnFailure, FailureOfState, StateOfTrial, Table
 from .trial_line import TrialLine, trial_lines

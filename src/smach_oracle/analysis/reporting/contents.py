@@ -12,8 +12,9 @@ from ..by_state.state_counts import StatesOfTrials
 from ..causes import CauseRow, cause_rows
 from ..comparing.groups import NOT_RECORDED, TrialGroup
 from ..comparing.report import PairOfGroups, compared
+from ..counting.trial_summary import TrialSummary
 from ..graphs.container_graph import ContainerGraph
-from ..trials import Trials, TrialSummary
+from ..trials import Trials
 from ..variants import VariantCounts, VariantTrials, count_variant, find_variants, time_series
 from .drawn import RateChart, Survival, rate_charts, survivals
 from .failure_ways import (

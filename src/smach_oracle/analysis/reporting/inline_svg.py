@@ -7,8 +7,8 @@ from typing import Any, Dict, Sequence
 
 from matplotlib import rc_context
 
+from ..counting.trial_summary import TrialSummary
 from ..figure import STYLE, draw_time_series
-from ..trials import TrialSummary
 
 _SVG, _XLINK = '{http://www.w3.org/2000/svg}', '{http://www.w3.org/1999/xlink}'
 _USED = re.compile(r'url\(#([^)]+)\)')

@@ -12,10 +12,10 @@ from smach_oracle.oracle.records.short_text import shortened
 
 from ..bag_machines import read_machines
 from ..by_state.state_counts import StatesOfTrials
+from ..counting.trial_summary import TrialSummary
 from ..graphs.container_graph import ContainerGraph, GraphEdge, GraphLayout, dot_text
 from ..graphs.dot import LayoutError, lay_out
 from ..graphs.recorded import graph_from_events, recorded_graphs
-from ..trials import TrialSummary
 from .taken import Taken
 
 MOST_GRAPHS = 30  # containers of a machine

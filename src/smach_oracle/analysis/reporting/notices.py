@@ -4,9 +4,10 @@ from collections import Counter
 from typing import List, Sequence
 
 from ..comparing.groups import NOT_RECORDED
+from ..counting.trial_summary import TrialSummary
 from ..table import rules_of
 from ..trial_counter import TrialEnding
-from ..trials import Trials, TrialSummary
+from ..trials import Trials
 from ..variants import VariantCounts
 from .learned_rates import LearnedRates
 

@@ -8,8 +8,8 @@ have gone on: it is censored.
 import math
 from typing import Dict, List, NamedTuple, Optional, Sequence
 
+from ..counting.trial_summary import TrialSummary
 from ..intervals import Z_95, Interval
-from ..trials import TrialSummary
 
 SECONDS_PER_HOUR = 3600.0
 

@@ -18,6 +18,8 @@ from urllib.parse import unquote, urlparse
 
 import numpy as np
 
+from smach_oracle.user_cache import cache_folder
+
 from .rigid_links import inertia_of, merge_rigid_links, set_inertia
 
 MENDED = 4  # raise it when what is derived here changes: it names the cache's folder
@@ -57,7 +59,7 @@ def pr2_files() -> Pr2Files:
     :raises ModelError: where example-robot-data is not installed, or the cache cannot be written.
     """
     source = _installed()
-    folder = _cache() / 'pr2-{}-{}'.format(metadata.version('example-robot-data'), MENDED)
+    folder = cache_folder() / 'pr2-{}-{}'.format(metadata.version('example-robot-data'), MENDED)
     if not folder.is_dir():
         _derive(source, folder)
     return Pr2Files(folder / 'pr2.urdf', folder / 'pr2_mobile.urdf', folder / 'pr2.srdf')
@@ -94,11 +96,6 @@ def _installed() -> Path:
             'there is no PR2 in {}: example-robot-data lies elsewhere or is broken'.format(share)
         )
     return share
-
-
-def _cache() -> Path:
-    root = os.environ.get('XDG_CACHE_HOME') or os.path.join(os.path.expanduser('~'), '.cache')
-    return Path(root) / 'smach_oracle'
 
 
 def _derive(share: Path, folder: Path) -> None:

@@ -16,7 +16,7 @@ import rospy
 
 from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
 from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
-from smach_oracle.analysis.trials import TrialSummary
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.variants import OTHER_END, Count, count_variant, find_variants
 from smach_oracle.forking import unlock
 from smach_oracle.oracle.errors import OracleError

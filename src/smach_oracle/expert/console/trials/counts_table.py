@@ -6,8 +6,8 @@ Definitions: doc/statistics.md.
 from collections import Counter
 from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
 
+from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
-from smach_oracle.analysis.trials import TrialSummary
 
 ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.OTHER, TrialEnding.PREEMPTED)
 COUNTED = ('failures', 'recoveries', 'questions', 'answered')

@@ -9,8 +9,8 @@ import random
 import pytest
 
 import smach
+from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
-from smach_oracle.analysis.trials import summarise
 from smach_oracle.expert.console.feeds.views import event_view
 from smach_oracle.expert.console.trials import recovery_statistics, trial_log
 from smach_oracle.expert.console.trials.counts_table import counts_table, has_oracle

@@ -1,0 +1,98 @@
+"""Counts the trials in many bags, bag by bag, in one process or in several.
+
+Bags are counted in groups. What was counted before is taken from where it is kept. The others of a
+group are counted here, or by another process while this one takes the groups before it.
+"""
+
+from collections import deque
+from contextlib import ExitStack
+from typing import Callable, Deque, Dict, Iterator, List, Optional, Sequence
+
+from ..bag_events import EventReader
+from .counted_bag import BeginCount, CountedBag, Counting, count_bag
+
+KEPT_FROM = 50  # bags. Fewer are read each time: it takes no longer than to look
+SHARED_FROM = 500  # bags. Fewer are counted in one process
+GROUP = 64  # bags
+
+
+def count_bags(paths: Sequence[str], counting: Counting) -> Iterator[CountedBag]:
+    """Yield the counts of some bags, in their order.
+
+    :raises ImportError: where rosbags is missing.
+    """
+    reader = EventReader()
+
+    def begin_here(paths: Sequence[str]) -> Callable[[], List[CountedBag]]:
+        return lambda: [count_bag(path, reader, counting) for path in paths]
+
+    with ExitStack() as closing:
+        begin: BeginCount = begin_here
+        ahead = 0
+        if counting.processes > 1 and len(paths) >= SHARED_FROM:
+            begin, ahead = _shared(counting, begin, closing), 2 * counting.processes
+        if counting.take is None and len(paths) >= KEPT_FROM:
+            begin = _kept(counting, begin, closing)
+        begun: Deque[Callable[[], List[CountedBag]]] = deque()
+        for at in range(0, len(paths), GROUP):
+            begun.append(begin(paths[at : at + GROUP]))
+            if len(begun) > ahead:
+                yield from begun.popleft()()
+        for counted in begun:
+            yield from counted()
+
+
+def _shared(counting: Counting, begin_here: BeginCount, closing: ExitStack) -> BeginCount:
+    """Return what has other processes count. They are started once there is something to count."""
+    processes: Optional[BeginCount] = None
+
+    def begin(paths: Sequence[str]) -> Callable[[], List[CountedBag]]:
+        nonlocal processes
+        if processes is None and paths:
+            from .other_processes import OtherProcesses  # it takes a while, and what is kept none
+
+            others = OtherProcesses(counting, begin_here)
+            closing.callback(others.close)
+            processes = others.begin
+        return processes(paths) if processes and paths else begin_here(paths)
+
+    return begin
+
+
+def _kept(counting: Counting, begin_others: BeginCount, closing: ExitStack) -> BeginCount:
+    """Return what takes the counts that are kept, has the others counted, and keeps these."""
+    from .kept_counts import KeptCounts  # with a database: only where there are many bags
+    from .summary_text import summaries_in, text_of
+
+    kept = KeptCounts(counting.rule)
+    closing.callback(kept.close)
+
+    def begin(paths: Sequence[str]) -> Callable[[], List[CountedBag]]:
+        known: Dict[str, CountedBag] = {}
+        keys: Dict[str, bytes] = {}
+        for path in paths:
+            key = kept.key_of(path)
+            if key is None:
+                continue
+            try:
+                found = summaries_in(kept.text(key), path)
+            except (LookupError, TypeError, ValueError):  # it is not kept, or was damaged
+                keys[path] = key
+            else:
+                known[path] = CountedBag(path, [(summary, None) for summary in found])
+        others = begin_others([path for path in paths if path not in known])
+
+        def counted() -> List[CountedBag]:
+            found = {bag.path: bag for bag in others()}
+            kept.keep(
+                {
+                    keys[path]: text_of([summary for summary, _ in bag.trials])
+                    for path, bag in found.items()
+                    if path in keys and not bag.reason
+                }
+            )
+            return [known.get(path) or found[path] for path in paths]
+
+        return counted
+
+    return begin

@@ -1,0 +1,113 @@
+"""What was counted in bags, kept in the user's cache folder for the next time.
+
+The key of a bag is its file: device, number, size, and the times at which its content and the file
+itself were last changed. No program sets the last one, so that another content is another bag,
+whatever its name and its date. The key has the version of this package, and the rule, in it. The
+file of kept counts may be deleted at any time. Where it cannot be used, nothing is kept.
+"""
+
+import hashlib
+import os
+import sqlite3
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Iterator, Mapping, Optional
+
+from smach_oracle.oracle.settings.failure_rule import FailureRule
+from smach_oracle.user_cache import cache_folder
+
+FILE = 'counts.sqlite'
+KEPT_DAYS = 90
+_SETTLED_NS = 2 * 10**9  # a file that was changed just now may change again within the same tick
+_BUSY_S = 0.5  # another count may be writing
+_DAY_S = 86400
+_PACKAGE = Path(__file__).resolve().parents[2]
+_COUNTS = ('analysis', 'oracle', 'bag_format.py')  # the part of the package that counts
+
+
+class KeptCounts:
+    """The texts that are kept, by key. A fault of the file ends its use, and is not told."""
+
+    def __init__(self, rule: Optional[FailureRule]) -> None:
+        """`rule`: by which the trials are counted. None: that of each record."""
+        self._counted_by = '{} {!r}'.format(_version(), rule).encode()
+        self._today = int(time.time() // _DAY_S)
+        self._path = cache_folder() / FILE
+        self._open: Optional[sqlite3.Connection] = None
+        with self._usable():
+            self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            # a transaction begins at the first text that is new
+            self._open = sqlite3.connect(str(self._path), timeout=_BUSY_S)
+            self._open.execute(
+                'CREATE TABLE IF NOT EXISTS counts '
+                '(key BLOB PRIMARY KEY, day INTEGER, text TEXT) WITHOUT ROWID'
+            )
+
+    def key_of(self, path: str) -> Optional[bytes]:
+        """Return the key of a bag, None where its file is not there, or was changed just now."""
+        try:
+            file = os.stat(path)
+        except OSError:
+            return None
+        if abs(time.time_ns() - file.st_mtime_ns) < _SETTLED_NS:
+            return None
+        told = b'%d %d %d %d %d ' % (
+            file.st_dev,
+            file.st_ino,
+            file.st_size,
+            file.st_mtime_ns,
+            file.st_ctime_ns,
+        )
+        return hashlib.blake2b(told + self._counted_by, digest_size=16).digest()
+
+    def text(self, key: bytes) -> str:
+        """Return what is kept under a key, '' where there is nothing."""
+        with self._usable():
+            if self._open is not None:
+                for (text,) in self._open.execute('SELECT text FROM counts WHERE key = ?', (key,)):
+                    return str(text)
+        return ''
+
+    def keep(self, texts: Mapping[bytes, str]) -> None:
+        """Keep some texts by their keys, once it is closed."""
+        with self._usable():
+            if self._open is not None and texts:
+                rows = [(key, self._today, text) for key, text in texts.items()]
+                self._open.executemany('INSERT OR REPLACE INTO counts VALUES (?, ?, ?)', rows)
+
+    def close(self) -> None:
+        """Write what is new. What is old goes then."""
+        with self._usable():
+            if self._open is not None:
+                if self._open.in_transaction:
+                    last_day = self._today - KEPT_DAYS
+                    self._open.execute('DELETE FROM counts WHERE day < ?', (last_day,))
+                self._open.commit()
+                self._open.close()
+
+    @contextmanager
+    def _usable(self) -> Iterator[None]:
+        """Do without the file from its first fault on. A damaged one is deleted."""
+        try:
+            yield
+        except (OSError, sqlite3.OperationalError):  # locked, not to be written, a full disk
+            self._open = None
+        except sqlite3.DatabaseError:
+            self._open = None
+            with suppress(OSError):
+                self._path.unlink()
+
+
+def _version() -> str:
+    """Return a digest of the names, sizes and times of change of the files that count."""
+    files = [
+        path
+        for part in _COUNTS
+        for path in ((_PACKAGE / part).rglob('*.py') if '.' not in part else [_PACKAGE / part])
+    ]
+    told = sorted(
+        (str(path), stat.st_size, stat.st_mtime_ns)
+        for path, stat in ((path, path.stat()) for path in files)
+    )
+    return hashlib.blake2b(repr(told).encode(), digest_size=16).hexdigest()
