@@ -4,8 +4,10 @@ memory.
 
 A two-state loop without work in its states: the executive at its full speed, the worst case for a
 recorder. With --trials many short trials follow each other, one bag each, and the exit status is 1
-where a later trial takes more memory, files, threads or time than an early one. Needs no ROS
-master. `recorder_throughput.py --help` shows the options.
+where a later trial takes more memory, files, threads or time than an early one. With --check the
+recorder and rosbags' writer take the same events in turns, and the exit status is 1 where the
+recorder takes more processor time than its limit. Needs no ROS master. `recorder_throughput.py
+--help` shows the options.
 """
 
 import argparse
@@ -13,21 +15,28 @@ import glob
 import os
 import resource
 import shutil
+import statistics
 import sys
 import tempfile
 import threading
 import time
 from typing import Any, Callable, Dict, List, Optional
 
-from rosbags.rosbag1 import Reader
+from rosbags.rosbag1 import Reader, Writer
 
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.recorder import TrialRecorder
+from smach_oracle.ros.recording.event_packing import EVENT_TYPE, pack_event
 
 # what the last tenth of many trials may take of what the first took
 MOST_GROWTH = {'ms per trial': 2.0, 'peak memory, MB': 1.1, 'threads': 1.0, 'open files': 1.2}
+
+# --check: events of a trial, rounds, and the processor time of the recorder by that of rosbags'
+# writer, which is given packed events and has neither a queue nor a disk to wait for
+CHECKED_EVENTS, ROUNDS = 6000, 7
+MOST_BY_ROSBAGS = 1.5
 
 
 class Step(smach.State):
@@ -53,14 +62,14 @@ def make_machine() -> smach.StateMachine:
 
 
 def run(transitions: int, observe: Optional[Callable[[Event], None]] = None) -> float:
-    """Returns the seconds that one trial takes."""
+    """Returns the processor seconds that one trial takes, in all threads."""
     machine = make_machine()
     if observe is not None:
         machine.events.observers.append(observe)
     Step.left = transitions
-    began = time.perf_counter()
+    began = time.process_time()
     machine.execute()
-    return time.perf_counter() - began
+    return time.process_time() - began
 
 
 class Count:
@@ -141,13 +150,67 @@ def main() -> int:
     parser.add_argument(
         '--trials', type=int, default=0, help='run so many short trials instead, e.g. 10000'
     )
+    parser.add_argument(
+        '--check',
+        action='store_true',
+        help="record {} events beside rosbags' writer instead".format(CHECKED_EVENTS),
+    )
     args = parser.parse_args()
     smach.set_loggers(*[lambda text: None] * 4)
     folder = tempfile.mkdtemp(dir=args.folder)
     try:
+        if args.check:
+            return beside_rosbags(folder)
         return growth_of(args.trials, folder) if args.trials else measure(args.transitions, folder)
     finally:
         shutil.rmtree(folder)
+
+
+def beside_rosbags(folder: str) -> int:
+    """Have the recorder and rosbags' writer write the same events, in turns."""
+    events: List[Event] = []
+    run(CHECKED_EVENTS // 2, events.append)
+    ours, theirs = [], []
+    for turn in range(ROUNDS + 1):  # the first one imports, and is not counted
+        ours.append(recorder_cpu_s(events, '{}/ours_{}'.format(folder, turn)))
+        theirs.append(rosbags_cpu_s(events, '{}/theirs_{}.bag'.format(folder, turn)))
+    for name, seconds in (('the recorder', ours), ("rosbags' writer", theirs)):
+        print(
+            '{:<16} {:6.2f} us of processor time an event'.format(
+                name, statistics.median(seconds[1:]) / len(events) * 1e6
+            )
+        )
+    ratio = statistics.median(mine / other for mine, other in zip(ours[1:], theirs[1:]))
+    print('{:.2f} times as much (at most {})'.format(ratio, MOST_BY_ROSBAGS))
+    return 0 if ratio <= MOST_BY_ROSBAGS else 1
+
+
+def recorder_cpu_s(events: List[Event], folder: str) -> float:
+    """Return the processor time (s) in which all threads of a recorder write the events."""
+    recorder = TrialRecorder(folder)
+    began = time.process_time()
+    for event in events:
+        recorder(event)
+    closed = recorder.close(60.0)
+    took = time.process_time() - began
+    if not closed or recorder.losses.events:
+        raise RuntimeError('not everything was recorded')
+    return took
+
+
+def rosbags_cpu_s(events: List[Event], path: str) -> float:
+    """Return that of rosbags' writer, with the recorder's packing of an event."""
+    began = time.process_time()
+    with Writer(path) as writer:
+        connection = writer.add_connection(
+            '/oracle/events',
+            'smach_oracle/msg/OracleEvent',
+            msgdef=EVENT_TYPE.definition,
+            md5sum=EVENT_TYPE.md5sum,
+        )
+        for event in events:
+            writer.write(connection, int(event.wall_time * 1e9), pack_event(event, (0, 0)))
+    return time.process_time() - began
 
 
 def measure(transitions: int, folder: str) -> int:

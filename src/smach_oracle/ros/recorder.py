@@ -30,10 +30,11 @@ from .recording.recorder_queue import (
     QueueItem,
     RecorderQueue,
     SnapshotItem,
+    new_event_item,
 )
 from .recording.recorder_status import DiskWatch, LossCounter, RecorderState, RecordingStatus
-from .recording.recorder_topics import MessageClass, TopicListener, now
-from .recording.trial_bags import RecorderTopics, Reporter, TrialBags, status_message
+from .recording.recorder_topics import MessageClass, TopicListener, moment_at, now
+from .recording.trial_bags import OPEN_A_BAG, RecorderTopics, Reporter, TrialBags, status_message
 
 if TYPE_CHECKING:  # it imports smach, which events of another source can do without
     from smach_oracle.oracle import OracleContainer
@@ -155,8 +156,8 @@ class TrialRecorder(OwnObserver):
     def _observe(self, event: Event) -> None:
         if self._is_parents:
             return
-        item = EventItem(event, now()._replace(wall=event.wall_time))
-        weight = WEIGHT_OF_A_FILE if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED) else 1
+        item = new_event_item(event, moment_at(event.wall_time))
+        weight = WEIGHT_OF_A_FILE if event.kind in OPEN_A_BAG else 1
         if not self._queue.put_event(item, self._may_wait, weight):
             self.losses.add_events(event.trial_id, 1)
             self._note_drop()
@@ -198,7 +199,10 @@ class TrialRecorder(OwnObserver):
             while not closing:
                 items, closing = self._queue.take(self._bags.wait_s())
                 for item in items:
-                    self._write(item)
+                    try:
+                        self._bags.write(item)
+                    except Exception as err:  # one that cannot be converted costs no later one
+                        self._lose(item, err)
                 self._bags.tick()
                 self._note_answer(items)
             self._bags.close()
@@ -212,15 +216,10 @@ class TrialRecorder(OwnObserver):
                 'The disk answers again; {} events were lost so far'.format(self.losses.events)
             )
 
-    def _write(self, item: QueueItem) -> None:
-        try:
-            self._bags.write(item)
-        except Exception as err:  # one event that cannot be converted must not cost all later ones
-            if isinstance(item, EventItem):
-                self.losses.add_events(item.event.trial_id, 1)
-            self._tell_not_recorded(item, error_text(err))
-
-    def _tell_not_recorded(self, item: QueueItem, why: str) -> None:
+    def _lose(self, item: QueueItem, err: Exception) -> None:
+        if isinstance(item, EventItem):
+            self.losses.add_events(item.event.trial_id, 1)
+        why = error_text(err)
         self._warn_once(
             'Not recorded: {}: {}. The recorder goes on, and counts what it '
             'loses. This is said once'.format(repr_of(item)[:LONGEST_ITEM], why),
@@ -315,7 +314,7 @@ class _MachineObserver(OwnObserver):
         if event.kind == EventKind.TRIAL_END:
             self._take_snapshots(event)
         self._observe(event)
-        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
+        if event.kind in OPEN_A_BAG:
             self._take_snapshots(event)
 
     def _take_snapshots(self, event: Event) -> None:

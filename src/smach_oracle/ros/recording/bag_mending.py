@@ -171,8 +171,10 @@ class _Pass:
         head = connection.topic.encode() + bag_format.STAMP.pack(*stamp)
         self._checksum = (self._checksum + zlib.crc32(data, zlib.crc32(head))) % (1 << 64)
         if writer is not None:
-            writer.add(connection.topic, connection.kind, stamp, data, dict(connection.details))
-            if writer.buffered_bytes >= MAX_CHUNK_BYTES:
+            buffered_bytes = writer.add(
+                connection.topic, connection.kind, stamp, data, dict(connection.details)
+            )
+            if buffered_bytes >= MAX_CHUNK_BYTES:
                 writer.flush()
 
     def _count_lost_events(self, number: int) -> None:

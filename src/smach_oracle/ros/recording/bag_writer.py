@@ -11,6 +11,8 @@ connections: where the first chunk is damaged, the messages of later ones still 
 import errno
 import fcntl
 import os
+import struct
+from itertools import chain
 from typing import Dict, List, NamedTuple, Optional, Tuple
 
 from smach_oracle import bag_format
@@ -34,6 +36,12 @@ class MessageType(NamedTuple):
 class _Connection(NamedTuple):
     number: int
     record: bytes
+    message_header: bytes  # up to the value of its last field, which is the time
+
+
+_TIME_AND_SIZE = struct.Struct('<III')  # s, ns, bytes of the data
+_Key = Tuple[str, str, str]  # of a connection: topic, md5sum, callerid
+_Entries = List[Tuple[int, int, int]]  # s, ns, offset in the chunk
 
 
 def _lock(fd: int) -> None:
@@ -63,7 +71,7 @@ class BagWriter:
         :raises OSError: where that cannot be done. FileExistsError where it is there already.
         """
         self.path = path
-        self._connections: Dict[Tuple[str, str, str], _Connection] = {}
+        self._connections: Dict[_Key, _Connection] = {}
         self._chunks: List[ChunkInfo] = []
         self._end = bag_format.BAG_HEADER_END
         self._reset_chunk()
@@ -88,11 +96,6 @@ class BagWriter:
         """Whether anything but the header has reached the file."""
         return bool(self._chunks)
 
-    @property
-    def buffered_bytes(self) -> int:
-        """Return the size of the chunk in memory."""
-        return len(self._buffer)
-
     def add(
         self,
         topic: str,
@@ -100,26 +103,29 @@ class BagWriter:
         stamp: Stamp,
         data: bytes,
         details: Optional[Dict[str, str]] = None,
-    ) -> None:
+    ) -> int:
         """Put a message, serialised to `data`, into the chunk in memory. Touches no disk.
 
-        `details` are further fields of the connection header (latching, callerid).
+        :param details: further fields of the connection header (latching, callerid).
+        :returns: the size of the chunk in memory, in bytes.
         """
-        connection = self._connection(topic, message_type, details or {})
+        key = (topic, message_type.md5sum, details.get('callerid', '') if details else '')
+        in_chunk = self._in_chunk.get(key)
+        if in_chunk is None:
+            in_chunk = self._connection(key, message_type, details or {}), []
+            self._in_chunk[key] = in_chunk
+        connection, entries = in_chunk
+        seconds, nanoseconds = stamp
         offset = len(self._buffer)
-        header = self._message_headers.get(connection.number)
-        if header is None:
-            header = _message_header(connection.number)
-            self._message_headers[connection.number] = header
         self._buffer += (
-            header + bag_format.STAMP.pack(*stamp) + bag_format.UINT32.pack(len(data)) + data
+            connection.message_header + _TIME_AND_SIZE.pack(seconds, nanoseconds, len(data)) + data
         )
-        self._index.setdefault(connection.number, []).append((stamp[0], stamp[1], offset))
+        entries.append((seconds, nanoseconds, offset))  # a message that failed has no entry
+        return len(self._buffer)
 
     def _connection(
-        self, topic: str, message_type: MessageType, details: Dict[str, str]
+        self, key: _Key, message_type: MessageType, details: Dict[str, str]
     ) -> _Connection:
-        key = (topic, message_type.md5sum, details.get('callerid', ''))
         connection = self._connections.get(key)
         if connection is None:
             number = len(self._connections)
@@ -129,7 +135,8 @@ class BagWriter:
                 'message_definition': message_type.definition,
                 **details,
             }
-            connection = _Connection(number, bag_format.pack_connection(number, topic, fields))
+            record = bag_format.pack_connection(number, key[0], fields)
+            connection = _Connection(number, record, _message_header(number))
             self._connections[key] = connection
             self._buffer += connection.record
         return connection
@@ -142,11 +149,12 @@ class BagWriter:
 
         :raises OSError: where the disk does not take it. The file then ends where it did before.
         """
-        if not self._index:
+        entries = {each.number: of_it for each, of_it in self._in_chunk.values() if of_it}
+        if not entries:
             return
         position = self._end
         chunk = bytes(self._buffer)
-        indexes, info = self._pack_indexes(position)
+        indexes, info = _pack_indexes(entries, position)
         self._append(bag_format.pack_chunk_header(len(chunk)) + chunk + indexes)
         self._chunks.append(info)
         self._reset_chunk()
@@ -189,19 +197,7 @@ class BagWriter:
 
     def _reset_chunk(self) -> None:
         self._buffer = bytearray()
-        self._index: Dict[int, List[Tuple[int, int, int]]] = {}
-        self._message_headers: Dict[int, bytes] = {}
-
-    def _pack_indexes(self, position: int) -> Tuple[bytes, ChunkInfo]:
-        records = []
-        for number, entries in self._index.items():
-            entries.sort(key=_stamp_of)  # ROS time may jump back
-            packed = b''.join(bag_format.INDEX_ENTRY.pack(*entry) for entry in entries)
-            records.append(bag_format.pack_index(number, len(entries), packed))
-        start = min(entries[0][:2] for entries in self._index.values())
-        end = max(entries[-1][:2] for entries in self._index.values())
-        counts = {number: len(entries) for number, entries in self._index.items()}
-        return b''.join(records), ChunkInfo(position, start, end, counts)
+        self._in_chunk: Dict[_Key, Tuple[_Connection, _Entries]] = {}  # messages in the chunk
 
     def _append(self, data: bytes) -> None:
         try:
@@ -210,6 +206,19 @@ class BagWriter:
             _cut_off(self._fd, self._end)
             raise
         self._end += len(data)
+
+
+def _pack_indexes(by_connection: Dict[int, _Entries], position: int) -> Tuple[bytes, ChunkInfo]:
+    """Return the index records behind a chunk at a position of the file, and what is in it."""
+    records = []
+    for number, entries in by_connection.items():
+        entries.sort()  # ROS time may jump back
+        packed = struct.pack('<{}I'.format(3 * len(entries)), *chain.from_iterable(entries))
+        records.append(bag_format.pack_index(number, len(entries), packed))
+    start = min(entries[0][:2] for entries in by_connection.values())
+    end = max(entries[-1][:2] for entries in by_connection.values())
+    counts = {number: len(entries) for number, entries in by_connection.items()}
+    return b''.join(records), ChunkInfo(position, start, end, counts)
 
 
 def write_bag_index(fd: int, end: int, connections: List[bytes], chunks: List[ChunkInfo]) -> None:
@@ -246,10 +255,6 @@ def _message_header(connection: int) -> bytes:
 
 def _is_power_of_two(number: int) -> bool:
     return number & (number - 1) == 0
-
-
-def _stamp_of(entry: Tuple[int, int, int]) -> Stamp:
-    return entry[:2]
 
 
 def _write_at(fd: int, data: bytes, position: int) -> None:

@@ -63,6 +63,19 @@ class MessageItem(NamedTuple):
     callerid: str
 
 
+_new_tuple = tuple.__new__
+
+
+def new_moment(ros: Optional[Stamp], wall: float, monotonic: float) -> Moment:
+    """Return a Moment, in half the time that its class takes: one is made for each event."""
+    return _new_tuple(Moment, (ros, wall, monotonic))
+
+
+def new_event_item(event: Event, when: Moment) -> EventItem:
+    """Return an EventItem, likewise."""
+    return _new_tuple(EventItem, (event, when))
+
+
 QueueItem = Union[EventItem, SnapshotItem, EndItem, MessageItem]
 
 
@@ -78,7 +91,8 @@ class RecorderQueue:
     def __init__(self, max_events: int, max_message_bytes: int) -> None:
         self._max_events = max_events
         self._max_message_bytes = max_message_bytes
-        self._changed = threading.Condition(threading.RLock())
+        self._lock = threading.RLock()
+        self._changed = threading.Condition(self._lock)
         self._items: List[QueueItem] = []
         self._weight = 0
         self._message_bytes = 0
@@ -90,7 +104,7 @@ class RecorderQueue:
 
         :returns: whether it was appended.
         """
-        with self._changed:
+        with self._lock:  # as `with self._changed`, without its two calls
             while self._weight >= self._max_events and not self._closing:
                 if not may_wait():
                     return False
@@ -98,7 +112,9 @@ class RecorderQueue:
             if self._closing:
                 return False
             self._weight += weight
-            self._append(item)
+            self._items.append(item)
+            if len(self._items) == 1:
+                self._changed.notify_all()
             return True
 
     def put_message(self, item: MessageItem) -> bool:
@@ -107,13 +123,10 @@ class RecorderQueue:
             if self._closing or self._message_bytes + len(item.data) > self._max_message_bytes:
                 return False
             self._message_bytes += len(item.data)
-            self._append(item)
+            self._items.append(item)
+            if len(self._items) == 1:
+                self._changed.notify_all()
             return True
-
-    def _append(self, item: QueueItem) -> None:
-        self._items.append(item)
-        if len(self._items) == 1:
-            self._changed.notify_all()
 
     def take(self, timeout_s: Optional[float]) -> Tuple[List[QueueItem], bool]:
         """Return all that waits, in order, and whether the queue is closing.

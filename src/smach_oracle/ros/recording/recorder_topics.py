@@ -16,7 +16,7 @@ from rospy.topics import get_topic_manager
 
 from .bag_writer import MessageType
 from .event_packing import serialise
-from .recorder_queue import MessageItem, Moment
+from .recorder_queue import MessageItem, Moment, new_moment
 from .trial_bag import ros_stamp_of
 
 MessageClass = Type[genpy.Message]
@@ -47,11 +47,16 @@ def audit_topic(server: str) -> str:
 
 def now() -> Moment:
     """Return the present moment by both clocks."""
+    return moment_at(time.time())
+
+
+def moment_at(wall_time: float) -> Moment:
+    """Return the present moment, whose wall time is known."""
     stamp = None
     if rospy.rostime.is_rostime_initialized():
         time_now = rospy.rostime.get_rostime()
         stamp = ros_stamp_of(time_now.secs, time_now.nsecs)
-    return Moment(stamp, time.time(), time.monotonic())
+    return new_moment(stamp, wall_time, time.monotonic())
 
 
 class TopicListener:

@@ -89,7 +89,7 @@ class TrialBag:
         data = pack_event(event, when.ros or (0, 0))
         self.events_written += 1
         self._events_in_chunk += 1  # before the chunk may be flushed: it is lost with it
-        self._add(topic, EVENT_TYPE, data, when, {})
+        self._add(topic, EVENT_TYPE, data, when, None)
 
     def add_message(
         self, topic: str, message: genpy.Message, when: Moment, latching: bool = False
@@ -106,12 +106,17 @@ class TrialBag:
         self._add(item.topic, item.message_type, item.data, item.when, details)
 
     def _add(
-        self, topic: str, kind: MessageType, data: bytes, when: Moment, details: Dict[str, str]
+        self,
+        topic: str,
+        kind: MessageType,
+        data: bytes,
+        when: Moment,
+        details: Optional[Dict[str, str]],
     ) -> None:
-        self._writer.add(topic, kind, self.stamp(when), data, details)
+        buffered_bytes = self._writer.add(topic, kind, self.stamp(when), data, details)
         if self._chunk_since is None:
             self._chunk_since = when.monotonic
-        if self._writer.buffered_bytes >= MAX_CHUNK_BYTES:
+        if buffered_bytes >= MAX_CHUNK_BYTES:
             self.flush()
 
     def due_s(self) -> Optional[float]:
@@ -170,8 +175,7 @@ class TrialBag:
 
 def wall_stamp(wall_time: float) -> Stamp:
     """Return seconds since the epoch as seconds and nanoseconds."""
-    nanoseconds = int(round(wall_time * 1e9))
-    return nanoseconds // 10**9, nanoseconds % 10**9
+    return divmod(round(wall_time * 1e9), 10**9)
 
 
 def file_name(trial_id: str, wall_time: float) -> str:

@@ -17,6 +17,7 @@ from .trial_bag import SyncBudget, TrialBag
 
 FIRST_RETRY_S, LONGEST_RETRY_S = 0.5, 5.0
 MEND_WAIT_S = 2.0  # for bags to be mended, before the robot goes on meanwhile
+OPEN_A_BAG = (EventKind.TRIAL_START, EventKind.RESUMED)
 KeptKey = Tuple[Union[str, bytes], ...]
 KEPT_FOR_NEXT_BAG = 500  # latched messages and structures with which every bag begins
 
@@ -92,13 +93,16 @@ class TrialBags:
                 self._guard(bag, bag.add_message, item.topic, item.message, item.when, True)
 
     def _write_event(self, event: Event, when: Moment) -> None:
-        if event.kind in (EventKind.TRIAL_START, EventKind.RESUMED):
+        if event.kind in OPEN_A_BAG:
             self._close_over(0.0)
         bag = self._bags.get(event.trial_id) or self._open(event, when)
         if bag is None:
             self._losses.add_events(event.trial_id, 1)
             return
-        self._guard(bag, bag.add_event, self._topics.events, event, when)
+        try:
+            bag.add_event(self._topics.events, event, when)
+        except OSError as err:
+            self._give_up(bag, err)
         if self._error:
             self._guard(bag, bag.flush)
             if event.trial_id in self._bags:
@@ -159,9 +163,12 @@ class TrialBags:
         try:
             work(*args)
         except OSError as err:
-            del self._bags[bag.trial_id]
-            self._losses.add_events(bag.trial_id, bag.abandon())
-            self._fail(err, bag)
+            self._give_up(bag, err)
+
+    def _give_up(self, bag: TrialBag, err: OSError) -> None:
+        del self._bags[bag.trial_id]
+        self._losses.add_events(bag.trial_id, bag.abandon())
+        self._fail(err, bag)
 
     def _fail(self, err: OSError, bag: Optional[TrialBag] = None) -> None:
         self._retry_s = min(2 * self._retry_s, LONGEST_RETRY_S) if self._error else FIRST_RETRY_S

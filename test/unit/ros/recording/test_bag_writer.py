@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import os
+import struct
 import subprocess
 import threading
 
@@ -57,6 +58,20 @@ def test_a_clock_that_jumps_back_leaves_a_readable_bag(tmp_path):
     assert texts_in(path) == ['10', '30', '50']
     with Reader(path) as reader:
         assert [stamp // 10**9 for _, stamp, _ in reader.messages()] == [10, 30, 50]
+
+
+def test_a_message_that_cannot_be_written_leaves_a_readable_bag(tmp_path):
+    path = tmp_path / 'a.bag'
+    writer = BagWriter(str(path))
+    with pytest.raises(struct.error):
+        writer.add('/talk', STRING, (-1, 0), string_data('before 1970'))
+    writer.flush()
+    assert not writer.has_chunks
+    writer.add('/talk', STRING, (1, 0), string_data('kept'))
+    with pytest.raises(struct.error):
+        writer.add('/talk', STRING, (-1, 0), string_data('before 1970'))
+    writer.close()
+    assert texts_in(path) == ['kept']
 
 
 def test_an_empty_bag_can_be_opened(tmp_path):

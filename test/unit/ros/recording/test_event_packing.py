@@ -68,3 +68,26 @@ def test_what_is_no_text_is_recorded_as_text(field):
     assert (
         getattr(OracleEvent().deserialize(recorder_packing.pack_event(event, (0, 0))), field) == '7'
     )
+
+
+class Loud(str):
+    """A string that is equal to a plain one, and reads otherwise."""
+
+    def __str__(self):
+        return self.upper()
+
+
+def test_values_that_are_equal_but_read_otherwise_are_not_taken_for_each_other():
+    for value in ['1', 1, 1.0, True, 'pick', Loud('pick'), 'pick', '1']:
+        event = Event(EventKind.TRANSITION, value, 0, 1.0, 'TOP', value, target=value)
+        packed = recorder_packing.pack_event(event, (0, 0))
+        assert packed == recorder_packing._pack_through_message(event, (0, 0))
+
+
+def test_packed_strings_do_not_pile_up():
+    most = recorder_packing._MOST_KEPT
+    for number in range(2 * most):
+        event = Event(EventKind.TRANSITION, 't', number, 1.0, str(number), 'x' * number)
+        recorder_packing.pack_event(event, (0, 0))
+    assert len(recorder_packing._kept) <= most
+    assert max(map(len, recorder_packing._kept.values())) <= recorder_packing._LONGEST_KEPT
