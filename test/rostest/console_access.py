@@ -152,10 +152,10 @@ class Access(ConsolePage, unittest.TestCase):
         browser.run('arguments[0].focus()', browser.find('[id="/alpha/KITCHEN/FETCH"]'))
         self.keys(' ')
         self.assertTrue(browser.says('KITCHEN/FETCH', '.machines h2'), 'Space opens it, too')
-        browser.click('.machine-card .head .tool')
+        browser.click('.machine-card [data-way=list]')
         browser.find('table.states')
         self.assert_accessible('a list of states')
-        browser.click('.machine-card .head .tool')
+        browser.click('.machine-card [data-way=graph]')
 
     def test_6_trials_and_sensors_are_accessible(self):
         browser = self.browser

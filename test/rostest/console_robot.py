@@ -36,12 +36,12 @@ class Work(smach.State):
         return 'succeeded'
 
 
-def chain(labels, make):
-    """A machine of states one after the other."""
+def chain(labels, make, **more):
+    """A machine of states one after the other. `more`: transitions that each state has."""
     sm = smach.StateMachine(OUTCOMES)
     with sm:
         for label, following in zip(labels, list(labels[1:]) + ['succeeded']):
-            smach.StateMachine.add(label, make(label), {'succeeded': following})
+            smach.StateMachine.add(label, make(label), dict(more, succeeded=following))
     return sm
 
 
@@ -63,6 +63,7 @@ def make_machine(failing, time_s, size):
     sm = chain(
         ['MOVE_ARMS_ASIDE', 'FETCH'] + labels,
         lambda label: inner if label == 'FETCH' else Work(label, failing, time_s),
+        **({'preempted': 'preempted'} if size > 50 else {}),  # as authors of large machines do
     )
     sm.userdata.object = {'name': 'mug', 'weight_kg': 0.3}
     return sm

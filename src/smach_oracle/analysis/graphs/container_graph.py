@@ -5,10 +5,16 @@ to itself. The page draws it beside the rest, and its edges as thin curves.
 """
 
 import json
-from typing import Any, Counter, Dict, Iterable, List, NamedTuple, Optional, Set, Tuple
+from collections import Counter
+from typing import Any, Dict, FrozenSet, Iterable, List, NamedTuple, Optional, Set, Tuple
 
-MOST_STATES = 500  # of a container. More are not drawn
-MOST_EDGES = 3000
+from smach_oracle.oracle.settings.failing_outcomes import is_preempted
+
+MOST_STATES = 2000  # of a container. One with more is refused
+MOST_EDGES = 20_000  # likewise
+MOST_DRAWN = 150  # states. dot would take minutes for more, and nobody could read the drawing
+# edges of preemption that are drawn. More are a thicket: they stand as one number at their end
+MOST_PREEMPTED = 5
 # edges up to which dot keeps room for their labels. Beyond, it would take minutes
 MOST_LABELLED = 100
 # of a large graph: fewer rounds of making it prettier
@@ -34,6 +40,30 @@ class ContainerGraph(NamedTuple):
     outcomes: Tuple[str, ...]
     edges: Tuple[GraphEdge, ...]  # those of ORACLE not among them
     oracle: str  # label of the meta state, '' where there is none
+    refused: int = 0  # number of its states where they are too many: none of them is told
+
+    @property
+    def is_small(self) -> bool:
+        """Whether a drawing of the whole can be made, and read."""
+        return 0 < len(self.states) <= MOST_DRAWN
+
+    @property
+    def bundled(self) -> Dict[str, int]:
+        """Return outcomes to which many states lead by a preemption, and their number."""
+        ends = Counter(edge.target for edge in self.edges if self._is_preemption(edge))
+        return {end: number for end, number in ends.items() if number > MOST_PREEMPTED}
+
+    def drawn_edges(self) -> FrozenSet[GraphEdge]:
+        """Return the edges that are drawn, each by itself."""
+        bundled = self.bundled
+        return frozenset(
+            edge
+            for edge in self.edges
+            if edge.target not in bundled or not self._is_preemption(edge)
+        )
+
+    def _is_preemption(self, edge: GraphEdge) -> bool:
+        return is_preempted(edge.outcome) and edge.target in self.outcomes
 
 
 Point = Tuple[float, float]
@@ -53,9 +83,11 @@ def make_structure(
     path: str, children: Iterable[str], edges: Iterable[GraphEdge], outcomes: Iterable[str]
 ) -> ContainerGraph:
     """Return the graph of a container as its introspection server publishes it."""
-    labels = list(dict.fromkeys(children))[:MOST_STATES]
-    all_edges = list(dict.fromkeys(edges))[:MOST_EDGES]
+    labels = list(dict.fromkeys(children))
+    all_edges = list(dict.fromkeys(edges))
     oracle = find_oracle(labels, all_edges)
+    if len(labels) - bool(oracle) > MOST_STATES or len(all_edges) > MOST_EDGES:
+        return ContainerGraph(path, (), (), (), '', len(labels) - bool(oracle))
     states = tuple(label for label in labels if label != oracle)
     ends = tuple(dict.fromkeys(outcome for outcome in outcomes if outcome not in labels))
     known = set(states) | set(ends)
@@ -86,8 +118,8 @@ def dot_text(structure: ContainerGraph) -> str:
 
     No text of a robot is in it: nodes and edges are numbered, labels are runs of x.
     """
-    names = _names(structure)
-    large = len(structure.edges) > MOST_LABELLED
+    names, drawn = _names(structure), structure.drawn_edges()
+    large = len(drawn) > MOST_LABELLED
     lines = [
         'digraph {',
         'rankdir=TB; nodesep=0.35; ranksep=0.5; node [shape=box, fixedsize=true];'
@@ -105,6 +137,8 @@ def dot_text(structure: ContainerGraph) -> str:
             '{{rank=sink; {}}}'.format('; '.join(names[outcome] for outcome in structure.outcomes))
         )
     for number, edge in enumerate(structure.edges):
+        if edge not in drawn:
+            continue
         label = '' if large else ', label="{}"'.format('x' * min(24, len(edge.outcome) + 5))
         lines.append(
             '{} -> {} [id=e{}{}];'.format(names[edge.source], names[edge.target], number, label)
@@ -158,6 +192,8 @@ def drawing(
             {'label': label, 'at': _place(layout, names[label])} for label in structure.outcomes
         ],
         'edges': [],
+        'bundled': structure.bundled,
+        'refused': structure.refused,
     }
     for number, edge in enumerate(structure.edges):
         points, label = _drawn_edge(layout, 'e{}'.format(number))
@@ -226,7 +262,7 @@ def _point(text: str, top: float) -> Point:
 def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
     """Rows of [source, outcome, target, times, share of all that left the source]."""
     rows = list(counts)
-    totals: Counter[str] = Counter()
+    totals: Dict[str, int] = Counter()
     for source, _, _, times in rows:
         totals[source] += times
     return [

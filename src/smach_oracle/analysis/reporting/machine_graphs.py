@@ -163,7 +163,11 @@ class Drawer:
                 if names[label] in layout.nodes
             ],
             [
-                OutcomeShape(*_moved(layout.nodes[names[label]]), shortened(label, _NAME), label)
+                OutcomeShape(
+                    *_moved(layout.nodes[names[label]]),
+                    shortened(label, _NAME),
+                    _title(label, whole.bundled.get(label, 0)),
+                )
                 for label in whole.outcomes
                 if names[label] in layout.nodes
             ],
@@ -173,6 +177,11 @@ class Drawer:
         )
 
     def _layout(self, graph: ContainerGraph) -> Optional[GraphLayout]:
+        if not graph.is_small:
+            self.problem = '{} has {} states, more than can be read in a drawing'.format(
+                graph.path, len(graph.states)
+            )
+            return None
         text = dot_text(graph)
         if text not in self._layouts:
             try:
@@ -195,6 +204,11 @@ def _with_taken(graph: ContainerGraph, counts: Mapping[GraphEdge, int]) -> Conta
         if edge not in graph.edges and edge.source in graph.states and edge.target in places
     )
     return graph._replace(edges=graph.edges + tuple(more))
+
+
+def _title(outcome: str, bundled: int) -> str:
+    """Return the title of an outcome. `bundled`: the preemptions that lead there undrawn."""
+    return '{}, by preemption from {} states'.format(outcome, bundled) if bundled else outcome
 
 
 def _moved(place: Tuple[float, float, float, float]) -> Tuple[float, float, float, float]:

@@ -136,8 +136,8 @@ def _about_graphs(problem: str) -> List[str]:
     if not problem:
         return []
     return [
-        'Graphs are tables here, since dot did not lay them out ({}). It is in the package '
-        'graphviz.'.format(problem)
+        'Some graphs are tables here, since they were not laid out ({}). dot, which does so, is in '
+        'the package graphviz.'.format(problem)
     ]
 
 

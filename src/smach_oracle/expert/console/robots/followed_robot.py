@@ -7,7 +7,6 @@ from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.analysis.graphs.container_graph import (
     ContainerGraph,
     GraphEdge,
-    dot_text,
     drawing,
     make_structure,
     shares,
@@ -159,7 +158,7 @@ class FollowedRobot:
             nested = [
                 label for label in structure.states if '{}/{}'.format(path, label) in structures
             ]
-            layout = layouts.find(dot_text(structure), self._note_layout)
+            layout = layouts.find(structure, self._note_layout)
             sections.put('graph {} {}'.format(self.name, path), drawing(structure, layout, nested))
 
     def forget(self, sections: PageSections) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Dict, List, Sequence, Set, Tuple
 from sensor_msgs.msg import CompressedImage
 
 from smach_oracle.analysis.bag_machines import FailureImage
-from smach_oracle.analysis.graphs.container_graph import ContainerGraph, dot_text, drawing
+from smach_oracle.analysis.graphs.container_graph import ContainerGraph, drawing
 from smach_oracle.analysis.graphs.recorded import graph_from_events, recorded_graphs
 from smach_oracle.ros.log.said_once import warn_once
 
@@ -87,7 +87,7 @@ class RecordedTrials:
         found = {}
         until_s = time.monotonic() + LAYOUT_WAIT_S
         for path, structure in structures.items():
-            layout = self._layouts.wait(dot_text(structure), max(0.0, until_s - time.monotonic()))
+            layout = self._layouts.wait(structure, max(0.0, until_s - time.monotonic()))
             nested = [
                 label for label in structure.states if '{}/{}'.format(path, label) in structures
             ]

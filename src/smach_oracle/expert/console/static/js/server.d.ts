@@ -212,6 +212,8 @@ export interface Graph {
   states: { label: string; nested: boolean; at: Place | null }[];
   outcomes: { label: string; at: Place | null }[];
   edges: GraphEdge[];
+  bundled: { [outcome: string]: number | undefined }; // edges of preemption that have no points
+  refused: number; // states, where they are too many: none of them is told. Else 0
 }
 
 /** px, of the middle. */

@@ -142,11 +142,15 @@ export function oracleShape(graph, id) {
  * @param {string} label
  * @param {Place} place
  * @param {string} id
+ * @param {number} bundled states that lead there by a preemption, whose edges are not drawn
  */
-export function outcomeShape(label, [x, y, width, height], id) {
-  return svg('g', { class: 'outcome', id, transform: translate(x, y) }, svg('title', {}, label),
+export function outcomeShape(label, [x, y, width, height], id, bundled) {
+  const from = 'from ' + bundled + ' states';
+  return svg('g', { class: 'outcome', id, transform: translate(x, y) },
+    svg('title', {}, label + (bundled ? ', by preemption ' + from : '')),
     svg('rect', { x: -width / 2, y: -height / 2, width, height, rx: height / 2 }),
-    svg('text', { y: 4 }, shorten(label, width)));
+    svg('text', { y: 4 }, shorten(label, width)),
+    bundled > 0 && svg('text', { class: 'bundled', y: -height / 2 - 6 }, from));
 }
 
 /**

@@ -7,7 +7,9 @@ import { whenLetGo } from '../page/redraw.js';
 import {
   arrowHeads, edgeShape, measured, oracleLines, oracleShape, outcomeShape, stateShape,
 } from './graph_shapes.js';
+import { activeIn } from './focus_state.js';
 import { takeGraphKeys } from './graph_keys.js';
+import { GraphMap } from './graph_map.js';
 import { GraphViewport } from './graph_viewport.js';
 
 /** @typedef {import('../server').Graph} Graph */
@@ -29,7 +31,8 @@ export class GraphView {
       this.layer);
     this.followButton = h('button', { class: 'tool', title: 'Keep what is active in view',
       onclick: () => this.viewport.setFollow(!this.viewport.follow) }, 'Follow');
-    this.root = h('div', { class: 'graph-frame' }, this.drawing, this.tools());
+    this.map = new GraphMap((at) => this.viewport.showMiddle(at));
+    this.root = h('div', { class: 'graph-frame' }, this.drawing, this.map.root, this.tools());
     this.robot = '';
     /** @type {Graph | null} */
     this.graph = null;
@@ -43,7 +46,8 @@ export class GraphView {
     this.oracle = null;
     /** @type {GraphViewport} */
     this.viewport = new GraphViewport(this.drawing, this.root, () => this.focus,
-      (on) => this.followButton.setAttribute('aria-pressed', String(on)));
+      (on) => this.followButton.setAttribute('aria-pressed', String(on)),
+      (seen) => this.map.show(seen, this.viewport.size));
     this.viewport.setFollow(true);
     takeGraphKeys(this.drawing, this.viewport);
   }
@@ -91,10 +95,12 @@ export class GraphView {
       this.layer.append(this.oracle);
     }
     for (const edge of graph.edges) {
-      this.addEdge(edgeKey(edge.from, edge.outcome, edge.to), edgeShape(edge));
+      const key = edgeKey(edge.from, edge.outcome, edge.to);
+      if (edge.points.length) this.addEdge(key, edgeShape(edge));
     }
     for (const { label, at } of graph.outcomes) {
-      if (at) this.layer.append(outcomeShape(label, at, id(label)));
+      const bundled = graph.bundled[label];
+      if (at) this.layer.append(outcomeShape(label, at, id(label), bundled || 0));
     }
     for (const { label, nested, at } of graph.states) {
       if (!at) continue;
@@ -103,6 +109,17 @@ export class GraphView {
       this.states.set(label, state);
       this.layer.append(state.group);
     }
+    this.map.set(graph);
+  }
+
+  /**
+   * Bring a state into view.
+   * @param {string} label
+   */
+  find(label) {
+    for (const [each, { group }] of this.states) group.classList.toggle('found', each === label);
+    const state = this.states.get(label);
+    if (state) this.viewport.showMiddle(state.at);
   }
 
   /**
@@ -121,7 +138,7 @@ export class GraphView {
   setState(machine) {
     if (!this.graph || !this.graph.drawn) return;
     const { path, oracle } = this.graph;
-    const active = machine.alive ? machine.active[path] || [] : [];
+    const active = activeIn(path, machine);
     const failed = machine.failed[path]?.state || '';
     const rates = machine.rates[path] || {};
     for (const [label, state] of this.states) {
@@ -130,6 +147,7 @@ export class GraphView {
       showRate(state, label, rates[label]);
     }
     if (this.oracle) this.oracle.classList.toggle('active', active.includes(oracle));
+    this.map.mark(failed, active);
     this.showCounts(machine.counts[path] || [], machine.latest[path], failed);
     const focus = failed || active.find((label) => this.states.has(label)) || '';
     const key = focus + ' ' + this.viewport.follow;

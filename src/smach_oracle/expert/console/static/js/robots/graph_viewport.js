@@ -4,6 +4,7 @@
 
 /** @typedef {{ width: number, height: number }} Size px */
 /** @typedef {[x: number, y: number]} Place px */
+/** @typedef {{ x: number, y: number, width: number, height: number }} Seen px of the drawing */
 
 const MARGIN = 24; // px
 const FOOT = 52; // px below the drawing, where the buttons are
@@ -18,12 +19,14 @@ export class GraphViewport {
    * @param {HTMLElement} root the frame around it
    * @param {() => Place} focusOf what should be in view where not all can be
    * @param {(on: boolean) => void} onFollow
+   * @param {(seen: Seen) => void} onSeen
    */
-  constructor(drawing, root, focusOf, onFollow) {
+  constructor(drawing, root, focusOf, onFollow, onSeen) {
     this.drawing = drawing;
     this.root = root;
     this.focusOf = focusOf;
     this.onFollow = onFollow;
+    this.onSeen = onSeen;
     /** @type {Size | null} */
     this.size = null;
     this.view = { x: 0, y: 0, scale: 1 };
@@ -93,7 +96,21 @@ export class GraphViewport {
   apply() {
     const { box } = this;
     const { x, y, scale } = this.view;
-    this.drawing.setAttribute('viewBox', [x, y, box.width / scale, box.height / scale].join(' '));
+    const [width, height] = [box.width / scale, box.height / scale];
+    this.drawing.setAttribute('viewBox', [x, y, width, height].join(' '));
+    this.onSeen({ x, y, width, height });
+  }
+
+  /**
+   * As a person wants it: a place in the middle, large enough to be read.
+   * @param {Place} place of the drawing
+   */
+  showMiddle([x, y]) {
+    const { box } = this;
+    this.leave();
+    const scale = Math.max(SMALLEST_READABLE, this.view.scale);
+    this.view = { scale, x: x - box.width / scale / 2, y: y - box.height / scale / 2 };
+    this.apply();
   }
 
   /**

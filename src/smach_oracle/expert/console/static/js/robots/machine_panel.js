@@ -2,7 +2,6 @@
 // All containers of all robots: one of them is shown, live.
 import { h, setText } from '../page/dom.js';
 import { aged } from '../page/liveness.js';
-import { remember, remembered } from '../page/preferences.js';
 import { arrange, redraw } from '../page/redraw.js';
 import { takeArrowKeys } from '../page/tree_keys.js';
 import { DownList } from './down_list.js';
@@ -26,7 +25,6 @@ export const machines = { id: 'machines', title: 'Machines',
 
 const NO_ROBOTS = 'No robots yet. Every state machine that publishes its structure, or runs under '
   + 'the oracle, appears here by itself.';
-const PREFERENCE = 'machine-list';
 
 class MachinePanel {
   /** @param {App} app */
@@ -37,31 +35,19 @@ class MachinePanel {
     this.source = machinesNow(app.store);
     this.view = new MachineView(this.source, (path) => this.open(this.robot, path));
     this.hand = new MachineHand(app);
-    this.view.prefersList = remembered(PREFERENCE, 'no') === 'yes';
     this.picker = h('div', { class: 'picker', role: 'tree',
       'aria-label': 'Robots and their machines' });
     takeArrowKeys(this.picker);
     this.pickerKey = ''; // of what it shows
     this.title = h('h2', { class: 'ellipsis' });
     this.state = h('span', { class: 'dim ellipsis' });
-    this.toggle = h('button', { class: 'tool', onclick: () => this.toggleList() });
     this.body = h('section', { class: 'card machine-card' },
-      h('div', { class: 'row head' }, this.title, this.state, h('span', { class: 'spacer' }),
-        this.toggle), this.hand.root, this.view.root, legend());
+      h('div', { class: 'row head' }, this.title, this.state), this.hand.root, this.view.root,
+      legend());
     this.root = h('div', { class: 'panel machines' }, this.picker, this.body);
     this.down = new DownList(app);
     this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
-    this.showToggle();
   }
-
-  toggleList() {
-    this.view.prefersList = !this.view.prefersList;
-    remember(PREFERENCE, this.view.prefersList ? 'yes' : 'no');
-    this.showToggle();
-    this.view.update();
-  }
-
-  showToggle() { setText(this.toggle, this.view.prefersList ? 'Graph' : 'List'); }
 
   /**
    * @param {string} robot
@@ -101,7 +87,6 @@ class MachinePanel {
       + (unwell ? ' · waits until it is well: ' + unwell : ''));
     if (this.robot) this.view.show(this.robot, this.path);
     this.hand.show(this.robot, this.path);
-    this.toggle.hidden = !this.view.drawable;
   }
 
   /**

@@ -3,6 +3,7 @@
 import { h } from '../page/dom.js';
 import { FAILURE_CLASSES, chip, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
+import { activeIn, focusState } from './focus_state.js';
 
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Graph} Graph */
@@ -16,6 +17,7 @@ export class StateList {
     this.onOpen = onOpen;
     this.body = h('tbody', {});
     this.key = ''; // of what is shown
+    this.seen = ''; // the state that was brought into view
     const titles = TITLES.map((title) => h('th', { scope: 'col' }, title));
     this.root = h('div', { class: 'table-frame' }, h('table', { class: 'states' },
       h('thead', {}, h('tr', {}, titles)), this.body));
@@ -25,13 +27,32 @@ export class StateList {
    * @param {string} robot
    * @param {Graph} graph
    * @param {MachineState} machine
+   * @param {(label: string) => boolean} wanted
    */
-  set(robot, graph, machine) {
-    const key = JSON.stringify([robot, graph, machine]);
+  set(robot, graph, machine, wanted = () => true) {
+    const states = graph.states.filter(({ label }) => wanted(label));
+    const key = JSON.stringify([robot, graph, machine, states]);
     if (key === this.key) return;
     this.key = key;
-    redraw(this.body, graph.states.map(({ label, nested }) => (
-      this.row(robot + '/' + graph.path + '/' + label, label, nested, graph, machine))));
+    const place = robot + '/' + graph.path + '/';
+    redraw(this.body, states.map(({ label, nested }) => (
+      this.row(place + label, label, nested, graph, machine))));
+    this.bringIntoView(place, focusState(graph, machine));
+  }
+
+  /**
+   * The state that failed or is active, once: a person may scroll away from it.
+   * @param {string} place
+   * @param {string} label
+   */
+  bringIntoView(place, label) {
+    const row = [...this.body.children].find((each) => each.getAttribute('data-id')
+      === place + label);
+    if (!label || !row || this.seen === place + label || !this.root.clientHeight) return;
+    this.seen = place + label;
+    // not by scrollIntoView(), which scrolls the page around it, too
+    const below = row.getBoundingClientRect().top - this.root.getBoundingClientRect().top;
+    this.root.scrollTop += below - this.root.clientHeight / 2;
   }
 
   /**
@@ -45,7 +66,7 @@ export class StateList {
     const { path } = graph;
     const learned = machine.rates[path]?.[label];
     const failed = machine.failed[path]?.state === label;
-    const active = machine.alive && (machine.active[path] || []).includes(label);
+    const active = activeIn(path, machine).includes(label);
     const open = () => this.onOpen(path + '/' + label);
     const name = nested ? h('button', { class: 'link', onclick: open }, label, ' ›') : label;
     return h('tr', { key: id, class: (active ? 'active ' : '') + (failed ? 'failed' : ''),

@@ -1,0 +1,158 @@
+// @ts-check
+// One state of a container, what leads to it and where it leads: for machines that are too large to
+// be drawn as a whole. It follows what fails or is active until a person chooses a state.
+import { h } from '../page/dom.js';
+import { FAILURE_CLASSES, chip, counted, percent, rateBar, times } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+import { activeIn, focusState } from './focus_state.js';
+
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Graph} Graph */
+/** @typedef {import('./types').MachineState} MachineState */
+/**
+ * @typedef {object} Way a transition, as a row
+ * @property {string} label of the state at its other end
+ * @property {string} outcome
+ * @property {number} times how often it was taken
+ * @property {number} share of all that left its source
+ */
+
+const MOST_WAYS = 40; // of each side
+
+export class AroundView {
+  /** @param {(path: string) => void} onOpen a nested container was chosen */
+  constructor(onOpen) {
+    this.onOpen = onOpen;
+    this.before = h('ul', { class: 'ways' });
+    this.state = h('div', { class: 'around-state' });
+    this.after = h('ul', { class: 'ways' });
+    this.follow = h('button', { class: 'tool', title: 'Show what fails or is active',
+      onclick: () => this.choose('') }, 'Follow');
+    this.root = h('div', { class: 'around' },
+      h('section', {}, h('h3', {}, 'Leads here'), this.before),
+      h('section', { class: 'around-middle' }, this.state, this.follow),
+      h('section', {}, h('h3', {}, 'Leads to'), this.after));
+    this.chosen = ''; // by a person; '': it follows
+    this.key = ''; // of what is shown
+    this.place = ''; // robot and path
+    /** @type {() => void} */
+    this.again = () => {};
+  }
+
+  /**
+   * @param {string} label '': follow
+   */
+  choose(label) {
+    this.chosen = label;
+    this.again();
+  }
+
+  /**
+   * @param {string} robot
+   * @param {Graph} graph
+   * @param {MachineState} machine
+   */
+  set(robot, graph, machine) {
+    const place = robot + ' ' + graph.path;
+    if (place !== this.place) this.chosen = '';
+    this.place = place;
+    this.again = () => this.set(robot, graph, machine);
+    if (!graph.states.some(({ label }) => label === this.chosen)) this.chosen = '';
+    const label = this.chosen || focusState(graph, machine) || graph.states[0]?.label || '';
+    this.follow.setAttribute('aria-pressed', String(!this.chosen));
+    const key = JSON.stringify([label, graph, machine]);
+    if (key === this.key) return;
+    this.key = key;
+    redraw(this.before, this.rows(waysTo(label, graph, machine), graph));
+    redraw(this.state, stateFacts(robot, label, graph, machine, this.onOpen));
+    redraw(this.after, this.rows(waysFrom(label, graph, machine), graph));
+  }
+
+  /**
+   * @param {Way[]} ways
+   * @param {Graph} graph
+   * @returns {Child[]}
+   */
+  rows(ways, { states, oracle }) {
+    if (!ways.length) return [h('li', { class: 'dim' }, 'nothing')];
+    const shown = ways.slice(0, MOST_WAYS).map((way) => {
+      const inside = states.some(({ label }) => label === way.label);
+      const name = inside
+        ? h('button', { class: 'link', onclick: () => this.choose(way.label) }, way.label)
+        : h('span', { class: way.label === oracle ? 'to-oracle' : 'end' }, way.label);
+      return h('li', { key: way.label + ' ' + way.outcome, class: way.times ? 'used' : '' }, name,
+        h('span', { class: 'dim' }, ' ', way.outcome, way.times ? ' ' + percent(way.share) : ''));
+    });
+    const left = ways.length - shown.length;
+    return [...shown, left > 0 && h('li', { class: 'dim' }, 'and ' + counted(left, 'other'))];
+  }
+}
+
+/**
+ * @param {string} robot
+ * @param {string} label
+ * @param {Graph} graph
+ * @param {MachineState} machine
+ * @param {(path: string) => void} onOpen
+ * @returns {Child[]}
+ */
+function stateFacts(robot, label, { path, states }, machine, onOpen) {
+  const learned = machine.rates[path]?.[label];
+  const nested = states.some((state) => state.label === label && state.nested);
+  const runs = learned ? learned.successes + learned.failures : 0;
+  return [
+    h('h3', { class: 'around-name', 'data-id': robot + '/' + path + '/' + label }, label),
+    h('p', { class: 'chips' },
+      machine.failed[path]?.state === label && chip('failed', 'bad'),
+      activeIn(path, machine).includes(label) && chip('active', 'accent'),
+      learned && chip(FAILURE_CLASSES[learned.class] || '–', 'class-' + learned.class)),
+    learned && h('p', {}, rateBar(learned.rate), h('span', { class: 'dim' },
+      ' failed ' + (learned.failures ? times(learned.failures) : 'never') + ' of ' + runs)),
+    nested && h('button', { class: 'link', onclick: () => onOpen(path + '/' + label) },
+      'Look into it ›'),
+  ];
+}
+
+/**
+ * @param {string} label
+ * @param {Graph} graph
+ * @param {MachineState} machine
+ */
+function waysFrom(label, { path, edges }, machine) {
+  const counts = (machine.counts[path] || []).filter(([from]) => from === label);
+  return sorted([
+    ...edges.filter(({ from }) => from === label)
+      .map(({ outcome, to }) => ({ label: to, outcome, times: 0, share: 0 })),
+    ...counts.map(([, outcome, to, number, share]) => (
+      { label: to, outcome, times: number, share })),
+  ]);
+}
+
+/**
+ * @param {string} label
+ * @param {Graph} graph
+ * @param {MachineState} machine
+ */
+function waysTo(label, { path, edges }, machine) {
+  const counts = (machine.counts[path] || []).filter(([, , to]) => to === label);
+  return sorted([
+    ...edges.filter(({ to }) => to === label)
+      .map(({ from, outcome }) => ({ label: from, outcome, times: 0, share: 0 })),
+    ...counts.map(([from, outcome, , number, share]) => (
+      { label: from, outcome, times: number, share })),
+  ]);
+}
+
+/**
+ * Each once, those that were taken most first.
+ * @param {Way[]} ways
+ */
+function sorted(ways) {
+  /** @type {Map<string, Way>} */
+  const found = new Map();
+  for (const way of ways) {
+    const key = JSON.stringify([way.label, way.outcome]);
+    if (!found.has(key) || way.times) found.set(key, way);
+  }
+  return [...found.values()].sort((one, two) => two.times - one.times);
+}
