@@ -46,12 +46,15 @@ class Group(NamedTuple):
     task: str
     share: Optional[float]  # of the causes that last. None means the world's own
     extra_causes: bool  # each has one of the extra kinds, and none of the usual ones
+    goes_on: bool  # their world goes on from one to the next
 
     @property
     def told(self) -> str:
         """Return what sets it apart from the other rows of its task, '' where nothing does."""
         if self.extra_causes:
             return ', extra causes'
+        if self.goes_on:
+            return ', continuous operation'
         return '' if self.share is None else ', {:.0%} of the causes last'.format(self.share)
 
 
@@ -255,12 +258,14 @@ def _same_seeds(rows: Sequence[TrialRow]) -> List[str]:
 def groups_of(rows: Sequence[TrialRow]) -> Dict[Group, List[TrialRow]]:
     """Return the rows that may be compared: of one task, and with the same kinds of causes."""
     found: Dict[Group, List[TrialRow]] = {}
-    for row in sorted(
-        rows, key=lambda row: (row.task, bool(row.extra_causes), row.lasting_share or 0.0)
-    ):
-        group = Group(row.task, row.lasting_share, bool(row.extra_causes))
+    for row in rows:
+        group = Group(row.task, row.lasting_share, bool(row.extra_causes), row.hour is not None)
         found.setdefault(group, []).append(row)
-    return found
+    return dict(sorted(found.items(), key=lambda each: _place_of(each[0])))
+
+
+def _place_of(group: Group) -> Tuple[str, bool, bool, float]:
+    return group.task, group.extra_causes, group.goes_on, group.share or 0.0
 
 
 def _variant(name: str, rows: Sequence[TrialRow]) -> str:

@@ -368,6 +368,14 @@ def test_rows_with_extra_causes_are_never_compared_with_the_others():
     assert '(5 trials' in told and '(15 trials' not in told
 
 
+def test_a_world_that_goes_on_is_another_experiment():
+    usual = rows_of('restart', 4) + rows_of('default', 1)
+    going_on = rows_of('default', 3, count=5, hour=0.5)
+    told = format_comparison(going_on + usual)
+    assert told.startswith(format_comparison(usual)) and 'continuous operation\n' in told
+    assert '(5 trials' in told and '(15 trials' not in told
+
+
 def test_a_world_that_goes_on_has_hours_between_its_trials():
     rows = [row._replace(hour=0.5 * number) for number, row in enumerate(rows_of('default', 1, 3))]
     assert robot_hours(rows) == pytest.approx(1.0 + 60 / 3600)

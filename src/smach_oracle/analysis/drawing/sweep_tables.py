@@ -22,7 +22,7 @@ def format_sweeps(kind: str, rows: Sequence[TrialRow]) -> str:
 def _differences(rows: Sequence[TrialRow]) -> List[str]:
     """Tell how often the default needed a person, less how often restart did, at each share."""
     lines: Dict[str, List[List[str]]] = {}
-    for (task, share, _), mine in groups_of(rows).items():
+    for (task, share, *_), mine in groups_of(rows).items():
         variants = by_variant(mine)
         if share is None or DEFAULT not in variants or RESTART not in variants:
             continue
