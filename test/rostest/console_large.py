@@ -1,5 +1,7 @@
 #!/usr/bin/env python3
-"""Large machines on the page: what failed is seen at once, all else is found."""
+"""Large machines on the page: what failed is seen at once, all else is found. Small and large
+pages: what is needed has room.
+"""
 
 import os
 import sys
@@ -129,6 +131,44 @@ class LargeMachines(ConsolePage, unittest.TestCase):
             'It has {} states, which are too many to be shown.'.format(MOST_STATES + 3),
         )
         self.assertEqual(self.browser.errors(), [])
+
+    def at(self, width, height):
+        """The page at another size."""
+        self.browser.driver.execute_cdp_cmd(
+            'Emulation.setDeviceMetricsOverride',
+            {'width': width, 'height': height, 'deviceScaleFactor': 1, 'mobile': width < 500},
+        )
+        self.assertTrue(wait_for(lambda: self.browser.run('return innerWidth') == width))
+
+    def test_7_a_question_has_the_room_of_a_tablet_and_the_queue_that_of_a_wall(self):
+        browser = self.browser
+        browser.click('#tab-questions')
+        self.at(2560, 1440)
+        columns = 'return getComputedStyle(document.querySelector(".queue")).gridTemplateColumns'
+        self.assertTrue(wait_for(lambda: len(browser.run(columns).split()) >= 4))
+        self.at(768, 1024)
+        browser.click('.question-row')
+        self.assertGreater(browser.find('.detail').size['width'], 560)
+        self.assertFalse(browser.find('.detail .back').size['width'] == 0)
+        self.assert_accessible('a question on a tablet')
+
+    def test_8_what_the_page_tells_lies_not_over_the_way_back(self):
+        browser = self.browser
+        self.at(390, 844)
+        browser.run('import("/static/js/page/dom.js").then(({ toast }) => toast("told", "good"))')
+        self.assertTrue(browser.says('told', '#toasts'))
+        self.assertTrue(
+            browser.run(
+                'const { x, y, width, height } = arguments[0].getBoundingClientRect();'
+                'return arguments[0].contains(document.elementFromPoint(x + width / 2,'
+                ' y + height / 2));',
+                browser.find('.detail .back'),
+            )
+        )
+        browser.click('.toast')
+        self.assertTrue(
+            wait_for(lambda: not browser.run('return document.querySelector(".toast")'))
+        )
 
 
 if __name__ == '__main__':

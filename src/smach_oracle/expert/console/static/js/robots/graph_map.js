@@ -10,6 +10,7 @@ import { svg } from '../page/dom.js';
 
 const WIDEST = 150; // px
 const HIGHEST = 200;
+const FROM = 12; // states: a map of fewer would tell nothing
 
 export class GraphMap {
   /** @param {(at: Place) => void} onPlace a place of the drawing was pressed */
@@ -49,7 +50,7 @@ export class GraphMap {
    * @param {Size | null} size
    */
   show({ x, y, width, height }, size) {
-    const whole = !size || (width >= size.width && height >= size.height);
+    const whole = !size || this.boxes.size < FROM || (width >= size.width && height >= size.height);
     this.root.style.display = whole ? 'none' : '';
     if (whole || !size) return;
     this.scale = Math.min(WIDEST / size.width, HIGHEST / size.height);

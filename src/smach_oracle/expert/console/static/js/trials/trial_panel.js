@@ -19,7 +19,7 @@ import { TrialReplay } from './trial_replay.js';
 /** @type {Panel} */
 export const trials = { id: 'trials', title: 'Trials', create: (app) => new TrialPanel(app) };
 
-const NARROW = '(max-width: 760px)';
+const NARROW = '(max-width: 960px)';
 const NO_TRIALS = 'No trials yet. They appear as robots run; of what happened before this console '
   + 'was started, the bags tell.';
 const COUNTED = ': in how many each happened at least once';
