@@ -134,7 +134,8 @@ export function part(id) {
 export function toast(text, kind) {
   const toasts = part('toasts');
   for (const before of [...toasts.children]) if (before.textContent === text) before.remove();
-  const shown = h('div', { class: 'toast ' + kind, onclick: () => shown.remove() }, text);
+  const shown = h('div', { class: 'toast ' + kind }, text);
+  shown.addEventListener('click', () => shown.remove());
   toasts.append(shown);
   setTimeout(() => shown.remove(), TOAST_MS);
 }
