@@ -11,7 +11,7 @@ Without ROS, unless it is asked for. doc/testing.md has the whole of it.
 
 from .bench import Bench
 from .errors import FaultError, ScriptError, TrialLimitError
-from .faults import Fault, FaultKind, crash, fail, hang, overrun
+from .faults import Fault, FaultKind, crash, fail, hang, overrun, stub
 from .injection import faults
 from .observed_trial import ObservedTrial
 from .script import AnswerScript, expert, give_up, goto, no_answer, supersede, use_interface
@@ -44,6 +44,7 @@ __all__ = [
     'run_script',
     'soak',
     'soak_trial',
+    'stub',
     'supersede',
     'use_interface',
 ]

@@ -76,7 +76,7 @@ class Bench:
     ) -> None:
         """Put a machine on the bench.
 
-        :param faults: of every trial. See `fail`, `crash`, `hang` and `overrun`.
+        :param faults: of every trial. See `fail`, `crash`, `hang`, `overrun` and `stub`.
         :param expert: who is asked. See the function `expert`. None: the expert that the machine
             has, else nobody answers, and no time passes. With `ros`: who answers over ROS.
         :param settings: of the oracle, with `preconditions`, as `OracleContainer.wrap` takes them.
@@ -88,6 +88,7 @@ class Bench:
         :raises SettingsError: naming key, value and what is allowed.
         :raises TrialError: for a machine that is wrapped inside another one.
         """
+        __tracebackhide__ = True
         self.machine = machine
         self.faults = tuple(faults)
         self._limit_s = limit_s
@@ -197,6 +198,7 @@ class Bench:
         return trial
 
     def _injection(self, faults: Tuple[Fault, ...], notes: '_TrialNotes') -> Injection:
+        __tracebackhide__ = True
         return Injection(self.machine, faults, notes.note_probe, self._failing)
 
     @contextlib.contextmanager
@@ -279,7 +281,11 @@ class _TrialNotes:
                 call.error,
                 steps,
                 tuple(self.questions),
-                [armed.fault for armed in injection.armed if not armed.happened],
+                [
+                    armed.fault
+                    for armed in injection.armed
+                    if not (armed.happened or armed.fault.is_stub)
+                ],
                 self._states,
                 self._failing,
             )

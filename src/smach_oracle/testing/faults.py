@@ -31,12 +31,15 @@ class Fault(NamedTuple):
     error: Optional[BaseException] = None  # EXCEPTION
     ignores_preempt: bool = False  # HANG
     seconds: float = 0.0  # OVERRUN; wall time
+    is_stub: bool = False  # it stands for the work of the state, and other faults come first
 
     def __str__(self) -> str:
         return '{} {} {}'.format(self.state, self.does(), self.when())
 
     def does(self) -> str:
         """Return what the state does, as the end of a sentence."""
+        if self.is_stub:
+            return 'stands for its work: ends in {!r}'.format(self.outcome)
         if self.kind is FaultKind.OUTCOME:
             return 'ends in {!r}'.format(self.outcome) if self.outcome else 'fails'
         if self.kind is FaultKind.EXCEPTION:
@@ -74,9 +77,22 @@ def fail(
     :param probability: that it happens at each of these visits, drawn with `seed`.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
+    __tracebackhide__ = True
     return _checked(
         Fault(state, FaultKind.OUTCOME, _visits(state, visit), probability, seed, outcome, outputs)
     )
+
+
+def stub(state: str, outcome: str = 'succeeded', **userdata: Any) -> Fault:
+    """Let a state end in an outcome without its work, at each visit: for states that need a robot.
+
+    Other faults of the state come first. `assert_all_faults_happened` asks nothing of it.
+
+    :param state: LABEL or PATH/LABEL, the path relative to the top machine.
+    :param outcome: one that the state has registered.
+    :param userdata: written to the userdata, by the state's own key names.
+    """
+    return Fault(state, FaultKind.OUTCOME, outcome=outcome, outputs=userdata, is_stub=True)
 
 
 def crash(
@@ -91,6 +107,7 @@ def crash(
 
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
+    __tracebackhide__ = True
     given = RuntimeError('a fault of this test') if error is None else error
     return _checked(
         Fault(state, FaultKind.EXCEPTION, _visits(state, visit), probability, seed, error=given)
@@ -110,6 +127,7 @@ def hang(
     :param for_good: it ignores a preempt too. The end of the trial lets it go.
     :raises FaultError: for a visit below 1 or a probability outside 0 to 1.
     """
+    __tracebackhide__ = True
     return _checked(
         Fault(
             state,
@@ -131,6 +149,7 @@ def overrun(
 
     :raises FaultError: for a visit below 1, a probability outside 0 to 1, or a time below 0.
     """
+    __tracebackhide__ = True
     if not (isinstance(seconds, (int, float)) and 0 <= seconds < math.inf):
         raise FaultError(
             'a fault of {}: {!r} s is not a time; give seconds from 0'.format(state, seconds)
@@ -148,6 +167,7 @@ def overrun(
 
 
 def _visits(state: str, visit: Visits) -> Tuple[int, ...]:
+    __tracebackhide__ = True
     if visit is None:
         return ()
     given = (visit,) if isinstance(visit, int) else tuple(visit)
@@ -164,6 +184,7 @@ def _visits(state: str, visit: Visits) -> Tuple[int, ...]:
 
 
 def _checked(fault: Fault) -> Fault:
+    __tracebackhide__ = True
     if not (isinstance(fault.probability, (int, float)) and 0 <= fault.probability <= 1):
         raise FaultError(
             'a fault of {}: probability {!r} is not within 0 to 1'.format(

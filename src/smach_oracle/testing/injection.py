@@ -15,10 +15,10 @@ from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingName
 
 from .errors import FaultError
 from .faults import Fault, FaultKind
-from .places import StatePlace, find_place, places_of
+from .places import StatePlace, did_you_mean, find_place, places_of
 
 _PERIOD_S = 0.01  # how soon a fault that waits notices a preempt
-# told of a place, its visit, what happens ('entered', 'fault', 'ended', 'raised'), and a text
+# told of a place, its visit, what happens (entered, fault, stub, ended, raised), and a text
 Report = Callable[[StatePlace, int, str, str], None]
 _MISSING = object()
 
@@ -107,9 +107,13 @@ class Injection:
 
         :raises FaultError: where a state is not there, or has not registered an outcome.
         """
+        __tracebackhide__ = True
         self._places = places_of(machine)
         self._failing = FailingNames() if failing is None else failing
-        self.armed = [self._armed(fault) for fault in faults]
+        self.armed: List[ArmedFault] = []
+        for fault in faults:
+            self.armed.append(self._armed(fault))
+        self.armed.sort(key=lambda armed: armed.fault.is_stub)  # the others come first
         self._report = report
         self._lifted = threading.Event()
         self._lock = threading.Lock()
@@ -117,14 +121,18 @@ class Injection:
         self._changed: List[Tuple[smach.State, object]] = []  # and what stood there before
 
     def _armed(self, fault: Fault) -> ArmedFault:
+        __tracebackhide__ = True
         if not isinstance(fault, Fault):
             raise FaultError(
-                '{!r} is not a fault; make one with fail, crash, hang or overrun'.format(fault)
+                '{!r} is not a fault; make one with fail, crash, hang, overrun or stub'.format(
+                    fault
+                )
             )
         place = find_place(self._places, fault.state, 'a fault')
         return ArmedFault(fault, place, self._outcome(fault, place))
 
     def _outcome(self, fault: Fault, place: StatePlace) -> str:
+        __tracebackhide__ = True
         if fault.kind is not FaultKind.OUTCOME:
             return ''
         outcomes = sorted(place.state.get_registered_outcomes(), key=str)
@@ -141,8 +149,11 @@ class Injection:
             )
         )
         raise FaultError(
-            'a fault: {} {}; name one of {}'.format(
-                place.path, what, ', '.join(map(repr, outcomes)) or 'none'
+            'a fault: {} {}{}; name one of {}'.format(
+                place.path,
+                what,
+                did_you_mean(fault.outcome, outcomes),
+                ', '.join(map(repr, outcomes)) or 'none',
             )
         )
 
@@ -197,7 +208,9 @@ class Injection:
         self._report(place, visit, 'entered', '')
         try:
             if due:
-                self._report(place, visit, 'fault', due[0].does())
+                self._report(
+                    place, visit, 'stub' if due[0].fault.is_stub else 'fault', due[0].does()
+                )
                 outcome = due[0].strike(userdata, self._lifted, work)
             else:
                 outcome = work()
@@ -228,6 +241,7 @@ def faults(machine: smach.StateMachine, given: Iterable[Fault]) -> Iterator[Inje
     :raises FaultError: where a state is not there, or has not registered an outcome. Nothing has
         been changed then.
     """
+    __tracebackhide__ = True
     injection = Injection(machine, given)
     injection.put_in()
     try:

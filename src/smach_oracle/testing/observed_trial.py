@@ -55,6 +55,12 @@ class ObservedTrial:
         return self._states_of(EventKind.QUERY_OPENED)
 
     @property
+    def duration_s(self) -> float:
+        """Return the seconds of wall time from the first to the last thing that happened."""
+        steps = self._seen.steps
+        return max(0.0, steps[-1].wall_time - steps[0].wall_time) if steps else 0.0
+
+    @property
     def decisions(self) -> List[str]:
         """Return the sentences of all decisions."""
         return [event.text for event in self.events if event.kind is EventKind.DECISION]
@@ -112,6 +118,19 @@ class ObservedTrial:
         return self._require(
             isinstance(self.error, kind),
             'the trial was to raise {}, and it {}'.format(kind.__name__, self.ending()),
+        )
+
+    def assert_took_less_than(self, seconds: float) -> 'ObservedTrial':
+        """Fail unless the trial took less wall time.
+
+        :raises AssertionError: with the course of the trial.
+        """
+        __tracebackhide__ = True
+        return self._require(
+            self.duration_s < seconds,
+            'the trial was to take less than {:g} s, and it took {:.2f} s'.format(
+                seconds, self.duration_s
+            ),
         )
 
     def assert_recovered(self, state: str = '') -> 'ObservedTrial':

@@ -1,6 +1,7 @@
 """The states of a machine, at any depth, by the names that tests give them."""
 
-from typing import Dict, Iterator, List, NamedTuple, Tuple
+from difflib import get_close_matches
+from typing import Dict, Iterable, Iterator, List, NamedTuple, Tuple
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -65,6 +66,7 @@ def find_place(places: List[StatePlace], name: str, what: str) -> StatePlace:
 
     :raises FaultError: where there is no such state, or where there are several.
     """
+    __tracebackhide__ = True
     found = [place for place in places if place.path == name]
     found = found or [place for place in places if place.label == name]
     found = found or [
@@ -78,8 +80,19 @@ def find_place(places: List[StatePlace], name: str, what: str) -> StatePlace:
                 what, name, len(found), ', '.join(place.path for place in found)
             )
         )
+    known = [each for place in places for each in (place.path, place.label)]
     raise FaultError(
-        '{}: there is no state {!r}; there are {}'.format(
-            what, name, ', '.join(place.path for place in places) or 'none'
+        '{}: there is no state {!r}{}; there are {}'.format(
+            what,
+            name,
+            did_you_mean(name, known),
+            ', '.join(place.path for place in places) or 'none',
         )
     )
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a question about the known name that is most like another one, '' for none."""
+    by_capitals = {each.upper(): each for each in known}
+    likely = get_close_matches(name.upper(), by_capitals, 1)
+    return ' (did you mean {!r}?)'.format(by_capitals[likely[0]]) if likely else ''

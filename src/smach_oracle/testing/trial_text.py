@@ -13,7 +13,7 @@ class ProbedStep(NamedTuple):
 
     path: str  # PATH/LABEL below the top machine
     visit: int
-    what: str  # entered, fault, ended, raised
+    what: str  # entered, fault, stub, ended, raised
     text: str
     wall_time: float  # s since the epoch
     told: bool = False  # whether events tell the visits of this state too
@@ -90,8 +90,8 @@ def _fails(before: TrialStep, step: Event) -> bool:
 
 
 def _of_probe(steps: Sequence[TrialStep], index: int, step: ProbedStep) -> str:
-    if step.what == 'fault':
-        return 'fault: {} (visit {})'.format(step.text, step.visit)
+    if step.what in ('fault', 'stub'):
+        return '{}: {} (visit {})'.format(step.what, step.text, step.visit)
     if step.told:
         return ''
     if step.what == 'entered':
@@ -103,7 +103,7 @@ def _ends_next(steps: Sequence[TrialStep], index: int, path: str) -> bool:
     """Whether the next thing told after a state was entered is its end."""
     for step in steps[index + 1 :]:
         if isinstance(step, ProbedStep):
-            if step.what == 'fault' or step.told:
+            if step.what in ('fault', 'stub') or step.told:
                 continue
             return step.path == path and step.what in ('ended', 'raised')
         return place_of(step) == path and step.kind in (EventKind.TRANSITION, EventKind.FAILURE)

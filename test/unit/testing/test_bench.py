@@ -166,7 +166,7 @@ def test_an_error_of_the_machine_is_in_the_trial():
 
 def test_a_fault_that_fits_no_state_leaves_the_machine_bare():
     machine = fetch_machine()
-    with pytest.raises(FaultError, match="no state 'PIKC'; there are DETECT, PICK, PLACE"):
+    with pytest.raises(FaultError, match="no state 'PIKC' .*; there are DETECT, PICK, PLACE"):
         Bench(machine, [fail('PIKC')])
     assert type(machine) is smach.StateMachine
     with Bench(machine) as bench:

@@ -1,5 +1,7 @@
 """Faults in machines of every kind, which stay as they were."""
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -14,7 +16,7 @@ from bench_machines import (
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.testing import FaultError, crash, fail, faults, hang, overrun
+from smach_oracle.testing import FaultError, crash, fail, faults, hang, overrun, stub
 from smach_oracle.testing.places import places_of
 
 
@@ -185,16 +187,16 @@ def test_a_machine_may_be_wrapped_while_faults_are_in_it():
     [
         (
             lambda: fail('PIKC'),
-            "a fault: there is no state 'PIKC'; there are KITCHEN, "
+            "a fault: there is no state 'PIKC' (did you mean 'PICK'?); there are KITCHEN, "
             'KITCHEN/DETECT, KITCHEN/PICK, KITCHEN/PLACE',
         ),
         (lambda: fail('HALL/PICK'), "there is no state 'HALL/PICK'"),
         (
             lambda: fail('PICK', outcome='abroted'),
-            "a fault: KITCHEN/PICK has no outcome 'abroted'; "
+            "a fault: KITCHEN/PICK has no outcome 'abroted' (did you mean 'aborted'?); "
             "name one of 'aborted', 'preempted', 'succeeded'",
         ),
-        (lambda: 'PICK', "'PICK' is not a fault; make one with fail, crash, hang or overrun"),
+        (lambda: 'PICK', "'PICK' is not a fault; make one with fail, crash, hang, overrun or stub"),
     ],
 )
 def test_a_fault_that_fits_no_state_names_what_is_there(fault, said):
@@ -205,6 +207,47 @@ def test_a_fault_that_fits_no_state_names_what_is_there(fault, said):
             raise AssertionError('it was taken')
     assert said in str(refused.value)
     assert everything_in(machine) == before
+
+
+def test_a_name_that_is_like_none_is_not_guessed_at():
+    with pytest.raises(FaultError, match="no state 'WASH_THE_DISHES'; there are"):
+        faults(nested_machine(), [fail('WASH_THE_DISHES')]).__enter__()
+
+
+LITTLE_TEST = """
+import smach
+from smach_oracle.testing import Bench, fail
+
+def test_it():
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    with machine:
+        pick = smach.CBState(lambda userdata: 'succeeded', ['succeeded', 'aborted'])
+        smach.StateMachine.add('PICK', pick)
+    Bench(machine, [fail('PIKC')])
+"""
+
+
+def test_pytest_leaves_out_the_frames_of_the_kit(tmp_path):
+    (tmp_path / 'test_little.py').write_text(LITTLE_TEST)
+    told = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', str(tmp_path)],
+        stdout=subprocess.PIPE,
+        text=True,
+    ).stdout
+    assert "did you mean 'PICK'?" in told
+    assert not any(file in told for file in ('places.py', 'injection.py', 'bench.py', 'faults.py'))
+
+
+def test_a_stub_stands_for_the_work_of_a_state_and_faults_come_first():
+    machine = fetch_machine()
+    state_of(machine, 'PICK').register_output_keys(['grasp'])
+    with faults(machine, [stub('PICK', grasp='from above'), fail('PICK', visit=1)]) as injection:
+        assert machine.execute() == 'aborted'
+        assert 'grasp' not in machine.userdata
+        assert machine.execute() == 'succeeded'
+    assert machine.userdata.grasp == 'from above'
+    assert [armed.happened for armed in injection.armed] == [1, 1]
+    assert state_of(machine, 'PICK').runs == 0
 
 
 @pytest.mark.parametrize('name', ['PICK', 'KITCHEN/PICK', 'SM_ROOT/KITCHEN/PICK'])

@@ -4,7 +4,7 @@ import pytest
 from bench_machines import fetch_machine, nested_machine
 
 import smach
-from smach_oracle.testing import Bench, expert, fail, give_up, goto
+from smach_oracle.testing import Bench, expert, fail, give_up, goto, overrun, stub
 
 COURSE = """The trial ended in 'succeeded'. 1 failure, 1 question.
   DETECT  ends in succeeded -> PICK
@@ -239,3 +239,18 @@ def test_a_failed_assertion_points_at_the_line_of_the_test():
         trial.assert_not_asked()
     hidden = [entry.frame.f_locals.get('__tracebackhide__', False) for entry in raised.traceback]
     assert hidden[0] is False and all(hidden[1:])
+
+
+def test_a_stub_is_told_and_need_not_happen():
+    trial = trial_of(fetch_machine(), [stub('DETECT'), fail('PICK'), stub('PLACE')], give_up())
+    trial.assert_all_faults_happened()
+    assert "DETECT  stub: stands for its work: ends in 'succeeded' (visit 1)" in str(trial)
+    assert 'did not happen' not in str(trial)
+
+
+def test_a_trial_took_less_than_a_time():
+    trial = trial_of(fetch_machine(), [overrun('PICK', 0.2)])
+    assert 0.2 <= trial.duration_s < 20.0
+    assert trial.assert_took_less_than(20.0) is trial
+    with pytest.raises(AssertionError, match='was to take less than 0.1 s, and it took 0'):
+        trial.assert_took_less_than(0.1)
