@@ -39,7 +39,7 @@ machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
 with machine:
     smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
     smach.StateMachine.add('PLACE', Place())
-sys.exit(machine.execute() != 'succeeded')
+print('It ended in', machine.execute())
 """
 
 
