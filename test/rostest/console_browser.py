@@ -127,6 +127,16 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
             browser.find('input.why').get_attribute('value'), 'typed before', 'no work is lost'
         )
 
+    def test_2_trials_that_began_before_the_server_was_restarted_are_listed(self):
+        browser = self.browser
+        browser.click('#tab-trials')
+        self.assertTrue(browser.says('1 failure · 1 question', '.trial'), browser.text('.panel'))
+        self.assertIn('running', browser.text('.trial'))
+        self.assertTrue(browser.says('trial 2 of its program', '.trial-detail p'))
+        self.assertIn('events were not heard', browser.text('.trial-detail p'))
+        browser.click('#tab-questions')
+        self.assertTrue(browser.says(YOURS), 'the question is still there')
+
     def test_3_a_second_console_takes_over_and_answers(self):
         browser = self.browser
         browser.driver.switch_to.new_window('tab')

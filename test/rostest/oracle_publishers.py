@@ -10,9 +10,10 @@ from typing import List, NamedTuple
 import rospy
 from waiting import wait_for
 
-from smach_oracle.msg import OracleEvent, OracleRates
+from smach_oracle.msg import NodeTrials, OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import EventKind, EventSource
 from smach_oracle.ros.publishers import EventPublisher, RatesPublisher
+from smach_oracle.ros.trials.trials_publisher import TrialsPublisher
 
 
 class FakeRow(NamedTuple):
@@ -121,6 +122,33 @@ class PublishersTest(unittest.TestCase):
         self.assertTrue(
             wait_for(lambda: len(received) == 1 and received[0].states[0].successes == 1)
         )
+
+    def test_who_comes_late_hears_which_trial_runs_and_its_counts(self) -> None:
+        publisher = TrialsPublisher(period_s=0.01)
+        source = self.machine.events
+        publisher.watch('TOP', source)
+        nobody_yet = self.subscribe('~oracle/trials', NodeTrials)
+        for trial in ('trial-1', 'trial-2'):
+            source.begin_trial(trial)
+            source.emit(EventKind.TRIAL_START, 'TOP')
+            source.emit(EventKind.FAILURE, 'TOP', state='PICK')
+            source.emit(EventKind.QUERY_OPENED, 'TOP', state='PICK', query_id=trial)
+            if trial == 'trial-1':
+                source.emit(EventKind.TRIAL_END, 'TOP', outcome='aborted')
+
+        def told() -> tuple:
+            found = nobody_yet[-1].trials[0]
+            return found.trial_id, found.nth, found.failures, found.questions, found.running
+
+        self.assertTrue(
+            wait_for(lambda: nobody_yet and told() == ('trial-2', 2, 1, 1, True)), nobody_yet
+        )
+        late = self.subscribe('~oracle/trials', NodeTrials)
+        self.assertTrue(wait_for(lambda: len(late) == 1), 'not latched')
+        self.assertEqual(late[0].trials, nobody_yet[-1].trials)
+        source.emit(EventKind.TRIAL_END, 'TOP', outcome='succeeded')
+        self.assertTrue(wait_for(lambda: not late[-1].trials[0].running))
+        self.assertEqual((late[-1].trials[0].ending, late[-1].trials[0].seq), ('success', 3))
 
     def test_a_machine_that_is_gone_is_forgotten(self) -> None:
         publisher = RatesPublisher('~oracle/rates_of_nobody', period_s=0.01)

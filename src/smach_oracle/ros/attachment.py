@@ -54,6 +54,7 @@ from .recording.recorder_topics import MessageClass, action_topics, audit_topic,
 from .shutdown import ShutdownGuard
 from .signals.latch import start_thread
 from .stored import prepare_store
+from .trials.trials_publisher import TrialsPublisher
 from .waiting.service_waiting import ServiceWaiting
 from .waiting.work_clock import MachineTimeWaiting, WorkClock, clock_of_work
 
@@ -98,6 +99,7 @@ class Attachments:
         self._expert: Optional[ExpertQueryClient] = None
         self._events: Optional[EventPublisher] = None
         self._rates: Optional[RatesPublisher] = None
+        self._told_trials: Optional[TrialsPublisher] = None
         self._hand: Optional[HandServer] = None
         self._diagnostics: Optional[DiagnosticsPublisher] = None
         # bound once: a machine listens again where it is given another one
@@ -121,7 +123,8 @@ class Attachments:
         self._on_ros.clear()
         self._introspection.clear()
         self._shown.clear()
-        self._expert = self._events = self._rates = self._hand = self._diagnostics = None
+        self._expert = self._events = self._rates = self._told_trials = None
+        self._hand = self._diagnostics = None
         self._node_started, self.work_clock = False, None
         self.has_parents_node = rospy.core.is_initialized()
         leave_node_to_parent()
@@ -236,6 +239,7 @@ class Attachments:
         rospy.on_shutdown(self._on_shutdown)
         self._events = EventPublisher()
         self._rates = RatesPublisher()
+        self._told_trials = TrialsPublisher()
         self._hand = HandServer()
         if private_flag('diagnostics', True):
             self._diagnostics = DiagnosticsPublisher(
@@ -253,6 +257,8 @@ class Attachments:
             oracle.events.observers.append(self._events)
         if self._rates is not None:
             self._rates.watch(machine)
+        if self._told_trials is not None:
+            self._told_trials.watch(oracle.path, oracle.events)
         if introspect and not has_introspection(machine):
             self._introspect(machine)
         if self._hand is not None:

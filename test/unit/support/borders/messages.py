@@ -14,6 +14,7 @@ from smach_msgs.msg import (
     SmachContainerStatus,
     SmachContainerStructure,
 )
+from smach_oracle.expert.console.feeds.told_trials import told_trials
 from smach_oracle.expert.console.feeds.views import event_of
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.trials.trial_log import TrialLog
@@ -24,6 +25,7 @@ from smach_oracle.msg import (
     ExpertDecision,
     ExpertQueryGoal,
     ExpertQueryResult,
+    NodeTrials,
     OracleEvent,
     OracleRates,
     SharedAutonomyGoal,
@@ -255,6 +257,13 @@ def _take_events(events: List[OracleEvent]) -> str:
     return _written(robot)
 
 
+def _take_trials(told: NodeTrials) -> str:
+    log = TrialLog()
+    log.take_told('/robot', told_trials(told))
+    _shown(log.overview())
+    return TAKEN
+
+
 def _shown(*views: Any) -> None:
     for each in views:
         json.dumps(each, allow_nan=False)
@@ -368,6 +377,7 @@ BORDERS = [
         (TAKEN,),
     ),
     Border('topic OracleRates, console', message(OracleRates), _robot('on_rates'), (TAKEN,)),
+    Border('topic NodeTrials, console', message(NodeTrials), _take_trials, (TAKEN,)),
     Border('topic ControlStatus, console', message(ControlStatus), _robot('on_control'), (TAKEN,)),
     Border(
         'topic SmachContainerStructure',

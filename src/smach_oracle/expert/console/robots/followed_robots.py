@@ -9,11 +9,12 @@ import rosgraph
 import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
+from smach_oracle.msg import ControlStatus, NodeTrials, OracleEvent, OracleRates
 from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
 from ...robot_topics import READ_BYTES
+from ..feeds.told_trials import told_trials
 from ..feeds.views import event_of
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.robot_clocks import RobotClocks
@@ -29,6 +30,7 @@ CONTROL = '/oracle/control'
 _TOPICS: Dict[str, Tuple[Any, str]] = {
     '/oracle/events': (OracleEvent, 'on_event'),
     '/oracle/rates': (OracleRates, 'on_rates'),
+    '/oracle/trials': (NodeTrials, 'on_trials'),
     CONTROL: (ControlStatus, 'on_control'),
     '/smach/container_structure': (SmachContainerStructure, 'on_structure'),
     '/smach/container_status': (SmachContainerStatus, 'on_status'),
@@ -36,7 +38,7 @@ _TOPICS: Dict[str, Tuple[Any, str]] = {
 
 
 class FollowedRobots:
-    """Follows all topics of four types and names. The name in front of them is the robot's."""
+    """Follows all topics of six types and names. The name in front of them is the robot's."""
 
     def __init__(
         self,
@@ -151,6 +153,8 @@ class FollowedRobots:
             self._robots[name] = robot
 
     def _receiver(self, robot: FollowedRobot, method: str) -> Callable[[Any], None]:
+        if method == 'on_trials':  # latched, as the next two
+            return lambda message: self._log.take_told(robot.name, told_trials(message))
         take_in = getattr(robot, method)
         if method == 'on_control':
             return lambda message: self._take_control(robot, message)

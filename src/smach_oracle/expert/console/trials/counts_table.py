@@ -9,21 +9,26 @@ from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
 from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 
+from ..feeds.told_trials import ToldTrial
+
 ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.OTHER, TrialEnding.PREEMPTED)
 COUNTED = ('failures', 'recoveries', 'questions', 'answered')
 
 
-def has_oracle(counter: TrialCounter) -> bool:
+Counted = Union[TrialCounter, ToldTrial]
+
+
+def has_oracle(counter: Counted) -> bool:
     """Whether a trial runs with an oracle. It does where nothing else is known yet."""
     return counter.recovers is not False
 
 
-def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
+def counts_table(trials: Iterable[Counted]) -> List[Dict[str, Any]]:
     """Return how many trials had each thing at least once, and how often it happened in all.
 
     Counted by experiment and by with or without oracle, over the trials that have ended.
     """
-    groups: Dict[Tuple[str, bool], List[TrialCounter]] = {}
+    groups: Dict[Tuple[str, bool], List[Counted]] = {}
     for trial in trials:
         if trial.ending is not TrialEnding.UNFINISHED:
             groups.setdefault((trial.experiment, has_oracle(trial)), []).append(trial)
@@ -31,7 +36,7 @@ def counts_table(trials: Iterable[TrialCounter]) -> List[Dict[str, Any]]:
     return [_row(experiment, oracle, groups[experiment, oracle]) for experiment, oracle in in_order]
 
 
-def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[str, Any]:
+def _row(experiment: str, oracle: bool, trials: Sequence[Counted]) -> Dict[str, Any]:
     endings = Counter(trial.ending for trial in trials)
     return {
         'experiment': experiment,
@@ -47,7 +52,7 @@ def _row(experiment: str, oracle: bool, trials: Sequence[TrialCounter]) -> Dict[
     }
 
 
-def unwell(trials: Iterable[Union[TrialCounter, TrialSummary]]) -> float:
+def unwell(trials: Iterable[Union[Counted, TrialSummary]]) -> float:
     """Return the time (s) for which all together waited until the robot was well."""
     return round(sum(trial.unwell_s for trial in trials), 1)
 

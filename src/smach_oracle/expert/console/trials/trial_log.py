@@ -6,12 +6,13 @@ Thread-safe, bounded.
 import json
 import threading
 from collections import OrderedDict
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.settings.failure_rule import EndMeaning
 
+from ..feeds.told_trials import ToldTrial
 from ..feeds.views import event_view
 from .counts_table import counts_table, has_oracle
 from .packed_texts import PackedTexts
@@ -23,6 +24,9 @@ MOST_DETAILED = 60
 MOST_EVENTS = 4000  # of a trial: the first ones
 MOST_BYTES = 16 * 2**20  # of the events of all trials, as they are kept
 SHOWN_TRIALS = 300
+GONE = 'the robot is gone'
+UNHEARD_END = 'its end was not heard'
+KEPT = 'kept to go on later'
 _NOT_WELL = (EndMeaning.FAILURE, EndMeaning.PREEMPTED)
 
 
@@ -31,15 +35,24 @@ class _LoggedTrial:
 
     def __init__(self, robot: str) -> None:
         self.robot = robot
-        self.robot_gone = False
-        self.counts = TrialCounter()
+        self.missing = ''  # why its end was not heard
+        self.heard = TrialCounter()
+        self.told: Optional[ToldTrial] = None  # as its robot counts it, where it says so
         self.last_seq = -1  # of the events heard
         self.events = PackedTexts()  # each as JSON
         self.detailed = True  # whether the events are kept
 
     @property
+    def counts(self) -> Union[TrialCounter, ToldTrial]:
+        """Return the counts that know most: the robot's own, unless later events were heard."""
+        told = self.told
+        if told is None or (self.heard.last_seq > told.last_seq and not self.heard.lost_events):
+            return self.heard
+        return told
+
+    @property
     def ended(self) -> bool:
-        """Whether its end was heard."""
+        """Whether it is known to have ended."""
         return self.counts.ending is not TrialEnding.UNFINISHED
 
 
@@ -68,14 +81,11 @@ class TrialLog:
         ended = event.kind in (EventKind.CONTAINER_END, EventKind.TRIAL_END)
         with self._lock:
             self._version += 1
-            trial = self._trials.get(event.trial_id)
-            if trial is None:
-                trial = self._trials[event.trial_id] = _LoggedTrial(robot)
-                self._forget()
+            trial = self._known(robot, event.trial_id)
             if event.seq <= trial.last_seq:
                 return  # it was heard: a bag of the trial is played
             trial.last_seq = event.seq
-            trial.counts.add(event)
+            trial.heard.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
                 before = trial.events.size
                 trial.events.append(json.dumps(event_view(event), allow_nan=False))
@@ -86,8 +96,21 @@ class TrialLog:
                 robot,
                 event,
                 ended
-                and (not event.outcome or trial.counts.rule.meaning(event.outcome) in _NOT_WELL),
+                and (not event.outcome or trial.heard.rule.meaning(event.outcome) in _NOT_WELL),
             )
+
+    def take_told(self, robot: str, told: Sequence[ToldTrial]) -> None:
+        """Take in the latest trials of a robot's machines, as the robot tells them.
+
+        One that ended before anything was heard of it is left out.
+        """
+        with self._lock:
+            self._version += 1
+            for each in told:
+                if each.trial_id in self._trials or each.running:
+                    trial = self._known(robot, each.trial_id)
+                    trial.told, trial.missing = each, ''
+                self._end_earlier(robot, each)
 
     def end_missing(self, robot: str) -> None:
         """A robot is gone: what still ran there has ended without a word."""
@@ -95,15 +118,14 @@ class TrialLog:
             self._version += 1
             for trial in self._trials.values():
                 if trial.robot == robot and not trial.ended:
-                    trial.robot_gone = True
+                    trial.missing = GONE
 
     def overview(self) -> Dict[str, Any]:
         """Return the table of counts and the latest trials, newest first, as plain data."""
         with self._lock:
-            trials = [
-                _row(trial_id, trial)
-                for trial_id, trial in list(self._trials.items())[-SHOWN_TRIALS:]
-            ]
+            latest = list(self._trials.items())[-SHOWN_TRIALS:]
+            latest.sort(key=lambda item: item[1].counts.start_time)
+            trials = [_row(trial_id, trial) for trial_id, trial in latest]
             return {
                 'table': counts_table(trial.counts for trial in self._trials.values()),
                 'trials': trials[::-1],
@@ -127,6 +149,27 @@ class TrialLog:
         with self._lock:
             return self._recoveries.recovery_counts(place, target)
 
+    def _known(self, robot: str, trial_id: str) -> _LoggedTrial:
+        """The trial of an id, also one that is new; with the lock held."""
+        trial = self._trials.get(trial_id)
+        if trial is None:
+            trial = self._trials[trial_id] = _LoggedTrial(robot)
+            self._forget()
+        return trial
+
+    def _end_earlier(self, robot: str, latest: ToldTrial) -> None:
+        """End the earlier trials of a machine whose ends were not heard; with the lock held."""
+        for trial_id, trial in self._trials.items():
+            counts = trial.counts
+            if (
+                trial_id != latest.trial_id
+                and trial.robot == robot
+                and not trial.ended
+                and counts.experiment == latest.experiment
+                and counts.start_time < latest.start_time
+            ):
+                trial.missing = UNHEARD_END
+
     def _forget(self) -> None:
         """Make room for a new trial; with the lock held."""
         while len(self._trials) > MOST_TRIALS:
@@ -149,7 +192,10 @@ class TrialLog:
 
 def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
     counts = trial.counts
-    outcome = 'the robot is gone' if trial.robot_gone and not trial.ended else counts.outcome
+    outcome = counts.outcome
+    if not trial.ended:
+        kept = KEPT if trial.told and not trial.told.running else ''
+        outcome = trial.missing or kept or outcome
     return {
         'id': trial_id,
         'robot': trial.robot,
@@ -163,6 +209,13 @@ def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
         'recoveries': counts.recoveries,
         'questions': counts.questions,
         'answered': counts.answered,
-        'lost': counts.lost_events,
+        'lost': _unheard(trial),
+        'nth': trial.told.nth if trial.told else 0,
         'detailed': trial.detailed,
     }
+
+
+def _unheard(trial: _LoggedTrial) -> int:
+    """How many of its events the console has not."""
+    told = trial.told.last_seq + 1 if trial.told else 0
+    return trial.heard.lost_events + max(0, told - (trial.last_seq + 1))

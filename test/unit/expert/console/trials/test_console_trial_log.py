@@ -11,14 +11,17 @@ import pytest
 import smach
 from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
+from smach_oracle.expert.console.feeds.told_trials import told_trials
 from smach_oracle.expert.console.feeds.views import event_view
 from smach_oracle.expert.console.trials import recovery_statistics, trial_log
 from smach_oracle.expert.console.trials.counts_table import counts_table, has_oracle
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryStatistics
 from smach_oracle.expert.console.trials.trial_log import TrialLog
+from smach_oracle.msg import NodeTrials
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.ros.trials.trials_publisher import LatestTrial
 
 
 class Chancy(smach.State):
@@ -383,3 +386,88 @@ def test_a_robot_that_dies_leaves_its_trial_marked():
     log.add('/robot', event(EventKind.TRIAL_START))
     log.end_missing('/robot')
     assert log.overview()['trials'][0]['outcome'] == 'the robot is gone'
+
+
+def told_by_robot(events, nth=1):
+    """Return what the robot's own node tells of a trial that has come so far."""
+    latest = LatestTrial('TASK', lambda path: None)
+    for number in range(nth - 1):
+        latest(event(EventKind.TRIAL_START, trial='before {}'.format(number)))
+    for each in events:
+        latest(each)
+    return told_trials(NodeTrials(trials=[latest.message()]))
+
+
+COUNTED = ('id', 'experiment', 'start', 'ending', 'outcome', 'failures', 'recoveries', 'questions')
+
+
+@pytest.mark.parametrize('heard_from', [0, 5, None])
+def test_a_trial_that_began_before_the_console_has_the_counts_of_its_robot(heard_from):
+    for events in run_trials(10):
+        log, whole = TrialLog(), TrialLog()
+        sofar = events[:-1]
+        log.take_told('/robot', told_by_robot(sofar, nth=3))
+        for each in sofar:
+            whole.add('/robot', each)
+        for each in sofar[heard_from:] if heard_from is not None else ():
+            log.add('/robot', each)
+        (row,), (true,) = log.overview()['trials'], whole.overview()['trials']
+        assert {key: row[key] for key in COUNTED} == {key: true[key] for key in COUNTED}
+        unheard = len(sofar) if heard_from is None else min(heard_from, len(sofar))
+        assert (row['nth'], row['lost']) == (3, unheard)
+
+
+def test_a_trial_that_was_heard_in_part_is_counted_whole_when_it_ends():
+    events = next(each for each in run_trials(10) if len(each) > 20)
+    log = TrialLog()
+    log.take_told('/robot', told_by_robot(events[:9]))
+    for each in events[9:]:
+        log.add('/robot', each)
+    log.take_told('/robot', told_by_robot(events))
+    (row,) = log.overview()['table']
+    assert row['counts'] == counts_table([count(events)])[0]['counts']
+
+
+def test_events_that_are_newer_than_what_the_robot_has_told_count():
+    events = next(each for each in run_trials(10) if count(each).failures)
+    log = TrialLog()
+    log.take_told('/robot', told_by_robot(events[:1]))
+    for each in events:
+        log.add('/robot', each)
+    assert log.overview()['trials'][0]['failures'] == count(events).failures
+
+
+def test_a_trial_that_ended_before_the_console_came_is_not_listed():
+    log = TrialLog()
+    log.take_told('/robot', told_by_robot(run_trials(1)[0]))
+    assert log.overview() == {'table': [], 'trials': [], 'heard': 0}
+
+
+def test_a_later_trial_of_the_same_machine_ends_one_whose_end_was_not_heard():
+    log = TrialLog()
+    begun = [
+        event(EventKind.TRIAL_START, trial=trial, path=path)._replace(wall_time=wall_time)
+        for trial, path, wall_time in (('old', 'TASK', 1.0), ('other', 'B', 1.0), ('new', 'TASK', 2.0))
+    ]
+    for each in begun[:2]:
+        log.add('/robot', each)
+    log.take_told('/robot', told_by_robot(begun[2:]))
+    rows = {row['id']: row['outcome'] for row in log.overview()['trials']}
+    assert rows == {'old': trial_log.UNHEARD_END, 'other': '', 'new': ''}
+
+
+def test_a_trial_that_is_kept_does_not_run():
+    log = TrialLog()
+    begun = event(EventKind.TRIAL_START)
+    log.add('/robot', begun)
+    kept = event(EventKind.TRIAL_END, data={'ended_by': 'kept'})
+    log.take_told('/robot', told_by_robot([begun, kept]))
+    assert log.overview()['trials'][0]['outcome'] == trial_log.KEPT
+
+
+def test_trials_are_listed_by_when_they_began_not_by_when_they_were_found():
+    log = TrialLog()
+    for trial, wall_time in (('2', 2.0), ('1', 1.0), ('3', 3.0)):
+        begun = event(EventKind.TRIAL_START, trial=trial)._replace(wall_time=wall_time)
+        log.take_told('/' + trial, told_by_robot([begun]))
+    assert [row['id'] for row in log.overview()['trials']] == ['3', '2', '1']

@@ -274,7 +274,8 @@ export interface Trial {
   recoveries: number;
   questions: number;
   answered: number;
-  lost: number; // events
+  lost: number; // events that were not heard
+  nth?: number; // of its machine in its process, 0 where it is not known; not of a bag's trial
   detailed: boolean; // whether its events are kept
   number?: number; // of a trial of a bag
   bag?: string;

@@ -20,11 +20,17 @@ import { TrialReplay } from './trial_replay.js';
 export const trials = { id: 'trials', title: 'Trials', create: (app) => new TrialPanel(app) };
 
 const NARROW = '(max-width: 960px)';
-const NO_TRIALS = 'No trials yet. They appear as robots run; of what happened before this console '
-  + 'was started, the bags tell.';
+const NO_TRIALS = 'No trial runs. Trials appear as robots run. Those that ended before this '
+  + 'console was started are in the bags.';
 const COUNTED = ': in how many each happened at least once';
 const HEARD = 'Trials that ended while this console watched' + COUNTED;
 const IN_BAGS = 'Trials in the bags' + COUNTED;
+
+/** @param {Trial} trial */
+function lostEvents(trial) {
+  const { lost } = trial;
+  return isOfBag(trial) ? lost + ' events missing' : lost + ' events were not heard';
+}
 
 class TrialPanel {
   /** @param {App} app */
@@ -173,9 +179,10 @@ class TrialPanel {
   /** @param {Trial} trial */
   showFacts(trial) {
     this.trial = trial;
-    const { experiment, start, lost, detailed, bag } = trial;
+    const { experiment, start, lost, nth, detailed, bag } = trial;
     setText(this.title, experiment + ' · ' + clock(start));
-    setText(this.facts, [summaryOf(trial, this.app.store.now()), lost && lost + ' events missing',
+    setText(this.facts, [summaryOf(trial, this.app.store.now()),
+      nth && `trial ${nth} of its program`, lost && lostEvents(trial),
       !detailed && 'its events are no longer kept', bag].filter(Boolean).join(' · '));
     this.showEvents();
   }

@@ -1,0 +1,1 @@
+"""The topic that says what runs on a node."""
