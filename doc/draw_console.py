@@ -99,6 +99,7 @@ def record_answer(_processes, folder):
         shoot(2.5)
         browser.click('#tab-questions')
         browser.click(QUESTION.format('alpha'))
+        browser.click('[data-action=claim]')
         expect(browser, 'It is yours.')
         browser.find('.choice.goto[data-settled]')
         shoot(4.0)
@@ -143,6 +144,7 @@ def write_gif(frames, path):
 def work_in_kitchen(browser, folder):
     """Work through a question, and take a picture at each place."""
     browser.click(QUESTION.format('alpha'))
+    browser.click('[data-action=claim]')
     expect(browser, 'It is yours.')
     browser.find('.choice.goto[data-settled]')
     take(browser, folder, 'console_question')
@@ -233,7 +235,6 @@ def mark_an_object(browser, folder):
     from selenium.webdriver.common.action_chains import ActionChains
 
     browser.click(QUESTION.format('pr2'), 120.0)
-    expect(browser, 'It is yours.')
     browser.click('.choice.interface[data-name=perception]')
     browser.find('.perception.shown', 60.0)
     canvas = browser.find('.perception .drawing')

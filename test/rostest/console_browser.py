@@ -13,13 +13,12 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage
+from console_page import WITH_BROWSER, YOURS, ConsolePage
 from waiting import wait_for
 
 from smach_oracle.msg import ConsoleCommand, OracleEvent
 
 QUESTION = '.question-row[data-key^="/alpha/"]'
-YOURS = 'It is yours.'
 UNKNOWN_SUCCESS = """return import("/static/js/answering/state_choices.js").then(
 ({ stateLines }) => (
   stateLines({ state: "PICK", success: null, class: 0, visits: 0, missing: [], preconditions: [],
@@ -61,6 +60,9 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         with open(path) as file:
             return next(line.split()[1] for line in file if line.startswith(role))
 
+    def told(self, command):
+        return [told for told in self.audited if told.command == command]
+
     def outcomes(self, kind, field):
         return [getattr(event, field) for event in self.events if event.kind == kind]
 
@@ -71,7 +73,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
             wait_for(lambda: browser.driver.title.startswith('(1)')), 'the title says so'
         )
         browser.click(QUESTION)
-        self.assertTrue(browser.says(YOURS), 'to open it is to claim it')
+        self.assertTrue(browser.says('Nobody works on it.', '.claim-bar'), 'to read is free')
         for told in (
             'raised an exception',
             '<b>mug</b>',
@@ -82,6 +84,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         ):
             self.assertIn(told, browser.text())
         self.assertTrue(browser.says('DETECT unknown'), 'the preconditions are looked at')
+        self.assertEqual(self.told('claim'), [], 'reading has taken nothing')
         self.assertIsNone(
             browser.run('return window.hacked || document.querySelector(".failure b") || null'),
             'what a robot says is text',
@@ -96,6 +99,7 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
             'the failed state is marked in its graph',
         )
         browser.find('[data-output=grasp]').send_keys('{"width_m": 0.04}')
+        self.assertTrue(browser.says(YOURS), 'the first key of an answer takes it')
         browser.click('.choice.supersede[data-name=succeeded]')
         self.assertTrue(
             browser.says('PICK counts as having ended with succeeded.', '.follow-up'),
@@ -116,8 +120,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.find(QUESTION)
         browser.run('document.activeElement.blur()')
         browser.press('n')
-        self.assertTrue(browser.says(YOURS), 'by keyboard, too')
         browser.find('input.why').send_keys('typed before')
+        self.assertTrue(browser.says(YOURS), 'the reason is part of an answer')
         type(self).console.stop()
         self.assertTrue(browser.says('connection lost', '#status'))
         type(self).console = self.start_console()
@@ -179,7 +183,6 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         )
         self.addCleanup(browser.driver.execute_cdp_cmd, 'Emulation.clearDeviceMetricsOverride', {})
         browser.tap(QUESTION)
-        self.assertTrue(browser.says(YOURS))
         self.assertTrue(
             browser.says('led on 1 of 1', '.choice.goto[data-name=PLACE]'),
             'how often it led on before',

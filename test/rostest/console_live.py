@@ -10,7 +10,7 @@ import unittest
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import OF_A_QUESTION, WITH_BROWSER, ConsolePage
+from console_page import OF_A_QUESTION, WITH_BROWSER, YOURS, ConsolePage
 from expert_fixtures import start_master
 from waiting import wait_for
 
@@ -96,6 +96,7 @@ class Live(ConsolePage, unittest.TestCase):
     def setUp(self):
         if not self.browser.text('.detail-head'):
             self.browser.click(QUESTION)
+            self.take()
         self.assertTrue(self.answerable())
 
     def answerable(self):
@@ -103,7 +104,7 @@ class Live(ConsolePage, unittest.TestCase):
         browser = self.browser
         return (
             browser.says(LIVE, '#status')
-            and browser.says('It is yours.')
+            and browser.says(YOURS)
             and wait_for(lambda: browser.find(ANSWER).is_enabled() and browser.run(GREY) == 'none')
         )
 
@@ -203,6 +204,7 @@ class Live(ConsolePage, unittest.TestCase):
         )
         browser.click('.claim-bar .inline')
         browser.click(QUESTION)
+        self.take()
         self.assertTrue(self.answerable())
         self.assertEqual(browser.errors(), [])
 

@@ -12,7 +12,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import OF_A_QUESTION, WITH_BROWSER, ConsolePage
+from console_page import OF_A_QUESTION, WITH_BROWSER, YOURS, ConsolePage
 from waiting import stays, wait_for
 
 from smach_oracle.msg import ConsoleCommand, OpenQueries, OracleEvent
@@ -79,8 +79,8 @@ TAKEN = (
   return [said("ann"), said("carl")];"""
 )
 # a press that was not meant opens another question than the one that is worked on: what was told
-# then, after the way back, and once the other one has been seen; which one the others are told that
-# it is; and what is still typed
+# while that one was only read, then, after the way back, and once the other one has been seen;
+# which one the others are told that it is; and what is still typed
 ANOTHER_BY_ACCIDENT = (
     OF_A_QUESTION
     % """
@@ -99,10 +99,13 @@ ANOTHER_BY_ACCIDENT = (
   const press = (key) => panel.queue.querySelector(`[data-key=${key}]`).click();
   const typed = () => panel.stage.querySelector(".why").value;
   panel.choose("a", true);
+  const read = sent();
+  const why = panel.stage.querySelector(".why");
+  why.value = "the mug lies";
+  why.dispatchEvent(new Event("input", { bubbles: true }));
   for (let turn = 0; turn < 9; turn += 1) await null; // the replies are there, and no time is over
-  panel.stage.querySelector(".why").value = "the mug lies";
   press("b");
-  const seen = [sent(), panel.detail.key];
+  const seen = [read, sent(), panel.detail.key];
   press("a");
   seen.push(sent(), panel.detail.key, typed());
   await new Promise((done) => setTimeout(done, 1000)); // longer than 0.7 s
@@ -137,6 +140,20 @@ return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
   part.root.remove();
   return focused;
 });"""
+# which outcome the key `s` sends, of states with these outcomes and what they mean
+SENT_BY_S = """
+return import("/static/js/answering/answer_form.js").then(({ AnswerForm }) => (
+  arguments[0].map((outcomes) => {
+    const sent = [];
+    const form = new AnswerForm({ choices: [], interfaces: [], state: "TURN", path: "TASK",
+      outputs: [], userdata: [], give_up: [], give_up_above: [], running: false, history: [],
+      supersede: outcomes.map(([outcome, meaning]) => ({ outcome, meaning, target: "NEXT" })) },
+    ({ name }) => sent.push(name), () => {});
+    form.enable(true);
+    form.press("s");
+    return sent.join();
+  })));"""
+GOOD, BAD = 'success', 'failure'
 # a robot that is held after an answer, and whose silence ends
 HELD = """
 return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
@@ -199,7 +216,7 @@ class OnPurpose(ConsolePage, unittest.TestCase):
     def claims(self):
         return [told for told in self.audited if told.command == 'claim']
 
-    def test_0_to_open_a_question_is_never_refused_and_claims_it_once_it_has_been_seen(self):
+    def test_0_to_open_a_question_is_never_refused_and_sends_nothing(self):
         browser = self.browser
         browser.find(QUESTION)
         browser.driver.refresh()
@@ -207,14 +224,13 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(
             browser.driver.execute_async_script(OPEN_AND_LEAVE, QUESTION), [True, True, False, 0]
         )
-        self.assertTrue(stays(lambda: not self.claims(), 1.5), 'who leaves at once sends nothing')
         browser.driver.refresh()
         self.assertEqual(self.press_at_once(QUESTION), 0)
-        self.assertTrue(browser.says('It is yours.'))
-        self.assertEqual(len(self.claims()), 1)
+        self.assertTrue(browser.says('Nobody works on it.', '.claim-bar'))
         self.assertEqual(self.press_at_once(GIVE_UP), 0, 'it only asks')
         self.assertTrue(browser.says('Give up? The work of PICK stays undone'))
         self.assertEqual(self.press_at_once('[data-action=confirm-give-up]'), 1, 'this sends')
+        self.assertTrue(stays(lambda: not self.claims(), 1.5), 'who only reads takes nothing')
         self.press('\ue00c')
         self.press('\ue00c')
         self.assertTrue(
@@ -238,8 +254,7 @@ class OnPurpose(ConsolePage, unittest.TestCase):
             '3',
             'the tap, the key, and what has moved under the pointer',
         )
-        self.assertTrue(browser.says('It is yours.'))
-        self.assertEqual(self.answers(), [])
+        self.assertEqual((self.answers(), self.claims()), ([], []))
         self.assertTrue(
             browser.says('Waits for an answer about PICK in KITCHEN/FETCH.', '.detail .standing'),
             browser.text('.detail .standing'),
@@ -253,6 +268,7 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertTrue(stays(lambda: not self.answers(), 0.5), 'the key alone sends nothing')
         browser.click('[data-action=confirm-give-up]')
         self.assertTrue(browser.says('Giving up in'))
+        self.assertTrue(browser.says(YOURS), 'it is taken before it is sent')
         self.assertFalse(browser.find('.choice.goto').is_enabled())
         browser.click('[data-action=undo-give-up]')
         self.assertTrue(wait_for(lambda: browser.find(GIVE_UP).is_enabled()))
@@ -319,7 +335,6 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         browser.click('.choice.goto[data-name=DETECT]')
         self.assertTrue(browser.says('It asks again, about PICK.', '.follow-up'))
         browser.click('[data-action=next-question]')
-        self.assertTrue(browser.says('It is yours.'))
         browser.click('.choice.goto[data-name=PLACE]')
         self.assertTrue(browser.says('The trial is over: it ended with succeeded.', '.follow-up'))
         browser.click('.follow-up [data-action=back]')
@@ -339,17 +354,32 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         self.assertEqual(
             browser.run(ANOTHER_BY_ACCIDENT),
             [
+                '',
                 'claim',
                 'b',
                 'claim',
                 'a',
                 'the mug lies',
                 'claim',
-                'claim,release,claim',
+                'claim,release',
                 'b',
                 'b',
                 '',
             ],
+        )
+        self.assertEqual(
+            browser.run(
+                SENT_BY_S,
+                [
+                    [['succeeded', GOOD], ['aborted', BAD]],
+                    [['aborted', BAD], ['turned', 'other end'], ['done', GOOD]],
+                    [['aborted', BAD], ['preempted', 'preempted']],
+                    [['left', GOOD], ['right', GOOD]],
+                    [['kept', GOOD], ['succeeded', GOOD]],
+                ],
+            ),
+            ['succeeded', 'done', '', '', 'succeeded'],
+            'the key stands for what an outcome means, not for its place',
         )
         waits = 'It waits until somebody lets it go on.'
         self.assertEqual(browser.run(HELD), [waits, 'gone', waits])

@@ -16,6 +16,7 @@ from waiting import wait_for
 from smach_oracle.experiment.launching import free_port
 
 HERE = os.path.dirname(os.path.abspath(__file__))
+YOURS = 'It is yours.'
 WITH_BROWSER = bool(shutil.which('chromedriver'))
 # pressed in the very frame in which it comes: no wall clock has a part in it
 PRESS_AT_ONCE = """
@@ -147,6 +148,12 @@ class ConsolePage:
             '__name:=expert_console',
             *more,
         )
+
+    def take(self, browser=None):
+        """Take the question that is shown: to read it takes nothing."""
+        browser = browser or self.browser
+        browser.click('[data-action=claim]')
+        self.assertTrue(browser.says(YOURS), browser.text('.claim-bar'))
 
     @classmethod
     def page_is_served(cls):

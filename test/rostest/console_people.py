@@ -16,7 +16,7 @@ import tornado.ioloop
 import tornado.websocket
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from console_page import WITH_BROWSER, ConsolePage
+from console_page import WITH_BROWSER, YOURS, ConsolePage
 from waiting import wait_for
 
 from smach_oracle.msg import OpenQueries, OracleEvent
@@ -25,7 +25,6 @@ if WITH_BROWSER:
     from selenium.webdriver.common.keys import Keys
 QUESTION = '.question-row[data-key^="/alpha/"]'
 ANSWER = '.choice.goto[data-name=PLACE]'
-YOURS = 'It is yours.'
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -67,6 +66,9 @@ class People(ConsolePage, unittest.TestCase):
         browser = self.browser
         self.assertTrue(browser.says('Your name?', '#person'))
         browser.click(QUESTION)
+        self.assertTrue(browser.says('Nobody works on it.', '.claim-bar'), 'anybody may read')
+        self.assertTrue(browser.find(ANSWER).is_enabled())
+        browser.click(ANSWER)
         browser.find('.name-demand')
         self.assertEqual(self.holder(), '', 'nobody claims without a name')
         self.assert_accessible('whose name is asked for')
@@ -83,6 +85,7 @@ class People(ConsolePage, unittest.TestCase):
             browser.says('your name is needed', '.claim-bar .problem'),
             'Esc leaves the dialog alone',
         )
+        self.assertEqual(self.answered, [], 'and nothing is answered')
         browser.click('[data-action=claim]')
         browser.click('#no-name')
         self.assertTrue(browser.says('your name is needed', '.claim-bar .problem'))
@@ -172,6 +175,21 @@ class People(ConsolePage, unittest.TestCase):
         self.phone.click(ANSWER)
         self.assertTrue(self.phone.says('The machine goes to PLACE.', '.follow-up'))
         self.assertTrue(wait_for(lambda: self.answered == ['ann']))
+
+    def test_6_who_only_reads_is_named_and_keeps_nobody_from_answering(self):
+        self.browser.click('.detail-head .back')
+        self.phone.click('.follow-up [data-action=back]')
+        self.phone.click(QUESTION)
+        self.assertTrue(self.browser.says('waiting · ann reads', QUESTION))
+        self.assertEqual(self.holder(), '', 'reading takes nothing')
+        self.browser.click(QUESTION)
+        self.assertTrue(self.browser.says('Nobody works on it.', '.claim-bar'))
+        self.browser.find('input.why').send_keys('it lies')
+        self.assertTrue(self.browser.says(YOURS), 'the first key of an answer takes it')
+        self.assertTrue(self.phone.says('the same name, in another browser', '.claim-bar'))
+        self.assertFalse(self.phone.find(ANSWER).is_enabled())
+        self.browser.click(ANSWER)
+        self.assertTrue(wait_for(lambda: len(self.answered) == 2))
         self.assertEqual(self.browser.errors() + self.phone.errors(), [])
 
 

@@ -60,6 +60,7 @@ from smach_oracle.msg import (
 from smach_oracle.oracle.asking.question import StateChoice
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.images import cloud_message, colour_image, depth_image, mask_image
 from smach_oracle.ros.recorder import TrialRecorder
@@ -98,7 +99,10 @@ def questions():
         listed(failure_kind=FailureKind.STILL_RUNNING, outcome='', interfaces=()),
     ]
     return [
-        dict(question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2)), session='a1')
+        dict(
+            question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule()),
+            session='a1',
+        )
         for each in asked
     ]
 

@@ -18,6 +18,7 @@ from smach_oracle.oracle.records.events import Event, EventKind, EventSource, Ow
 from smach_oracle.oracle.records.trial_counter import TrialCounter
 
 from ..connections import quiet_at_shutdown
+from ..event_messages import json_of
 from ..log.said_once import SaidOnce
 from ..sendable_text import sendable_text
 
@@ -90,6 +91,7 @@ class LatestTrial(OwnObserver):
                 unwell_s=counts.unwell_s,
                 running=not self._over,
                 ending=counts.ending.value if self._over else '',
+                failure_rule=json_of(counts.rule.as_data()),
                 outcome=sendable_text(counts.outcome),
             )
 

@@ -54,7 +54,10 @@ class QuestionSections:
     def _view(self, listed: ListedQuestion) -> Dict[str, Any]:
         place = (listed.goal.robot, listed.goal.container_path, listed.goal.failed_state)
         view = question_view(
-            listed, self._epoch_s, lambda target: self._log.recovery_counts(place, target)
+            listed,
+            self._epoch_s,
+            lambda target: self._log.recovery_counts(place, target),
+            self._log.rule(listed.goal.trial_id),
         )
         for name, before in self._times.get(listed.key, {}).items():
             now = view[name]

@@ -4,7 +4,9 @@ import math
 from typing import Any, Callable, Dict, List
 
 from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem
+from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.records.short_text import shortened
+from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
 from ...followed_server import ListedQuestion
@@ -15,6 +17,7 @@ from ..trials.recovery_statistics import RecoveryCounts
 LONGEST_TEXT = 8000
 LONGEST_VALUE = 4000
 _VISITS = {1: 'success', 2: 'failure', 3: 'superseded', 4: 'preempted'}
+_FAILED_BY_OUTCOME = (FailureKind.FAILING_OUTCOME, FailureKind.FELL_THROUGH)
 _STATUS = {
     OpenQuery.PENDING: 'pending',
     OpenQuery.CLAIMED: 'claimed',
@@ -23,12 +26,16 @@ _STATUS = {
 
 
 def question_view(
-    listed: ListedQuestion, epoch_s: float, recovery_counts: Callable[[str], RecoveryCounts]
+    listed: ListedQuestion,
+    epoch_s: float,
+    recovery_counts: Callable[[str], RecoveryCounts],
+    rule: FailureRule,
 ) -> Dict[str, Any]:
     """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
     :param recovery_counts: how often going to a state has helped.
+    :param rule: tells which outcomes are failures.
     """
     goal = listed.goal
     return {
@@ -67,7 +74,7 @@ def question_view(
             for visit in goal.history
         ],
         'choices': _choices(goal, recovery_counts),
-        'supersede': _supersede(goal),
+        'supersede': _supersede(goal, rule),
         'outputs': list(goal.output_keys),
         'give_up': list(goal.give_up_outcomes),
         'give_up_above': [
@@ -112,15 +119,25 @@ def _helped(
     return RecoveryCounts(0, 0) if choice.container else recovery_counts(choice.state)
 
 
-def _supersede(goal: ExpertQueryGoal) -> List[Dict[str, str]]:
-    """First those with which the machine goes on."""
+def _supersede(goal: ExpertQueryGoal, rule: FailureRule) -> List[Dict[str, str]]:
+    """First those with which the machine goes on. Each with what it means of the state's work."""
     states = {choice.state for choice in goal.choices if not choice.container}
     return [
-        {'outcome': choice.outcome, 'target': choice.target}
+        {
+            'outcome': choice.outcome,
+            'target': choice.target,
+            'meaning': _meaning(choice.outcome, goal, rule),
+        }
         for choice in sorted(
             goal.supersede_outcomes, key=lambda choice: choice.target not in states
         )
     ]
+
+
+def _meaning(outcome: str, goal: ExpertQueryGoal, rule: FailureRule) -> str:
+    if outcome and outcome == goal.outcome and goal.failure_kind in _FAILED_BY_OUTCOME:
+        return EndMeaning.FAILURE.value  # whatever its name
+    return rule.meaning(outcome).value
 
 
 def _item(item: UserdataItem) -> Dict[str, str]:

@@ -1,13 +1,14 @@
-"""The trials of a node as it tells them itself, for a console that has not heard all of them. Pure."""
+"""The trials of a node as it tells them, for a console that has not heard all of them. Pure."""
 
 import math
-from typing import List, NamedTuple
+from typing import List, NamedTuple, Optional
 
 from smach_oracle.msg import NodeTrials, TrialCounts
 from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.records.trial_counter import TrialEnding
+from smach_oracle.oracle.settings.failure_rule import RULE, FailureRule, rule_in
 
-from .views import LATEST_S
+from .views import LATEST_S, parsed
 
 MOST_TRIALS = 100  # of a node
 _LONGEST_NAME = 300
@@ -32,6 +33,7 @@ class ToldTrial(NamedTuple):
     unwell_s: float
     running: bool
     ending: TrialEnding
+    rule: Optional[FailureRule]
     outcome: str
 
 
@@ -58,6 +60,7 @@ def _told(counts: TrialCounts) -> ToldTrial:
         _time_s(counts.unwell_s),
         counts.running,
         over or TrialEnding.UNFINISHED,
+        rule_in({RULE: parsed(counts.failure_rule)}),
         shortened(counts.outcome, _LONGEST_NAME),
     )
 

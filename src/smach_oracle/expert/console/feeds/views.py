@@ -11,6 +11,7 @@ from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_words
 from smach_oracle.oracle.records.short_text import shortened
+from smach_oracle.oracle.settings.failure_rule import RULE, rule_in
 
 from ...wording import event_words
 
@@ -24,11 +25,13 @@ def event_of(message: OracleEvent) -> Event:
     kind: Any = _KINDS.get(message.kind, message.kind)
     data: Optional[Dict[str, Any]] = None
     if kind == EventKind.TRIAL_START:
-        data = {'recovers': '"recovers": false' not in message.data}
+        data = {'recovers': '"recovers": false' not in message.data, **_rule_in(message.data)}
+    elif kind == EventKind.RESUMED:
+        data = _rule_in(message.data)
     elif kind == EventKind.TRANSITION and NOT_COUNTED in message.data:
         data = {NOT_COUNTED: True}
     elif kind in (EventKind.JUMP, EventKind.DECISION):
-        data = told_in_words(_parsed(message.data))
+        data = told_in_words(parsed(message.data))
     time_s = message.wall_time if 0 <= message.wall_time <= LATEST_S else 0.0  # NaN is neither
     return Event(
         kind,
@@ -50,11 +53,18 @@ def event_of(message: OracleEvent) -> Event:
     )
 
 
-def _parsed(data: str) -> Any:
+def parsed(data: str) -> Any:
+    """Return what a text of JSON says, None where it is no JSON."""
     try:
         return json.loads(data)
     except (ValueError, RecursionError):
         return None
+
+
+def _rule_in(data: str) -> Dict[str, Any]:
+    """The rule that tells failures, where the data of an event name one."""
+    rule = rule_in(parsed(data))
+    return {} if rule is None else {RULE: rule.as_data()}
 
 
 def event_view(event: Event) -> Dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.settings.failure_rule import EndMeaning
+from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 
 from ..feeds.told_trials import ToldTrial
 from ..feeds.views import event_view
@@ -140,6 +140,15 @@ class TrialLog:
         with self._lock:
             trial = self._trials.get(trial_id)
             return trial.events.lines(start, most) if trial else []
+
+    def rule(self, trial_id: str) -> FailureRule:
+        """Return the rule that tells failures in a trial: by name, where nobody has told it."""
+        with self._lock:
+            trial = self._trials.get(trial_id)
+            told = trial.told.rule if trial and trial.told else None
+            if told is None and trial and trial.heard.trial_id and not trial.heard.lost_events:
+                told = trial.heard.rule  # that of its start
+            return told or FailureRule()
 
     def recovery_counts(self, place: Tuple[str, str, str], target: str) -> RecoveryCounts:
         """Return how often going to `target` helped after a failure.

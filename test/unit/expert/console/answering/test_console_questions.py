@@ -16,10 +16,13 @@ from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import OpenQuery
-from smach_oracle.oracle.asking.question import StateChoice
+from smach_oracle.oracle.asking.question import OutcomeChoice, StateChoice
 from smach_oracle.oracle.records.events import FailureKind
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.userdata_codec import decode_all
+
+BY_NAME = FailureRule()
 
 
 def goal(**changes):
@@ -28,7 +31,7 @@ def goal(**changes):
     return to_goal(make_question(**changes), '/robot', rospy.Time(1))
 
 
-def view(**changes):
+def view(rule=BY_NAME, **changes):
     listed = ListedQuestion(
         '/robot/expert_query', goal(**changes), OpenQuery.CLAIMED, 'ann', 10.0, math.inf
     )
@@ -36,6 +39,7 @@ def view(**changes):
         listed,
         1000.0,
         lambda target: RecoveryCounts(2, 3) if target == 'DETECT' else RecoveryCounts(0, 0),
+        rule,
     )
 
 
@@ -53,9 +57,33 @@ def test_a_question_is_told_whole():
     detect, pick, place = shown['choices']
     assert detect['helped'] == [2, 3] and pick['missing'] == ['grasp'] and place['blocked']
     assert pick['preconditions'] == ['MOVE_ARMS_ASIDE', 'view_is_clear']
-    assert shown['supersede'][0] == {'outcome': 'succeeded', 'target': 'PLACE'}
+    assert shown['supersede'][0] == {
+        'outcome': 'succeeded',
+        'target': 'PLACE',
+        'meaning': 'success',
+    }
     assert shown['outputs'] == ['grasped']
     assert shown['interfaces'] == [{'name': 'assist', 'description': 'do it by hand'}]
+
+
+@pytest.mark.parametrize(
+    'rule, failed_with, meanings',
+    [
+        (BY_NAME, '', {'succeeded': 'success', 'aborted': 'failure', 'parked': 'other end'}),
+        (BY_NAME, 'parked', {'parked': 'failure'}),
+        (FailureRule(('parked',)), '', {'aborted': 'success', 'parked': 'failure'}),
+    ],
+)
+def test_each_outcome_says_what_it_means_by_the_rule_of_its_robot(rule, failed_with, meanings):
+    names = ('aborted', 'parked', 'succeeded')
+    shown = view(
+        rule,
+        supersede_outcomes=tuple(OutcomeChoice(name, 'PLACE') for name in names),
+        outcome=failed_with,
+        failure_kind=FailureKind.FAILING_OUTCOME if failed_with else FailureKind.EXCEPTION,
+    )
+    told = {each['outcome']: each['meaning'] for each in shown['supersede']}
+    assert {outcome: told[outcome] for outcome in meanings} == meanings
 
 
 def test_a_question_says_what_would_come_again_and_that_nothing_failed():

@@ -12,7 +12,7 @@ import smach
 from smach_oracle.analysis.counting.trial_summary import summarise
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.expert.console.feeds.told_trials import told_trials
-from smach_oracle.expert.console.feeds.views import event_view
+from smach_oracle.expert.console.feeds.views import event_of, event_view
 from smach_oracle.expert.console.trials import recovery_statistics, trial_log
 from smach_oracle.expert.console.trials.counts_table import counts_table, has_oracle
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryStatistics
@@ -21,6 +21,8 @@ from smach_oracle.msg import NodeTrials
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.settings.failure_rule import FailureRule
+from smach_oracle.ros.event_messages import to_msg
 from smach_oracle.ros.trials.trials_publisher import LatestTrial
 
 
@@ -447,7 +449,11 @@ def test_a_later_trial_of_the_same_machine_ends_one_whose_end_was_not_heard():
     log = TrialLog()
     begun = [
         event(EventKind.TRIAL_START, trial=trial, path=path)._replace(wall_time=wall_time)
-        for trial, path, wall_time in (('old', 'TASK', 1.0), ('other', 'B', 1.0), ('new', 'TASK', 2.0))
+        for trial, path, wall_time in (
+            ('old', 'TASK', 1.0),
+            ('other', 'B', 1.0),
+            ('new', 'TASK', 2.0),
+        )
     ]
     for each in begun[:2]:
         log.add('/robot', each)
@@ -471,3 +477,24 @@ def test_trials_are_listed_by_when_they_began_not_by_when_they_were_found():
         begun = event(EventKind.TRIAL_START, trial=trial)._replace(wall_time=wall_time)
         log.take_told('/' + trial, told_by_robot([begun]))
     assert [row['id'] for row in log.overview()['trials']] == ['3', '2', '1']
+
+
+LISTED = FailureRule(('parked',))
+
+
+@pytest.mark.parametrize('take', ['hear', 'be_told'])
+def test_the_rule_of_a_trial_is_the_one_that_its_robot_names(take):
+    log = TrialLog()
+    begun = event(EventKind.TRIAL_START, data={'failure_rule': LISTED.as_data()})
+    if take == 'hear':
+        log.add('/robot', event_of(to_msg(begun._replace(seq=0))))
+    else:
+        log.take_told('/robot', told_by_robot([begun]))
+    assert log.rule('t') == LISTED
+    assert log.rule('nobody has heard of it') == FailureRule()
+
+
+def test_a_trial_whose_start_was_not_heard_has_the_rule_of_names():
+    log = TrialLog()
+    log.add('/robot', event(EventKind.FAILURE)._replace(seq=7))
+    assert log.rule('t') == FailureRule()

@@ -140,7 +140,12 @@ export interface StateChoice {
 }
 
 export interface LevelOutcome { container: string; outcome: string }
-export interface OutcomeChoice { outcome: string; target: string }
+/** `meaning`: of the state's work; 'other end': its name says neither. */
+export interface OutcomeChoice {
+  outcome: string;
+  target: string;
+  meaning: 'success' | 'failure' | 'preempted' | 'other end';
+}
 export interface InterfaceOffer { name: string; description: string }
 
 export interface UserdataItem {

@@ -1,10 +1,13 @@
 // @ts-check
 // Everything that may be answered, each a button: one press sends it, but for giving up. Keys: 1 to
-// 9 a state, s the first supersede, i the first interface, g asks whether to give up.
+// 9 a state, s the outcome that says that the work is done, i the first interface, g asks whether to
+// give up.
 import { h, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { whenLetGo } from '../page/redraw.js';
+import { chip } from '../page/format.js';
 import { GiveUp } from './give_up.js';
+import { MEANINGS, successOf } from './outcome_choices.js';
 import { outputFields, readOutputs } from './output_field.js';
 import { PreconditionList } from './precondition_list.js';
 import { likeliest, stateLines } from './state_choices.js';
@@ -12,6 +15,7 @@ import { likeliest, stateLines } from './state_choices.js';
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Answer} Answer */
 /** @typedef {import('../server').AnswerKind} AnswerKind */
+/** @typedef {import('../server').OutcomeChoice} OutcomeChoice */
 /** @typedef {import('../server').PreconditionStatus} PreconditionStatus */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').StateChoice} StateChoice */
@@ -24,10 +28,12 @@ export class AnswerForm {
   /**
    * @param {Question} question
    * @param {(answer: Answer) => void} onAnswer
+   * @param {() => void} onBegin a person begins an answer that is not sent yet
    */
-  constructor(question, onAnswer) {
+  constructor(question, onAnswer, onBegin) {
     this.question = question;
     this.onAnswer = onAnswer;
+    this.onBegin = onBegin;
     /** @type {HTMLButtonElement[]} */
     this.buttons = [];
     /** @type {Map<string, HTMLButtonElement>} */
@@ -44,6 +50,9 @@ export class AnswerForm {
     this.giveUp = this.makeGiveUp();
     this.root = h('div', { class: 'answer-form' }, this.goTo(), this.interfaces(), this.supersede(),
       this.giveUp.root, this.problem, this.why);
+    this.root.addEventListener('input', ({ target }) => {
+      if (!(target instanceof Element && target.matches('.state-filter'))) onBegin();
+    });
     this.enable(false);
   }
 
@@ -204,16 +213,23 @@ export class AnswerForm {
     return supersede.length > 0 && [h('h4', {}, 'I have done the work of ', state),
       outputs.length > 0 && h('details', { class: 'outputs', open: outputs.length <= MOST_OPEN },
         h('summary', {}, 'Its output userdata'), outputs.map((output) => output.root)),
-      choicesBox(supersede.map(({ outcome, target }, index) => (
-        this.choice('supersede', outcome, index ? '' : 's', [h('strong', {}, outcome),
-          h('span', { class: 'dim' }, '→ ', target)]))), 'short')];
+      choicesBox(supersede.map((choice) => this.outcome(choice)), 'short')];
+  }
+
+  /** @param {OutcomeChoice} choice */
+  outcome(choice) {
+    const { outcome, target, meaning } = choice;
+    const key = choice === successOf(this.question.supersede) ? 's' : '';
+    const words = MEANINGS[meaning];
+    return this.choice('supersede', outcome, key, [h('strong', {}, outcome),
+      h('span', { class: 'dim' }, '→ ', target), words && chip(words, 'bad')]);
   }
 
   makeGiveUp() {
     return new GiveUp(this.question,
       (outcome, key, words, ask) => this.choice('give_up', outcome, key, words, '', ask),
       { send: (outcome, container) => this.send('give_up', outcome, container),
-        changed: () => this.enable(this.on) });
+        begin: () => this.onBegin(), changed: () => this.enable(this.on) });
   }
 }
 

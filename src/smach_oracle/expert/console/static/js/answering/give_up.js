@@ -18,8 +18,9 @@ export class GiveUp {
   /**
    * @param {Question} question
    * @param {MakeButton} makeButton
-   * @param {{ send: (outcome: string, container: string) => void, changed: () => void }} use
-   *   `changed`: whether it is about to be sent
+   * @param {{ send: (outcome: string, container: string) => void, begin: () => void,
+   *   changed: () => void }} use `begin`: it was confirmed; `changed`: whether it is about to be
+   *   sent
    */
   constructor(question, makeButton, use) {
     this.question = question;
@@ -92,6 +93,7 @@ export class GiveUp {
 
   /** Confirmed: wait for an undo. */
   count() {
+    this.use.begin();
     this.left = UNDO_S;
     const words = h('p', { role: 'status' });
     const undo = h('button', { class: 'primary', 'data-action': 'undo-give-up',

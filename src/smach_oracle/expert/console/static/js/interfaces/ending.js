@@ -1,5 +1,6 @@
 // @ts-check
 // How an interface ends: the outcome of the state whose work it did, and the reply of the robot.
+import { successOf } from '../answering/outcome_choices.js';
 import { NoReply, unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
 
@@ -12,8 +13,10 @@ const LOST = 'The connection was lost before the robot had confirmed; try again.
 
 /** @param {Question} question */
 export function outcomeChoice({ supersede }) {
-  return h('select', { 'aria-label': 'Outcome' }, supersede.map(({ outcome, target }) => (
-    h('option', { value: outcome, selected: outcome === 'succeeded' }, outcome + ' → ' + target))));
+  const done = successOf(supersede);
+  return h('select', { 'aria-label': 'Outcome' }, supersede.map((choice) => (
+    h('option', { value: choice.outcome, selected: choice === done },
+      choice.outcome + ' → ' + choice.target))));
 }
 
 /** @param {HTMLSelectElement} choice */

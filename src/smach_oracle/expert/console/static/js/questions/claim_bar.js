@@ -30,6 +30,7 @@ const CLOSED = 'This question is closed: it was answered elsewhere, taken back, 
   + 'over. ';
 const ELSEWHERE = ' (the same name, in another browser or front end)';
 const RUN_OUT = 'Your claim has run out. It is made again as soon as all are heard.';
+const FREE = 'Nobody works on it. Your first key or tap of an answer takes it. ';
 const VIEWER = 'You are signed in as a viewer: you can watch, others answer.';
 
 export class ClaimBar {
@@ -88,7 +89,7 @@ export class ClaimBar {
     if (held && silent) return { kind: '', words: RUN_OUT };
     if (claiming || held) return { kind: '', words: 'Taking it…' };
     const take = button('Take it', this.use.claim, 'claim');
-    return { kind: '', words: ['Nobody works on it. ', take] };
+    return { kind: '', words: [FREE, take] };
   }
 
   /** @returns {Child} */

@@ -7,6 +7,7 @@ import { h, setText } from '../page/dom.js';
 /** @typedef {import('../server').Question} Question */
 
 const PAUSE_MS = 1000; // turning the pages fast uses up no limit on commands
+const ELSEWHERE = ' (in another browser)';
 let wanted = ''; // the question that this page shows
 let timer = 0;
 
@@ -56,10 +57,19 @@ function namesOf(app, key) {
 }
 
 /**
+ * The names of the others who look at a question, in short.
+ * @param {App} app
+ * @param {string} key
+ */
+export function readersOf(app, key) {
+  return namesOf(app, key).map((name) => name.replace(ELSEWHERE, ''));
+}
+
+/**
  * @param {App} app
  * @param {Onlooker} onlooker
  */
 function nameOf(app, { name, role }) {
-  if (name) return name + (name === app.expert ? ' (in another browser)' : '');
+  if (name) return name + (name === app.expert ? ELSEWHERE : '');
   return role === 'viewer' ? 'a viewer' : 'somebody without a name';
 }

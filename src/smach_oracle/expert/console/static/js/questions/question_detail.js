@@ -5,7 +5,6 @@ import { FollowUp } from '../answering/follow_up.js';
 import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
 import { NoReply, unlessLost } from '../page/connection.js';
-import { SETTLING_MS } from '../page/deliberate.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
@@ -25,6 +24,7 @@ export const URGENT_S = 20;
 const RETRY_MS = 3000; // after a claim that was lost, and could not be made again
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
+const NOT_TAKEN = 'The question could not be taken, so no answer was sent. Send it again.';
 const UNKNOWN = 'The robot has not confirmed in time: whether it has your answer is not known. The '
   + 'same answer twice does no harm.';
 
@@ -41,6 +41,8 @@ export class QuestionDetail {
     this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
     this.claiming = false;
+    /** @type {Promise<void>} */
+    this.claimed = Promise.resolve(); // the latest claim has its reply
     this.held = false; // this page has claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
     this.sending = false;
@@ -65,7 +67,8 @@ export class QuestionDetail {
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
       takeOver: () => this.claim('take_over') });
-    this.form = new AnswerForm(question, (answer) => this.answer(answer));
+    this.form = new AnswerForm(question, (answer) => this.answer(answer),
+      () => { if (this.mayBegin && !this.settled) this.take(); });
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What should it do?'),
       this.form.root);
     this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
@@ -107,26 +110,13 @@ export class QuestionDetail {
     return Boolean(now && now.status === 'claimed' && this.app.isMine(now));
   }
 
-  /**
-   * Take the question, unless somebody else works on it.
-   * @param {boolean} meant else it is taken once it has been seen for a while
-   */
-  begin(meant) {
+  /** Show it. To read it takes nothing. */
+  begin() {
     this.showPerception();
     this.showInterface();
     this.onlookers.look();
-    const free = this.question.status === 'pending' || this.mine; // by a page of before: keep it
-    if (this.app.mayAnswer && free) {
-      if (meant) this.claim('claim');
-      else setTimeout(() => this.claimSeen(), SETTLING_MS);
-    }
+    if (this.app.mayAnswer && this.mine) this.claim('claim'); // by a page of before: keep it
     this.show();
-  }
-
-  /** Nothing was sent as it was opened: it might have been another one. Now it has been seen. */
-  claimSeen() {
-    if (this.ended || this.held || this.settled) return;
-    if (this.free || this.mine) this.claim('claim');
   }
 
   /** The connection is back: so is the claim, if nobody has taken it meanwhile. */
@@ -159,9 +149,24 @@ export class QuestionDetail {
     this.app.connection.request('release', { question: this.key }).catch(() => {});
   }
 
+  /**
+   * Ask for the question, unless that was asked already.
+   * @param {'claim' | 'take_over'} command
+   */
+  claim(command) {
+    if (!this.claiming) this.claimed = this.sendClaim(command);
+    return this.claimed;
+  }
+
+  /** With the first key or tap of an answer. Whether it is this page's then. */
+  async take() {
+    if (this.held || this.mine) return true;
+    await this.claim('claim');
+    return this.held;
+  }
+
   /** @param {'claim' | 'take_over'} command */
-  async claim(command) {
-    if (this.claiming) return;
+  async sendClaim(command) {
     this.claiming = true;
     this.problem = '';
     this.holderBefore = this.otherHolder;
@@ -181,18 +186,13 @@ export class QuestionDetail {
 
   /** @param {Answer} answer */
   async answer(answer) {
-    if (this.sending || this.settled || !this.mine) return;
+    if (this.sending || this.settled || !this.mayBegin) return;
     this.sending = true;
     this.problem = '';
     this.show();
     try {
-      const reply = await this.app.connection.request('answer', { question: this.key, ...answer });
-      if (reply.ok) {
-        this.held = false;
-        this.turnTo(answer);
-      } else {
-        this.problem = reply.message;
-      }
+      if (await this.take()) await this.send(answer);
+      else this.problem = this.problem || NOT_TAKEN;
     } catch (err) {
       unlessLost(err);
       this.problem = err instanceof NoReply ? UNKNOWN : LOST;
@@ -202,13 +202,24 @@ export class QuestionDetail {
     if (!this.settled) this.form.takeFocusBack();
   }
 
+  /** @param {Answer} answer */
+  async send(answer) {
+    const reply = await this.app.connection.request('answer', { question: this.key, ...answer });
+    if (reply.ok) {
+      this.held = false;
+      this.turnTo(answer);
+    } else {
+      this.problem = reply.message;
+    }
+  }
+
   /** Take back what is not sent yet; whether there was any such thing. */
   cancel() { return !this.settled && this.form.cancel(); }
 
   /** @param {string} key */
   press(key) {
     if (key === 't') this.claimBar.press('take-over');
-    else if (this.mine && !this.settled) this.form.press(key);
+    else if (this.mayBegin && !this.settled) this.form.press(key);
   }
 
   tick() {
@@ -327,6 +338,12 @@ export class QuestionDetail {
     return Boolean(now && !now.holder && now.status === 'pending');
   }
 
+  /** Whether a person may begin an answer here: it is this page's, or nobody's. */
+  get mayBegin() {
+    const taken = this.held && this.now?.status === 'claimed' && !this.otherHolder; // not told yet
+    return this.app.mayAnswer && (this.mine || this.free || taken);
+  }
+
   /** Keep the claim, or see that it is lost. */
   showClaim() {
     // a server that was restarted, or not reached for long, knows nobody who holds it
@@ -356,7 +373,7 @@ export class QuestionDetail {
     this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
       gone: this.robotGone || '', silent });
     this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
-    this.form.enable(mine && !sending && !settled && !silent);
+    this.form.enable(this.mayBegin && !sending && !settled && !silent);
     this.showTime();
   }
 }

@@ -8,6 +8,7 @@ import { breakable, chip, counted, duration, percent, rateBar } from '../page/fo
 import { redraw } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
+import { readersOf } from './onlookers.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -19,6 +20,7 @@ export const questions = { id: 'questions', title: 'Questions',
   create: (app) => new QuestionPanel(app) };
 
 const NO_SERVER = 'No robot with an expert query server is known yet.';
+const LONGEST_NAME = 14; // of a reader, in the list
 const QUIET = 'Robots recover by themselves where they can; they ask here where they cannot.';
 
 class QuestionPanel {
@@ -72,7 +74,7 @@ class QuestionPanel {
   /** @param {string[]} names */
   update(names) {
     if (names.includes('servers')) this.showServers();
-    if (names.includes('questions')) this.showQueue();
+    if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
     if (this.detail) this.detail.update(names);
     else if (names.includes('questions')) this.showStage();
   }
@@ -110,11 +112,11 @@ class QuestionPanel {
 
   /** @param {Question} question */
   statusChip(question) {
-    const { status, holder, interface: name } = question;
+    const { key, status, holder, interface: name } = question;
     if (status === 'interface') {
       return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
     }
-    if (!holder) return chip('waiting', 'bad');
+    if (!holder) return chip(readWords(readersOf(this.app, key)), 'bad');
     return this.app.isMine(question) ? chip('yours', 'good') : chip(holder, 'warn');
   }
 
@@ -132,7 +134,7 @@ class QuestionPanel {
   /**
    * Open a question.
    * @param {string} key
-   * @param {boolean} meant else it is claimed once it has been seen
+   * @param {boolean} meant else the one that was held is let go once this one has been seen
    */
   choose(key, meant) {
     const question = this.open.find((each) => each.key === key);
@@ -146,7 +148,7 @@ class QuestionPanel {
     this.showStage();
     this.showQueue();
     moveFocus(this.detail.title);
-    this.detail.begin(meant); // may ask for a name, which takes the focus
+    this.detail.begin();
     if (back) back.update(['questions', 'images']); // what it has missed
   }
 
@@ -212,4 +214,19 @@ class QuestionPanel {
       this.detail.press(event.key);
     }
   }
+}
+
+/**
+ * What is said of a question that nobody works on.
+ * @param {string[]} readers others who look at it
+ */
+function readWords(readers) {
+  if (!readers.length) return 'waiting';
+  const who = readers.length === 1 ? shortened(readers[0]) + ' reads' : readers.length + ' read';
+  return 'waiting · ' + who;
+}
+
+/** @param {string} name */
+function shortened(name) {
+  return name.length > LONGEST_NAME ? name.slice(0, LONGEST_NAME - 1) + '…' : name;
 }
