@@ -39,7 +39,7 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
   const store = new Store();
   const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
     state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
-    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", interface: "",
+    recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", idle: 0, interface: "",
     asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
     give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
   const replies = [];

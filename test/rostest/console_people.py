@@ -25,6 +25,21 @@ if WITH_BROWSER:
     from selenium.webdriver.common.keys import Keys
 QUESTION = '.question-row[data-key^="/alpha/"]'
 ANSWER = '.choice.goto[data-name=PLACE]'
+IDLE_S = 6.0
+# how often a question has rung, as it stands at some times: status, periods of idleness, time
+RUNG = """
+return import("/static/js/page/alerts.js").then(({ Alerts }) => {
+  const alerts = new Alerts();
+  let rung = 0;
+  alerts.ring = () => { rung += 1; };
+  alerts.look([], 0);
+  return arguments[0].map(([status, idle, now]) => {
+    const question = { key: "s q", status, idle, holder: "ann", state: "PICK", stands: "failed",
+      robot: "/r", deadline: 200 };
+    alerts.look([question], now);
+    return rung;
+  });
+});"""
 
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
@@ -51,6 +66,10 @@ class People(ConsolePage, unittest.TestCase):
         cls.phone.driver.get(cls.page)
 
     @classmethod
+    def start_console(cls, *more):
+        return super().start_console('_idle_s:={}'.format(IDLE_S), *more)
+
+    @classmethod
     def tearDownClass(cls):
         cls.phone.close()
         super().tearDownClass()
@@ -65,7 +84,9 @@ class People(ConsolePage, unittest.TestCase):
     def test_1_a_name_is_asked_for_before_the_first_claim(self):
         browser = self.browser
         self.assertTrue(browser.says('Your name?', '#person'))
+        self.assertEqual(browser.text('#sound'), 'Allow sound', 'nobody would hear it yet')
         browser.click(QUESTION)
+        self.assertTrue(browser.says('Sound on', '#sound'), 'a press has allowed it')
         self.assertTrue(browser.says('Nobody works on it.', '.claim-bar'), 'anybody may read')
         self.assertTrue(browser.find(ANSWER).is_enabled())
         browser.click(ANSWER)
@@ -190,6 +211,33 @@ class People(ConsolePage, unittest.TestCase):
         self.assertFalse(self.phone.find(ANSWER).is_enabled())
         self.browser.click(ANSWER)
         self.assertTrue(wait_for(lambda: len(self.answered) == 2))
+
+    def test_7_a_question_calls_again_whose_holder_presses_nothing(self):
+        self.browser.click('.follow-up [data-action=back]')
+        self.phone.click('.detail-head .back')
+        self.browser.click(QUESTION)
+        self.take()
+        self.assertTrue(self.phone.says('ann', QUESTION))
+        self.assertTrue(wait_for(lambda: self.phone.driver.title == 'Operator console'))
+        self.assertTrue(self.phone.says('ann · idle', QUESTION), 'its holder presses nothing')
+        self.assertTrue(wait_for(lambda: self.phone.driver.title.startswith('(1)')))
+        self.browser.find('input.why').send_keys('still here')
+        self.assertTrue(
+            wait_for(lambda: 'idle' not in self.phone.text(QUESTION)), 'its holder is at work again'
+        )
+        seen = [
+            ('pending', 0, 0),
+            ('claimed', 0, 10),
+            ('claimed', 1, 60),
+            ('claimed', 1, 61),
+            ('claimed', 2, 105),
+            ('claimed', 0, 106),
+            ('claimed', 0, 141),
+            ('claimed', 0, 142),
+            ('pending', 0, 143),
+        ]
+        self.assertEqual(self.browser.run(RUNG, seen), [1, 1, 2, 2, 3, 3, 4, 4, 4])
+        self.assertEqual(self.browser.errors() + self.phone.errors(), [])
         self.assertEqual(self.browser.errors() + self.phone.errors(), [])
 
 

@@ -102,6 +102,7 @@ def questions():
         dict(
             question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule()),
             session='a1',
+            idle=0,
         )
         for each in asked
     ]

@@ -277,6 +277,9 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self.lists.looks = bool(command.arguments['at'])
             self._pages.write_trials()
             return self._note(command, CommandReply(True))
+        if command.name == 'pressed':
+            self._pages.question_commands.note_press(command, self._person)
+            return CommandReply(True)
         if command.name == 'drive':
             return self._pages.teleoperation.drive(command, self._number)
         if command.name in STOPPING_COMMANDS:  # whatever else is at work

@@ -144,10 +144,9 @@ class Console:
             self._audit,
             InterfaceCommands(self._teleoperation.is_interface).commands,
             self._last_heard.refusal,
+            settings.idle_s,
         )
-        self._question_sections = QuestionSections(
-            self._front_end, self._log, questions.sessions.session_of
-        )
+        self._question_sections = QuestionSections(self._front_end, self._log, questions.sessions)
         self._machine_hand = MachineHand(
             self._robots.holdable, self._audit, self._last_heard.robot_refusal, stop_calls
         )
@@ -277,7 +276,7 @@ def main() -> None:
         'Node: a web page from which people watch robots and answer their questions. Parameters: '
         '~address, '
         '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
-        '~cameras; '
+        '~cameras, ~idle_s; '
         'see doc/console.md.'
     )
     init_beside_others('expert_console')

@@ -21,6 +21,7 @@ from ...front_end import FrontEnd
 from ..commands.checks import TypedOutput
 from ..commands.commands import KINDS, CommandReply, PageCommand
 from ..web.audit import Audit, Person
+from ..web.settings import DEFAULT_IDLE_S
 from .session_claims import SessionClaims
 
 _KIND = dict(
@@ -61,16 +62,18 @@ class QuestionCommands:
         audit: Audit,
         others: Mapping[str, CommandWorker],
         refusal: Refusal = lambda command, listed: '',
+        idle_s: float = DEFAULT_IDLE_S,
     ) -> None:
         """
         :param others: further commands about questions, by name.
         :param refusal: says of each command whether it is too late for it.
+        :param idle_s: a holder who presses nothing for so long (s) is idle. 0: nobody ever is.
         """
         self._refusal = refusal
         self._front_end = front_end
         self._others = others
         self._audit = audit
-        self.sessions = SessionClaims()
+        self.sessions = SessionClaims(idle_s)
         self.claims = ClaimKeeper(front_end)  # held by the pages that show the questions
 
     def carry_out(self, command: PageCommand, person: Person, page: int) -> CommandReply:
@@ -80,6 +83,12 @@ class QuestionCommands:
         arguments = {name: value for name, value in command.arguments.items() if name != 'question'}
         self._audit.record(person, command.name, reply.ok, reply.message, arguments, listed)
         return reply
+
+    def note_press(self, command: PageCommand, person: Person) -> None:
+        """Note that the holder of a question is at work. It is not recorded: it comes often."""
+        listed = self._front_end.find(command.arguments['question'])
+        if listed is not None:
+            self.sessions.note_press(person, listed)
 
     def leave(self, page: int) -> None:
         """A page is gone: its claims are renewed no longer, and run out unless it comes back."""

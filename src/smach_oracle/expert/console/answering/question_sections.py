@@ -2,13 +2,14 @@
 
 import time
 from collections import OrderedDict
-from typing import Any, Callable, Dict, List, Optional
+from typing import Any, Dict, List, Optional
 
 from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
 from ..trials.trial_log import TrialLog
 from ..web.sections import PageSections
 from .question_view import question_view
+from .session_claims import SessionClaims
 
 # each list has ages of its own. Smaller differences come from the link, not from the question
 _JITTER_S = 1.0
@@ -22,10 +23,10 @@ class QuestionSections:
         self,
         front_end: FrontEnd,
         log: TrialLog,
-        session_of: Callable[[ListedQuestion], str] = lambda listed: '',
+        sessions: Optional[SessionClaims] = None,
     ) -> None:
-        """`session_of`: the browser that holds a question, in short."""
-        self._session_of = session_of
+        """`sessions`: the browsers that hold questions, None where there are none."""
+        self._sessions = sessions or SessionClaims()
         self._front_end = front_end
         self._log = log
         self._epoch_s = time.time() - time.monotonic()
@@ -63,7 +64,8 @@ class QuestionSections:
             now = view[name]
             if before is not None and now is not None and abs(before - now) < _JITTER_S:
                 view[name] = before
-        view['session'] = self._session_of(listed)
+        view['session'] = self._sessions.session_of(listed)
+        view['idle'] = self._sessions.idle_periods(listed)
         view['asked'] = self._since(listed.key, view['asked'])
         return view
 

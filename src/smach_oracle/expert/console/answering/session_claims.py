@@ -12,6 +12,7 @@ from typing import NamedTuple, Optional
 from ...followed_server import ListedQuestion
 from ..commands.commands import PageCommand
 from ..web.audit import Person
+from ..web.settings import DEFAULT_IDLE_S
 
 MOST_REMEMBERED = 1000
 TOLD_WITHIN_S = 3.0  # after a claim its server's list has it
@@ -23,13 +24,20 @@ class HeldClaim(NamedTuple):
 
     session: str  # in short
     expert: str
-    since_s: float  # monotonic
+    since_s: float  # monotonic, as the next one
+    pressed_s: float  # when its holder was last known to press something
+
+    def is_of(self, person: Person) -> bool:
+        """Whether it is this browser's, under the name that the person has now."""
+        return (self.session, self.expert) == (person.session, person.expert)
 
 
 class SessionClaims:
     """The claims made through this console, by question."""
 
-    def __init__(self) -> None:
+    def __init__(self, idle_s: float = DEFAULT_IDLE_S) -> None:
+        """`idle_s`: a holder who presses nothing for so long is idle. 0: nobody ever is."""
+        self._idle_s = idle_s
         self._lock = threading.Lock()
         self._held: 'OrderedDict[str, HeldClaim]' = OrderedDict()
 
@@ -41,7 +49,21 @@ class SessionClaims:
     def holds(self, person: Person, listed: ListedQuestion) -> bool:
         """Whether this browser holds the claim, under the name that the person has now."""
         held = self._valid(listed)
-        return held is not None and (held.session, held.expert) == (person.session, person.expert)
+        return held is not None and held.is_of(person)
+
+    def note_press(self, person: Person, listed: ListedQuestion) -> None:
+        """Its holder has pressed something. Of others nothing is noted."""
+        with self._lock:
+            held = self._held.get(listed.key)
+            if held is not None and held.is_of(person):
+                self._held[listed.key] = held._replace(pressed_s=time.monotonic())
+
+    def idle_periods(self, listed: ListedQuestion) -> int:
+        """Return for how many whole periods the holder has pressed nothing, 0 of other claims."""
+        held = self._held.get(listed.key)
+        if not self._idle_s or held is None or held.expert != listed.holder:
+            return 0
+        return int((time.monotonic() - held.pressed_s) / self._idle_s)
 
     def refusal(self, command: PageCommand, person: Person, listed: ListedQuestion) -> str:
         """Return why a claim or an answer is not the person's, or '' where it may be."""
@@ -59,9 +81,12 @@ class SessionClaims:
         return ''
 
     def take(self, person: Person, listed: ListedQuestion) -> None:
-        """The claim is this browser's from now on."""
+        """The claim is this browser's from now on. A page makes it again without any press."""
+        now_s = time.monotonic()
         with self._lock:
-            self._held[listed.key] = HeldClaim(person.session, person.expert, time.monotonic())
+            held = self._held.get(listed.key)
+            pressed_s = held.pressed_s if held is not None and held.is_of(person) else now_s
+            self._held[listed.key] = HeldClaim(person.session, person.expert, now_s, pressed_s)
             self._held.move_to_end(listed.key)
             while len(self._held) > MOST_REMEMBERED:
                 self._held.popitem(last=False)

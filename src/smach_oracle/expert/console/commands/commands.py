@@ -115,6 +115,7 @@ COMMANDS: Dict[str, CommandSpec] = {
     'claim': CommandSpec('operator', QUESTION),
     'take_over': CommandSpec('operator', QUESTION),
     'release': CommandSpec('operator', QUESTION),
+    'pressed': CommandSpec('operator', QUESTION),
     'answer': CommandSpec(
         'operator',
         dict(

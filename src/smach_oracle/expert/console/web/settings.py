@@ -15,6 +15,8 @@ from .access import AccessTokens, AllowedHosts, is_loopback, load_tokens
 GetParameter = Callable[[str, object], object]
 NONE = 'none'
 DEFAULT_PORT = 8090
+DEFAULT_IDLE_S = 45.0
+_idle_s = checks.number(0.0, 86400.0, '0 (never) to 86400 s')
 _port = checks.whole(0, '0 (any free one) to 65535', 65535)
 
 
@@ -31,6 +33,7 @@ class ConsoleSettings(NamedTuple):
     stores: Tuple[str, ...] = ()  # files in which programs keep where their machines stand
     # by robot: topics, or names above them
     cameras: Mapping[str, Tuple[str, ...]] = MappingProxyType({})
+    idle_s: float = DEFAULT_IDLE_S  # without a press of the holder. 0: nobody is idle
 
     @property
     def scheme(self) -> str:
@@ -69,6 +72,7 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
         _paths('~bags', get('bags', []), 'folders'),
         _paths('~stores', get('stores', []), 'files'),
         _cameras(get('cameras', {})),
+        _idle_s('~idle_s', get('idle_s', DEFAULT_IDLE_S)),
     )
 
 

@@ -16,7 +16,7 @@ from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import ExpertQueryGoal
 from smach_oracle.ros.expert.open_questions import OpenQuestions
 from smach_oracle.ros.expert.question_messages import to_goal
-from smach_oracle.srv import AnswerQueryResponse, ClaimQueryResponse
+from smach_oracle.srv import AnswerQueryResponse, ClaimQueryRequest, ClaimQueryResponse
 
 DESK = Person('10.0.0.7', 'desk', 'operator', 'ann')
 PHONE = Person('10.0.0.8', 'phone', 'operator', 'ann')
@@ -147,3 +147,46 @@ def test_a_claim_under_the_name_from_elsewhere_is_none_of_this_browser(console):
     assert robot.questions.claim(1, 'q', 'ann').ok, 'by a terminal, perhaps'
     assert made.sessions.session_of(robot.listed()) == ''
     assert answer(console, DESK).message == CLAIM_FIRST
+
+
+def test_a_holder_who_presses_nothing_is_idle_and_a_claim_that_is_made_again_is_no_press(clock):
+    robot = Robot()
+    claims = session_claims.SessionClaims(idle_s=45.0)
+    robot.claim('q', 'ann', ClaimQueryRequest.CLAIM, 3600.0)
+    claims.take(DESK, robot.listed())
+    for later_s, act, periods in (
+        (44.0, None, 0),
+        (2.0, None, 1),
+        (0.0, claims.take, 1),
+        (44.0, None, 2),
+        (0.0, claims.note_press, 0),
+        (46.0, None, 1),
+    ):
+        clock.now_s += later_s
+        if act is not None:
+            act(DESK, robot.listed())
+        assert claims.idle_periods(robot.listed()) == periods
+    claims.note_press(PHONE, robot.listed())
+    assert claims.idle_periods(robot.listed()) == 1, 'another browser is not the holder'
+    claims.take(PHONE, robot.listed())
+    assert claims.idle_periods(robot.listed()) == 0
+
+
+def test_without_a_period_nobody_is_idle(clock):
+    robot = Robot()
+    claims = session_claims.SessionClaims(idle_s=0.0)
+    robot.claim('q', 'ann', ClaimQueryRequest.CLAIM, 3600.0)
+    claims.take(DESK, robot.listed())
+    clock.now_s += 1e6
+    assert claims.idle_periods(robot.listed()) == 0
+
+
+class FakeClock:
+    now_s = 0.0
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    found = FakeClock()
+    monkeypatch.setattr(session_claims.time, 'monotonic', lambda: found.now_s)
+    return found

@@ -46,6 +46,7 @@ export interface Commands {
   claim: OfQuestion;
   take_over: OfQuestion;
   release: OfQuestion;
+  pressed: OfQuestion; // its holder is at work
   view: { question: string }; // '': at none
   answer: OfQuestion & Answer & { seen?: number }; // the newest beat that the page has had
   mark: OfQuestion & { stamp: string; region: Point[]; strokes: Stroke[] };

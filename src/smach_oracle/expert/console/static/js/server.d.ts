@@ -105,6 +105,7 @@ export interface Question {
   status: 'pending' | 'claimed' | 'interface';
   holder: string; // the expert who has claimed it
   session: string; // of the holder's browser, in short; '': not by this console
+  idle: number; // for how many periods its holder has pressed nothing; 0 of other claims
   interface: string; // that runs for it
   asked: number;
   deadline: number | null; // null: it waits without end

@@ -2,49 +2,97 @@
 // What calls a person who looks elsewhere, or does not see: the title, a sound, a notification, a
 // live region.
 import { announce } from './announce.js';
-import { h } from './dom.js';
+import { h, setText } from './dom.js';
 import { counted } from './format.js';
 import { remember, remembered } from './preferences.js';
 
 /** @typedef {import('../server').Question} Question */
+/** @typedef {'on' | 'off' | 'asks' | 'none'} SoundState `asks`: the browser waits for a press */
 
 const TITLE = 'Operator console';
 const TONES = [{ pitch: 660, start: 0 }, { pitch: 880, start: 0.16 }]; // Hz, s
 const CAN_NOTIFY = 'Notification' in window;
+const CAN_SOUND = 'AudioContext' in window;
+
+const NEAR_S = 60; // before the deadline
+/** @type {{ [state in SoundState]: string }} */
+const SOUNDS = { on: 'Sound on', off: 'Sound off', asks: 'Allow sound', none: 'No sound here' };
+
+/**
+ * Whether a question waits for somebody: nobody works on it, or its holder presses nothing.
+ * @param {Question} question
+ */
+export function waits({ status, idle }) {
+  return status === 'pending' || (status === 'claimed' && idle > 0);
+}
+
+/**
+ * Why a question calls people now, each reason with what makes it another one.
+ * @param {Question} question
+ * @param {number} now by the server's clock
+ * @returns {{ kind: 'new' | 'idle' | 'near', id: string }[]}
+ */
+function reasonsOf({ key, status, idle, deadline }, now) {
+  const claimed = status === 'claimed';
+  const near = status !== 'interface' && deadline !== null && deadline - now <= NEAR_S;
+  /** @type {{ kind: 'new' | 'idle' | 'near', id: string }[]} */
+  const reasons = [];
+  if (status === 'pending') reasons.push({ kind: 'new', id: key });
+  if (claimed && idle > 0) reasons.push({ kind: 'idle', id: key + ' idle ' + idle });
+  if (near) reasons.push({ kind: 'near', id: key + ' near' });
+  return reasons;
+}
 
 export class Alerts {
   constructor() {
     this.sound = remembered('sound', 'on') === 'on';
     /** @type {Set<string>} */
-    this.known = new Set();
+    this.known = new Set(); // reasons
     this.first = true;
     /** @type {AudioContext | null} */
     this.audio = null;
-    const wake = () => this.wakeAudio();
-    window.addEventListener('pointerdown', wake, { once: true });
-    window.addEventListener('keydown', wake, { once: true });
+    /** @type {HTMLButtonElement} */
+    this.button = h('button', { class: 'icon-button', id: 'sound',
+      onpointerdown: () => { this.pressedAs = this.soundState; },
+      onkeydown: () => { this.pressedAs = this.soundState; },
+      onclick: () => this.press() });
+    /** @type {SoundState} */
+    this.pressedAs = 'off';
+    this.showSound();
+    window.addEventListener('pointerdown', () => this.wakeAudio());
+    window.addEventListener('keydown', () => this.wakeAudio());
   }
 
   /** Browsers allow sound only once somebody has pressed something. */
   wakeAudio() {
-    if (!this.audio && 'AudioContext' in window) this.audio = new AudioContext();
-    if (this.audio && this.audio.state === 'suspended') this.audio.resume();
+    if (!this.audio && CAN_SOUND) {
+      this.audio = new AudioContext();
+      this.audio.onstatechange = () => this.showSound();
+    }
+    if (this.audio && this.audio.state === 'suspended') this.audio.resume().catch(() => {});
+    this.showSound();
     return this.audio;
   }
 
   /**
-   * Call for those that nobody works on.
+   * Call for those that nobody works on, whose holder presses nothing, or whose time is short.
    * @param {Question[]} questions that are open
+   * @param {number} now by the server's clock
    */
-  look(questions) {
-    const pending = questions.filter((each) => each.status === 'pending');
-    document.title = pending.length ? '(' + pending.length + ') ' + TITLE : TITLE;
-    const fresh = pending.filter((each) => !this.known.has(each.key));
-    this.known = new Set(questions.map((each) => each.key));
+  look(questions, now) {
+    const waiting = questions.filter(waits).length;
+    const title = waiting ? '(' + waiting + ') ' + TITLE : TITLE;
+    if (document.title !== title) document.title = title;
+    const calls = questions.map((question) => ({ question,
+      fresh: reasonsOf(question, now).filter(({ id }) => !this.known.has(id)) }));
+    const fresh = calls.filter((each) => each.fresh.length);
+    // one that was claimed, and is released, calls nobody again
+    this.known = new Set(questions.flatMap((question) => [question.key,
+      ...reasonsOf(question, now).map(({ id }) => id)]));
     if (fresh.length) {
       if (this.sound && !this.first) this.ring();
-      this.notify(fresh[0]);
-      announce(newsOf(fresh, pending.length));
+      this.notify(fresh[0].question);
+      announce(newsOf(fresh[0].question, fresh[0].fresh[0].kind, fresh.length, waiting));
     }
     this.first = false;
   }
@@ -77,40 +125,53 @@ export class Alerts {
 
   /** The buttons of the top bar. */
   buttons() {
-    /** @type {HTMLButtonElement} */
-    const sound = h('button', { class: 'icon-button', onclick: () => this.toggleSound(sound) });
-    this.showSound(sound);
-    if (!CAN_NOTIFY || Notification.permission !== 'default') return [sound];
+    if (!CAN_NOTIFY || Notification.permission !== 'default') return [this.button];
     /** @type {HTMLButtonElement} */
     const ask = h('button', { class: 'icon-button wide-only', onclick: async () => {
       await Notification.requestPermission();
       ask.remove();
     } }, 'Notify me');
-    return [sound, ask];
+    return [this.button, ask];
   }
 
-  /** @param {HTMLButtonElement} button */
-  toggleSound(button) {
-    this.sound = !this.sound;
-    remember('sound', this.sound ? 'on' : 'off');
-    this.showSound(button);
-    if (this.sound && this.wakeAudio()) this.ring();
+  /**
+   * Whether a sound would be heard: it is on only where the browser plays it.
+   * @returns {SoundState}
+   */
+  get soundState() {
+    if (!CAN_SOUND) return 'none';
+    if (!this.sound) return 'off';
+    return this.audio?.state === 'running' ? 'on' : 'asks';
   }
 
-  /** @param {HTMLButtonElement} button */
-  showSound(button) {
-    button.textContent = this.sound ? 'Sound on' : 'Sound off';
-    button.setAttribute('aria-pressed', String(this.sound));
+  /** Turn it on or off. A press that has only allowed it turns nothing off. */
+  press() {
+    if (this.pressedAs !== 'asks') {
+      this.sound = !this.sound;
+      remember('sound', this.sound ? 'on' : 'off');
+    }
+    this.wakeAudio();
+    if (this.sound) this.ring();
+  }
+
+  showSound() {
+    const state = this.soundState;
+    setText(this.button, SOUNDS[state]);
+    this.button.disabled = state === 'none';
+    this.button.setAttribute('aria-pressed', String(state === 'on'));
   }
 }
 
 /**
- * @param {Question[]} fresh
+ * @param {Question} question the first of those that call
+ * @param {'new' | 'idle' | 'near'} kind why it does
+ * @param {number} count how many call
  * @param {number} waiting how many wait in all
  */
-function newsOf(fresh, waiting) {
-  const { state, stands, robot } = fresh[0];
-  const others = fresh.length > 1 ? ', and ' + counted(fresh.length - 1, 'other') : '';
-  return 'New question: ' + state + ' ' + stands + ', ' + robot + others + '. '
+function newsOf({ state, stands, robot, holder }, kind, count, waiting) {
+  const words = { new: 'New question', near: 'Little time is left',
+    idle: holder + ' has a question, and presses nothing' };
+  const others = count > 1 ? ', and ' + counted(count - 1, 'other') : '';
+  return words[kind] + ': ' + state + ' ' + stands + ', ' + robot + others + '. '
     + counted(waiting, 'question waits', 'questions wait') + '.';
 }

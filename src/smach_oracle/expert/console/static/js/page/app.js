@@ -32,7 +32,7 @@ const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': '
   lost: 'connection lost – trying again' };
 const RECONNECT_AFTER_S = 22; // of silence: the connection may lead nowhere
 /** @type {Set<keyof Commands>} */
-const UNTOLD = new Set(['hello', 'watch', 'look', 'view', 'release', 'drive']);
+const UNTOLD = new Set(['hello', 'watch', 'look', 'view', 'pressed', 'release', 'drive']);
 /** @type {{ [theme in Theme]: { words: string, dark: string, next: Theme } }} dark: its media */
 const THEMES = {
   auto: { words: '◐ Auto', dark: '(prefers-color-scheme: dark)', next: 'light' },
@@ -121,7 +121,7 @@ export class App {
 
   /** @param {string[]} names of sections */
   update(names) {
-    if (names.includes('questions')) this.alerts.look(this.store.questions);
+    if (names.includes('questions')) this.alerts.look(this.store.questions, this.store.now());
     for (const { view, badge } of this.tabs) {
       view.update?.(names);
       const count = view.badge ? view.badge() : 0;
@@ -132,6 +132,7 @@ export class App {
 
   tick() {
     this.showLife();
+    if (this.store.get('questions')) this.alerts.look(this.store.questions, this.store.now());
     if (this.connection.connected && this.liveness.console > RECONNECT_AFTER_S) {
       this.connection.connect();
     }

@@ -1,11 +1,13 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
+import { waits } from '../page/alerts.js';
 import { SETTLING_MS, wasMeant } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
+import { tellPresses } from '../page/presence.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { readersOf } from './onlookers.js';
@@ -41,6 +43,7 @@ class QuestionPanel {
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
+    tellPresses(app, () => (this.detail?.held ? this.detail.key : ''));
     this.showStage();
   }
 
@@ -56,7 +59,7 @@ class QuestionPanel {
     return this.app.current === 'questions' && !document.querySelector('dialog[open]');
   }
 
-  badge() { return this.open.filter((each) => each.status === 'pending').length; }
+  badge() { return this.open.filter(waits).length; }
 
   shown() {
     this.update(['questions', 'servers']);
@@ -115,6 +118,10 @@ class QuestionPanel {
     const { key, status, holder, interface: name } = question;
     if (status === 'interface') {
       return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
+    }
+    if (waits(question) && holder) {
+      return chip((this.app.isMine(question) ? 'yours' : holder) + ' · idle', 'bad',
+        'Whoever holds it has pressed nothing for a while');
     }
     if (!holder) return chip(readWords(readersOf(this.app, key)), 'bad');
     return this.app.isMine(question) ? chip('yours', 'good') : chip(holder, 'warn');
