@@ -198,6 +198,44 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         )
         self.assertTrue(0 < top < bottom < 844, (top, bottom))
 
+    def test_4_back_forward_reload_and_a_link_lead_where_they_say(self):
+        browser, driver = self.browser, self.browser.driver
+        browser.click('.follow-up [data-action=back]')
+        browser.click(QUESTION)
+        browser.find('.detail')
+        question = driver.current_url
+        self.assertIn('#questions//alpha/expert_query+', question)
+        browser.click('#tab-machines')
+        browser.click('[id="/alpha/KITCHEN/FETCH"] .box')
+        self.assertTrue(browser.says('KITCHEN/FETCH', '.machine-card h2'))
+        machine = driver.current_url
+        self.assertTrue(machine.endswith('#machines//alpha+KITCHEN/FETCH'), machine)
+        driver.back()
+        driver.back()
+        browser.find('.detail')
+        self.assertEqual(driver.current_url, question)
+        driver.back()
+        self.assertTrue(wait_for(lambda: not browser.text('.detail')), 'the list, and the console')
+        driver.forward()
+        browser.find('.detail')
+        driver.refresh()
+        self.assertTrue(browser.says('PICK', '.detail-head h2'), 'a reload shows the same')
+        driver.get('about:blank')
+        driver.get(machine)
+        self.assertTrue(browser.says('KITCHEN/FETCH', '.machine-card h2'), 'so does a link')
+        browser.click('#tab-trials')
+        browser.click('.trial:last-child')
+        trial = browser.find('.trial[aria-current=true]').get_attribute('data-trial')
+        self.assertIn('#trials/', driver.current_url)
+        driver.refresh()
+        browser.find('.trial[aria-current=true][data-trial="{}"]'.format(trial))
+        driver.get(self.page + '#questions/nobody+asks')
+        self.assertTrue(browser.says('The question of this address is not open', '.stage'))
+        browser.click(QUESTION)
+        browser.find('.detail')
+        browser.click('.detail-head .back')
+        self.assertEqual(browser.errors(), [])
+
     def test_4_machines_and_trials_are_shown(self):
         browser = self.browser
         browser.click('#tab-machines')

@@ -50,7 +50,7 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
   };
   const app = { store, expert: "ann", mayAnswer: true, role: "operator", current: "questions",
     connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
-    isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
+    went() {}, isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
   const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
   store.onChange((names) => detail.update(names));
   const said = (holder) => {

@@ -1,5 +1,6 @@
 // @ts-check
 // The frame around the panels: the top bar, the tabs, and which panel is shown.
+import { addressOf, readAddress } from './address.js';
 import { Alerts } from './alerts.js';
 import { Connection } from './connection.js';
 import { watchOverClicks } from './deliberate.js';
@@ -71,6 +72,7 @@ export class App {
     replace(part('nav'), this.tabs.map((tab) => tab.button));
     this.store.onChange((names) => this.update(names));
     setInterval(() => this.tick(), 1000);
+    window.addEventListener('popstate', () => { if (this.showsPanel) this.arrive(); });
     watchOverClicks();
   }
 
@@ -100,7 +102,10 @@ export class App {
    */
   tab({ id, title, create }) {
     const badge = h('span', { class: 'badge', hidden: true });
-    const button = h('button', { class: 'tab', id: 'tab-' + id, onclick: () => this.show(id) },
+    const button = h('button', { class: 'tab', id: 'tab-' + id, onclick: () => {
+      this.show(id);
+      this.went();
+    } },
       h('span', {}, title), badge);
     return { id, view: create(this), button, badge };
   }
@@ -114,9 +119,26 @@ export class App {
     }
     const main = part('main');
     if (main.firstElementChild !== shown.view.root) replace(main, shown.view.root);
-    history.replaceState(null, '', '#' + this.current);
     this.looking.tell();
     shown.view.shown?.();
+  }
+
+  /** The tab that is shown. */
+  get tabNow() { return this.tabs.find((tab) => tab.id === this.current) || this.tabs[0]; }
+
+  /** Whether a panel is shown, and not the sign-in. */
+  get showsPanel() { return part('main').contains(this.tabNow.view.root); }
+
+  went() {
+    const address = addressOf(this.current, this.tabNow.view.place || '');
+    if (address !== location.hash) history.pushState(null, '', address);
+  }
+
+  /** Show what the address names. */
+  arrive() {
+    const { panel, place } = readAddress(location.hash);
+    this.show(panel);
+    this.tabNow.view.goTo?.(place);
   }
 
   /** @param {string[]} names of sections */
@@ -192,8 +214,7 @@ export class App {
   /** The connection is there: so are the panels. */
   begin() {
     this.looking.connected();
-    const current = this.tabs.find((tab) => tab.id === this.current) || this.tabs[0];
-    if (!part('main').contains(current.view.root)) this.show(location.hash.slice(1));
+    if (!this.showsPanel) this.arrive();
     for (const { view } of this.tabs) view.connected?.();
   }
 

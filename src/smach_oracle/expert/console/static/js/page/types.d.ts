@@ -36,6 +36,7 @@ export interface App {
   readonly mayAnswer: boolean;
   /** Whether this browser holds its claim. */
   isMine(question: Question): boolean;
+  went(): void; // a person has turned to something: Back leads to what was shown before
 }
 
 /** One tab of the page. */
@@ -55,6 +56,10 @@ export interface PanelView {
   tick?(): void;
   /** The connection is there, again. */
   connected?(): void;
+  /** What it shows, for the address; '' for what it opens with. */
+  readonly place?: string;
+  /** Show what an address names. */
+  goTo?(place: string): void;
   /** How many things wait there. */
   badge?(): number;
 }

@@ -23,6 +23,8 @@ export const questions = { id: 'questions', title: 'Questions',
 
 const NO_SERVER = 'No robot with an expert query server is known yet.';
 const LONGEST_NAME = 14; // of a reader, in the list
+const GONE = 'The question of this address is not open: it was answered or taken back, or its time '
+  + 'was over.';
 const QUIET = 'Robots recover by themselves where they can; they ask here where they cannot.';
 
 class QuestionPanel {
@@ -34,6 +36,9 @@ class QuestionPanel {
     /** @type {QuestionDetail | null} */
     this.aside = null; // still held: what took its place may have been opened by accident
     this.asideTimer = 0;
+    /** @type {string | null} */
+    this.wanted = null; // what an address names, until it is known whether it is open; '': the list
+    this.missing = ''; // the question of an address, where it is not open
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.servers = h('p', { class: 'dim servers' });
@@ -74,8 +79,36 @@ class QuestionPanel {
     if (this.detail) this.detail.tick();
   }
 
+  get place() { return this.detail?.key || ''; }
+
+  /** @param {string} key of a question, '' for the list */
+  goTo(key) {
+    this.wanted = key;
+    this.arrive();
+  }
+
+  /** Turn to what was wanted, once all that are open are known. */
+  arrive() {
+    const key = this.wanted;
+    if (key === null || !this.app.store.get('questions')) return;
+    this.wanted = null;
+    if (!key) {
+      if (this.detail) this.leave();
+    } else if (this.open.some((each) => each.key === key)) {
+      this.choose(key, false);
+    } else if (!this.isChosen(key)) {
+      this.close();
+      this.missing = key;
+      this.showStage();
+    }
+  }
+
   /** @param {string[]} names */
   update(names) {
+    // a console that has just begun may not have heard of it yet
+    const comes = this.open.some(({ key }) => key === this.missing);
+    if (comes && !this.detail && this.app.current === 'questions') this.wanted = this.missing;
+    if (names.includes('questions')) this.arrive();
     if (names.includes('servers')) this.showServers();
     if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
     if (this.detail) this.detail.update(names);
@@ -148,6 +181,7 @@ class QuestionPanel {
     if (!question || (this.isChosen(key) && !this.detail?.settled)) return; // else it is put again
     const back = this.aside?.key === key ? this.aside : null;
     if (back) this.aside = null;
+    this.missing = '';
     if (!meant && this.detail?.held && !this.detail.settled) this.putAside(this.detail);
     else this.close();
     this.detail = back || new QuestionDetail(this.app, question,
@@ -157,6 +191,7 @@ class QuestionPanel {
     moveFocus(this.detail.title);
     this.detail.begin();
     if (back) back.update(['questions', 'images']); // what it has missed
+    this.app.went();
   }
 
   /**
@@ -179,6 +214,9 @@ class QuestionPanel {
   /** Back to the list, as a person wants it: the focus goes to its first question. */
   leave() {
     this.close();
+    this.missing = '';
+    this.showStage();
+    this.app.went();
     const first = this.queue.querySelector('.question-row') || this.stage.querySelector('h2');
     if (first instanceof HTMLElement) moveFocus(first);
   }
@@ -205,8 +243,10 @@ class QuestionPanel {
       ' for the oldest that nobody works on.'] : 'Choose one.';
     const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
       : 'each of the ' + this.open.length + ' open questions.');
+    const gone = this.missing && h('p', { class: 'gone', role: 'status' }, GONE);
     const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
-    replace(this.stage, h('div', { class: 'empty' }, h('h2', { tabindex: -1 }, title), hint));
+    replace(this.stage, h('div', { class: 'empty' }, gone, h('h2', { tabindex: -1 }, title),
+      hint));
   }
 
   /** @param {KeyboardEvent} event */

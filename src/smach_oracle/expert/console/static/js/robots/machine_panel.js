@@ -32,6 +32,8 @@ class MachinePanel {
     this.app = app;
     this.robot = '';
     this.path = '';
+    this.picked = false; // by a person, or an address
+    this.wanted = ''; // what an address names, until it is known
     this.source = machinesNow(app.store);
     this.view = new MachineView(this.source, (path) => this.open(this.robot, path));
     this.hand = new MachineHand(app);
@@ -56,6 +58,17 @@ class MachinePanel {
   open(robot, path) {
     this.robot = robot;
     this.path = path;
+    this.picked = true;
+    this.wanted = '';
+    this.show();
+    this.app.went();
+  }
+
+  get place() { return this.picked ? this.robot + ' ' + this.path : ''; }
+
+  /** @param {string} place a robot and the path of a container, '' for any */
+  goTo(place) {
+    this.wanted = place;
     this.show();
   }
 
@@ -94,7 +107,16 @@ class MachinePanel {
    * @param {string[]} robots
    */
   settle(robots) {
+    const found = robots.find((robot) => this.wanted.startsWith(robot + ' ')
+      && this.paths(robot).includes(this.wanted.slice(robot.length + 1)));
+    if (found) {
+      this.robot = found;
+      this.path = this.wanted.slice(found.length + 1);
+      this.picked = true;
+      this.wanted = '';
+    }
     if (!robots.includes(this.robot)) {
+      this.picked = false;
       const living = robots.find((robot) => this.source.state(robot).alive);
       this.robot = living || robots[0] || '';
       this.path = '';

@@ -41,6 +41,7 @@ class TrialPanel {
     this.bag = null; // the trial that is shown, if it is one of a bag
     /** @type {Trial | null} */
     this.trial = null;
+    this.wanted = ''; // id of the trial that an address names, until it is found
     this.follows = true; // the newest trial is shown, until a person chooses
     /** @type {TrialEvent[]} */
     this.events = [];
@@ -67,15 +68,26 @@ class TrialPanel {
 
   shown() { this.update(['trials', 'bags']); }
 
+  get place() { return this.follows ? '' : this.chosen; }
+
+  /** @param {string} id of a trial, '' for the newest */
+  goTo(id) {
+    this.wanted = id;
+    if (!id) this.follows = true;
+    this.update(['trials', 'bags']);
+  }
+
   connected() { if (this.chosen && !this.bag) this.watch(this.chosen); }
 
   /** @param {string} id */
   choose(id) {
     this.follows = false;
+    this.wanted = '';
     const trial = this.all.find((each) => each.id === id);
     if (trial) this.open(trial);
     else this.watch(id);
     this.update(['trials']);
+    this.app.went();
     if (matchMedia(NARROW).matches) this.detail.scrollIntoView();
   }
 
@@ -157,6 +169,13 @@ class TrialPanel {
    * @param {Trial[]} all
    */
   settle(all) {
+    const named = all.find(({ id }) => id === this.wanted);
+    if (named) {
+      this.wanted = '';
+      this.follows = false;
+      if (named.id !== this.chosen) this.open(named);
+      return;
+    }
     const newest = all[0];
     const gone = !all.some((trial) => trial.id === this.chosen);
     const newer = this.follows && !isOfBag(newest) && newest.id !== this.chosen;
