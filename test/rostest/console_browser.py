@@ -25,6 +25,13 @@ UNKNOWN_SUCCESS = """return import("/static/js/answering/state_choices.js").then
     blocked: "", repeats: [], runs_again: [], helped: [0, 0], helped_s: null,
     recommended: "", container: "" },
   { state: "PLACE", running: false }).map((line) => line ? line.textContent : "").join("")))"""
+DOUBTFUL = """return import("/static/js/answering/state_choices.js").then(
+({ stateLines }) => (
+  stateLines({ state: "INSPECT", success: 0.95, class: 1, visits: 0, missing: [],
+    preconditions: ["DETECT"], blocked: "", repeats: [], runs_again: [], helped: [0, 0],
+    helped_s: null, recommended: "", container: "" },
+  { state: "DETECT", running: false, history: [] }).map((line) => (
+    line ? line.textContent : "")).join(", ")))"""
 NO_PLACE = """return import("/static/js/robots/graph_view.js").then(({ GraphView }) => {
   const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));
   const view = new GraphView(() => {});
@@ -253,6 +260,9 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         )
         self.assertEqual(browser.run(added), ['', ' no cup'], 'nothing is told twice')
         self.assertEqual(browser.run(UNKNOWN_SUCCESS), 'PICK–', 'not drawn as a failure')
+        doubtful = browser.run(DOUBTFUL)
+        for told in ('est. 95% ok', 'low failure rate', 'DETECT has just failed'):
+            self.assertIn(told, doubtful)
         self.assertEqual(browser.run(NO_PLACE), 1, 'it costs the other states nothing')
         viewers, operators = browser.run(BARS)
         self.assertIn('as a viewer', viewers)

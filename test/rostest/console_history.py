@@ -34,6 +34,30 @@ MIDDLE = (
     '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]'
 )
 
+# px of a minute of work before a wait of 15, on the whole axis and on a part of it around the
+# cursor; whether it is drawn where the cursor is far away; and on the whole axis again
+ZOOMED = """
+return import("/static/js/trials/timeline.js").then(({ Timeline }) => {
+  const line = new Timeline({ onPick() {}, onSeek() {}, onKey() {} });
+  line.root.style.width = "900px";
+  document.body.append(line.root);
+  const events = [["state_start", 0], ["failure", 60], ["query_opened", 60],
+    ["query_answered", 960]].map(([kind, t], seq) => (
+    { seq, kind, t, path: "TOP", state: "PICK", words: kind }));
+  const width = () => Number(line.root.querySelector("rect.bar.bad")?.getAttribute("width") || 0);
+  line.set(events, 960);
+  line.place(30, "");
+  const found = [width()];
+  line.zoom(16);
+  found.push(width());
+  line.place(900, "");
+  found.push(width());
+  line.zoom(0);
+  found.push(width());
+  line.root.remove();
+  return found;
+});"""
+
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class SituationAndHistory(ConsolePage, unittest.TestCase):
@@ -220,6 +244,11 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
             'a line of the log leads there',
         )
         self.assertEqual(browser.errors(), [])
+
+    def test_9_a_part_of_the_time_axis_can_be_seen_larger(self):
+        whole, part, elsewhere, again = self.browser.run(ZOOMED)
+        self.assertGreater(part, 5 * whole)
+        self.assertEqual((elsewhere, again), (0, whole))
 
 
 if __name__ == '__main__':

@@ -78,6 +78,15 @@ TAKEN = (
   said("bob");
   return [said("ann"), said("carl")];"""
 )
+# it was taken over, and comes back: nothing that was said of the one contradicts the other
+BACK_AGAIN = (
+    OF_A_QUESTION
+    % """
+  said("");
+  await detail.claim("claim");
+  said("ann");
+  return [said("carl"), said("ann")];"""
+)
 # a press that was not meant opens another question than the one that is worked on: what was told
 # while that one was only read, then, after the way back, and once the other one has been seen;
 # which one the others are told that it is; and what is still typed
@@ -350,6 +359,9 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         mine, taken = browser.run(TAKEN)
         self.assertEqual(mine, 'It is yours. Leave it to others')
         self.assertIn('carl has taken this question over.', taken)
+        taken, mine = browser.run(BACK_AGAIN)
+        self.assertIn('carl has taken this question over.', taken)
+        self.assertEqual(mine, 'It is yours. Leave it to others')
         self.assertEqual(browser.run(GO_BACK), 'TOP', 'the focus is where it was')
         self.assertEqual(
             browser.run(ANOTHER_BY_ACCIDENT),

@@ -141,12 +141,8 @@ export interface StateChoice {
 }
 
 export interface LevelOutcome { container: string; outcome: string }
-/** `meaning`: of the state's work; 'other end': its name says neither. */
-export interface OutcomeChoice {
-  outcome: string;
-  target: string;
-  meaning: 'success' | 'failure' | 'preempted' | 'other end';
-}
+export type OutcomeMeaning = 'success' | 'failure' | 'preempted' | 'other end'; // of the work
+export interface OutcomeChoice { outcome: string; target: string; meaning: OutcomeMeaning }
 export interface InterfaceOffer { name: string; description: string }
 
 export interface UserdataItem {

@@ -1,7 +1,7 @@
 // @ts-check
 // Everything that may be answered, each a button: one press sends it, but for giving up. Keys: 1 to
-// 9 a state, s the outcome that says that the work is done, i the first interface, g asks whether to
-// give up.
+// 9 a state, s the outcome that says that the work is done, i the first interface, g asks whether
+// to give up.
 import { h, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { whenLetGo } from '../page/redraw.js';
@@ -10,7 +10,7 @@ import { GiveUp } from './give_up.js';
 import { MEANINGS, successOf } from './outcome_choices.js';
 import { outputFields, readOutputs } from './output_field.js';
 import { PreconditionList } from './precondition_list.js';
-import { likeliest, stateLines } from './state_choices.js';
+import { justFailed, likeliest, stateLines } from './state_choices.js';
 
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Answer} Answer */
@@ -76,7 +76,11 @@ export class AnswerForm {
    */
   showPreconditions(statuses, now) {
     whenLetGo(this.root, () => {
-      for (const [state, list] of this.preconditions) list.show(statuses[state], now);
+      for (const [state, list] of this.preconditions) {
+        list.show(statuses[state], now);
+        const unmet = Boolean(statuses[state]?.some(({ holds }) => holds === false));
+        list.root.closest('.choice')?.classList.toggle('doubtful', unmet);
+      }
     });
   }
 
@@ -194,6 +198,8 @@ export class AnswerForm {
     }
     const button = this.choice('goto', state, key, words, container);
     if (blocked) button.dataset['blocked'] = 'yes';
+    // the estimate is of a state whose preconditions hold
+    button.classList.toggle('unmet', Boolean(justFailed(choice, this.question)));
     return button;
   }
 

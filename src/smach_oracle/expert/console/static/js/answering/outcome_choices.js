@@ -5,8 +5,8 @@
 
 const USUAL = 'succeeded';
 /** @type {{ [meaning in OutcomeChoice['meaning']]: string }} */
-export const MEANINGS = { success: '', failure: 'counts as a failure', preempted: 'counts as stopped',
-  'other end': '' };
+export const MEANINGS = { success: '', failure: 'counts as a failure',
+  preempted: 'counts as stopped', 'other end': '' };
 
 /**
  * The one outcome that says that the work is done; undefined where none does, or several do and

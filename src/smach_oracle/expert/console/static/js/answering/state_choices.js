@@ -8,6 +8,7 @@ import {
 /** @typedef {import('../page/types').Child} Child */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').StateChoice} StateChoice */
+/** @typedef {Pick<Question, 'state' | 'running' | 'history'>} Asked */
 
 const LIKELIEST = 6;
 const MOST_HELPFUL = 2;
@@ -37,10 +38,11 @@ export function likeliest({ choices, state, supersede, history }) {
 /**
  * What a button says of a state.
  * @param {StateChoice} choice
- * @param {Pick<Question, 'state' | 'running'>} question
+ * @param {Asked} question
  * @returns {Child[]}
  */
-export function stateLines(choice, { state: failed, running }) {
+export function stateLines(choice, question) {
+  const { state: failed, running } = question;
   const same = choice.state === failed && !choice.container;
   return [
     choice.container && h('span', { class: 'dim' }, breakable(choice.container, '/'), ' /'),
@@ -48,9 +50,9 @@ export function stateLines(choice, { state: failed, running }) {
       h('strong', { class: 'ellipsis' }, same && running && 'Wait on: ',
         breakable(choice.state, '_')),
       same && (running ? chip('runs on', '', 'You are asked again if it takes twice as long')
-        : chip('again', '', 'The state that failed')),
+        : chip('again: it has just failed', 'warn')),
       h('span', { class: 'spacer' }), successBar(choice)),
-    h('span', { class: 'chips' }, stateChips(choice, failed)),
+    h('span', { class: 'chips' }, stateChips(choice, question)),
   ];
 }
 
@@ -62,7 +64,8 @@ function successBar({ success, helped: [helped, tried] }) {
   if (tried > 0) {
     return rateBar(1 - helped / tried, helped / tried, 'led on ' + helped + ' of ' + tried);
   }
-  return success === null ? rateBar(null) : rateBar(1 - success, success, percent(success) + ' ok');
+  return success === null ? rateBar(null)
+    : rateBar(1 - success, success, 'est. ' + percent(success) + ' ok');
 }
 
 /**
@@ -79,25 +82,40 @@ function helpedChip({ helped: [helped, tried], helped_s: seconds }, failed) {
 }
 
 /**
+ * The precondition of a state that has just failed: what the question is about, or what the last
+ * visit to it ended in. '' where none has.
  * @param {StateChoice} choice
- * @param {string} failed the state that failed
+ * @param {Asked} question
+ */
+export function justFailed({ preconditions }, { state, running, history }) {
+  return preconditions.find((name) => {
+    const last = history.filter((visit) => visit.state === name).pop();
+    return (name === state && !running) || last?.result === 'failure';
+  }) || '';
+}
+
+/**
+ * @param {StateChoice} choice
+ * @param {Asked} question
  * @returns {Child[]}
  */
-function stateChips(choice, failed) {
+function stateChips(choice, question) {
   const { class: rank, blocked, repeats, missing, visits, recommended } = choice;
   const again = choice.runs_again;
   const words = FAILURE_CLASSES[rank];
+  const unmet = justFailed(choice, question);
   return [
     recommended && chip('recommended', 'good', recommended),
-    words && chip(words, 'class-' + rank),
+    words && chip(words + ' failure rate', 'class-' + rank),
     blocked && chip('blocked: ' + blocked, 'bad'),
     repeats.length > 0 && chip('repeats: ' + repeats.join(', '), 'warn',
       'Done in this trial, and not repeated by itself'),
     again.length > 0 && chip('runs again: ' + again.join(', '), 'warn',
       'All branches of a Concurrence run again'),
+    unmet && chip(unmet + ' has just failed', 'bad', 'A precondition of it'),
     missing.length > 0 && chip('missing: ' + missing.join(', '), 'warn',
       'Userdata that it needs and would not have'),
     visits > 0 && chip(counted(visits, 'visit'), '', 'In this trial'),
-    helpedChip(choice, failed),
+    helpedChip(choice, question.state),
   ];
 }

@@ -1,6 +1,6 @@
 // @ts-check
-// The address of what is shown: #PANEL, or #PANEL/PLACE. A place is what the panel calls it, such as
-// the key of a question. Slashes stay, and a space is a plus.
+// The address of what is shown: #PANEL, or #PANEL/PLACE. A place is what the panel calls it, such
+// as the key of a question. Slashes stay, and a space is a plus.
 
 /**
  * @param {string} panel

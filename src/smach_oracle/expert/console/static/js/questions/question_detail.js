@@ -41,13 +41,12 @@ export class QuestionDetail {
     this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
     this.claiming = false;
-    /** @type {Promise<void>} */
     this.claimed = Promise.resolve(); // the latest claim has its reply
     this.held = false; // this page has claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
     this.sending = false;
     this.ended = false; // it is shown no longer
-    this.problem = '';
+    this.problem = this.takenWords = ''; // the latter when somebody has taken it over
     /** @type {FollowUp | null} */
     this.followUp = null;
     /** @type {PerceptionPanel | null} */
@@ -73,13 +72,13 @@ export class QuestionDetail {
       this.form.root);
     this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
     this.root = this.build();
-    this.machine.show(question.robot, question.path);
-    this.hand.show(question.robot, question.path);
     this.show();
   }
 
   build() {
     const { question } = this;
+    this.machine.show(question.robot, question.path);
+    this.hand.show(question.robot, question.path);
     return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
       this.silence.root, this.claimBar.root, this.onlookers.root, this.perceptionPlace,
       this.interfacePlace,
@@ -350,11 +349,14 @@ export class QuestionDetail {
     if (this.held && this.free && this.app.connection.connected
       && !this.app.liveness.whoIsSilent(this.question)
       && performance.now() - this.claimedAt > RETRY_MS) this.claim('claim');
-    if (this.mine) this.holderBefore = ''; // whoever holds it next has taken it over
+    if (this.mine) {
+      this.holderBefore = ''; // whoever holds it next has taken it over
+      if (this.problem === this.takenWords) this.problem = ''; // it is here again
+    }
     const other = this.otherHolder;
     if (this.held && other && other !== this.holderBefore) { // else it is not told yet
       this.held = false;
-      this.problem = other + ' has taken this question over.';
+      this.problem = this.takenWords = other + ' has taken this question over.';
     }
     this.show();
   }

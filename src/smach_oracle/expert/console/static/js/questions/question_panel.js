@@ -7,10 +7,10 @@ import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
 import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
-import { tellPresses } from '../page/presence.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { readersOf } from './onlookers.js';
+import { tellPresses } from './presence.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -141,8 +141,8 @@ class QuestionPanel {
       h('span', { class: 'spacer' }), this.statusChip(question)),
     h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
       h('span', { class: 'spacer' }),
-      h('span', { title: 'How often it fails, as learned' },
-        rateBar(rate, undefined, percent(rate) + ' fail'))),
+      h('span', { title: 'How often it is expected to fail, as learned' },
+        rateBar(rate, undefined, 'est. ' + percent(rate) + ' fail'))),
     this.times(question));
   }
 
@@ -243,7 +243,7 @@ class QuestionPanel {
       ' for the oldest that nobody works on.'] : 'Choose one.';
     const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
       : 'each of the ' + this.open.length + ' open questions.');
-    const gone = this.missing && h('p', { class: 'gone', role: 'status' }, GONE);
+    const gone = this.missing && h('p', { class: 'question-gone', role: 'status' }, GONE);
     const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
     replace(this.stage, h('div', { class: 'empty' }, gone, h('h2', { tabindex: -1 }, title),
       hint));

@@ -228,7 +228,7 @@ function showRate({ group, rate, title }, label, learned) {
   if (!learned || learned.rate === null) return;
   group.style.setProperty('--hue', String(hue(learned.rate)));
   const { failures, successes } = learned;
-  const text = percent(learned.rate) + ' fails · ' + failures + '/' + (failures + successes);
+  const text = `failed ${failures}/${failures + successes} · est. ${percent(learned.rate)}`;
   if (rate.textContent !== text) {
     rate.textContent = text;
     title.textContent = label + ': ' + text;
@@ -273,5 +273,5 @@ function arrowOf({ ofOracle }, taken, hot) {
 function edgeText({ ofOracle, outcome }, taken, toOracle) {
   if (!ofOracle) return outcome + (taken ? ' ' + percent(taken.share) : '');
   if (!taken) return '';
-  return toOracle ? percent(taken.share) + ' fail' : taken.times + '×';
+  return taken.times + (toOracle ? '× failed' : '×');
 }

@@ -69,6 +69,11 @@ class MachinePanel {
   /** @param {string} place a robot and the path of a container, '' for any */
   goTo(place) {
     this.wanted = place;
+    if (!place && this.picked) {
+      this.picked = false;
+      this.robot = '';
+      this.path = '';
+    }
     this.show();
   }
 

@@ -12,6 +12,7 @@ const SPEEDS = [0.25, 1, 4, 16, 64, 256];
  * @property {() => void} forward
  * @property {() => void} last
  * @property {() => void} follow
+ * @property {(factor: number) => void} zoom the time axis; 0: the whole trial
  */
 
 export class ReplayControls {
@@ -27,7 +28,11 @@ export class ReplayControls {
       button('|◂', 'To the beginning', 'first', use.first),
       button('◂', 'One event back', 'back', use.back), this.playButton,
       button('▸', 'One event on', 'on', use.forward), button('▸|', 'To the end', 'last', use.last),
-      this.speedChoice, this.liveButton, h('span', { class: 'spacer' }), this.time);
+      this.speedChoice,
+      button('−', 'A longer part of the time axis', 'longer', () => use.zoom(0.5)),
+      button('+', 'A shorter part of the time axis', 'shorter', () => use.zoom(2)),
+      button('↔', 'The whole time axis', 'whole', () => use.zoom(0)), this.liveButton,
+      h('span', { class: 'spacer' }), this.time);
   }
 
   get speed() { return Number(this.speedChoice.value); }

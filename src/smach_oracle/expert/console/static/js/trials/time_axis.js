@@ -97,13 +97,16 @@ export function questionBars(events, end) {
 }
 
 /**
- * Round times from 0 on, s.
- * @param {number} whole
+ * Round times of a part of the axis, s since its beginning.
+ * @param {number} whole length of the part
  * @param {number} most
+ * @param {number} [from] where the part begins
  */
-export function ticks(whole, most) {
+export function ticks(whole, most, from = 0) {
   const step = STEPS_S.find((each) => whole / each <= Math.min(MOST_TICKS, most)) || whole / 5;
   const found = [];
-  for (let tick = 0; tick <= whole; tick += step) found.push(tick);
+  for (let number = Math.ceil(from / step); number * step <= from + whole; number += 1) {
+    found.push(number * step);
+  }
   return found;
 }

@@ -10,6 +10,7 @@ import { MARKS, laneOf, lanesOf, questionBars, stateBars, ticks } from './time_a
 /** @typedef {import('../server').TrialEvent} TrialEvent */
 /** @typedef {import('./types').Bar} Bar */
 /** @typedef {{ left: number, right: number, begin: number, whole: number }} Scale px and s */
+/** @typedef {{ from: number, to: number }} Part of the axis, s since the epoch */
 /**
  * @typedef {object} Use
  * @property {(seq: number) => void} onPick an event was chosen
@@ -23,6 +24,7 @@ const RIGHT = 14; // px that are left free
 const TOP = 6;
 const AXIS = 24;
 const NARROWEST = 50;
+const SHORTEST_S = 0.5; // that the axis may show
 
 export class Timeline {
   /** @param {Use} use */
@@ -46,6 +48,8 @@ export class Timeline {
     /** @type {string[]} */
     this.shownLanes = [];
     this.picked = -1; // number of an event
+    /** @type {Part | null} */
+    this.part = null; // that is shown; null: the whole trial
     /** @type {{ t: number, words: string } | null} */
     this.placed = null; // where the cursor is
     for (const element of [this.slider, this.canvas]) this.listen(element);
@@ -102,14 +106,53 @@ export class Timeline {
   place(t, words) {
     this.placed = { t, words };
     if (!this.scale) return;
+    if (this.part && (t < this.part.from || t > this.part.to)) this.moveTo(t);
     const { left, right, begin, whole } = this.scale;
     const share = Math.min(1, Math.max(0, (t - begin) / whole));
     const at = left + (right - left) * share;
     this.handle.style.setProperty('--at', at + 'px');
     this.cursor.style.setProperty('--at', at + 'px');
-    this.slider.setAttribute('aria-valuemax', whole.toFixed(2));
-    this.slider.setAttribute('aria-valuenow', (whole * share).toFixed(2));
+    const first = this.events[0].t;
+    this.slider.setAttribute('aria-valuemax', (this.end - first).toFixed(2));
+    this.slider.setAttribute('aria-valuenow', (begin + whole * share - first).toFixed(2));
     this.slider.setAttribute('aria-valuetext', words);
+  }
+
+  /**
+   * Show a shorter part, or a longer one. The cursor stays where it is on the screen.
+   * @param {number} factor above 1: shorter; 0: the whole trial
+   */
+  zoom(factor) {
+    if (!this.scale || !this.events.length) return;
+    const { begin, whole } = this.scale;
+    const first = this.events[0].t;
+    const span = factor ? Math.max(whole / factor, SHORTEST_S) : Infinity;
+    const at = Math.min(begin + whole, Math.max(begin, this.placed ? this.placed.t : begin));
+    const from = Math.max(first, at - span * ((at - begin) / whole));
+    this.part = span >= this.end - first ? null : this.within(from, span);
+    this.draw();
+  }
+
+  /**
+   * So much from a time on, as far as there is so much.
+   * @param {number} from
+   * @param {number} span s
+   * @returns {Part}
+   */
+  within(from, span) {
+    const start = Math.max(this.events[0].t, Math.min(from, this.end - span));
+    return { from: start, to: start + span };
+  }
+
+  /**
+   * Another part of the same length, with a time in its middle.
+   * @param {number} t
+   */
+  moveTo(t) {
+    if (!this.part) return;
+    const span = this.part.to - this.part.from;
+    this.part = this.within(t - span / 2, span);
+    this.drawPart();
   }
 
   /**
@@ -117,6 +160,7 @@ export class Timeline {
    * @param {number} end of the axis
    */
   set(events, end) {
+    if (events[0]?.t !== this.events[0]?.t) this.part = null; // another trial
     this.events = events;
     this.end = end;
     this.draw();
@@ -139,6 +183,11 @@ export class Timeline {
   }
 
   draw() {
+    this.drawPart();
+    if (this.placed) this.place(this.placed.t, this.placed.words);
+  }
+
+  drawPart() {
     const width = this.canvas.clientWidth;
     const empty = !this.events.length || width < NARROWEST;
     this.slider.hidden = this.cursor.hidden = empty;
@@ -147,16 +196,23 @@ export class Timeline {
       this.scale = null;
       return;
     }
-    const begin = this.events[0].t;
-    const whole = Math.max(this.end - begin, 0.001);
+    const first = this.events[0].t;
+    const begin = this.part ? this.part.from : first;
+    const whole = Math.max((this.part ? this.part.to : this.end) - begin, 0.001);
     const left = Math.min(NAME, width * 0.3);
     this.scale = { left, right: width - RIGHT, begin, whole };
     this.shownLanes = lanesOf(this.events);
-    const shown = ticks(whole, Math.max(2, (width - left) / 62));
+    const shown = ticks(whole, Math.max(2, (width - left) / 62), begin - first);
     redraw(this.axis, this.drawAxis(width, shown));
     redraw(this.lanes, this.drawLanes(width, shown, this.scale));
-    if (this.placed) this.place(this.placed.t, this.placed.words);
   }
+
+  /**
+   * Whether something lies in the part that is shown.
+   * @param {number} from
+   * @param {number} to
+   */
+  isShown(from, to) { return !this.part || (to >= this.part.from && from <= this.part.to); }
 
   /**
    * px of a time.
@@ -178,7 +234,7 @@ export class Timeline {
    * @param {number[]} shown ticks
    */
   drawAxis(width, shown) {
-    const begin = this.scale ? this.scale.begin : 0;
+    const begin = this.events[0].t;
     return svg('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS,
       'aria-hidden': true }, shown.map((tick) => svg('text', { class: 'tick-text',
       x: Math.min(this.x(begin + tick), width - 26), y: 16 },
@@ -190,7 +246,8 @@ export class Timeline {
    * @param {number[]} shown ticks
    * @param {Scale} scale
    */
-  drawLanes(width, shown, { begin, left }) {
+  drawLanes(width, shown, { left }) {
+    const begin = this.events[0].t;
     const height = TOP + this.shownLanes.length * LANE + 6;
     this.cursor.style.setProperty('--height', height + 'px');
     const bars = [...stateBars(this.events, this.end), ...questionBars(this.events, this.end)];
@@ -202,8 +259,8 @@ export class Timeline {
     }),
     this.shownLanes.map((lane) => svg('text', { class: 'lane', x: 0, y: this.y(lane) + 16 },
       short(lane, left), svg('title', {}, lane))),
-    bars.map((bar) => this.drawBar(bar)),
-    this.events.map((event) => this.drawMark(event)));
+    bars.filter(({ from, to }) => this.isShown(from, to)).map((bar) => this.drawBar(bar)),
+    this.events.filter(({ t }) => this.isShown(t, t)).map((event) => this.drawMark(event)));
   }
 
   /** @param {Bar} bar */

@@ -43,7 +43,7 @@ export class TrialReplay {
       onKey: (event) => this.key(event) });
     this.controls = new ReplayControls({ first: () => this.to(0), back: () => this.step(-1),
       play: () => this.toggle(), forward: () => this.step(1), last: () => this.to(this.last),
-      follow: () => this.follow(true) });
+      follow: () => this.follow(true), zoom: (factor) => this.timeline.zoom(factor) });
     /** @type {MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
@@ -245,6 +245,9 @@ export class TrialReplay {
       Home: () => { this.stop(); this.to(0); },
       End: () => { this.stop(); this.to(this.last); },
       ' ': () => this.toggle(),
+      '+': () => this.timeline.zoom(2),
+      '-': () => this.timeline.zoom(0.5),
+      0: () => this.timeline.zoom(0),
     };
     const act = acts[event.key];
     if (!act || modified(event)) return;

@@ -1,7 +1,7 @@
 // @ts-check
 // Tells the console that the person who holds a question is still at it.
 
-/** @typedef {import('./types').App} App */
+/** @typedef {import('../page/types').App} App */
 
 const PAUSE_MS = 5000; // between two that are told
 const PRESSES = ['pointerdown', 'keydown', 'wheel'];
