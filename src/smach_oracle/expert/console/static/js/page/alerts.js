@@ -14,6 +14,7 @@ const TONES = [{ pitch: 660, start: 0 }, { pitch: 880, start: 0.16 }]; // Hz, s
 const CAN_NOTIFY = 'Notification' in window;
 const CAN_SOUND = 'AudioContext' in window;
 
+const PRESSES = ['pointerdown', 'pointerup', 'keydown']; // of a finger the second one allows sound
 const NEAR_S = 60; // before the deadline
 /** @type {{ [state in SoundState]: string }} */
 const SOUNDS = { on: 'Sound on', off: 'Sound off', asks: 'Allow sound', none: 'No sound here' };
@@ -59,12 +60,12 @@ export class Alerts {
     /** @type {SoundState} */
     this.pressedAs = 'off';
     this.showSound();
-    window.addEventListener('pointerdown', () => this.wakeAudio());
-    window.addEventListener('keydown', () => this.wakeAudio());
+    for (const kind of PRESSES) window.addEventListener(kind, () => this.wakeAudio());
   }
 
   /** Browsers allow sound only once somebody has pressed something. */
   wakeAudio() {
+    if (navigator.userActivation?.hasBeenActive === false) return this.audio;
     if (!this.audio && CAN_SOUND) {
       this.audio = new AudioContext();
       this.audio.onstatechange = () => this.showSound();
