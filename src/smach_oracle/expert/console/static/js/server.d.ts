@@ -80,8 +80,6 @@ export interface Onlooker {
 
 // --- questions
 
-export type FailureClass = 0 | 1 | 2 | 3; // none, low, moderate, high
-
 /** An open question. */
 export interface Question {
   key: string; // tells questions of all robots apart
@@ -120,6 +118,7 @@ export interface Question {
   userdata: UserdataItem[];
 }
 
+export type FailureClass = 0 | 1 | 2 | 3; // none, low, moderate, high
 export type VisitResult = 'success' | 'failure' | 'superseded' | 'preempted' | '';
 export interface Visit { state: string; outcome: string; result: VisitResult }
 
@@ -144,6 +143,7 @@ export interface LevelOutcome { container: string; outcome: string }
 export type OutcomeMeaning = 'success' | 'failure' | 'preempted' | 'other end'; // of the work
 export interface OutcomeChoice { outcome: string; target: string; meaning: OutcomeMeaning }
 export interface InterfaceOffer { name: string; description: string }
+export interface QueryServer { name: string; connected: boolean }
 
 export interface UserdataItem {
   key: string;
@@ -151,8 +151,6 @@ export interface UserdataItem {
   value: string; // JSON of plain data
   note: string; // why it is not shown
 }
-
-export interface QueryServer { name: string; connected: boolean }
 
 export interface PreconditionStatus {
   name: string;
