@@ -107,6 +107,7 @@ class OracleRunTest(unittest.TestCase):
         expected = {
             '/task/oracle/events': 'smach_oracle/OracleEvent',
             '/task/oracle/rates': 'smach_oracle/OracleRates',
+            '/task/oracle/trials': 'smach_oracle/NodeTrials',
             '/task/expert_query/open': 'smach_oracle/OpenQueries',
             '/task/expert_query/result': 'smach_oracle/ExpertQueryActionResult',
             '/task/smach/container_structure': 'smach_msgs/SmachContainerStructure',
