@@ -240,7 +240,8 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('The question of this address is not open', '.stage'))
         browser.click(QUESTION)
         browser.find('.detail')
-        browser.click('.detail-head .back')
+        browser.press('\ue00c')  # Escape
+        self.assertTrue(wait_for(lambda: not browser.text('.detail')))
         self.assertEqual(browser.errors(), [])
 
     def test_4_machines_and_trials_are_shown(self):

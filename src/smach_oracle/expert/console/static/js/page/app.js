@@ -131,7 +131,10 @@ export class App {
 
   went() {
     const address = addressOf(this.current, this.tabNow.view.place || '');
-    if (address !== location.hash) history.pushState(null, '', address);
+    if (address === location.hash) return;
+    try {
+      history.pushState(null, '', address);
+    } catch (err) { /* browsers refuse too many in a short time */ }
   }
 
   /** Show what the address names. */
