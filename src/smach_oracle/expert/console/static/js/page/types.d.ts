@@ -4,6 +4,12 @@ import { Liveness } from './liveness.js';
 import { Store } from './store.js';
 import { Question, Role } from '../server';
 
+declare global {
+  interface Navigator { // of browsers of 2023 and later
+    readonly userActivation?: { readonly hasBeenActive: boolean };
+  }
+}
+
 /** What an element may hold: null, undefined and false are left out. */
 export type Child = Node | string | number | false | null | undefined | Child[];
 
