@@ -225,6 +225,6 @@ def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
 
 
 def _unheard(trial: _LoggedTrial) -> int:
-    """How many of its events the console has not."""
+    """Return how many of its events the console has not heard."""
     told = trial.told.last_seq + 1 if trial.told else 0
     return trial.heard.lost_events + max(0, told - (trial.last_seq + 1))
