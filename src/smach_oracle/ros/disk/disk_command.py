@@ -91,9 +91,10 @@ def _folder(path: str, limits: Limits, delete: bool) -> int:
     if not delete:
         for removal in plan.removals:
             _say('would go {}'.format(told(removal)))
+        number = len(plan.removals)
         _say(
-            '{}: {} bags would go, {:.1f} MB; {} over the limits stay'.format(
-                path, len(plan.removals), sizes(plan.removals) / 1e6, len(plan.kept)
+            '{}: {} bag{} would go, {:.1f} MB; {} over the limits stay'.format(
+                path, number, '' if number == 1 else 's', sizes(plan.removals) / 1e6, len(plan.kept)
             )
         )
         return 0

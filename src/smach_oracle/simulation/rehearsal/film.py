@@ -30,7 +30,7 @@ class FilmedTask(NamedTuple):
     draw: Callable[[int, bool], Scene]
     steps: Callable[[World], Rehearsal]
     carried_s: float  # of simulated time, for which something has been in the hand
-    seed: int  # of a scene that looks well
+    seed: int  # of a scene that looks good
 
 
 TASKS = {
@@ -144,7 +144,7 @@ def main(argv: Optional[List[str]] = None) -> int:
     parser.add_argument(
         '--task', choices=sorted(TASKS), default='pick_and_place', help='(default: %(default)s)'
     )
-    parser.add_argument('--seed', type=int, help='of the scene (default: one that looks well)')
+    parser.add_argument('--seed', type=int, help='of the scene (default: one that looks good)')
     args = parser.parse_args(argv)
     task = TASKS[args.task]
     seed = task.seed if args.seed is None else args.seed
