@@ -9,7 +9,7 @@ _smach_oracle_words() {
   case $1 in
     'bag_statistics')
       echo '--by --by-state --columns --csv --failing-outcomes --figure --help --html --json
---version --x-axis -h' ;;
+--scheduler --version --without-tls --x-axis -h' ;;
     'bag_statistics --by')
       echo 'folder node host version settings script day' ;;
     'bag_statistics --columns')
@@ -94,7 +94,8 @@ retry step_back' ;;
       echo '--abandon-freeze --answer-delay --benign --estimator --extra-causes --freeze
 --frozen --help --high-from --hours --hung-after --jobs --lasting
 --max-recoveries --memory --moderate-from --output --plan --policy --prior
---protocol --replicates --seed --task --trials --variants --version -h' ;;
+--protocol --replicates --scheduler --seed --task --trials --variants --version
+--without-tls -h' ;;
     'run_trials --estimator')
       echo 'exponential window' ;;
     'run_trials --policy')

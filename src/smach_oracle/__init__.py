@@ -11,6 +11,8 @@ Errors that you may catch, in addition to those of the executive in `smach_oracl
     +-- BagError: a bag cannot be used (analysis.bag_events)
     |     +-- BagReadError: of several bags, this one cannot be used (analysis.bag_worker)
     +-- BagFormatError: the bytes are no bag (bag_format)
+    +-- ClusterError: a Dask cluster cannot be used (cluster)
+    |     +-- WorkersLost: those that had the work are gone (cluster)
     +-- FaultError (also a ValueError): a fault does not fit the machine (testing.errors)
     +-- InterfaceGoalError (also a ValueError): a goal cannot end so (interfaces.interface_goal)
     +-- ServerGoneError: a server is not reached or does not answer (ros.service_calls)

@@ -5,11 +5,13 @@ cannot be written.
 """
 
 import argparse
+import contextlib
 import os
 import re
 import sys
 from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
+from smach_oracle.cluster import ClusterError, WorkerCluster, add_options
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
@@ -40,7 +42,15 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     try:
         listed = args.failing_outcomes
         rule = FailureRule(tuple(listed)) if listed else None
-        found, events, by_trial = _load(args, rule)
+        with contextlib.ExitStack() as closing:
+            cluster = (
+                closing.enter_context(WorkerCluster(args.scheduler, args.without_tls))
+                if args.scheduler
+                else None
+            )
+            found, events, by_trial = _load(args, rule, cluster)
+            for text in cluster.messages if cluster else ():
+                sys.stderr.write('bag_statistics: {}\n'.format(text))
         variants = count_variants(found.trials)
         sys.stdout.write(table.format_text(variants, found.trials))
         states = None if by_trial is None else _print_states(found, by_trial)
@@ -49,6 +59,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         _write_files(args, found, variants, states, groups)
         if events is not None:
             _write_report(args, rule, found, events, groups)
+    except ClusterError as err:
+        return report_error('bag_statistics', err)
     except (BagError, ImportError, OSError) as err:
         from .compare_command.inputs import instead_of_bags
 
@@ -73,7 +85,9 @@ def _print_groups(args: argparse.Namespace, found: Trials) -> List[TrialGroup]:
     return groups
 
 
-def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
+def _load(
+    args: argparse.Namespace, rule: Optional[FailureRule], cluster: Optional[WorkerCluster]
+) -> _Loaded:
     if args.html:
         found, events = load_with_events(args.folders, rule)
         if not args.by_state:
@@ -82,9 +96,9 @@ def _load(args: argparse.Namespace, rule: Optional[FailureRule]) -> _Loaded:
 
         return found, events, {key: states_of(each, rule) for key, each in events.items()}
     if args.by_state:
-        found, by_trial = load_by_state(args.folders, rule, _processes())
+        found, by_trial = load_by_state(args.folders, rule, _processes(), cluster)
         return found, None, by_trial
-    return load_trials(args.folders, rule, _processes()), None, None
+    return load_trials(args.folders, rule, _processes(), cluster), None, None
 
 
 def _processes() -> int:
@@ -154,7 +168,13 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         help='outcomes of a trial that are failures, whole or as a suffix; all others are then '
         'successes (default: each trial is counted by the rule that its record names)',
     )
-    return parser.parse_args(argv)
+    add_options(parser, 'counts the bags')
+    args = parser.parse_args(argv)
+    if args.scheduler and args.html:
+        parser.error('--scheduler: not with --html, whose report needs all events in one place')
+    if args.without_tls and not args.scheduler:
+        parser.error('--without-tls: name a --scheduler')
+    return args
 
 
 def _write_files(

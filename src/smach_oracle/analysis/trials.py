@@ -28,6 +28,8 @@ from .reading import bags_in, read_bags
 from .truth import TruthFiles
 
 if TYPE_CHECKING:
+    from smach_oracle.cluster import WorkerCluster
+
     from .by_state.state_counts import StatesOfTrials
 
 
@@ -53,7 +55,10 @@ class TrialsWithEvents(NamedTuple):
 
 
 def load_trials(
-    places: Sequence[str], rule: Optional[FailureRule] = None, processes: int = 1
+    places: Sequence[str],
+    rule: Optional[FailureRule] = None,
+    processes: int = 1,
+    cluster: Optional['WorkerCluster'] = None,
 ) -> Trials:
     """Read all bags in folders and below. Those that cannot be used are listed with the reason.
 
@@ -61,20 +66,26 @@ def load_trials(
 
     :param rule: for all trials. None means that each is counted by the rule of its record.
     :param processes: that count many bags. More than one is for a process without other threads.
+    :param cluster: that counts in place of them.
 
+    :raises ClusterError: where the cluster sees other folders.
     :raises BagError: where there is nothing to read: no such folder, no bags, or none with a trial
         in it.
     """
-    return _load(places, Counting(rule, None, processes))[0]
+    return _load(places, Counting(rule, None, processes), cluster)[0]
 
 
 def load_by_state(
-    places: Sequence[str], rule: Optional[FailureRule] = None, processes: int = 1
+    places: Sequence[str],
+    rule: Optional[FailureRule] = None,
+    processes: int = 1,
+    cluster: Optional['WorkerCluster'] = None,
 ) -> TrialsByState:
     """Read the same, and count what happened in the states of each trial. As `load_trials`."""
     from .by_state.follower import states_of  # only where it is asked for: it takes a while
 
-    return TrialsByState(*_load(places, Counting(rule, partial(states_of, rule=rule), processes)))
+    counting = Counting(rule, partial(states_of, rule=rule), processes)
+    return TrialsByState(*_load(places, counting, cluster))
 
 
 def load_with_events(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsWithEvents:
@@ -82,7 +93,9 @@ def load_with_events(places: Sequence[str], rule: Optional[FailureRule] = None) 
     return TrialsWithEvents(*_load(places, Counting(rule, list)))
 
 
-def _load(places: Sequence[str], counting: Counting) -> Tuple[Trials, Dict[str, Any]]:
+def _load(
+    places: Sequence[str], counting: Counting, cluster: Optional['WorkerCluster'] = None
+) -> Tuple[Trials, Dict[str, Any]]:
     """Read the trials, and what is taken of the events of each, by trial id.
 
     A trial is summed up as soon as its bag is read, and its events are let go.
@@ -92,7 +105,7 @@ def _load(places: Sequence[str], counting: Counting) -> Tuple[Trials, Dict[str, 
     taken: Dict[str, Any] = {}
     bags = 0
     spread: Dict[str, Tuple[str, ...]] = {}  # trials that are in several bags, and these
-    for bag in count_bags(bags_in(places), counting):
+    for bag in count_bags(bags_in(places), counting, cluster):
         bags += 1
         if bag.reason:
             skipped.append(SkippedBag(bag.path, bag.reason))

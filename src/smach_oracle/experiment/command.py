@@ -6,6 +6,7 @@ again with the same --output, an experiment goes on where it was.
 """
 
 import argparse
+import contextlib
 import os
 import shutil
 import sys
@@ -15,6 +16,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis import bag_statistics
 from smach_oracle.analysis.compare_command.renamed_option import RenamedOption
+from smach_oracle.cluster import ClusterError, WorkerCluster, add_options
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import SettingsError
@@ -44,6 +46,7 @@ from .protocols import ALL, PROTOCOLS, Part
 from .stop_signals import StopRequested
 
 FAILED, LACKING, LOST = 1, 2, 3  # exit codes
+JOBS = 2  # at a time
 DEFAULT_TASK = 'pick_and_place'
 LONGEST_DELAY = 3600.0  # s, of the operator
 COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
@@ -103,8 +106,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--jobs',
         type=int,
-        default=2,
-        help='replicates of variants at a time (default: %(default)s)',
+        help='replicates of variants at a time (default: 2; of a cluster: what its workers take)',
     )
     parser.add_argument(
         '--variants',
@@ -174,6 +176,7 @@ def make_parser() -> argparse.ArgumentParser:
         help='after so many s without an event a trial is run again, and likewise after five times '
         'as many in all (default: {:.0f})'.format(HUNG_AFTER_S),
     )
+    add_options(parser, 'runs the trials, each with a master and a world there')
     freezing = parser.add_mutually_exclusive_group()
     freezing.add_argument(
         '--freeze',
@@ -209,7 +212,7 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
     replicates = 1 if args.replicates is None else args.replicates
     for check, option, value in (
         (COUNT, '--trials', trials),
-        (COUNT, '--jobs', args.jobs),
+        (COUNT, '--jobs', args.jobs if args.jobs is not None else 1),
         (COUNT, '--replicates', replicates),
         (SEED, '--seed', args.seed),
         (SHARE, '--lasting', args.lasting),
@@ -231,6 +234,10 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
                     name, task
                 )
             )
+    if args.without_tls and not args.scheduler:
+        parser.error('--without-tls: name a --scheduler')
+    if args.jobs is None and not args.scheduler:
+        args.jobs = JOBS
     if not args.hung_after > 0:
         parser.error('--hung-after must be more than 0')
     settings = {
@@ -321,22 +328,22 @@ def main(argv: Optional[List[str]] = None) -> int:
             raise ExperimentError('--output: {}: a file; allowed: a folder'.format(output))
         if args.only_plan:
             parts = chosen_parts(args) if args.protocol else [Part('', args.plan)]
-            print(plan_text(parts, args.output, args.jobs))
+            print(plan_text(parts, args.output, args.jobs or JOBS))
             print(limit_text(args.hung_after))
             return 0
-        if shutil.which('roslaunch') is None:
-            raise ExperimentError('roslaunch not found; source the workspace first')
-        print(limit_text(args.hung_after))
-        if args.protocol:
-            with alone_in(output):
-                code, told = run_protocol(args, output)
-            print(told)
-            return code
-        jobs = _run_in(output, args.plan, args)
+        with contextlib.ExitStack() as closing:
+            cluster = _cluster(args, closing)
+            print(limit_text(args.hung_after))
+            if args.protocol:
+                with alone_in(output):
+                    code, told = run_protocol(args, output, cluster)
+                print(told)
+                return code
+            jobs = _run_in(output, args.plan, args, cluster)
     except ImportError as err:  # bags are read with a package that not every robot has
         print('run_trials: {}'.format(lacking(err) or err), file=sys.stderr)
         return LACKING
-    except (ExperimentError, OSError) as err:
+    except (ClusterError, ExperimentError, OSError) as err:
         print('run_trials: {}'.format(err), file=sys.stderr)
         return FAILED
     except StopRequested as err:
@@ -350,11 +357,33 @@ def main(argv: Optional[List[str]] = None) -> int:
     return report(jobs, output)
 
 
-def _run_in(output: Path, plan: ExperimentPlan, args: argparse.Namespace) -> List[ExperimentJob]:
+def _cluster(args: argparse.Namespace, closing: contextlib.ExitStack) -> Optional[WorkerCluster]:
+    """Return the cluster that runs the trials, None where this machine does, and set `args.jobs`.
+
+    :raises ExperimentError: where roslaunch is not found that runs them.
+    """
+    if not args.scheduler:
+        if shutil.which('roslaunch') is None:
+            raise ExperimentError('roslaunch not found; source the workspace first')
+        return None
+    cluster = closing.enter_context(WorkerCluster(args.scheduler, args.without_tls))
+    for facts in cluster.facts:
+        if not facts.roslaunch:
+            raise ExperimentError(
+                'the worker on {} does not find roslaunch; start it in a shell that has sourced '
+                'the workspace'.format(facts.host)
+            )
+    args.jobs = min(args.jobs or cluster.slots(), cluster.slots())
+    return cluster
+
+
+def _run_in(
+    output: Path, plan: ExperimentPlan, args: argparse.Namespace, cluster: Optional[WorkerCluster]
+) -> List[ExperimentJob]:
     with alone_in(output):
         if enter_folder(output, plan, args.hung_after):
             print('Going on in {}'.format(output))
-        return run(plan, output, args.jobs, args.hung_after)
+        return run(plan, output, args.jobs, args.hung_after, cluster)
 
 
 def limit_text(hung_after_s: float) -> str:

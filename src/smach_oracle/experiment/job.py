@@ -6,12 +6,14 @@ It has a master, a world and learned rates of its own.
 import json
 import time
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Set, Tuple
+from typing import Any, Dict, List, Optional, Set, Tuple, Union
 
 from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.truth import SHARED
+from smach_oracle.cluster import WorkerCluster
 from smach_oracle.oracle.decision.policies import POLICIES
 
+from .cluster_launch import ClusterLaunch
 from .estimate import ALONE, SHARING, JobWork, replayed
 from .estimate import BARE as BARE_JOB
 from .lab import LAB_FILE, write_lab
@@ -41,9 +43,11 @@ class ExperimentJob:
         replicate: int,
         output: Path,
         hung_after_s: float,
+        cluster: Optional[WorkerCluster] = None,
     ) -> None:
         """Look through the folder.
 
+        :param cluster: that runs its launches. None means this machine does.
         :raises ExperimentError: where the folder cannot be gone on with.
         :raises OSError: where it cannot be read or written.
         """
@@ -73,7 +77,8 @@ class ExperimentJob:
         )
         # trials whose bags are whole, and of which the world has not told yet
         self._untold: List[RecordedTrial] = []
-        self._launch: Optional[Launch] = None
+        self._cluster = cluster
+        self._launch: Union[Launch, ClusterLaunch, None] = None
         self._attempts: Dict[int, int] = {}
         self._sharing: Optional[Sharing] = None
         self._bare: Optional['ExperimentJob'] = None  # that runs the trials which it shares
@@ -173,15 +178,18 @@ class ExperimentJob:
         """Launch the trials that are missing.
 
         :raises OSError: where that cannot be done.
+        :raises ClusterError: where the cluster is gone.
         """
         self._ended_at = self._sign_at = time.monotonic()
         if self._plan.slot_h is not None:
             write_lab(
                 self._records.folder, self._seed, self._plan.slot_h, self._results.last_left()
             )
-        self._launch = Launch(
-            self._records.folder, TASKS[self._plan.task].launch_file, self._arguments(), self.core
-        )
+        folder, launch_file = self._records.folder, TASKS[self._plan.task].launch_file
+        if self._cluster is None:
+            self._launch = Launch(folder, launch_file, self._arguments(), self.core)
+        else:
+            self._launch = ClusterLaunch(self._cluster, folder, launch_file, self._arguments())
 
     def _arguments(self) -> Dict[str, Any]:
         settings = dict(self.variant.settings, rates_file=str(self._records.rates))
@@ -262,6 +270,8 @@ class ExperimentJob:
         A trial may take long on a machine with much to do.
         """
         logged, now = size_of(self._records.folder / LOG_FILE), time.monotonic()
+        if isinstance(self._launch, ClusterLaunch) and self._launch.waits:
+            self._ended_at = self._sign_at = now
         if logged != self._logged:
             self._logged, self._sign_at = logged, now
         if now - self._sign_at > self._hung_after_s:

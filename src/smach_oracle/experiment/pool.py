@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
+from smach_oracle.cluster import ClusterError, WorkerCluster
 from smach_oracle.forking import unlock
 
 from .estimate import seconds_missing
@@ -41,10 +42,16 @@ class PoolResult(NamedTuple):
 
 
 def run(
-    plan: ExperimentPlan, output: Path, at_a_time: int, hung_after_s: float
+    plan: ExperimentPlan,
+    output: Path,
+    at_a_time: int,
+    hung_after_s: float,
+    cluster: Optional[WorkerCluster] = None,
 ) -> List[ExperimentJob]:
     """Run the jobs of an experiment that are not over, some at a time, and return them all.
 
+    :param cluster: whose machines run them. None means this one does.
+    :raises ClusterError: where the cluster is gone, or does not see the folder.
     :raises ExperimentError: naming the job and its folder.
     :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
     """
@@ -52,7 +59,9 @@ def run(
     progress = ProgressLine(sys.stdout)
     with StopSignals() as signals:
         try:
-            jobs += _make_jobs(plan, output, hung_after_s)
+            if cluster is not None:
+                cluster.check_folder(output)
+            jobs += _make_jobs(plan, output, hung_after_s, cluster)
             _let_share([(plan, jobs)], output)
             run_jobs(jobs, at_a_time, signals, progress)
         finally:
@@ -62,13 +71,19 @@ def run(
 
 
 def run_parts(
-    parts: Sequence[Part], output: Path, at_a_time: int, hung_after_s: float
+    parts: Sequence[Part],
+    output: Path,
+    at_a_time: int,
+    hung_after_s: float,
+    cluster: Optional[WorkerCluster] = None,
 ) -> PoolResult:
     """Run the jobs of all parts that are not over, the longest first.
 
     A job that cannot go on costs its replicate. The others go on.
 
     :param output: each part gets a folder in it.
+    :param cluster: whose machines run them. None means this one does.
+    :raises ClusterError: where the cluster is gone, or does not see the folder.
     :raises ExperimentError: where a folder cannot be gone on with, or job after job breaks.
     :raises StopRequested: by Ctrl-C and the like, once everything is stopped.
     """
@@ -78,11 +93,13 @@ def run_parts(
     progress = PoolProgress(sys.stdout, at_a_time)
     with StopSignals() as signals:
         try:
+            if cluster is not None:
+                cluster.check_folder(output)
             for part in parts:
                 folder = output / part.name
                 goes_on = enter_folder(folder, part.plan, hung_after_s)
                 made.append(PartJobs(part, []))
-                for job in _make_jobs(part.plan, folder, hung_after_s):
+                for job in _make_jobs(part.plan, folder, hung_after_s, cluster):
                     job.name = '{}/{}'.format(part.name, job.name)
                     made[-1].jobs.append(job)
                 if goes_on:
@@ -100,10 +117,12 @@ def _all(made: Sequence[PartJobs]) -> List[ExperimentJob]:
     return [job for each in made for job in each.jobs]
 
 
-def _make_jobs(plan: ExperimentPlan, output: Path, hung_after_s: float) -> Iterator[ExperimentJob]:
+def _make_jobs(
+    plan: ExperimentPlan, output: Path, hung_after_s: float, cluster: Optional[WorkerCluster]
+) -> Iterator[ExperimentJob]:
     for replicate in range(plan.replicates):
         for variant in plan.variants:
-            yield ExperimentJob(plan, variant, replicate, output, hung_after_s)
+            yield ExperimentJob(plan, variant, replicate, output, hung_after_s, cluster)
 
 
 def _let_share(
@@ -133,7 +152,7 @@ def stop_all(jobs: Sequence[ExperimentJob]) -> None:
     for job in jobs:
         try:
             job.stop()
-        except (ExperimentError, OSError) as err:  # e.g. the disk is full
+        except (ClusterError, ExperimentError, OSError) as err:  # e.g. the disk is full
             errors.append(err)
     if errors:
         raise errors[0]

@@ -8,6 +8,7 @@ from smach_oracle.analysis.bag_events import BagError
 from smach_oracle.analysis.comparison import format_comparison, verdicts_text
 from smach_oracle.analysis.drawing.command import draw_all, find_rows
 from smach_oracle.analysis.trial_rows import TrialRow, read_rows
+from smach_oracle.cluster import WorkerCluster
 from smach_oracle.packages import lacking
 
 from .estimate import (
@@ -64,7 +65,9 @@ def frozen_blocks(root: Path) -> Dict[str, int]:
     return last.blocks()
 
 
-def run_protocol(args: argparse.Namespace, output: Path) -> Tuple[int, str]:
+def run_protocol(
+    args: argparse.Namespace, output: Path, cluster: Optional[WorkerCluster] = None
+) -> Tuple[int, str]:
     """Run the parts in one pool, compare the variants, draw the figures, and name what is missing.
 
     Figures and tables are of all rows in the folder, also those of other parts.
@@ -72,7 +75,7 @@ def run_protocol(args: argparse.Namespace, output: Path) -> Tuple[int, str]:
     :returns: the exit code, and a text to print.
     :raises ExperimentError: as run_parts() does.
     """
-    result = run_parts(chosen_parts(args), output, args.jobs, args.hung_after)
+    result = run_parts(chosen_parts(args), output, args.jobs, args.hung_after, cluster)
     lost = [
         '{}: seed {}: {}'.format(job.name, *each)
         for _, jobs in result.parts

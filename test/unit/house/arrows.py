@@ -40,6 +40,7 @@ ARROWS: Dict[str, Set[str]] = {
     'geometry': set(),
     'analysis': {
         'bag_format',
+        'cluster',
         'oracle.decision',
         'oracle.errors',
         'oracle.records',
@@ -93,6 +94,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.records',
         'oracle.settings',
         'analysis',
+        'cluster',
         'forking',
         'packages',
     },
@@ -115,6 +117,7 @@ ARROWS: Dict[str, Set[str]] = {
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'bag_format': {'oracle.errors'},
+    'cluster': {'oracle.errors', 'packages', 'release'},
     'documentation': set(),
     'forking': set(),
     'packages': set(),

@@ -6,19 +6,26 @@ group are counted here, or by another process while this one takes the groups be
 
 from collections import deque
 from contextlib import ExitStack
-from typing import Callable, Deque, Dict, Iterator, List, Optional, Sequence
+from typing import TYPE_CHECKING, Callable, Deque, Dict, Iterator, List, Optional, Sequence
 
 from ..bag_events import EventReader
 from .counted_bag import BeginCount, CountedBag, Counting, count_bag
 
+if TYPE_CHECKING:
+    from smach_oracle.cluster import WorkerCluster
+
 KEPT_FROM = 50  # bags. Fewer are read each time: it takes no longer than to look
 SHARED_FROM = 500  # bags. Fewer are counted in one process
 GROUP = 64  # bags
+CLUSTER_AHEAD = 3  # groups for each place at a worker: nobody waits for the next one
 
 
-def count_bags(paths: Sequence[str], counting: Counting) -> Iterator[CountedBag]:
+def count_bags(
+    paths: Sequence[str], counting: Counting, cluster: Optional['WorkerCluster'] = None
+) -> Iterator[CountedBag]:
     """Yield the counts of some bags, in their order.
 
+    :raises ClusterError: where the cluster counts, and sees other folders.
     :raises ImportError: where rosbags is missing.
     """
     reader = EventReader()
@@ -29,7 +36,12 @@ def count_bags(paths: Sequence[str], counting: Counting) -> Iterator[CountedBag]
     with ExitStack() as closing:
         begin: BeginCount = begin_here
         ahead = 0
-        if counting.processes > 1 and len(paths) >= SHARED_FROM:
+        if cluster is not None:
+            from .cluster_count import ClusterCount
+
+            begin = ClusterCount(cluster, counting, begin).begin
+            ahead = CLUSTER_AHEAD * cluster.slots()
+        elif counting.processes > 1 and len(paths) >= SHARED_FROM:
             begin, ahead = _shared(counting, begin, closing), 2 * counting.processes
         if counting.take is None and len(paths) >= KEPT_FROM:
             begin = _kept(counting, begin, closing)
