@@ -47,7 +47,7 @@ class DaskCluster:
             try:
                 self.address = json.loads(file.read_text())['address']
             except (OSError, ValueError, KeyError):
-                time.sleep(0.1)
+                time.sleep(0.1)  # the file that names the address is all that it says of itself
         self.workers = [
             self._start('worker', [self.address, '--nthreads', '1', '--no-nanny'])
             for _ in range(self._count)
@@ -55,7 +55,7 @@ class DaskCluster:
         while self.log().count('Starting established connection to') < 2 * self._count:
             assert time.monotonic() < deadline, self.log()
             assert not any(worker.poll() for worker in self.workers), self.log()
-            time.sleep(0.1)
+            time.sleep(0.1)  # until the logs of all of them say it
         return self
 
     def _start(self, what: str, *arguments: List[str]) -> 'subprocess.Popen[bytes]':

@@ -41,7 +41,7 @@ class TrialCounter:
         self.trial_id = ''
         self.experiment = ''  # path of the top machine
         self.start_time = 0.0  # s since the epoch, the machine's own clock
-        self.recoveries = 0  # of the oracle, without the expert
+        self._recoveries = 0
         self.unwell_s = 0.0  # in which it waited until the robot was well
         self._unwell_since_s: Optional[float] = None
         self._rule = rule
@@ -141,6 +141,11 @@ class TrialCounter:
         return tuple(sorted(self._failures.items()))
 
     @property
+    def recoveries(self) -> int:
+        """Return how often the oracle has recovered a state, without the expert."""
+        return self._recoveries
+
+    @property
     def questions(self) -> int:
         """Return how many questions were put to the expert."""
         return len(self._asked)
@@ -232,9 +237,9 @@ class TrialCounter:
         elif event.kind in (EventKind.QUERY_OPENED, EventKind.FAILURE, EventKind.GIVE_UP):
             self._decided[event.path] = False
         elif event.kind == EventKind.JUMP:
-            self.recoveries += self._decided.pop(event.path, False)
+            self._recoveries += self._decided.pop(event.path, False)
             left = event.data.get(JUMPED_FROM, '') if isinstance(event.data, Mapping) else ''
-            self.recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
+            self._recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
 
     def _was_stopped(self, end: Event) -> bool:
         """Whether a shutdown or Ctrl-C ended it.

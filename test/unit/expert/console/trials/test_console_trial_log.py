@@ -391,7 +391,7 @@ def test_a_robot_that_dies_leaves_its_trial_marked():
 
 
 def told_by_robot(events, nth=1):
-    """Return what the robot's own node tells of a trial that has come so far."""
+    """Return what the robot's own node says about a trial that has come so far."""
     latest = LatestTrial('TASK', lambda path: None)
     for number in range(nth - 1):
         latest(event(EventKind.TRIAL_START, trial='before {}'.format(number)))
