@@ -5,6 +5,7 @@ import re
 import pytest
 from house import ROOT
 
+from smach_oracle.analysis.comparison import verdicts_text
 from smach_oracle.analysis.drawing.command import find_rows, tables_page
 from smach_oracle.analysis.pairing import COMPARED, on_common_seeds
 from smach_oracle.analysis.trial_rows import read_rows
@@ -12,9 +13,12 @@ from smach_oracle.experiment.freeze import standing_freezes
 from smach_oracle.experiment.protocols import ALL, ProtocolChoice, parts_of
 
 TRIALS = ROOT / 'doc/trials/fourth'  # of the fourth freeze
-FIFTH = ROOT / 'doc/trials/fifth'  # of the fifth, which is under way
-PAGE = (ROOT / 'doc/results.md').read_text(encoding='utf-8')
-TABLES = (ROOT / 'doc/results_tables.md').read_text(encoding='utf-8')
+FIFTH = ROOT / 'doc/trials/fifth'  # of the fifth
+PAGE, TABLES, BY_ONE_LINE, TABLES_BY_ONE_LINE = (
+    (ROOT / 'doc' / (name + '.md')).read_text(encoding='utf-8')
+    for name in ('results', 'results_tables', 'results_one_line', 'results_one_line_tables')
+)
+PAGES = [(TRIALS, PAGE, TABLES), (FIFTH, BY_ONE_LINE, TABLES_BY_ONE_LINE)]
 OF_FOURTH, OF_FIFTH = (freeze.blocks() for freeze in standing_freezes(ROOT))
 PARTS = parts_of(ALL, ProtocolChoice(OF_FOURTH, 15.0))
 PARTS_OF_FIFTH = [
@@ -61,14 +65,21 @@ def test_rows_of_the_fifth_freeze_are_of_its_parts():
     assert names <= {part.name for part in PARTS_OF_FIFTH}
 
 
-def test_the_page_of_tables_is_made_of_the_rows():
-    assert tables_page(find_rows(TRIALS)) == TABLES
+@pytest.mark.parametrize('folder, _, tables', PAGES, ids=['fourth', 'fifth'])
+def test_the_page_of_tables_is_made_of_the_rows(folder, _, tables):
+    assert tables_page(find_rows(folder)) == tables
 
 
-def test_each_line_of_a_table_of_the_page_stands_in_the_page_of_tables():
-    lines = [line for line in PAGE.splitlines() if line.startswith('|')]
-    assert len(lines) > 50
-    assert [line for line in lines if line not in TABLES.splitlines()] == []
+@pytest.mark.parametrize('_, page, tables', PAGES, ids=['fourth', 'fifth'])
+def test_each_line_of_a_table_of_the_page_stands_in_the_page_of_tables(_, page, tables):
+    lines = [line for line in page.splitlines() if line.startswith('|')]
+    assert len(lines) > 20
+    assert [line for line in lines if line not in tables.splitlines()] == []
+
+
+def test_the_page_by_one_line_has_the_verdicts_of_the_rows():
+    rows = [row for path in sorted(FIFTH.rglob('results.csv')) for row in read_rows(path)]
+    assert verdicts_text(rows) in BY_ONE_LINE
 
 
 @pytest.mark.parametrize(
