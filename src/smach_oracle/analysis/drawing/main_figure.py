@@ -23,6 +23,7 @@ SHOWN: Tuple[Tuple[str, str, str, Happened], ...] = (
 APART = 0.17  # of a line's height, from one share's marker to the next
 PALE = 0.3  # of the bars of replicates
 LINE_IN, FRAME_IN = 0.32, 0.95
+LETTER = 0.0076  # of the figure's width, in the name of a variant
 
 
 def draw_main(rows: Sequence[TrialRow]) -> Figure:
@@ -61,6 +62,7 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]], told: Mapping[s
     :param told: what stands behind a task's title.
     """
     names = _in_order(tasks)
+    labels = [name.replace('_', ' ').replace(':', ': ') for name in names]
     height_in = FRAME_IN + LINE_IN * len(names)
     titles = [
         ', '.join([title_of(task), *([told[task]] if task in told else [])]) for task in tasks
@@ -68,7 +70,12 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]], told: Mapping[s
     figure, (made,) = panels(
         titles,
         height_in,
-        margins=dict(left=0.11, top=1 - 0.5 / height_in, bottom=0.38 / height_in, wspace=0.09),
+        margins=dict(
+            left=max(0.11, 0.03 + LETTER * max(map(len, labels))),
+            top=1 - 0.5 / height_in,
+            bottom=0.38 / height_in,
+            wspace=0.09,
+        ),
     )
     for axes, variants in zip(made, tasks.values()):
         for line, name in enumerate(names):
@@ -102,7 +109,7 @@ def _draw(tasks: Mapping[str, Mapping[str, Sequence[TrialRow]]], told: Mapping[s
         axes.set_xlim(0, 100)
         axes.set_ylim(len(names) - 0.5, -0.5)
         axes.set_yticks(range(len(names)))
-        axes.set_yticklabels([name.replace('_', ' ') for name in names] if axes is made[0] else [])
+        axes.set_yticklabels(labels if axes is made[0] else [])
         axes.set_xlabel('Trials (%)')
         axes.grid(axis='x', linewidth=0.3)
     several = any(
