@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 import smach_oracle
+from smach_oracle.experiment.cluster_launch import RUNNING_FILE, ClusterLaunch
 from smach_oracle.experiment.pool import alone_in
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.oracle.records.folder_locks import folder_lock
@@ -86,6 +87,13 @@ def experiment(path):
     return path / '.lock'
 
 
+def cluster(path):
+    file = path.parent / RUNNING_FILE
+    file.write_text('token')
+    assert ClusterLaunch._helper_gone(SimpleNamespace(_folder=path.parent, _token='token'))
+    return file
+
+
 WAYS = {
     'ros/recording/bag_repair.py': [bag_repair],
     'ros/recording/bag_writer.py': [bag_writer],
@@ -93,6 +101,7 @@ WAYS = {
     'expert/console/trials/bag_catalogue.py': [catalogue],
     'oracle/records/folder_locks.py': [rates_folder],
     'experiment/pool.py': [experiment],
+    'experiment/cluster_launch.py': [cluster],
     'store/holding.py': [held_machine, looked_at_machine, looked_at_all_machines],
 }
 
