@@ -13,6 +13,8 @@ from .world import World
 
 MOST_LOOPS = 2  # of a trial
 
+LONGEST_END = 1000  # states that a machine may enter once it is preempted
+
 
 class Scene:
     """What the states of one machine share."""
@@ -28,13 +30,20 @@ class Scene:
         self.world.begin(trial)
         self.rounds = 0  # in which the author has led the machine back
         self.is_cut = False
+        self._entered_since = 0
 
     def cut(self) -> bool:
-        """Whether the trial has taken too long. The machine is then preempted."""
+        """Whether the trial has taken too long. The machine is then preempted.
+
+        :raises RuntimeError: where its author leads it on then, round and round.
+        """
         took_s = self.world.clock.now() - self.world.began_s - self.world.expert_s
         if not self.is_cut and took_s > self.mix.patience_s:
             self.is_cut = True
             self.top.request_preempt()
+        self._entered_since += self.is_cut
+        if self._entered_since > LONGEST_END:
+            raise RuntimeError('it does not end')
         return self.is_cut
 
 
