@@ -14,7 +14,7 @@ from .counted_bag import BeginCount, CountedBag, Counting, count_bag
 if TYPE_CHECKING:
     from smach_oracle.cluster import WorkerCluster
 
-KEPT_FROM = 50  # bags. Fewer are read each time: it takes no longer than to look
+KEPT_FROM = 500  # bags. Fewer are read each time: it takes no longer than Python's start
 SHARED_FROM = 500  # bags. Fewer are counted in one process
 GROUP = 64  # bags
 CLUSTER_AHEAD = 3  # groups for each place at a worker: nobody waits for the next one
