@@ -16,7 +16,12 @@ from typing import List
 
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.drink_retrieval import DrinkRetrievalRehearsal
-from smach_oracle.simulation.rehearsal.persistence import Course, label, run_scene, scenes_of
+from smach_oracle.simulation.rehearsal.persistence import (
+    RehearsedTrial,
+    label,
+    run_scene,
+    scenes_of,
+)
 from smach_oracle.simulation.rehearsal.pick_and_place import PickAndPlaceRehearsal
 from smach_oracle.simulation.scenes import kitchen_causes, tabletop_causes
 from smach_oracle.simulation.scenes.tasks import TASKS, draw
@@ -27,7 +32,7 @@ SEEDS = range(1000)
 HEAD = '{:18} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>9} {:>9}  {}'
 
 
-def report(kind: str, courses: List[Course]) -> None:
+def report(kind: str, courses: List[RehearsedTrial]) -> None:
     """Print a row about one kind."""
     ended = [each.ended for each in courses]
     failed = [each for each in courses if each.failed]
@@ -84,7 +89,7 @@ def main() -> None:
     if args.csv:
         with open(args.csv, 'w', newline='', encoding='utf-8') as file:
             writer = csv.writer(file)
-            writer.writerow(Course._fields + ('ended',))
+            writer.writerow(RehearsedTrial._fields + ('ended',))
             writer.writerows([*each, each.ended] for each in rows)
 
 

@@ -6,7 +6,8 @@ import subprocess
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-LEFT_OUT = ('.git', '.venv*', 'build', '.build', 'trials', '__pycache__', '*.pyc', '.*_cache')
+LEFT_OUT = ('.git', '.venv*', 'build', '.build', '__pycache__', '*.pyc', '.*_cache')
+RESULTS = (ROOT / 'trials', ROOT / 'doc/trials')  # a package of src/ may have that name too
 UPSTREAM_CMAKE = """cmake_minimum_required(VERSION 3.5)
 project({0})
 find_package(catkin REQUIRED)
@@ -28,7 +29,13 @@ setup(**generate_distutils_setup(packages=['{0}'], package_dir={{'': 'src'}}))
 
 def copy_sources(target: Path) -> Path:
     """Copy the checkout, without what is built or downloaded, to `target`."""
-    shutil.copytree(str(ROOT), str(target), ignore=shutil.ignore_patterns(*LEFT_OUT))
+    patterns = shutil.ignore_patterns(*LEFT_OUT)
+
+    def left_out(folder, names):
+        results = {each.name for each in RESULTS if str(each.parent) == folder}
+        return set(patterns(folder, names)) | results.intersection(names)
+
+    shutil.copytree(str(ROOT), str(target), ignore=left_out)
     return target
 
 

@@ -16,8 +16,9 @@ from std_msgs.msg import Bool
 from waiting import stays, wait_for
 
 from smach_msgs.msg import SmachContainerStatus
-from smach_oracle.analysis.trials import TrialEnding, load_trials
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.msg import MoveArmsAsideAction, OracleEvent
+from smach_oracle.oracle.records.trial_counter import TrialEnding
 
 SCRIPT = """
 import sys, rospy, smach, smach_ros

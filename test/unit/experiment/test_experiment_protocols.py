@@ -179,7 +179,7 @@ class FakeRunner:
     stop_after = 1000  # trials, after which somebody presses Ctrl-C
     started, ended = [], 0
 
-    def __init__(self, plan, variant, replicate, output, hung_after_s):
+    def __init__(self, plan, variant, replicate, output, hung_after_s, cluster):
         self.name = '{}/replicate_{}'.format(variant.name, replicate)
         self.variant, self.trials, self.lost, self.messages = variant, plan.trials, {}, []
         self._plan, self._replicate, self._rows = plan, replicate, output / 'results.csv'

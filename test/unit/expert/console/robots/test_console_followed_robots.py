@@ -147,5 +147,5 @@ def test_a_connection_waits_with_a_small_buffer(monkeypatch):
     topics.follow(['/a'])
     assert wait_for(lambda: '/a/more' in [each.topic for each in FakeSubscriber.made])
     topics.stop()
-    assert len(FakeSubscriber.made) == 6
+    assert len(FakeSubscriber.made) == 7
     assert {each.buff_size for each in FakeSubscriber.made} == {robot_topics.READ_BYTES}
