@@ -22,6 +22,7 @@ from smach_oracle.expert.console.trials.trial_log import TrialLog
 from smach_oracle.expert.console.web.access import AccessTokens, AllowedHosts
 from smach_oracle.expert.console.web.access_control import AccessControl
 from smach_oracle.expert.console.web.connections import LimitedServer
+from smach_oracle.expert.console.web.proxies import TrustedProxies
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.console.web.settings import ConsoleSettings
 
@@ -106,6 +107,7 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
 
     tokens = True
     certificate, private_key = '', ''
+    public, proxies = None, TrustedProxies()
 
     def get_app(self):
         text = '\n'.join('{} {}'.format(role, token) for role, token in TOKENS.items())
@@ -116,9 +118,10 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
             PageSections(),
             TrialLog(),
         )
+        hosts = AllowedHosts([self.public.host] if self.public else [], False)
         settings = ConsoleSettings(
-            '127.0.0.1', 1, tokens, AllowedHosts([], False), self.certificate, self.private_key
-        )
+            '127.0.0.1', 1, tokens, hosts, self.certificate, self.private_key
+        )._replace(public=self.public, proxies=self.proxies)
         self.teleoperation = FakeTeleoperation()
         self.access = AccessControl(
             settings, tokens.cookie_secret if tokens else 'secret', self.audit
@@ -157,6 +160,7 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
     def get_http_server(self):
         limited = LimitedServer(self._app, **self.get_httpserver_options())
         limited.connections = self.access.connections
+        limited.proxies = self.proxies
         return limited
 
     @property

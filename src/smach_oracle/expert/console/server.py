@@ -177,6 +177,7 @@ class Console:
             max_buffer_size=4 * MOST_BYTES,
         )
         server.connections = access.connections
+        server.proxies = settings.proxies
         server.add_sockets(sockets)
         self._overview_s = -OVERVIEW_PERIOD_S
 
@@ -276,7 +277,7 @@ def main() -> None:
         'Node: a web page from which people watch robots and answer their questions. Parameters: '
         '~address, '
         '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
-        '~cameras, ~idle_s; '
+        '~cameras, ~idle_s, ~public_address, ~trusted_proxy; '
         'see doc/console.md.'
     )
     init_beside_others('expert_console')

@@ -1,13 +1,14 @@
 """The checks that every request passes first: its host, its rate, its origin, and its session."""
 
 import time
-from typing import Dict, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
+import rospy
 import tornado.httputil
 import tornado.web
 
 from . import sessions
-from .access import ClientRateLimits, Identity, network_of
+from .access import ClientRateLimits, Identity, RateLimit, network_of
 from .audit import Audit
 from .connections import OpenConnections
 from .sessions import BrowserSession
@@ -21,7 +22,8 @@ class AccessControl:
         self.settings = settings
         self.secret = secret
         self.audit = audit
-        self.connections = OpenConnections()
+        self.connections = OpenConnections(proxies=settings.proxies)
+        self._warnings = RateLimit(1.0 / 60.0, 1.0)
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
         # a page has some 100. A browser may open many pages
@@ -72,7 +74,7 @@ class AccessControl:
         :param limited: False: it is never too fast.
         """
         request = handler.request
-        if not self.settings.hosts.allows(request.headers.get('Host', '')):
+        if not self._is_for_us(request):
             return 421
         session = self.session(handler)
         known = session.id if session is not None and self.identity(session) else ''
@@ -83,6 +85,29 @@ class AccessControl:
         if not self.from_own_page(handler, must_say=request.method not in ('GET', 'HEAD')):
             return 403
         return 0
+
+    def _is_for_us(self, request: tornado.httputil.HTTPServerRequest) -> bool:
+        """Whether it calls this console by a name of its own: through a proxy by one alone."""
+        host = request.headers.get('Host', '')
+        public = self.settings.public
+        if public is None or not self._is_passed_on(request):
+            return self.settings.hosts.allows(host)
+        if public.is_host(host) and request.protocol == public.scheme:
+            return True
+        if self._warnings.take():
+            rospy.logwarn(
+                'A proxy passes on requests with Host %r and X-Forwarded-Proto %r. They are '
+                'refused, since ~public_address is %s.',
+                host[:100],
+                request.protocol[:10],
+                public.origin,
+            )
+        return False
+
+    def _is_passed_on(self, request: tornado.httputil.HTTPServerRequest) -> bool:
+        """Whether a proxy that is trusted has passed a request on."""
+        context: Any = getattr(request.connection, 'context', None)
+        return context is not None and self.settings.proxies.trusts(str(context.remote_ip))
 
     def _share_of(
         self, request: tornado.httputil.HTTPServerRequest, known: str
@@ -101,6 +126,9 @@ class AccessControl:
         origin = headers.get('Origin')
         if origin is None:
             return not must_say
+        public = self.settings.public
+        if public is not None and self._is_passed_on(handler.request):
+            return origin.lower() == public.origin
         return self.settings.hosts.allows_origin(
             origin, headers.get('Host', ''), self.settings.scheme
         )

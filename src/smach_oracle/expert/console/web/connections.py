@@ -14,6 +14,8 @@ import tornado.httputil
 import tornado.iostream
 
 from .access import RateLimit, network_of
+from .framing import FramedRequest
+from .proxies import TrustedProxies
 
 MOST_STRANGERS = 192  # connections that have shown no token, in all
 MOST_OF_A_NETWORK = 32  # of these from one address
@@ -30,8 +32,14 @@ class OpenConnections:
     time, of the addresses that have many: a person who comes among very many idle ones gets in.
     """
 
-    def __init__(self, most_files: Optional[int] = None) -> None:
-        """`most_files`: that this process may open, by default as the system says."""
+    def __init__(
+        self, most_files: Optional[int] = None, proxies: Optional[TrustedProxies] = None
+    ) -> None:
+        """
+        :param most_files: that this process may open, by default as the system says.
+        :param proxies: they limit the connections of their clients by themselves.
+        """
+        self._proxies = proxies or TrustedProxies()
         files = most_files or resource.getrlimit(resource.RLIMIT_NOFILE)[0]
         # a new file has the lowest number that is free: one above means that the files run out
         self._highest_file = max(files // 2, files - KEPT_FILES)
@@ -42,6 +50,8 @@ class OpenConnections:
 
     def admit(self, stream: tornado.iostream.IOStream, address: str) -> bool:
         """Whether a new connection may stay. It or another one may be closed."""
+        if self._proxies.trusts(address):
+            return self._admit_proxy(stream)
         network = self._strangers[stream] = network_of(address)
         if stream.socket.fileno() >= self._highest_file:
             self._forget_closed()
@@ -52,6 +62,16 @@ class OpenConnections:
             self._close(next(each for each, of in self._strangers.items() if of == network))
         elif len(self._strangers) > MOST_STRANGERS:
             self._close_one()
+        return not stream.closed()
+
+    def _admit_proxy(self, stream: tornado.iostream.IOStream) -> bool:
+        """Whether a connection of a proxy may stay: the requests on it are of many people."""
+        if len(self._known) >= MOST_KNOWN:
+            self._forget_closed()
+        if len(self._known) >= MOST_KNOWN:
+            stream.close()
+        else:
+            self._known[stream] = ''
         return not stream.closed()
 
     def heard(self, request: tornado.httputil.HTTPServerRequest, session: str) -> bool:
@@ -108,6 +128,14 @@ class LimitedServer(tornado.httpserver.HTTPServer):
     """A server that admits only so many connections."""
 
     connections: OpenConnections  # to be set before it is given sockets
+    proxies = TrustedProxies()
+
+    def start_request(
+        self, server_conn: object, request_conn: tornado.httputil.HTTPConnection
+    ) -> tornado.httputil.HTTPMessageDelegate:
+        """Begin to read a request."""
+        inner = super().start_request(server_conn, request_conn)
+        return FramedRequest(inner, request_conn, self.proxies)
 
     def handle_stream(self, stream: tornado.iostream.IOStream, address: Any) -> None:
         """Begin to serve a connection."""

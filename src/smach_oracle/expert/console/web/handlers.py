@@ -209,7 +209,7 @@ class SessionHandler(CheckedHandler):
             expires_days=None,
             httponly=True,
             samesite='Strict',
-            secure=self.access.settings.scheme == 'https',
+            secure=self.request.protocol == 'https',
         )
         return session
 

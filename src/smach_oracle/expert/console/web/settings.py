@@ -10,6 +10,7 @@ from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.paths import path_of
 
 from .access import AccessTokens, AllowedHosts, is_loopback, load_tokens
+from .proxies import PublicAddress, TrustedProxies
 
 # a parameter by its name, or the default
 GetParameter = Callable[[str, object], object]
@@ -34,6 +35,9 @@ class ConsoleSettings(NamedTuple):
     # by robot: topics, or names above them
     cameras: Mapping[str, Tuple[str, ...]] = MappingProxyType({})
     idle_s: float = DEFAULT_IDLE_S  # without a press of the holder. 0: nobody is idle
+    public: Optional[PublicAddress] = None  # by which people reach it
+    proxies: TrustedProxies = TrustedProxies()
+    on_call: str = ''  # file that says who is reached, '' where nobody is
 
     @property
     def scheme(self) -> str:
@@ -62,28 +66,57 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
     certificate, key = _path(get, 'certificate'), _path(get, 'private_key')
     if bool(certificate) != bool(key):
         raise SettingsError('~certificate', certificate or NONE, 'together with ~private_key')
+    public, proxies = _public(get), TrustedProxies(_names(get, 'trusted_proxy', 'IP addresses'))
+    if proxies and public is None:
+        raise SettingsError(
+            '~public_address', NONE, 'the address by which browsers reach ~trusted_proxy'
+        )
+    if proxies and not token_file:
+        raise SettingsError(
+            '~token_file', NONE, 'a file of tokens where a proxy lets others reach the console'
+        )
+    on_call = _path(get, 'on_call')
+    if on_call and public is None:
+        raise SettingsError(
+            '~public_address', NONE, 'the address of this page, for the links that ~on_call sends'
+        )
+    own = [public.host.strip('[]')] if public else []
     return ConsoleSettings(
         address,
         _port('~port', get('port', DEFAULT_PORT)),
         load_tokens(token_file) if token_file else None,
-        AllowedHosts(_hosts(get, remote), addresses=remote),
+        AllowedHosts(own + _hosts(get, remote), addresses=remote),
         certificate,
         key,
         _paths('~bags', get('bags', []), 'folders'),
         _paths('~stores', get('stores', []), 'files'),
         _cameras(get('cameras', {})),
         _idle_s('~idle_s', get('idle_s', DEFAULT_IDLE_S)),
+        public,
+        proxies,
+        on_call,
     )
 
 
+def _public(get: GetParameter) -> Optional[PublicAddress]:
+    text = _text(get, 'public_address', NONE)
+    return None if text in ('', NONE) else PublicAddress.parse('~public_address', text)
+
+
 def _hosts(get: GetParameter, remote: bool) -> List[str]:
-    value = get('hosts', [])
-    names = value.split() if isinstance(value, str) else value
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise SettingsError('~hosts', value, 'names separated by spaces, or a list of names')
-    names = [name for name in names if name != NONE]
+    names = _names(get, 'hosts', 'names')
     own = socket.gethostname()
     return names + ([own, own.split('.')[0], own.split('.')[0] + '.local'] if remote else [])
+
+
+def _names(get: GetParameter, name: str, what: str) -> List[str]:
+    value = get(name, [])
+    names = value.split() if isinstance(value, str) else value
+    if not isinstance(names, list) or not all(isinstance(each, str) for each in names):
+        raise SettingsError(
+            '~' + name, value, '{} separated by spaces, or a list of {}'.format(what, what)
+        )
+    return [each for each in names if each != NONE]
 
 
 def _paths(name: str, value: object, what: str) -> Tuple[str, ...]:
