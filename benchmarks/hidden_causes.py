@@ -5,9 +5,9 @@
     [--jobs N] [--best N] [--report FILE]
 
 The machines are drawn with the statistics of public SMACH programs, and their failures follow from
-a small world of conditions (test/unit/support/hidden_causes, doc/hidden_causes.md). Each is a plain
-script under `OracleContainer.wrap`, with a policy and no other setting, executed by the real
-executive in simulated time. The policies are those of the executive by name, such as ladder or
+a small world of conditions (test/unit/support/hidden_causes, doc/inside/hidden_causes.md). Each is
+a plain script under `OracleContainer.wrap`, with a policy and no other setting, executed by the
+real executive in simulated time. The policies are those of the executive by name, such as ladder or
 ladder:wait_s=30. Beside them are bare (no oracle), order:WAY,... (retry, wait, step_back, restart,
 ask, give_up), shuffled (the same ways in an order that is drawn for each trial), shuffled_labels
 (learned, from results that have changed places), and best: the

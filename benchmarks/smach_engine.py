@@ -140,7 +140,7 @@ def measure_in_process(path: str, steps: int, rounds: int) -> Dict[str, float]:
 
 
 def print_table(ours: Dict[str, float], upstream: Optional[Dict[str, float]]) -> None:
-    """Rows of nanoseconds and ratios, as in doc/smach_engine.md."""
+    """Rows of nanoseconds and ratios, as in doc/inside/smach_engine.md."""
     print(
         '| a step of | ns | x bare loop | limit |%s'
         % (' upstream ns | upstream x |' if upstream else '')

@@ -4,11 +4,11 @@
     python3 benchmarks/what_if_cover.py [--machines N] [--trials N] [--seed S] [--recorded NAME]
     [--asked NAME ...] [--jobs N]
 
-Each machine of the generator (test/unit/support/hidden_causes, doc/hidden_causes.md) runs under a
-policy whose choices are drawn, such as escalating:explore=0.3 or any_way. The command puts the
-record to another policy. The same machine then runs under that one, in the same trials. A figure is
-covered if what is measured lies within its 95% interval. Exit code: 0 if each figure is covered in
-90% of the machines with enough data, else 1. Seeds below 1000 are for trying.
+Each machine of the generator (test/unit/support/hidden_causes, doc/inside/hidden_causes.md) runs
+under a policy whose choices are drawn, such as escalating:explore=0.3 or any_way. The command puts
+the record to another policy. The same machine then runs under that one, in the same trials. A
+figure is covered if what is measured lies within its 95% interval. Exit code: 0 if each figure is
+covered in 90% of the machines with enough data, else 1. Seeds below 1000 are for trying.
 """
 
 import argparse

@@ -4,13 +4,15 @@ Called by scripts/doc, in the environment of scripts/ros_env.
 """
 
 import argparse
+import os
 import re
 import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
-from typing import Iterator, List, Tuple
+from typing import Dict, Iterable, Iterator, List, Tuple
 
 import theme
 from interfaces import interface_pages
@@ -19,7 +21,21 @@ from smach_oracle.documentation import PAGES
 
 ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / 'doc'
-GENERATED = {'Reference': ['commands', 'messages', 'services', 'actions', 'api']}
+GENERATED = {'Reference': ['api']}
+# pages that a sidebar shows below another one, when that one is opened
+BELOW = {
+    'commands': ['options'],
+    'console': ['open_console', 'console_security'],
+    'expert': ['many_robots'],
+    'install': ['noetic', 'container'],
+    'policies': ['ways'],
+    'ros_interface': ['messages', 'services', 'actions'],
+    'shared_autonomy': ['perception', 'own_interface'],
+    'statistics': ['notebook', 'cluster'],
+    'testing': ['own_rostest'],
+}
+EXPERIMENT = 'Robots and experiment'  # a section whose first page has the others below it
+INSIDE = 'inside/index'
 API = [
     (
         'The machine',
@@ -49,9 +65,11 @@ API = [
     ('Tests of your machines', 'smach_oracle.testing', []),
 ]
 # links that show the name of a page's file, where a site shows its title
-NAMED = re.compile(r'\[(?:doc/)?(\w+)\.md\](?=\(\1\.md[#)])')
+NAMED = re.compile(r'\[(?:\w+/)*(\w+)\.md\]\(((?:[\w.]+/)*\1\.md)(?=[#)])')
 # links of a page to files that are not pages: to the repository's files, copied beside the pages
-FILES = re.compile(r'(\]\()\.\./((?:launch|examples|msg|srv|action)/[\w./]+|LICENSE)\)')
+FILES = re.compile(r'(\]\()((?:\.\./)+)((?:launch|examples|msg|srv|action)/[\w./]+|LICENSE)\)')
+# a command in the first cell of a table of commands
+LISTED = re.compile(r'^\| `(\w+)` \|', re.MULTILINE)
 
 
 def api_page() -> str:
@@ -87,62 +105,60 @@ def help_of(command: str) -> str:
     return text
 
 
-def commands_page() -> str:
-    """The page of the commands, each with its help."""
-    names = [
-        name
-        for name in sorted(PAGES)
-        if 'run_renamed(' not in (ROOT / 'scripts' / name.split()[0]).read_text('utf-8')
-    ]
+def helps_of(page: str) -> str:
+    """A section for a page of commands: what each one that its tables list prints at --help."""
+    listed = LISTED.findall(page)
+    names = [name for first in listed for name in sorted(PAGES) if name.split()[0] == first]
     with ThreadPoolExecutor(2) as pool:
         helps = list(pool.map(help_of, names))
-    lines = [
-        '# Commands',
-        '',
-        'Run them with `rosrun smach_oracle NAME`. `--help` prints this.',
-        '',
-    ]
+    lines = ['', '## Their help', '']
     for name, text in zip(names, helps):
-        page = PAGES[name] + '.md'
-        lines += [
-            '## ' + name,
-            '',
-            '```text',
-            text.rstrip(),
-            '```',
-            '',
-            'More: [{0}]({0})'.format(page),
-            '',
-        ]
+        more = PAGES[name] + '.md'
+        lines += ['### ' + name, '', '```text', text.rstrip(), '```', '']
+        lines += ['More: [{0}]({0})'.format(more), '']
     return '\n'.join(lines)
 
 
 def sections(index: str) -> Iterator[Tuple[str, List[str]]]:
     """The sections of the index, each with its pages."""
     for section in index.split('\n### ')[1:]:
-        yield section.splitlines()[0], re.findall(r'^\| \[(\w+)\.md\]', section, re.MULTILINE)
+        pages = re.findall(r'^(?:\| |\* )\[[^]]+\]\((\w+)\.md\)', section, re.MULTILINE)
+        yield section.splitlines()[0], pages
+
+
+def _toctree(pages: Iterable[str], caption: str = '') -> List[str]:
+    captioned = [':caption: ' + caption] if caption else []
+    return ['', '```{toctree}', ':hidden:', *captioned, *pages, '```', '']
 
 
 def contents(index: str) -> str:
-    """The site's table of contents, from the tables of the index."""
-    lines = ['', '```{toctree}', ':hidden:', 'readme', 'contributing', '```', '']
+    """The site's table of contents, from the sections of the index."""
+    lines = _toctree(['readme'])
+    below = {page for pages in BELOW.values() for page in pages}
     for name, pages in sections(index):
-        lines += [
-            '```{toctree}',
-            ':hidden:',
-            ':caption: ' + name,
-            *pages,
-            *GENERATED.get(name, []),
-            '```',
-            '',
-        ]
+        shown = [page for page in pages if page not in below] + GENERATED.get(name, [])
+        if name == EXPERIMENT:
+            lines += _toctree([pages[0], INSIDE], 'More')
+        else:
+            lines += _toctree(shown, name)
     return '\n'.join(lines)
+
+
+def tables_below(index: str, inside: str) -> Dict[str, str]:
+    """The tables of contents of pages that have others below them."""
+    below = dict(BELOW)
+    first, *others = dict(sections(index))[EXPERIMENT]
+    below[first] = others
+    below[INSIDE] = re.findall(r'^\| \[\w+\.md\]\((\w+)\.md\)', inside, re.MULTILINE)
+    below[INSIDE].append('../contributing')
+    return {page: '\n'.join(_toctree(pages)) for page, pages in below.items()}
 
 
 def write_sources(folder: Path, quick: bool) -> None:
     """Put all pages into one folder, with links that hold there."""
     shutil.rmtree(str(folder), ignore_errors=True)
     shutil.copytree(str(DOC / 'images'), str(folder / 'images'))
+    (folder / 'inside').mkdir()
     for table in DOC.glob('*.csv'):
         shutil.copy(str(table), str(folder))
     for name in ('README.md', 'CONTRIBUTING.md'):
@@ -151,26 +167,46 @@ def write_sources(folder: Path, quick: bool) -> None:
         (folder / name.lower()).write_text(
             text.replace('](CONTRIBUTING.md)', '](contributing.md)'), 'utf-8'
         )
-    for page in DOC.glob('*.md'):
-        text = page.read_text(encoding='utf-8').replace('](../README.md', '](readme.md')
+    for page in (*DOC.glob('*.md'), *DOC.glob('inside/*.md')):
+        text = re.sub(r'\]\((?:\.\./)+README\.md', '](/readme.md', page.read_text('utf-8'))
+        text = re.sub(r'\]\((?:\.\./)+CONTRIBUTING\.md', '](/contributing.md', text)
         text = text.replace('```frozen\n', '```text\n')  # Pygments does not know the first
-        (folder / page.name).write_text(text, 'utf-8')
+        (folder / page.relative_to(DOC)).write_text(text, 'utf-8')
     generated = [
         *interface_pages(ROOT),
         ('api.md', '# Python API\n' if quick else api_page()),
-        ('commands.md', '# Commands\n' if quick else commands_page()),
     ]
     for name, text in generated:
         (folder / name).write_text(text, 'utf-8')
-    index = folder / 'index.md'
-    index.write_text(index.read_text('utf-8') + contents(index.read_text('utf-8')), 'utf-8')
-    titles = {
-        page.stem: page.read_text('utf-8').split('\n', 1)[0].lstrip('# ')
-        for page in folder.glob('*.md')
-    }
-    for page in folder.glob('*.md'):
+    _add_to_pages(folder, quick)
+    _name_links(folder)
+
+
+def _add_to_pages(folder: Path, quick: bool) -> None:
+    """Add the help of commands and the tables of contents to pages."""
+    index, inside = (folder / 'index.md'), (folder / (INSIDE + '.md'))
+    added = tables_below(index.read_text('utf-8'), inside.read_text('utf-8'))
+    added['index'] = contents(index.read_text('utf-8'))
+    for name in ('commands', 'experiment'):
+        helps = '' if quick else helps_of((folder / (name + '.md')).read_text('utf-8'))
+        added[name] = helps + added[name]
+    for name, text in added.items():
+        page = folder / (name + '.md')
+        page.write_text(page.read_text('utf-8') + text, 'utf-8')
+
+
+def _name_links(folder: Path) -> None:
+    """Let links to pages show their titles, and links to files lead to copies of them."""
+    pages = list(folder.rglob('*.md'))
+    titles = {page: page.read_text('utf-8').split('\n', 1)[0].lstrip('# ') for page in pages}
+
+    def titled(link: 're.Match[str]', page: Path) -> str:
+        target = Path(os.path.normpath(str(page.parent / link.group(2))))
+        return '[{}]({}'.format(titles[target], link.group(2))
+
+    for page in pages:
         text = FILES.sub(lambda link: _copied(link, folder), page.read_text('utf-8'))
-        text = NAMED.sub(lambda link: '[{}]'.format(titles[link.group(1)]), text)
+        text = NAMED.sub(partial(titled, page=page), text)
         page.write_text(text, 'utf-8')
 
 
@@ -180,11 +216,11 @@ def _copied(link: 're.Match[str]', folder: Path) -> str:
     It gets another name: roslaunch looks for a launch file in all folders below the package, and
     refuses one of which it finds two.
     """
-    name = link.group(2) + '.txt'
+    name = link.group(3) + '.txt'
     target = folder / 'files' / name
     target.parent.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(str(ROOT / link.group(2)), str(target))
-    return '{}files/{})'.format(link.group(1), name)
+    shutil.copyfile(str(ROOT / link.group(3)), str(target))
+    return '{}{}files/{})'.format(link.group(1), link.group(2)[len('../') :], name)
 
 
 def main() -> int:

@@ -79,7 +79,7 @@ def test_help_points_to_a_page_that_is_installed_with_all_that_it_links_to(insta
     share = installed / 'installed/share/smach_oracle'
     shown = in_installed(installed, 'rosrun smach_oracle oracle_disk --help')
     assert shown.splitlines()[-1] == 'More: {}'.format(share / 'doc/recording.md')
-    for page in (share / 'doc').glob('*.md'):
+    for page in (share / 'doc').rglob('*.md'):
         text = re.sub(
             r'^```.*?^```', '', page.read_text(encoding='utf-8'), flags=re.MULTILINE | re.DOTALL
         )

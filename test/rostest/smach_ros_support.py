@@ -16,7 +16,7 @@ from smach_ros import SimpleActionState
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 OURS = os.path.exists(os.path.join(os.path.dirname(smach_ros.__file__), 'action_link.py'))
-# what doc/smach_ros.md says ours does better; upstream's does otherwise
+# what doc/inside/smach_ros.md says ours does better; upstream's does otherwise
 improvement = unittest.skipUnless(OURS, 'upstream does otherwise')
 
 

@@ -107,7 +107,7 @@ def with_every_option(command: str, options: Dict[str, List[str]]) -> List[str]:
 
 def documented_private_names() -> List[str]:
     """The private names (`~name`: parameters, topics, services) in the documentation."""
-    pages = [ROOT / 'README.md', *sorted((ROOT / 'doc').glob('*.md'))]
+    pages = [ROOT / 'README.md', *sorted((ROOT / 'doc').rglob('*.md'))]
     return sorted(
         {name for page in pages for name in re.findall(r'`(~[a-z_][a-z0-9_/]*)`', _text(page))}
     )

@@ -1,4 +1,4 @@
-"""What a rule can see of doc/style.md: long sentences, semicolons, inverted sentences, terms.
+"""What a rule can see of doc/inside/style.md: long or inverted sentences, semicolons, terms.
 
 ``python3 test/unit/house/plain_words.py [FILE]...`` prints what it and proselint find in files.
 Without names it reads all files.
@@ -15,7 +15,7 @@ from typing import Iterator, List, NamedTuple, Pattern
 from house import ROOT, is_python, shown, tracked_text
 
 MOST_WORDS = 35
-STYLE = 'doc/style.md'
+STYLE = 'doc/inside/style.md'
 PAGES = ('.md', '.rst')
 INTERFACES = ('.msg', '.srv', '.action')
 

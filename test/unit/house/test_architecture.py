@@ -1,4 +1,4 @@
-"""doc/architecture.md: its picture is drawn from the imports, its ways are there."""
+"""doc/inside/architecture.md: its picture is drawn from the imports, its ways are there."""
 
 import ast
 import collections
@@ -13,7 +13,7 @@ from house import ROOT, imports
 from layers import LAYERS
 
 SOURCES = ROOT / 'src/smach_oracle'
-PAGE = (ROOT / 'doc/architecture.md').read_text(encoding='utf-8')
+PAGE = (ROOT / 'doc/inside/architecture.md').read_text(encoding='utf-8')
 PICTURE = ROOT / 'doc/images/rooms'
 STEP = re.compile(r'^\| `([\w/.]+\.(?:py|js))` \| `(\w+)` \| (\w+) \|$', re.MULTILINE)
 

@@ -12,7 +12,7 @@ from functools import lru_cache
 import pytest
 from house import ROOT
 
-PAGES = sorted((ROOT / 'doc').glob('*.md'))
+PAGES = sorted((ROOT / 'doc').rglob('*.md'))
 # on lines of their own, also continued ones, or within a line of text
 COMMAND = re.compile(
     r'^ *(ros(?:run|launch) smach_oracle (?:.*\\\n)*.*)$|`(ros(?:run|launch) smach_oracle [^`]+)`',

@@ -1,4 +1,4 @@
-"""doc/executive_inside.md: its tests and functions are there, and the code writes where it says."""
+"""doc/inside/executive_inside.md: its tests and functions are there, and so are the writers."""
 
 import ast
 import re
@@ -9,7 +9,7 @@ from house import ROOT, parse
 
 EXECUTIVE = ROOT / 'src/smach_oracle/oracle'
 TESTS = ROOT / 'test/unit/oracle'
-PAGE = (ROOT / 'doc/executive_inside.md').read_text(encoding='utf-8')
+PAGE = (ROOT / 'doc/inside/executive_inside.md').read_text(encoding='utf-8')
 CITED = sorted(set(re.findall(r'`([\w/]+\.py)::(\w+)`', PAGE)))
 FUNCTIONS = sorted(set(re.findall(r'`(\w+)\.(\w+)` \|', PAGE)))  # a module's
 

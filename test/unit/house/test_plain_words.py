@@ -1,4 +1,4 @@
-"""The texts for people keep the rules of doc/style.md, and the rules find what they are for."""
+"""Texts for people keep the rules of doc/inside/style.md, and the rules find what they are for."""
 
 import pytest
 from house import ROOT, shown

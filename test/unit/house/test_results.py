@@ -16,7 +16,12 @@ TRIALS = ROOT / 'doc/trials/fourth'  # of the fourth freeze
 FIFTH = ROOT / 'doc/trials/fifth'  # of the fifth
 PAGE, TABLES, BY_ONE_LINE, TABLES_BY_ONE_LINE = (
     (ROOT / 'doc' / (name + '.md')).read_text(encoding='utf-8')
-    for name in ('results', 'results_tables', 'results_one_line', 'results_one_line_tables')
+    for name in (
+        'results',
+        'inside/results_tables',
+        'results_one_line',
+        'inside/results_one_line_tables',
+    )
 )
 PAGES = [(TRIALS, PAGE, TABLES), (FIFTH, BY_ONE_LINE, TABLES_BY_ONE_LINE)]
 OF_FOURTH, OF_FIFTH = (freeze.blocks() for freeze in standing_freezes(ROOT))

@@ -1,4 +1,4 @@
-"""doc/executive_inside.md: threads and lock of a container, what an execution leaves, and more."""
+"""doc/inside/executive_inside.md: threads and lock of a container, what an execution leaves, ..."""
 
 import threading
 

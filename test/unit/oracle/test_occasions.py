@@ -1,4 +1,4 @@
-"""doc/executive_inside.md: the phases of each occasion, in machines that run."""
+"""doc/inside/executive_inside.md: the phases of each occasion, in machines that run."""
 
 import os
 import re
@@ -18,7 +18,7 @@ KEEP = 'keep'
 
 def table_of(first: str) -> Dict[str, Dict[str, str]]:
     """The table of the page whose first column has this heading, by the words in that column."""
-    with open(os.path.join(ROOT, 'doc', 'executive_inside.md'), encoding='utf-8') as page:
+    with open(os.path.join(ROOT, 'doc', 'inside', 'executive_inside.md'), encoding='utf-8') as page:
         found = re.search(
             r'^(\| {} \|.*\n)\|[-|]+\n((?:\|.*\n)+)'.format(first), page.read(), re.MULTILINE
         )

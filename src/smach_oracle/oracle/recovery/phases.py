@@ -2,7 +2,7 @@
 
 Each phase is a function of the recovery. It returns a verdict, or None to leave it to the next. A
 new way to recover is one more function here, and its place in `PHASES`. Which phases do anything on
-which occasion is in a table of doc/executive_inside.md.
+which occasion is in a table of doc/inside/executive_inside.md.
 """
 
 import threading
