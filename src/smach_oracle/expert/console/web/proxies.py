@@ -79,7 +79,7 @@ class TrustedProxies:
 
 
 def _plain(address: str) -> str:
-    """Return an address in its shortest form, '' for what is none."""
+    """Return an address in its shortest form, '' for any other text."""
     found = _address(address)
     mapped = found.ipv4_mapped if isinstance(found, ipaddress.IPv6Address) else None
     return str(mapped or found or '')
