@@ -1,7 +1,6 @@
 """Finds bags, and reads the executive's events and the worlds' causes, without ROS."""
 
 import contextlib
-import json
 import math
 import os
 import stat
@@ -9,23 +8,27 @@ from importlib.util import find_spec
 from operator import attrgetter, itemgetter
 from typing import (
     Any,
+    Callable,
     Dict,
     Iterable,
     Iterator,
     List,
+    Mapping,
     NamedTuple,
     Optional,
     Sequence,
     Tuple,
+    Union,
 )
 
 from smach_oracle.bag_format import MAGIC
 from smach_oracle.oracle.errors import OracleError
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event
 
 from .plain_bags.decoding import STAMP_NS, STAMP_S, MessageDecoder
 from .plain_bags.definition_sum import sum_of
-from .plain_bags.indexed_bag import IndexedBag, NotPlain
+from .plain_bags.event_decoder import EventDecoder, StampedEvent, event_of
+from .plain_bags.indexed_bag import IndexedBag, KnownHeaders, NotPlain, PlainConnection
 
 EVENT_TYPE = 'smach_oracle/msg/OracleEvent'  # as rosbags writes smach_oracle/OracleEvent
 CAUSE_TYPE = 'smach_oracle/msg/TrialCause'
@@ -40,16 +43,12 @@ MENDING = (
 NO_EVENTS = 'no events of the executive in it'
 _EVENTS = '/oracle/events'
 _WRAP = 2**32
-_KINDS = {int(kind): kind for kind in EventKind}
+_MOST_DECODERS = 100
 # fields that are taken of a message, in this order
 _TAKEN = {
-    EVENT_TYPE: (STAMP_S, STAMP_NS, *Event._fields),
+    EVENT_TYPE: (STAMP_S, STAMP_NS, 'kind', 'trial_id', 'seq', 'wall_time', *Event._fields[4:]),
     CAUSE_TYPE: ('seed', 'task', 'kinds', 'details'),
 }
-
-# a message of one of the two types: type, topic, time of recording in ns, what is taken of it
-_Message = Tuple[str, str, int, Sequence[Any]]
-_new_tuple = tuple.__new__
 _PICKS = {msgtype: attrgetter(*names) for msgtype, names in _TAKEN.items()}
 
 
@@ -73,8 +72,14 @@ class RecordedCause(NamedTuple):
     details: Tuple[str, ...]
 
 
+# a message of one of the two types: topic, time of recording in ns, and what it tells
+_Message = Tuple[str, int, Union[StampedEvent, RecordedCause]]
+# decodes a message that stands in some bytes, from one place to another
+_Decoder = Callable[[bytes, int, int], Union[StampedEvent, RecordedCause]]
+
+
 class _Taker:
-    """Takes what is wanted of the messages of a definition."""
+    """Takes what is wanted of the messages of a definition, whatever their fields' order."""
 
     def __init__(self, msgtype: str, definition: str) -> None:
         """:raises NotPlain: where rosbags is to read them."""
@@ -84,14 +89,33 @@ class _Taker:
         if missing:
             raise NotPlain('no field {}'.format(missing[0]))
         self._pick = itemgetter(*map(names.index, _TAKEN[msgtype]))
+        self._told: Callable[..., Union[StampedEvent, RecordedCause]] = _TOLD[msgtype]
 
-    def __call__(self, data: bytes) -> Sequence[Any]:
+    def __call__(self, data: bytes, start: int, end: int) -> Union[StampedEvent, RecordedCause]:
         """Return it.
 
         :raises NotPlain: where the message is not as its definition says.
         """
-        taken: Sequence[Any] = self._pick(self._decode(data))
-        return taken
+        return self._told(*self._pick(self._decode(data[start:end])))
+
+
+def _decoder_of(connection: PlainConnection) -> _Decoder:
+    """:raises NotPlain: where rosbags is to read the messages of a connection."""
+    if connection.msgtype == EVENT_TYPE:
+        with contextlib.suppress(NotPlain):
+            return EventDecoder(connection.msgdef)
+    return _Taker(connection.msgtype, connection.msgdef)
+
+
+def _cause(seed: int, task: str, kinds: Sequence[str], details: Sequence[str]) -> RecordedCause:
+    return RecordedCause(int(seed), task, tuple(kinds), tuple(details))
+
+
+# what a message tells, by what is taken of it
+_TOLD: Mapping[str, Callable[..., Union[StampedEvent, RecordedCause]]] = {
+    EVENT_TYPE: event_of,
+    CAUSE_TYPE: _cause,
+}
 
 
 class BagContent(NamedTuple):
@@ -172,7 +196,8 @@ class EventReader:
         if find_spec('rosbags') is None:
             raise ModuleNotFoundError("No module named 'rosbags'", name='rosbags')
         self._made_stores: Optional[MessageStores] = None
-        self._takers: Dict[str, _Taker] = {}  # by message definition
+        self._decoders: Dict[Tuple[str, str], _Decoder] = {}  # by topic and definition
+        self._known = KnownHeaders()
         self._most_events = most_events
 
     def read(self, path: str) -> BagContent:
@@ -206,16 +231,28 @@ class EventReader:
 
         :raises NotPlain: where rosbags is to read it.
         """
-        with IndexedBag(path) as bag:
+        with IndexedBag(path, self._known) as bag:
             _check_types(each.msgtype for each in bag.connections.values())
-            for stamp, connection, data in bag.messages(EVENT_TYPE, CAUSE_TYPE):
-                take = self._takers.get(connection.msgdef)
-                if take is None:
-                    if sum_of(connection.msgdef) != connection.md5sum:
-                        self._stores.store_of(connection.msgdef, connection.msgtype)
-                    take = _Taker(connection.msgtype, connection.msgdef)
-                    self._takers[connection.msgdef] = take
-                yield connection.msgtype, connection.topic, stamp, take(data)
+            decoders: Dict[int, _Decoder] = {}
+            for stamp, order, _, connection, data, start, end in bag.messages(
+                EVENT_TYPE, CAUSE_TYPE
+            ):
+                decode = decoders.get(order)
+                if decode is None:
+                    decode = decoders[order] = self._decoder(connection)
+                yield connection.topic, stamp, decode(data, start, end)
+
+    def _decoder(self, connection: PlainConnection) -> _Decoder:
+        key = connection.topic, connection.msgdef
+        decode = self._decoders.get(key)
+        if decode is None:
+            if sum_of(connection.msgdef) != connection.md5sum:
+                self._stores.store_of(connection.msgdef, connection.msgtype)
+            decode = _decoder_of(connection)
+            if len(self._decoders) == _MOST_DECODERS:
+                self._decoders.clear()
+            self._decoders[key] = decode
+        return decode
 
     @property
     def _stores(self) -> MessageStores:
@@ -232,8 +269,12 @@ class EventReader:
                 item for item in reader.connections if item.msgtype in (EVENT_TYPE, CAUSE_TYPE)
             ]
             for item, stamp, data in reader.messages(connections):
-                message = self._stores.read(item, data)
-                yield item.msgtype, item.topic, stamp, _PICKS[item.msgtype](message)
+                taken = _PICKS[item.msgtype](self._stores.read(item, data))
+                if item.msgtype == CAUSE_TYPE:
+                    yield item.topic, stamp, _cause(*taken)
+                else:  # rosbags takes the numbers of a stamp for signed ones
+                    second, rest, *fields = taken
+                    yield item.topic, stamp, event_of(second % _WRAP, rest % _WRAP, *fields)
 
     def _content_of(self, messages: Iterable[_Message]) -> BagContent:
         events: List[Event] = []
@@ -241,20 +282,16 @@ class EventReader:
         causes: List[Tuple[int, RecordedCause]] = []
         topics: Dict[str, str] = {}
         stamps: List[float] = []
-        for msgtype, topic, stamp, taken in messages:
-            if msgtype == CAUSE_TYPE:
-                seed, task, kinds, details = taken
-                cause = RecordedCause(int(seed), task, tuple(kinds), tuple(details))
-                causes.append((stamp, cause))
+        for topic, stamp, told in messages:
+            if isinstance(told, RecordedCause):
+                causes.append((stamp, told))
             else:
-                second, rest, kind, trial_id, *fields, data = taken
-                kind = _KINDS.get(kind, kind)  # a later release may know more kinds
-                more = json.loads(data) if data else None
-                events.append(_new_tuple(Event, (kind, trial_id, *fields, more)))
+                ros_time, event = told
+                events.append(event)
+                trial_id = event.trial_id
                 ends[trial_id] = stamp
                 topics[trial_id] = topic
-                # rosbags takes these numbers for signed ones
-                stamps.append(second % _WRAP + rest % _WRAP / 1e9)
+                stamps.append(ros_time)
             if len(events) > self._most_events:
                 raise BagError('it has more than {:g} events'.format(self._most_events))
         if ends:  # what is recorded while the last trial of a bag ends is its own

@@ -1,7 +1,8 @@
 """The counts of one trial (definitions: doc/statistics.md)."""
 
 import os
-from typing import Any, Iterable, NamedTuple, Optional, Tuple
+from operator import attrgetter
+from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
 
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
@@ -9,6 +10,10 @@ from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, FailureRule
 from ..bag_events import RecordedCause
 from ..trial_counter import TrialCounter, TrialEnding
 from ..truth import Truth
+
+_NUMBER = attrgetter('seq')
+_MOST_TOLD = 100
+_told: Dict[int, '_ToldAtStart'] = {}  # by the identity of the data, which it holds
 
 
 class TrialSummary(NamedTuple):
@@ -73,33 +78,65 @@ class TrialSummary(NamedTuple):
         return None if self.truly_succeeded is None else not self.truly_succeeded
 
 
+class _ToldAtStart(NamedTuple):
+    """The fields that the data of a TRIAL_START tell."""
+
+    data: Mapping[str, Any]
+    settings: Tuple[Tuple[str, Any], ...]
+    origin: Tuple[Tuple[str, str], ...]
+    inputs: Tuple[Tuple[str, Any], ...]
+
+
 def summarise(
-    events: Iterable[Event], bags: Tuple[str, ...] = (), rule: Optional[FailureRule] = None
+    events: Iterable[Event],
+    bags: Tuple[str, ...] = (),
+    rule: Optional[FailureRule] = None,
+    cause: Optional[RecordedCause] = None,
+    node: str = '',
 ) -> TrialSummary:
     """Sum up the events of one trial, at least one, in any order. `rule`: as in `load_trials`."""
     counter = TrialCounter(rule)
-    for event in sorted(events, key=lambda event: event.seq):
+    for event in sorted(events, key=_NUMBER):
         counter.add(event)
+    told = _told_by(counter)
     return TrialSummary(
-        trial_id=counter.trial_id,
-        experiment=counter.experiment,
-        recovers=counter.recovers,
-        start_time=counter.start_time,
-        duration_s=counter.duration_s,
-        ending=counter.ending,
-        outcome=counter.outcome,
-        failures=counter.failures,
-        recoveries=counter.recoveries,
-        questions=counter.questions,
-        answered=counter.answered,
-        failures_by_state=counter.failures_by_state,
-        lost_events=counter.lost_events,
-        bags=bags,
-        settings=counter.settings,
-        unwell_s=counter.unwell_s,
-        resumed=counter.resumed,
-        down_s=counter.down_s,
-        rule=counter.rule,
-        origin=counter.origin,
-        inputs=counter.inputs,
+        counter.trial_id,
+        counter.experiment,
+        counter.recovers,
+        counter.start_time,
+        counter.duration_s,
+        counter.ending,
+        counter.outcome,
+        counter.failures,
+        counter.recoveries,
+        counter.questions,
+        counter.answered,
+        counter.failures_by_state,
+        counter.lost_events,
+        bags,
+        told.settings,
+        cause,
+        None,
+        counter.unwell_s,
+        counter.resumed,
+        counter.down_s,
+        counter.rule,
+        node,
+        told.origin,
+        told.inputs,
     )
+
+
+def _told_by(counter: TrialCounter) -> _ToldAtStart:
+    """Return what the start of a trial told. Trials with the same data share it.
+
+    The data are told apart by identity: `1`, `1.0` and `True` are equal, and not the same.
+    """
+    data = counter.start
+    told = _told.get(id(data))
+    if told is None or told.data is not data:
+        told = _ToldAtStart(data, counter.settings, counter.origin, counter.inputs)
+        if len(_told) == _MOST_TOLD:
+            _told.clear()
+        _told[id(data)] = told
+    return told

@@ -20,8 +20,7 @@ class TrialOfBags(NamedTuple):
 
     def summary(self, rule: Optional[FailureRule]) -> TrialSummary:
         """Sum it up."""
-        trial = summarise(self.events, self.bags, rule)
-        return trial._replace(cause=self.cause, node=self.node)
+        return summarise(self.events, self.bags, rule, self.cause, self.node)
 
 
 def trials_of(contents: Mapping[str, BagContent]) -> List[TrialOfBags]:

@@ -13,7 +13,7 @@ from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
 from .indexed_bag import NotPlain
 
 STAMP_S, STAMP_NS = 'header.stamp.sec', 'header.stamp.nanosec'  # names of a Header's parts
-_CODES = {
+PLAIN_CODES = {
     'bool': '?',
     'uint8': 'B',
     'int8': 'b',
@@ -26,12 +26,12 @@ _CODES = {
     'float32': 'f',
     'float64': 'd',
 }
-_STRING, _STRINGS = 'string', 'string[]'
+STRING, _STRINGS = 'string', 'string[]'
 _HEADER = (
     ('uint32', 'header.seq'),
     ('uint32', STAMP_S),
     ('uint32', STAMP_NS),
-    (_STRING, 'header.frame_id'),
+    (STRING, 'header.frame_id'),
 )
 _HEADERS = ('Header', 'std_msgs/Header')
 _LINE = re.compile(r'(?P<type>[\w/]+(?:\[\])?)\s+(?P<name>\w+)\s*(?P<constant>=)?')
@@ -48,19 +48,18 @@ class _Stretch(NamedTuple):
     is_list: bool
 
 
-class MessageDecoder:
-    """Decodes the messages of a definition. `names` are those of the fields, in their order."""
+class FieldsDecoder:
+    """Decodes fields that follow each other. `names` are those of the fields, in their order."""
 
-    def __init__(self, definition: str) -> None:
+    def __init__(self, fields: Sequence[Field]) -> None:
         """:raises NotPlain: where a field is of another type."""
-        fields = _fields_of(definition)
         self.names: Sequence[str] = [name for _, name in fields]
         self._stretches: List[_Stretch] = []
         codes = '<'
         for kind, _ in fields:
-            if kind in _CODES:
-                codes += _CODES[kind]
-            elif kind in (_STRING, _STRINGS):
+            if kind in PLAIN_CODES:
+                codes += PLAIN_CODES[kind]
+            elif kind in (STRING, _STRINGS):
                 layout = struct.Struct(codes + 'I')
                 stretch = _Stretch(layout.unpack_from, layout.size, kind == _STRINGS)
                 self._stretches.append(stretch)
@@ -70,12 +69,21 @@ class MessageDecoder:
         self._last = struct.Struct(codes)
 
     def __call__(self, data: bytes) -> List[Any]:
-        """Return the values of the fields of a message.
+        """Return the values of the fields. They are all of the data.
 
-        :raises NotPlain: where it is not as its definition says.
+        :raises NotPlain: where they are not as their definition says.
+        """
+        values, end = self.begin(data, 0)
+        if end != len(data):
+            raise NotPlain('a message of another length')
+        return values
+
+    def begin(self, data: bytes, at: int) -> Tuple[List[Any], int]:
+        """Return the values of the fields that begin at a place, and where they end.
+
+        :raises NotPlain: where they are not as their definition says.
         """
         values: List[Any] = []
-        at = 0
         try:
             for unpack, size, is_list in self._stretches:
                 values += unpack(data, at)
@@ -92,9 +100,15 @@ class MessageDecoder:
             values += self._last.unpack_from(data, at)
         except (struct.error, UnicodeDecodeError) as err:
             raise NotPlain(str(err)) from err
-        if at + self._last.size != len(data):
-            raise NotPlain('a message of another length')
-        return values
+        return values, at + self._last.size
+
+
+class MessageDecoder(FieldsDecoder):
+    """Decodes the messages of a definition."""
+
+    def __init__(self, definition: str) -> None:
+        """:raises NotPlain: where a field is of another type."""
+        super().__init__(fields_of(definition))
 
 
 def _texts(data: bytes, at: int, count: int) -> Tuple[List[str], int]:
@@ -106,8 +120,11 @@ def _texts(data: bytes, at: int, count: int) -> Tuple[List[str], int]:
     return texts, at
 
 
-def _fields_of(definition: str) -> List[Field]:
-    """Return type and name of each field. Behind a line of `=` come other messages."""
+def fields_of(definition: str) -> List[Field]:
+    """Return type and name of each field. Behind a line of `=` come other messages.
+
+    :raises NotPlain: for a line that is no field.
+    """
     found: List[Field] = []
     for text in definition.split('\n====')[0].split('\n'):
         line = text.split('#')[0].strip()

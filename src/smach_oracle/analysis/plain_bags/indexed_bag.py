@@ -8,10 +8,9 @@ what is wrong. Format: ROS bag 2.0 (http://wiki.ros.org/Bags/Format/2.0).
 import bz2
 import os
 import struct
-from contextlib import contextmanager
-from functools import partial
+from collections import deque
 from types import TracebackType
-from typing import Callable, Dict, Iterator, List, Mapping, NamedTuple, Optional, Tuple, Type
+from typing import Callable, Deque, Dict, Iterable, List, Mapping, NamedTuple, Optional, Tuple, Type
 
 from smach_oracle.bag_format import (
     BAG_HEADER_END,
@@ -43,6 +42,25 @@ _IS_MESSAGE, _IS_INDEX, _IS_CHUNK, _IS_CHUNK_INFO = (
 )
 _AT_ONCE, _PIECE = 1 << 16, 1 << 12  # bytes. Larger chunks are read by pieces
 _LARGEST_CHUNK = 1 << 24  # bytes. Larger ones do not come into memory as a whole
+_MOST_KNOWN, _LONGEST_KNOWN = 8, 1 << 18  # beginnings of indexes, and their bytes
+_MOST_NUMBERS = 1000  # headers
+# what a file that is not sound makes the code raise
+_NOT_SOUND = (
+    ArithmeticError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    OSError,
+    ValueError,
+    BagFormatError,
+    struct.error,
+)
+_UNPACK_UINT32 = UINT32.unpack_from
+_new_tuple = tuple.__new__
+
+# of a message: what unpacks header, time and size, and the header up to the time. b'': not known
+_RecordLayout = Tuple[struct.Struct, bytes]
+_NO_RECORD: _RecordLayout = (struct.Struct(''), b'')
 
 
 class NotPlain(Exception):
@@ -60,11 +78,20 @@ class PlainConnection(NamedTuple):
 
 
 class BagMessage(NamedTuple):
-    """A message as it was recorded."""
+    """A message as it was recorded, where it stands in some bytes."""
 
     stamp: int  # ns
+    order: int  # of its connection
+    number: int  # of the messages that were found
     connection: PlainConnection
-    data: bytes
+    source: bytes
+    start: int
+    end: int
+
+    @property
+    def data(self) -> bytes:
+        """Return its bytes alone."""
+        return self.source[self.start : self.end]
 
 
 class _RawRecord(NamedTuple):
@@ -78,23 +105,108 @@ class _Chunk(NamedTuple):
     counts: Mapping[int, int]  # of messages by connection
 
 
+class KnownHeaders:
+    """Parts that many bags have alike, by their bytes. Each is parsed once."""
+
+    def __init__(self) -> None:
+        self._connections: Deque[_KnownConnections] = deque(maxlen=_MOST_KNOWN)
+        self._numbers: Dict[bytes, int] = {}  # of connections, by the header of an index
+        self._records: Dict[int, _RecordLayout] = {}  # by the number of the connection
+
+    def connections(self, tail: bytes, count: int) -> Tuple[Mapping[int, PlainConnection], int]:
+        """Return the connections of an index, by number, and where they end.
+
+        :param count: how many there are.
+        :raises NotPlain: where a record is of another kind, or cut off.
+        """
+        for known in self._connections:
+            if len(known.by_number) == count and tail.startswith(known.told):
+                return known.by_number, len(known.told)
+        by_number, at = _connections_in(tail, count)
+        if len(by_number) == count and at <= _LONGEST_KNOWN:
+            self._connections.appendleft(_KnownConnections(tail[:at], by_number))
+        return by_number, at
+
+    def connection_of(self, index: bytes, at: int) -> Tuple[int, int, int]:
+        """Return the connection of the index at a place, and where its entries begin and end.
+
+        :raises NotPlain: where the record is of another kind, or cut off.
+        """
+        (length,) = _UNPACK_UINT32(index, at)
+        start = at + 4 + length
+        header = index[at:start]
+        number = self._numbers.get(header)
+        if number is None:
+            name, begin, end = _found(index, at, _IS_INDEX, _CONNECTION_FIELD, UINT32.size)
+            (number,) = UINT32.unpack(name[-UINT32.size :])
+            if len(self._numbers) == _MOST_NUMBERS:
+                self._numbers.clear()
+            self._numbers[header] = number
+            return number, begin, end
+        (size,) = _UNPACK_UINT32(index, start)
+        end = start + 4 + size
+        if end > len(index):
+            raise NotPlain('a record is cut off')
+        return number, start + 4, end
+
+    def find_messages(
+        self,
+        data: bytes,
+        entries: Iterable[Tuple[int, ...]],
+        number: int,
+        connection: PlainConnection,
+        found: List[BagMessage],
+    ) -> None:
+        """Add messages of one connection to those that were found.
+
+        :param entries: of its index: s, ns, and where in the data the message's record begins.
+        :param number: of the connection.
+        :raises NotPlain: where an entry leads to no message of the connection.
+        """
+        layout, head = self._records.get(number, _NO_RECORD)
+        name = _CONNECTION_FIELD + UINT32.pack(number)
+        for second, rest, place in entries:
+            if head:
+                told, told_s, told_ns, size = layout.unpack_from(data, place)
+                start = place + layout.size
+                end = start + size
+            if not head or not (
+                told == head and told_s == second and told_ns == rest and end <= len(data)
+            ):
+                time = _TIME_FIELD + STAMP.pack(second, rest)
+                start, end = _message(data, place, name, time)
+                layout, head = _record_layout(data[place : start - 4])
+                self._records[number] = layout, head
+            stamp = second * 10**9 + rest
+            message = (stamp, connection.order, len(found), connection, data, start, end)
+            found.append(_new_tuple(BagMessage, message))
+
+
+class _KnownConnections(NamedTuple):
+    told: bytes
+    by_number: Mapping[int, PlainConnection]
+
+
 class IndexedBag:
     """A bag that is open for reading."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, known: Optional[KnownHeaders] = None) -> None:
         """Read its index.
 
+        :param known: parts of bags that were read before.
         :raises NotPlain: where rosbags is to read it.
         :raises OSError: where it cannot be opened.
         """
-        self.connections: Dict[int, PlainConnection] = {}
+        self.connections: Mapping[int, PlainConnection] = {}
+        self._known = known or KnownHeaders()
         self._chunks: List[_Chunk] = []
         self._file = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
         try:
-            with _plain():
-                self._read_index()
-        except BaseException:
+            self._read_index()
+        except BaseException as err:
             os.close(self._file)
+            if isinstance(err, _NOT_SOUND):
+                raise NotPlain(repr(err)) from err
             raise
 
     def __enter__(self) -> 'IndexedBag':
@@ -119,14 +231,15 @@ class IndexedBag:
             number: each for number, each in self.connections.items() if each.msgtype in types
         }
         ends = [chunk.place for chunk in self._chunks[1:]] + [self._index_place]
-        with _plain():
-            found = [
-                message
-                for chunk, end in zip(self._chunks, ends)
-                if not wanted.keys().isdisjoint(chunk.counts)
-                for message in self._messages_in(chunk, end, wanted)
-            ]
-        return sorted(found, key=lambda message: (message.stamp, message.connection.order))
+        found: List[BagMessage] = []
+        try:
+            for chunk, end in zip(self._chunks, ends):
+                if not wanted.keys().isdisjoint(chunk.counts):
+                    self._find_messages(chunk, end, wanted, found)
+        except _NOT_SOUND as err:
+            raise NotPlain(repr(err)) from err
+        found.sort()  # by their first fields. The third one is another in each
+        return found
 
     def _part(self, start: int, end: int) -> bytes:
         data = os.pread(self._file, end - start, start)
@@ -141,19 +254,8 @@ class IndexedBag:
         fields = _record(begin, len(MAGIC), OP_BAG_HEADER).fields
         (self._index_place,) = UINT64.unpack(fields['index_pos'])
         tail = self._part(self._index_place, os.fstat(self._file).st_size)
-        at = 0
-        for _ in range(uint32_field(fields, 'conn_count')):
-            record = _record(tail, at, OP_CONNECTION)
-            number = uint32_field(record.fields, 'conn')
-            about = parse_fields(tail[record.start : record.end])
-            self.connections[number] = PlainConnection(
-                len(self.connections),
-                record.fields['topic'].decode(),
-                about['type'].decode().replace('/', '/msg/'),
-                about['message_definition'].decode(),
-                about['md5sum'].decode(),
-            )
-            at = record.end
+        count = uint32_field(fields, 'conn_count')
+        self.connections, at = self._known.connections(tail, count)
         for _ in range(uint32_field(fields, 'chunk_count')):
             place_field, start, at = _found(tail, at, _IS_CHUNK_INFO, _PLACE_FIELD, UINT64.size)
             (place,) = UINT64.unpack(place_field[-UINT64.size :])
@@ -163,32 +265,36 @@ class IndexedBag:
         if at != len(tail) or not self._chunks:
             raise NotPlain('the index is not the end of it')
 
-    def _messages_in(
-        self, chunk: _Chunk, end: int, wanted: Mapping[int, PlainConnection]
-    ) -> Iterator[BagMessage]:
-        """Yield the messages of a chunk. Its index comes behind it, up to `end`."""
-        record_at, index = self._opened_chunk(chunk.place, end)
+    def _find_messages(
+        self,
+        chunk: _Chunk,
+        end: int,
+        wanted: Mapping[int, PlainConnection],
+        found: List[BagMessage],
+    ) -> None:
+        """Find the messages of a chunk. Its index comes behind it, up to `end`."""
+        whole, pieces, index = self._opened_chunk(chunk.place, end)
         left, at = dict(chunk.counts), 0
         while at < len(index):
-            name, start, at = _found(index, at, _IS_INDEX, _CONNECTION_FIELD, UINT32.size)
-            (number,) = UINT32.unpack(name[-UINT32.size :])
+            number, start, at = self._known.connection_of(index, at)
             if left.pop(number, 0) * INDEX_ENTRY.size != at - start:
                 raise NotPlain('an index has another length')
             if number in wanted:
-                for second, rest, place in INDEX_ENTRY.iter_unpack(index[start:at]):
-                    time = _TIME_FIELD + STAMP.pack(second, rest)
-                    message = _message(*record_at(place), name, time)
-                    yield BagMessage(second * 10**9 + rest, wanted[number], message)
+                entries = INDEX_ENTRY.iter_unpack(index[start:at])
+                if pieces is None:
+                    self._known.find_messages(whole, entries, number, wanted[number], found)
+                    continue
+                for second, rest, place in entries:
+                    data, at_piece = pieces.read(place)
+                    entry = ((second, rest, at_piece),)
+                    self._known.find_messages(data, entry, number, wanted[number], found)
         if left:
             raise NotPlain('an index is missing')
 
-    def _opened_chunk(
-        self, place: int, end: int
-    ) -> Tuple[Callable[[int], Tuple[bytes, int]], bytes]:
-        """Return what reads a message's record by its place in the chunk, and the chunk's index.
+    def _opened_chunk(self, place: int, end: int) -> Tuple[bytes, Optional['_Pieces'], bytes]:
+        """Return the messages of a chunk, or what reads pieces of it, and the chunk's index.
 
-        The record begins at a place of the bytes that are returned. A chunk that is large, such as
-        one with images, is read by pieces.
+        A chunk that is large, such as one with images, is read by pieces.
         """
         if end - place > _AT_ONCE:
             head = self._part(place, place + _PIECE)
@@ -199,35 +305,51 @@ class IndexedBag:
                     parse_fields(head[4 : 4 + length]), 'size'
                 ):
                     raise NotPlain('a chunk has another length')
-                piece_at = partial(self._piece, start, start + size)
-                return piece_at, self._part(start + size, end)
+                return b'', _Pieces(self._part, start, start + size), self._part(start + size, end)
         if end - place > _LARGEST_CHUNK:
             raise NotPlain('a large chunk')
         whole = self._part(place, end)
         data, at = _content(whole)
-        return (lambda place: (data, place)), whole[at:]
-
-    def _piece(self, start: int, end: int, place: int) -> Tuple[bytes, int]:
-        """Return the record at a place of a chunk whose messages stand from `start` to `end`."""
-        piece = self._part(start + place, min(end, start + place + _PIECE))
-        (length,) = UINT32.unpack_from(piece, 0)
-        (size,) = UINT32.unpack_from(piece, 4 + length)
-        if 8 + length + size > len(piece):
-            piece = self._part(start + place, min(end, start + place + 8 + length + size))
-        return piece, 0
+        return data, None, whole[at:]
 
 
-@contextmanager
-def _plain() -> Iterator[None]:
-    """Raise NotPlain for whatever a file that is not sound makes the code inside raise."""
-    try:
-        yield
-    except NotPlain:
-        raise
-    except (ArithmeticError, EOFError, LookupError, MemoryError, OSError, ValueError) as err:
-        raise NotPlain(repr(err)) from err
-    except (BagFormatError, struct.error) as err:
-        raise NotPlain(str(err)) from err
+class _Pieces:
+    """Reads the records of a chunk by pieces. Small ones that lie together are in one piece."""
+
+    def __init__(self, part: Callable[[int, int], bytes], start: int, end: int) -> None:
+        """`part`: reads a part of the file. `start`, `end`: of the chunk's messages in it."""
+        self._part = part
+        self._start = start
+        self._end = end
+        self._piece = b''
+        self._from = 0  # of the piece, in the chunk
+
+    def read(self, place: int) -> Tuple[bytes, int]:
+        """Return a piece in which the record at a place of the chunk is whole, and where there."""
+        at = place - self._from
+        if not (at >= 0 and self._is_whole(at)):
+            self._take(place, _PIECE)
+            at = 0
+            if not self._is_whole(at):
+                (length,) = UINT32.unpack_from(self._piece, 0)
+                (size,) = UINT32.unpack_from(self._piece, 4 + length)
+                self._take(place, 8 + length + size)
+        return self._piece, at
+
+    def _is_whole(self, at: int) -> bool:
+        """Whether the record at a place of the piece is all in it."""
+        room = len(self._piece) - at - 8  # for its header and data, each behind its length
+        if room < 0:
+            return False
+        (length,) = UINT32.unpack_from(self._piece, at)
+        if length > room:
+            return False
+        (size,) = UINT32.unpack_from(self._piece, at + 4 + length)
+        return bool(length + size <= room)
+
+    def _take(self, place: int, size: int) -> None:
+        begin = self._start + place
+        self._piece, self._from = self._part(begin, min(self._end, begin + size)), place
 
 
 def _record(data: bytes, at: int, kind: int) -> _RawRecord:
@@ -294,8 +416,19 @@ def _found(data: bytes, at: int, kind: bytes, name: bytes, size: int) -> Tuple[b
     return field, start + 4, start + 4 + content
 
 
-def _message(data: bytes, at: int, connection: bytes, time: bytes) -> bytes:
-    """Return the data of the message whose record begins at a place of a chunk.
+def _record_layout(header: bytes) -> _RecordLayout:
+    """Return a layout of a message's record whose header is as this one, except for its time.
+
+    There is none where the time does not come last.
+    """
+    head = header[: -STAMP.size]
+    if not head.endswith(_TIME_FIELD):
+        return _NO_RECORD
+    return struct.Struct('<{}sIII'.format(len(head))), head
+
+
+def _message(data: bytes, at: int, connection: bytes, time: bytes) -> Tuple[int, int]:
+    """Return where the data of a message are, whose record begins at a place of a chunk.
 
     :param connection: the field of its header that names it.
     :param time: the field that tells its time.
@@ -304,8 +437,26 @@ def _message(data: bytes, at: int, connection: bytes, time: bytes) -> bytes:
     start = at + 4 + length
     header = data[at + 4 : start]
     (size,) = UINT32.unpack_from(data, start)
-    message = data[start + 4 : start + 4 + size]
     sound = connection in header and time in header and _IS_MESSAGE in header
-    if not sound or len(message) != size:
+    if not sound or start + 4 + size > len(data):
         raise NotPlain('an index leads to no message of its connection')
-    return message
+    return start + 4, start + 4 + size
+
+
+def _connections_in(tail: bytes, count: int) -> Tuple[Dict[int, PlainConnection], int]:
+    """Return the connections with which an index begins, and where they end."""
+    found: Dict[int, PlainConnection] = {}
+    at = 0
+    for _ in range(count):
+        record = _record(tail, at, OP_CONNECTION)
+        number = uint32_field(record.fields, 'conn')
+        about = parse_fields(tail[record.start : record.end])
+        found[number] = PlainConnection(
+            len(found),
+            record.fields['topic'].decode(),
+            about['type'].decode().replace('/', '/msg/'),
+            about['message_definition'].decode(),
+            about['md5sum'].decode(),
+        )
+        at = record.end
+    return found, at

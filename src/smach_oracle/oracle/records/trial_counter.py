@@ -4,9 +4,9 @@ The one definition for trials in bags, for trials that a robot runs, and for tho
 follows.
 """
 
-from collections import Counter
+from collections import defaultdict
 from enum import Enum
-from typing import Any, Dict, Mapping, Optional, Set, Tuple
+from typing import Any, Callable, ClassVar, Dict, Mapping, Optional, Set, Tuple
 
 from ..settings.failure_rule import FORMER_RULE, EndMeaning, FailureRule, rule_after
 from .events import Event, EventKind, FailureKind
@@ -46,7 +46,7 @@ class TrialCounter:
         self._unwell_since_s: Optional[float] = None
         self._rule = rule
         self._recorded_rule = FORMER_RULE
-        self._start: Mapping[str, Any] = {}  # data of TRIAL_START
+        self.start: Mapping[str, Any] = {}  # data of TRIAL_START
         self._end: Optional[Event] = None
         self._earliest_s = self._latest_s = self._before_s = 0.0
         self.resumed = 0  # how often it went on after its program was stopped
@@ -54,7 +54,7 @@ class TrialCounter:
         self._count = 0
         self._last_seq = -1
         self._left_out = 0  # numbers that no event has, as a resumed trial numbers on
-        self._failures: Dict[str, int] = Counter()
+        self._failures: Dict[str, int] = defaultdict(int)
         self._asked: Set[str] = set()
         self._answered: Set[str] = set()
         # by container: whether its last decision is a recovery that no jump has carried out yet
@@ -70,7 +70,7 @@ class TrialCounter:
 
         None where neither is recorded.
         """
-        stated = self._start.get('recovers')
+        stated = self.start.get('recovers')
         if isinstance(stated, bool):
             return stated
         return True if self._oracle_seen else None
@@ -78,13 +78,13 @@ class TrialCounter:
     @property
     def settings(self) -> Tuple[Tuple[str, Any], ...]:
         """Return the oracle's settings, sorted, or () where they are not recorded."""
-        stated = self._start.get('settings')
+        stated = self.start.get('settings')
         return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
     @property
     def origin(self) -> Tuple[Tuple[str, str], ...]:
         """Return where it ran, sorted, or () where that is not recorded."""
-        stated = self._start.get(ORIGIN)
+        stated = self.start.get(ORIGIN)
         if not isinstance(stated, Mapping):
             return ()
         return tuple(sorted((str(key), str(value)) for key, value in stated.items()))
@@ -95,7 +95,7 @@ class TrialCounter:
 
         It is () where there were none, or where they are not recorded.
         """
-        stated = self._start.get(INPUTS)
+        stated = self.start.get(INPUTS)
         return tuple(sorted(stated.items())) if isinstance(stated, Mapping) else ()
 
     @property
@@ -170,42 +170,52 @@ class TrialCounter:
 
     def add(self, event: Event) -> None:
         """Count one event."""
-        self._note_arrival(event)
-        if event.kind == EventKind.TRIAL_START:
-            self.experiment = _experiment(event)
-            self._start = event.data if isinstance(event.data, Mapping) else {}
-            self._recorded_rule = rule_after(FORMER_RULE, event.data)
-        elif event.kind == EventKind.RESUMED:
-            self.resumed += 1
-            self._count_down_time(event)
-            self._end = None  # it was stopped, and has not ended
-            self._recorded_rule = rule_after(self._recorded_rule, event.data)
-        elif event.kind == EventKind.TRIAL_END:
-            self._end = self._end or event
-        elif event.kind == EventKind.STATE_START:
-            self._state_seen = True
-        elif event.kind == EventKind.FAILURE:
-            if event.failure_kind != FailureKind.INTERRUPTED:
-                self._failures['{}/{}'.format(event.path, event.state)] += 1
-        elif event.kind in (EventKind.HEALTH_WAIT_START, EventKind.HEALTH_WAIT_END):
-            self._count_wait(event)
-        elif event.kind == EventKind.QUERY_OPENED:
-            self._asked.add(event.query_id)
-        elif event.kind == EventKind.QUERY_ANSWERED:
-            self._answered.add(event.query_id)
-        self._count_recovery(event)
-
-    def _note_arrival(self, event: Event) -> None:
+        kind, seq, wall_time = event.kind, event.seq, event.wall_time
         if not self._count:
             self.trial_id, self.experiment = event.trial_id, _experiment(event)
-            self.start_time = self._earliest_s = self._latest_s = event.wall_time
-        if event.kind == EventKind.RESUMED:
-            self._left_out += max(0, event.seq - 1 - max(last_stored(event), self._last_seq))
+            self.start_time = self._earliest_s = self._latest_s = wall_time
+        if kind == EventKind.RESUMED:
+            self._left_out += max(0, seq - 1 - max(last_stored(event), self._last_seq))
         self._before_s = self._latest_s  # that of the events before this one
         self._count += 1
-        self._last_seq = max(self._last_seq, event.seq)
-        self._earliest_s = min(self._earliest_s, event.wall_time)
-        self._latest_s = max(self._latest_s, event.wall_time)
+        if seq > self._last_seq:
+            self._last_seq = seq
+        if wall_time > self._latest_s:
+            self._latest_s = wall_time
+        elif wall_time < self._earliest_s:
+            self._earliest_s = wall_time
+        count = self._COUNTS.get(kind)
+        if count is not None:
+            count(self, event)
+
+    def _count_start(self, event: Event) -> None:
+        self.experiment = _experiment(event)
+        self.start = event.data if isinstance(event.data, Mapping) else {}
+        self._recorded_rule = rule_after(FORMER_RULE, event.data)
+
+    def _count_resumed(self, event: Event) -> None:
+        self.resumed += 1
+        self._count_down_time(event)
+        self._end = None  # it was stopped, and has not ended
+        self._recorded_rule = rule_after(self._recorded_rule, event.data)
+
+    def _count_end(self, event: Event) -> None:
+        self._end = self._end or event
+
+    def _count_state(self, event: Event) -> None:
+        self._state_seen = True
+
+    def _count_failure(self, event: Event) -> None:
+        if event.failure_kind != FailureKind.INTERRUPTED:
+            self._failures['{}/{}'.format(event.path, event.state)] += 1
+        self._decided[event.path] = False
+
+    def _count_question(self, event: Event) -> None:
+        self._asked.add(event.query_id)
+        self._decided[event.path] = False
+
+    def _count_answer(self, event: Event) -> None:
+        self._answered.add(event.query_id)
 
     def _count_down_time(self, event: Event) -> None:
         """Count the time from the last event that is known of, until the trial went on.
@@ -225,21 +235,21 @@ class TrialCounter:
             self.unwell_s += max(0.0, event.wall_time - self._unwell_since_s)
             self._unwell_since_s = None
 
-    def _count_recovery(self, event: Event) -> None:
-        """Count a decision to revisit, step back or start over, once it is carried out.
+    # A decision to revisit, step back or start over is counted once it is carried out. The next
+    # JUMP of the same container carries it out, or one that comes from there. A failure or a
+    # question in between replaces it.
 
-        The next JUMP of the same container carries it out, or one that comes from there. A failure
-        or a question in between replaces it.
-        """
-        if event.kind == EventKind.DECISION:
-            self._oracle_seen = True
-            self._decided[event.path] = event.outcome in AUTONOMOUS_DECISIONS
-        elif event.kind in (EventKind.QUERY_OPENED, EventKind.FAILURE, EventKind.GIVE_UP):
-            self._decided[event.path] = False
-        elif event.kind == EventKind.JUMP:
-            self._recoveries += self._decided.pop(event.path, False)
-            left = event.data.get(JUMPED_FROM, '') if isinstance(event.data, Mapping) else ''
-            self._recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
+    def _count_decision(self, event: Event) -> None:
+        self._oracle_seen = True
+        self._decided[event.path] = event.outcome in AUTONOMOUS_DECISIONS
+
+    def _count_give_up(self, event: Event) -> None:
+        self._decided[event.path] = False
+
+    def _count_jump(self, event: Event) -> None:
+        self._recoveries += self._decided.pop(event.path, False)
+        left = event.data.get(JUMPED_FROM, '') if isinstance(event.data, Mapping) else ''
+        self._recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
 
     def _was_stopped(self, end: Event) -> bool:
         """Whether a shutdown or Ctrl-C ended it.
@@ -247,6 +257,22 @@ class TrialCounter:
         An inconsistent machine has no outcome either, but enters no state.
         """
         return ended_by(end, self._state_seen) in (TrialEnd.STOPPED, TrialEnd.SHUTDOWN)
+
+    # by kind. An event of another kind says no more than that it happened
+    _COUNTS: ClassVar[Mapping[int, Callable[['TrialCounter', Event], None]]] = {
+        EventKind.TRIAL_START: _count_start,
+        EventKind.RESUMED: _count_resumed,
+        EventKind.TRIAL_END: _count_end,
+        EventKind.STATE_START: _count_state,
+        EventKind.FAILURE: _count_failure,
+        EventKind.HEALTH_WAIT_START: _count_wait,
+        EventKind.HEALTH_WAIT_END: _count_wait,
+        EventKind.QUERY_OPENED: _count_question,
+        EventKind.QUERY_ANSWERED: _count_answer,
+        EventKind.DECISION: _count_decision,
+        EventKind.GIVE_UP: _count_give_up,
+        EventKind.JUMP: _count_jump,
+    }
 
 
 def _experiment(event: Event) -> str:

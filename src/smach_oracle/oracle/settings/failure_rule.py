@@ -66,25 +66,12 @@ class FailureRule(NamedTuple):
 
         By a list, each outcome that is not on it is a success.
         """
-        if is_preempted(end):
-            return EndMeaning.PREEMPTED
-        if end in self.failing:
-            return EndMeaning.FAILURE
-        if self.words is not None:
-            return EndMeaning.SUCCESS
-        words = words_of(end)
-        if words[-1:] == ['preempted'] or words[-2:] == ['pre', 'empted']:
-            return EndMeaning.PREEMPTED
-        return EndMeaning.SUCCESS if self._went_well(end, words) else EndMeaning.UNKNOWN
+        return _meaning_by(self.words, end)
 
     def unknown(self, ends: Iterable[object]) -> Tuple[str, ...]:
         """Return those of some ends whose names say neither success nor failure, sorted."""
         names = (end for end in ends if isinstance(end, str))
         return tuple(sorted(end for end in names if self.meaning(end) is EndMeaning.UNKNOWN))
-
-    def _went_well(self, end: str, words: Sequence[str]) -> bool:
-        is_called_so = sounds_like_success(end) or (bool(words) and words[-1] in _WELL)
-        return is_called_so and not any(word in _NOT_SO or word in self.failing for word in words)
 
     def as_data(self) -> Mapping[str, object]:
         """Return it as plain data."""
@@ -126,3 +113,23 @@ def rule_after(before: FailureRule, data: object) -> FailureRule:
 @lru_cache(maxsize=100)
 def _names_by(words: Optional[Tuple[str, ...]]) -> FailingNames:
     return FailingNames(words)
+
+
+@lru_cache(maxsize=1000)
+def _meaning_by(listed: Optional[Tuple[str, ...]], end: str) -> EndMeaning:
+    if is_preempted(end):
+        return EndMeaning.PREEMPTED
+    if end in _names_by(listed):
+        return EndMeaning.FAILURE
+    if listed is not None:
+        return EndMeaning.SUCCESS
+    words = words_of(end)
+    if words[-1:] == ['preempted'] or words[-2:] == ['pre', 'empted']:
+        return EndMeaning.PREEMPTED
+    return EndMeaning.SUCCESS if _went_well(end, words) else EndMeaning.UNKNOWN
+
+
+def _went_well(end: str, words: Sequence[str]) -> bool:
+    is_called_so = sounds_like_success(end) or (bool(words) and words[-1] in _WELL)
+    failing = _names_by(None)
+    return is_called_so and not any(word in _NOT_SO or word in failing for word in words)
