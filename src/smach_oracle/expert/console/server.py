@@ -30,6 +30,7 @@ from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
 from .feeds.node_pulse import NodePulse
 from .graphs.layout_worker import LayoutWorker
+from .options import DESCRIPTION
 from .page_socket import OpenPages, PageSocket
 from .robots.down_machine_hand import DownMachineHand
 from .robots.down_machines import DownMachines
@@ -273,13 +274,7 @@ def _parameter(name: str, default: object) -> object:
 
 def main() -> None:
     """Entry point of the node `expert_console`."""
-    parameters_only(
-        'Node: a web page from which people watch robots and answer their questions. Parameters: '
-        '~address, '
-        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
-        '~cameras, ~idle_s, ~public_address, ~trusted_proxy; '
-        'see doc/console.md.'
-    )
+    parameters_only(DESCRIPTION)
     init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()
