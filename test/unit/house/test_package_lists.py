@@ -30,6 +30,7 @@ OF_DEVELOPERS = {
 }
 PAIRS = [
     ('debian-packages.txt', 'debian-packages-dev.txt'),
+    ('debian-packages.txt', 'debian-packages-doc.txt'),
     ('requirements.txt', 'requirements-dev.txt'),
     ('requirements-noetic.txt', 'requirements-noetic-dev.txt'),
 ]
@@ -70,9 +71,9 @@ def test_each_python_gets_one_version_of_each_package(python):
     assert lacking == ({'pybullet'} if python in ('3.12', '3.13') else set())
 
 
-@pytest.mark.parametrize('script, dev', [('demo', False), ('test', True), ('doc', True)])
-def test_only_what_developers_run_sets_up_their_packages(script, dev):
+@pytest.mark.parametrize('script, more', [('demo', ''), ('test', '--dev'), ('doc', '--doc')])
+def test_a_script_sets_up_no_more_than_it_needs(script, more):
     (line,) = re.findall(
         r'^"\$root/scripts/setup".*$', (ROOT / 'scripts' / script).read_text(), re.MULTILINE
     )
-    assert (' --dev' in line) == dev
+    assert re.findall(r'--(?:dev|doc)', line) == ([more] if more else [])
