@@ -81,7 +81,7 @@ def run_renamed(module: str, new: str, *options: str) -> None:
     run(module, [*options, *sys.argv[1:]], old)
 
 
-def run(module: str, *arguments: object, options: str = '') -> None:
+def run(module: str, *arguments: object) -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
     The process ends with the code that it returns. `--version` alone, or behind a subcommand,
@@ -90,8 +90,6 @@ def run(module: str, *arguments: object, options: str = '') -> None:
     Where a package is missing that the module imports, one line says which, and what installs it.
 
     :param arguments: of its `main`.
-    :param options: a module whose `make_parser` makes the parser of the options. --help needs that
-        one alone.
     """
     asked = _asked(VERSION)
     if asked is not None:
@@ -99,12 +97,8 @@ def run(module: str, *arguments: object, options: str = '') -> None:
         return
     if module.startswith(PRINTING) or sys.argv[1:2] in HELP:
         sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
-    only_help = options and _asked(*HELP) is not None
     try:
-        if only_help:
-            main = import_module('smach_oracle.' + options).make_parser().parse_args
-        else:
-            main = import_module('smach_oracle.' + module).main
+        main = import_module('smach_oracle.' + module).main
     except ImportError as err:
         from smach_oracle.packages import lacking
 
@@ -115,7 +109,7 @@ def run(module: str, *arguments: object, options: str = '') -> None:
         sys.exit(LACKING)
     try:
         with _more_below_the_help():
-            code = main(*([['--help']] if only_help else arguments))
+            code = main(*arguments)
     finally:
         if isinstance(sys.stdout, _Printed):
             sys.stdout.flush()

@@ -31,6 +31,16 @@ from smach_oracle.expert.console.answering.precondition_sections import status_v
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view
+from smach_oracle.expert.console.reach.on_call import (
+    CallStep,
+    OnCallList,
+    OnCallPerson,
+    Receiver,
+)
+from smach_oracle.expert.console.reach.outbox import CallResult
+from smach_oracle.expert.console.reach.quiet_hours import QuietHours
+from smach_oracle.expert.console.reach.reach import Reach
+from smach_oracle.expert.console.reach.secret_file import Secret
 from smach_oracle.expert.console.robots.down_machines import DownMachines
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.sensors import sample_handlers
@@ -40,7 +50,6 @@ from smach_oracle.expert.console.sensors.robot_cameras import RobotCameras
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStream, SensorStreams
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
-from smach_oracle.expert.console.trials.ways import Level
 from smach_oracle.expert.console.web.audit import Person
 from smach_oracle.expert.followed_server import ListedQuestion, ListNews
 from smach_oracle.expert.interface_outputs import InterfaceOutputs
@@ -101,18 +110,12 @@ def questions():
     ]
     return [
         dict(
-            question_view(
-                each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule(), levels(visits)
-            ),
+            question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule()),
             session='a1',
             idle=0,
         )
         for each in asked
     ]
-
-
-def levels(visits):
-    return [Level('TASK', 'FETCH', visits, missing) for missing in ('', 'unheard', 'older')]
 
 
 class NoLayouter:
@@ -132,6 +135,7 @@ class FrontEnd:
 def put_questions(sections):
     sections.put('questions', questions())
     put_people(sections)
+    put_reach(sections)
     sections.put('servers', [{'name': '/robot/expert_query', 'connected': True}])
     checks = [
         PreconditionCheck(state='PICK', age=age, result=result)
@@ -143,6 +147,31 @@ def put_questions(sections):
         'images',
         {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4)) for late_s in (None, 1.5)]},
     )
+
+
+def put_reach(sections):
+    """A person was called about a question, and another one was not reached."""
+    people = {
+        name: OnCallPerson((Receiver(name, 'slack', Secret('x')),), QuietHours('quiet', ()))
+        for name in ('ann', 'bob')
+    }
+    on_call = OnCallList(people, (CallStep(0.0, ('ann',)), CallStep(1e9, ('bob',))), pictures=False)
+    sent = SimpleNamespace(add=lambda question: None)
+    open_now = [listed()]
+    reach = Reach(
+        on_call,
+        'https://robots.example.org',
+        sections,
+        lambda: open_now,
+        lambda each: True,
+        lambda key: None,
+        lambda *arguments: sent,
+    )
+    for status in ('sent', 'failed'):
+        reach._note(CallResult(KEY, people['ann'].receivers[0], status, 'no', 1.0))
+    reach.look()
+    shown = sections.get('reach')
+    assert shown['calls'] and shown['next'] and shown['failed']
 
 
 def put_people(sections):

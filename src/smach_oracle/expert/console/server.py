@@ -26,12 +26,14 @@ from .answering.precondition_sections import PreconditionStatuses
 from .answering.question_commands import QuestionCommands
 from .answering.question_sections import QuestionSections
 from .answering.sensor_discovery import SensorDiscovery
+from .answering.session_claims import SessionClaims
 from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
 from .feeds.node_pulse import NodePulse
 from .graphs.layout_worker import LayoutWorker
-from .options import DESCRIPTION
 from .page_socket import OpenPages, PageSocket
+from .reach.on_call import read_on_call
+from .reach.reach import Reach
 from .robots.down_machine_hand import DownMachineHand
 from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
@@ -57,6 +59,7 @@ PUSH_PERIOD_MS = 100
 ROBOTS_PERIOD_S = 1.5
 SECTIONS_PERIOD_S = 0.1
 OVERVIEW_PERIOD_S = 0.5
+REACH_PERIOD_S = 0.5
 PING_S = 5.0
 PONG_LIMIT_S = 15.0
 
@@ -180,7 +183,20 @@ class Console:
         server.connections = access.connections
         server.proxies = settings.proxies
         server.add_sockets(sockets)
+        self._reach = self._begin_reach(settings, questions.sessions)
         self._overview_s = -OVERVIEW_PERIOD_S
+
+    def _begin_reach(self, settings: ConsoleSettings, claims: SessionClaims) -> Optional[Reach]:
+        if not settings.on_call or settings.public is None:
+            return None
+        return Reach(
+            read_on_call(settings.on_call),
+            settings.public.origin,
+            self._sections,
+            self._front_end.questions,
+            claims.waits,
+            self._question_images.picture_of,
+        )
 
     def run(self) -> None:
         """Serve until the node goes down."""
@@ -189,6 +205,8 @@ class Console:
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
         repeat(self._down.look, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
+        if self._reach is not None:
+            repeat(self._reach.look, REACH_PERIOD_S)
         threading.Thread(target=self._catalogue.run, name='bags', daemon=True).start()
         loop = tornado.ioloop.IOLoop.current()
         rospy.on_shutdown(lambda: loop.add_callback(loop.stop))
@@ -274,7 +292,14 @@ def _parameter(name: str, default: object) -> object:
 
 def main() -> None:
     """Entry point of the node `expert_console`."""
-    parameters_only(DESCRIPTION)
+    parameters_only(
+        'Node: a web page from which people watch robots and answer their questions. Parameters: '
+        '~address, '
+        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
+        '~cameras, ~idle_s, ~public_address, ~trusted_proxy, '
+        '~on_call; '
+        'see doc/console.md.'
+    )
     init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()

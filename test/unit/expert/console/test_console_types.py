@@ -36,6 +36,7 @@ SECTIONS = {
     'sensors',
     'manipulation',
     'interface_output',
+    'reach',
     'live',
     'graph',
 }

@@ -1,12 +1,11 @@
 """An open question as plain data for the page. Pure."""
 
 import math
-from typing import Any, Callable, Dict, Iterable, List, Sequence, Union
+from typing import Any, Callable, Dict, List
 
-from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem, VisitedState
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem
 from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.records.short_text import shortened
-from smach_oracle.oracle.records.visits import Visit
 from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
@@ -14,7 +13,6 @@ from ...followed_server import ListedQuestion
 from ...wording import failure_words, standing_words, still_runs
 from ..feeds.views import number
 from ..trials.recovery_statistics import RecoveryCounts
-from ..trials.ways import Level
 
 LONGEST_TEXT = 8000
 LONGEST_VALUE = 4000
@@ -32,14 +30,12 @@ def question_view(
     epoch_s: float,
     recovery_counts: Callable[[str], RecoveryCounts],
     rule: FailureRule,
-    above: Sequence[Level] = (),
 ) -> Dict[str, Any]:
     """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
     :param recovery_counts: how often going to a state has helped.
     :param rule: tells which outcomes are failures.
-    :param above: the containers around that of the failed state, the outermost first.
     """
     goal = listed.goal
     return {
@@ -69,15 +65,13 @@ def question_view(
         if listed.deadline_s == math.inf
         else round(epoch_s + listed.deadline_s, 1),
         'fallback': goal.fallback,
-        'history': _visits(goal.history),
-        'above': [
+        'history': [
             {
-                'path': level.path,
-                'state': level.state,
-                'visits': _visits(level.visits),
-                'missing': level.missing,
+                'state': visit.state,
+                'outcome': visit.outcome,
+                'result': _VISITS.get(visit.result, ''),
             }
-            for level in above
+            for visit in goal.history
         ],
         'choices': _choices(goal, recovery_counts),
         'supersede': _supersede(goal, rule),
@@ -91,13 +85,6 @@ def question_view(
         ],
         'userdata': [_item(item) for item in goal.userdata],
     }
-
-
-def _visits(visits: Iterable[Union[VisitedState, Visit]]) -> List[Dict[str, str]]:
-    return [
-        {'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')}
-        for visit in visits
-    ]
 
 
 def _choices(

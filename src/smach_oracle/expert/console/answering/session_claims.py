@@ -9,6 +9,8 @@ import time
 from collections import OrderedDict
 from typing import NamedTuple, Optional
 
+from smach_oracle.msg import OpenQuery
+
 from ...followed_server import ListedQuestion
 from ..commands.commands import PageCommand
 from ..web.audit import Person
@@ -64,6 +66,12 @@ class SessionClaims:
         if not self._idle_s or held is None or held.expert != listed.holder:
             return 0
         return int((time.monotonic() - held.pressed_s) / self._idle_s)
+
+    def waits(self, listed: ListedQuestion) -> bool:
+        """Whether a question waits: nobody works on it, or its holder presses nothing."""
+        return listed.status == OpenQuery.PENDING or (
+            listed.status == OpenQuery.CLAIMED and self.idle_periods(listed) > 0
+        )
 
     def refusal(self, command: PageCommand, person: Person, listed: ListedQuestion) -> str:
         """Return why a claim or an answer is not the person's, or '' where it may be."""

@@ -103,6 +103,7 @@ class QuestionImages:
         self._sent: 'OrderedDict[str, List[QuestionImage]]' = OrderedDict()  # by robot and query id
         # by question: topic -> our image
         self._seen: 'OrderedDict[str, Dict[str, QuestionImage]]' = OrderedDict()
+        self._first: Dict[str, int] = {}  # by question, the number of its first image
         self._failed: Dict[str, float] = {}  # cameras that could not be shown, and when
 
     def write_sections(self, sections: PageSections, questions: Sequence[ListedQuestion]) -> None:
@@ -117,7 +118,13 @@ class QuestionImages:
             if shown:
                 asked_s = listed.goal.asked.to_sec()
                 found[listed.key] = [image_view(image, asked_s) for image in shown]
+        self._first = {key: images[0]['id'] for key, images in found.items()}
         sections.put(SECTION, found)
+
+    def picture_of(self, key: str) -> Optional[BrowserFile]:
+        """Return the first image of an open question, None where there is none yet."""
+        number = self._first.get(key)
+        return None if number is None else self._files.find(number)
 
     def _taken(self, listed: ListedQuestion, now_s: float) -> List[QuestionImage]:
         seen = self._seen.get(listed.key)

@@ -8,9 +8,9 @@ import { NoReply, unlessLost } from '../page/connection.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
 import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
+import { Calls } from './calls.js';
 import { ClaimBar } from './claim_bar.js';
 import { Onlookers } from './onlookers.js';
 import { SilenceBar } from './silence_bar.js';
@@ -45,7 +45,8 @@ export class QuestionDetail {
     this.claimed = Promise.resolve(); // the latest claim has its reply
     this.held = false; // this page has claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
-    this.sending = this.ended = false; // the latter once it is shown no longer
+    this.sending = false;
+    this.ended = false; // it is shown no longer
     this.problem = this.takenWords = ''; // the latter when somebody has taken it over
     /** @type {FollowUp | null} */
     this.followUp = null;
@@ -57,12 +58,12 @@ export class QuestionDetail {
     this.machine = new MachineView(machinesNow(app.store), () => {});
     this.hand = new MachineHand(app);
     this.camera = new SituationCamera(app, question);
-    this.way = h('div', {}, visitsCard(question));
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
     this.silence = new SilenceBar(app.liveness, question);
     this.onlookers = new Onlookers(app, question);
+    this.calls = new Calls(app, question.key);
     /** @type {string | null} */
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
@@ -81,12 +82,12 @@ export class QuestionDetail {
     this.machine.show(question.robot, question.path);
     this.hand.show(question.robot, question.path);
     return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
-      this.silence.root, this.claimBar.root, this.onlookers.root, this.perceptionPlace,
-      this.interfacePlace,
+      this.silence.root, this.claimBar.root, this.onlookers.root, this.calls.root,
+      this.perceptionPlace, this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
           h('section', { class: 'card mini-machine' }, this.hand.root, this.machine.root),
-          this.way, userdataCard(question)),
+          visitsCard(question), userdataCard(question)),
         this.answers));
   }
 
@@ -224,6 +225,7 @@ export class QuestionDetail {
 
   tick() {
     this.showClaim();
+    this.calls.show();
     this.hand.update();
   }
 
@@ -313,12 +315,10 @@ export class QuestionDetail {
     if (changed('questions', 'manipulation', 'interface_output', 'sensors')) this.showInterface();
     if (changed('preconditions')) this.showTime();
     if (changed('onlookers')) this.onlookers.show();
+    if (changed('reach')) this.calls.show();
     if (changed('images', 'cameras')) this.camera.update();
     if (changed('sensors')) this.showPerception();
-    if (changed('questions')) {
-      if (this.now) redraw(this.way, visitsCard(this.now)); // events may come after the question
-      this.showClaim();
-    }
+    if (changed('questions')) this.showClaim();
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
     if (machines || changed('questions')) {
       this.machine.update();

@@ -9,6 +9,7 @@ import { breakable, chip, counted, duration, percent, rateBar } from '../page/fo
 import { redraw } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
+import { Unreached } from './calls.js';
 import { readersOf } from './onlookers.js';
 import { tellPresses } from './presence.js';
 import { QuestionDetail, URGENT_S } from './question_detail.js';
@@ -41,10 +42,11 @@ class QuestionPanel {
     this.missing = ''; // the question of an address, where it is not open
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
+    this.unreached = new Unreached(app);
     this.servers = h('p', { class: 'dim servers' });
     this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.servers, this.ages,
+      h('aside', { class: 'queue-side' }, this.queue, this.unreached.root, this.servers, this.ages,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
@@ -110,6 +112,7 @@ class QuestionPanel {
     if (comes && !this.detail && this.app.current === 'questions') this.wanted = this.missing;
     if (names.includes('questions')) this.arrive();
     if (names.includes('servers')) this.showServers();
+    if (names.includes('reach')) this.unreached.show();
     if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
     if (this.detail) this.detail.update(names);
     else if (names.includes('questions')) this.showStage();
