@@ -36,6 +36,9 @@ BELOW = {
 }
 EXPERIMENT = 'Robots and experiment'  # a section whose first page has the others below it
 INSIDE = 'inside/index'
+# headings: of the README, up to which the site shows it first, and of the index, from which on that
+# page has the rest
+FIRST_STEPS, WAYS_IN = '## Set it up', '## Ways in'
 API = [
     (
         'The machine',
@@ -154,6 +157,13 @@ def tables_below(index: str, inside: str) -> Dict[str, str]:
     return {page: '\n'.join(_toctree(pages)) for page, pages in below.items()}
 
 
+def halves_of(readme: str) -> Tuple[str, str]:
+    """The first steps, as a page of the site, and the top, with which the site begins."""
+    begin = readme.index(FIRST_STEPS)
+    steps = readme[begin:].replace('](#results)', '](index.md#results)')
+    return '# First steps\n\n' + steps, readme[:begin]
+
+
 def write_sources(folder: Path, quick: bool) -> None:
     """Put all pages into one folder, with links that hold there."""
     shutil.rmtree(str(folder), ignore_errors=True)
@@ -161,18 +171,28 @@ def write_sources(folder: Path, quick: bool) -> None:
     (folder / 'inside').mkdir()
     for table in DOC.glob('*.csv'):
         shutil.copy(str(table), str(folder))
-    for name in ('README.md', 'CONTRIBUTING.md'):
-        text = (ROOT / name).read_text(encoding='utf-8').replace('](LICENSE)', '](../LICENSE)')
-        text = re.sub(r'((?:\]\(|src="))doc/', r'\1', text)
-        (folder / name.lower()).write_text(
-            text.replace('](CONTRIBUTING.md)', '](contributing.md)'), 'utf-8'
+    front = {
+        name: re.sub(
+            r'((?:\]\(|src="))doc/',
+            r'\1',
+            (ROOT / name)
+            .read_text(encoding='utf-8')
+            .replace('](LICENSE)', '](../LICENSE)')
+            .replace('](CONTRIBUTING.md)', '](contributing.md)'),
         )
+        for name in ('README.md', 'CONTRIBUTING.md')
+    }
+    front['README.md'], landing = halves_of(front['README.md'])
+    for name, text in front.items():
+        (folder / name.lower()).write_text(text, 'utf-8')
     for page in (*DOC.glob('*.md'), *DOC.glob('inside/*.md')):
         text = re.sub(r'\]\((?:\.\./)+README\.md', '](/readme.md', page.read_text('utf-8'))
         text = re.sub(r'\]\((?:\.\./)+CONTRIBUTING\.md', '](/contributing.md', text)
         text = text.replace('```frozen\n', '```text\n')  # Pygments does not know the first
         (folder / page.relative_to(DOC)).write_text(text, 'utf-8')
+    index = (folder / 'index.md').read_text('utf-8')
     generated = [
+        ('index.md', landing + index[index.index(WAYS_IN) :]),
         *interface_pages(ROOT),
         ('api.md', '# Python API\n' if quick else api_page()),
     ]
@@ -233,7 +253,14 @@ def main() -> int:
         help='only check the pages and the links between them: without the '
         'commands and the API, into build/doc/check',
     )
-    quick = parser.parse_args().check
+    parser.add_argument(
+        '--for-files',
+        action='store_true',
+        help='the search shows titles alone. Without this it also shows the sentences that it '
+        'finds, but only where a web server hands out the site',
+    )
+    args = parser.parse_args()
+    quick = args.check
     source = ROOT / 'build' / 'doc' / ('check_source' if quick else 'source')
     target = ROOT / 'build' / 'doc' / ('check' if quick else 'html')
     write_sources(source, quick)
@@ -247,6 +274,7 @@ def main() -> int:
             '-q',
             '-W',
             '--keep-going',
+            *(['-D', 'html_show_search_summary=0'] if args.for_files else []),
             '-d',
             str(target.with_name(target.name + '_state')),
             '-c',
@@ -259,6 +287,8 @@ def main() -> int:
     if not status and not quick:
         theme.complete(target / '_static')
         print('The site: {}'.format(target / 'index.html'))
+        if not args.for_files:
+            print('To search in sentences: python3 -m http.server -d {}'.format(target))
     return status
 
 

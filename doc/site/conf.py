@@ -10,8 +10,9 @@ html_show_sphinx = False
 html_copy_source = False
 html_static_path = ['static']
 html_css_files = ['site.css']
-# summaries are fetched, which a browser refuses where the site is opened as a file
-html_show_search_summary = False
+# a found page is fetched, to show the sentence. A browser refuses that where the site is opened as
+# a file: build.py --for-files
+html_show_search_summary = True
 # headings down to #### are targets of links, under the same names as on GitHub
 myst_heading_anchors = 4
 myst_enable_extensions = ['html_image']

@@ -81,7 +81,7 @@ def run_renamed(module: str, new: str, *options: str) -> None:
     run(module, [*options, *sys.argv[1:]], old)
 
 
-def run(module: str, *arguments: object) -> None:
+def run(module: str, *arguments: object, options: str = '') -> None:
     """Run `main` of a module, named relative to smach_oracle.
 
     The process ends with the code that it returns. `--version` alone, or behind a subcommand,
@@ -90,6 +90,8 @@ def run(module: str, *arguments: object) -> None:
     Where a package is missing that the module imports, one line says which, and what installs it.
 
     :param arguments: of its `main`.
+    :param options: a module whose `make_parser` makes the parser of the options. --help needs that
+        one alone.
     """
     asked = _asked(VERSION)
     if asked is not None:
@@ -97,8 +99,12 @@ def run(module: str, *arguments: object) -> None:
         return
     if module.startswith(PRINTING) or sys.argv[1:2] in HELP:
         sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
+    only_help = options and _asked(*HELP) is not None
     try:
-        main = import_module('smach_oracle.' + module).main
+        if only_help:
+            main = import_module('smach_oracle.' + options).make_parser().parse_args
+        else:
+            main = import_module('smach_oracle.' + module).main
     except ImportError as err:
         from smach_oracle.packages import lacking
 
@@ -109,7 +115,7 @@ def run(module: str, *arguments: object) -> None:
         sys.exit(LACKING)
     try:
         with _more_below_the_help():
-            code = main(*arguments)
+            code = main(*([['--help']] if only_help else arguments))
     finally:
         if isinstance(sys.stdout, _Printed):
             sys.stdout.flush()

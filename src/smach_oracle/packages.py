@@ -57,7 +57,13 @@ def lacking(err: ImportError) -> str:
         )
     return (
         'the Python package {} cannot be imported ({}); install it: {} (in a checkout: '
-        'scripts/setup)'.format(package, err, _how_to_install(_PACKAGES.get(package, package)))
+        'scripts/setup{})'.format(
+            package,
+            err,
+            _how_to_install(_PACKAGES.get(package, package)),
+            # where it has no wheel, scripts/setup alone does without it
+            ' --simulation' if package == 'pybullet' else '',
+        )
     )
 
 

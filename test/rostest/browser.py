@@ -187,6 +187,13 @@ class Browser:
         except StaleElementReferenceException:
             return ''
 
+    def texts(self, selector):
+        """The text of each such element."""
+        return self.run(
+            'return [...document.querySelectorAll(arguments[0])].map((each) => each.innerText)',
+            selector,
+        )
+
     def run(self, script, *arguments):
         """Run JavaScript in the page."""
         return self.driver.execute_script(script, *arguments)

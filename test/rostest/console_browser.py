@@ -129,6 +129,15 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         browser.press('n')
         browser.find('input.why').send_keys('typed before')
         self.assertTrue(browser.says(YOURS), 'the reason is part of an answer')
+        levels = [each.split() for each in browser.texts('.way .level')]
+        self.assertEqual(
+            levels,
+            [
+                'KITCHEN MOVE_ARMS_ASIDE ✓ FETCH ▾ in it'.split(),
+                'KITCHEN/FETCH DETECT ✓ PICK ✗'.split(),
+            ],
+            'the whole way',
+        )
         type(self).console.stop()
         self.assertTrue(browser.says('connection lost', '#status'))
         type(self).console = self.start_console()
@@ -147,6 +156,9 @@ class ConsoleInABrowser(ConsolePage, unittest.TestCase):
         self.assertIn('events were not heard', browser.text('.trial-detail p'))
         browser.click('#tab-questions')
         self.assertTrue(browser.says(YOURS), 'the question is still there')
+        self.assertTrue(
+            browser.says('this console has not heard all', '.way .level'), 'no wrong way is shown'
+        )
 
     def test_3_a_second_console_takes_over_and_answers(self):
         browser = self.browser

@@ -40,8 +40,8 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
   const question = { key: "s q", server: "s", id: "q", trial: "t", robot: "/r", path: "TASK",
     state: "PICK", what: "failed", outcome: "", text: "", class: 0, rate: null, continuous: false,
     recoveries: 0, reason: "", tried: [], status: "claimed", holder: "bob", idle: 0, interface: "",
-    asked: 0, deadline: null, fallback: "", history: [], choices: [], supersede: [], outputs: [],
-    give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
+    asked: 0, deadline: null, fallback: "", history: [], above: [], choices: [], supersede: [],
+    outputs: [], give_up: [], give_up_above: [], interfaces: [], userdata: [], running: false };
   const replies = [];
   const told = [];
   const request = async (name) => {

@@ -91,11 +91,18 @@ def test_every_command_named_in_the_text_is_there():
     ), commands
 
 
-def test_the_example_runs(tmp_path):
-    (example,) = blocks('python')
+def test_the_examples_run(tmp_path):
+    six_lines, example = blocks('python')
     script = tmp_path / 'example.py'
     script.write_text(example)
     run_python(script)
+    assert len([line for line in six_lines.splitlines() if line]) <= 6
+    unwrapped = example[: example.index('OracleContainer.wrap(')].replace(
+        'from smach_oracle import OracleContainer\n', ''
+    )
+    (tmp_path / 'my_robot.py').write_text(unwrapped + 'make_machine = lambda: sm\n')
+    script.write_text(six_lines)
+    assert run_python(script).splitlines()[-1] == 'succeeded'
 
 
 def test_every_type_in_the_table_of_the_ros_interface_is_there():

@@ -1,6 +1,7 @@
 """The site: its table of contents, and the reference that is made from comments."""
 
 import re
+import subprocess
 import sys
 
 from house import ROOT
@@ -115,3 +116,24 @@ def test_a_link_into_the_repository_leads_to_a_copy(tmp_path):
     # roslaunch looks in all folders of a package, and refuses a launch file of which it finds two
     assert (tmp_path / 'source' / 'files' / 'launch' / 'inspection.launch.txt').is_file()
     assert not list(tmp_path.rglob('*.launch'))
+
+
+def test_the_site_begins_with_the_top_of_the_readme(tmp_path):
+    build.write_sources(tmp_path, quick=True)
+    first = (tmp_path / 'index.md').read_text(encoding='utf-8')
+    parts = ['images/recovery.gif', '## In six lines', '## Results', '## Why trust it']
+    places = [first.index(part) for part in [*parts, '## Ways in', '### How-to']]
+    assert places == sorted(places) and build.FIRST_STEPS not in first
+    steps = (tmp_path / 'readme.md').read_text(encoding='utf-8')
+    assert build.FIRST_STEPS in steps and '## In six lines' not in steps
+
+
+def test_its_help_sets_nothing_up():
+    shown = subprocess.run(
+        [str(ROOT / 'scripts/doc'), '--help'],
+        env={'PATH': '/usr/bin:/bin', 'PYTHONDONTWRITEBYTECODE': '1'},
+        stdout=subprocess.PIPE,
+        timeout=60,
+        check=True,
+    ).stdout.decode()
+    assert shown.startswith('usage: scripts/doc ') and '--for-files' in shown

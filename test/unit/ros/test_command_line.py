@@ -2,8 +2,8 @@
 
 import pytest
 
-from smach_oracle.ros.oracle_run import script_runner
-from smach_oracle.ros.oracle_run.script_runner import OPTIONS_WITH_VALUE, make_parser, parse, split
+from smach_oracle.ros.oracle_run import options, script_runner
+from smach_oracle.ros.oracle_run.options import OPTIONS_WITH_VALUE, make_parser, parse, split
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def test_options_become_settings_and_options_of_the_process(script, tmp_path):
         'rates_file': str(tmp_path / 'rates.json'),
         'nested': False,
     }
-    assert run.options == (str(tmp_path / 'bags'), ('/tf', '/camera'))
+    assert (run.record, run.record_topics) == (str(tmp_path / 'bags'), ('/tf', '/camera'))
     assert (run.recover, run.config, run.script_args) == (False, 'o.yaml', ['--n', '3'])
 
 
@@ -138,7 +138,7 @@ def test_a_script_that_cannot_be_read_is_told_before_it_starts(script, monkeypat
     def refuse(name, *args):
         raise PermissionError(13, 'Permission denied', name)
 
-    monkeypatch.setattr(script_runner, 'open', refuse, raising=False)
+    monkeypatch.setattr(options, 'open', refuse, raising=False)
     with pytest.raises(SystemExit) as caught:
         script_runner.main([script])
     assert caught.value.code == 2
@@ -174,7 +174,7 @@ def test_every_path_may_begin_with_the_home_folder(script, tmp_path, monkeypatch
     (tmp_path / 'o.yaml').write_text('rates_file: ~/rates.json\n')
     run = parse(['--config', '~/o.yaml', '--record', '~/bags', '~/task.py', '~/as it is'])
     assert (run.script, run.script_args) == (str(tmp_path / 'task.py'), ['~/as it is'])
-    assert run.options.record == str(tmp_path / 'bags')
+    assert run.record == str(tmp_path / 'bags')
     settings = script_runner.read_settings(script_runner.load(run))
     assert settings.rates_file == str(tmp_path / 'rates.json')
     assert parse(['--rates-file', '~/r.json', script]).overrides['rates_file'] == str(

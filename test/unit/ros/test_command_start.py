@@ -138,6 +138,13 @@ def test_the_help_of_a_subcommand_loads_no_package_for_bags_or_figures(subcomman
     assert not loaded & {'rosbags', 'matplotlib', 'numpy'}
 
 
+@pytest.mark.parametrize('command', ['oracle_run', 'expert_console'])
+def test_the_help_loads_neither_ros_nor_smach(command):
+    loaded = loaded_for(command, '--help')
+    assert 'smach_oracle.commands' in loaded
+    assert not loaded & {'rospy', 'smach', 'numpy', 'tornado', 'smach_oracle.msg'}
+
+
 @pytest.mark.parametrize(
     'old, new, options',
     [

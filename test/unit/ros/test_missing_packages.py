@@ -67,6 +67,7 @@ def test_the_missing_package_is_told_in_one_line(tmp_path, command, package):
     ]
     assert line.startswith('{}: the Python package {} cannot be imported'.format(command, package))
     assert ' -m pip install {} '.format(installed_as) in line and 'scripts/setup' in line
+    assert ('scripts/setup --simulation' in line) == (package == 'pybullet')
     assert told.returncode == 2
 
 

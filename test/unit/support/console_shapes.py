@@ -50,6 +50,7 @@ from smach_oracle.expert.console.sensors.robot_cameras import RobotCameras
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStream, SensorStreams
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
+from smach_oracle.expert.console.trials.ways import Level
 from smach_oracle.expert.console.web.audit import Person
 from smach_oracle.expert.followed_server import ListedQuestion, ListNews
 from smach_oracle.expert.interface_outputs import InterfaceOutputs
@@ -110,12 +111,18 @@ def questions():
     ]
     return [
         dict(
-            question_view(each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule()),
+            question_view(
+                each, 1000.0, lambda target: RecoveryCounts(1, 2), FailureRule(), levels(visits)
+            ),
             session='a1',
             idle=0,
         )
         for each in asked
     ]
+
+
+def levels(visits):
+    return [Level('TASK', 'FETCH', visits, missing) for missing in ('', 'unheard', 'older')]
 
 
 class NoLayouter:

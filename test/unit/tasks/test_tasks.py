@@ -7,7 +7,7 @@ import rospy
 from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
 
-from smach_oracle.ros.oracle_run.script_runner import parse
+from smach_oracle.ros.oracle_run.options import parse
 from smach_oracle.tasks import drink_retrieval, inspection, pick_and_place
 
 

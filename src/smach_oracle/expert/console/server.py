@@ -31,6 +31,7 @@ from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
 from .feeds.node_pulse import NodePulse
 from .graphs.layout_worker import LayoutWorker
+from .options import DESCRIPTION
 from .page_socket import OpenPages, PageSocket
 from .reach.on_call import read_on_call
 from .reach.reach import Reach
@@ -292,6 +293,9 @@ def _parameter(name: str, default: object) -> object:
 
 def main() -> None:
     """Entry point of the node `expert_console`."""
+<<<<<<< HEAD
+    parameters_only(DESCRIPTION)
+=======
     parameters_only(
         'Node: a web page from which people watch robots and answer their questions. Parameters: '
         '~address, '
@@ -300,6 +304,7 @@ def main() -> None:
         '~on_call; '
         'see doc/console.md.'
     )
+>>>>>>> aed5288d (console: call people by webhook and e-mail (as built))
     init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()

@@ -19,12 +19,12 @@ from .check_signals import SignalWatch
 from .checked_names import CheckedNames
 from .machine_check import MachineCheck, intercept
 from .machine_faults import MachineFaultError, refused_while_built
+from .options import parse
 from .refusal import USAGE_ERROR, Refusal
 from .script_runner import (
     MachineWrapper,
     give_names,
     load,
-    parse,
     read_settings,
     run_script,
     tell,

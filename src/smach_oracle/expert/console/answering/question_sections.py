@@ -59,6 +59,7 @@ class QuestionSections:
             self._epoch_s,
             lambda target: self._log.recovery_counts(place, target),
             self._log.rule(listed.goal.trial_id),
+            self._log.way_above(listed.goal.trial_id, listed.goal.container_path),
         )
         for name, before in self._times.get(listed.key, {}).items():
             now = view[name]

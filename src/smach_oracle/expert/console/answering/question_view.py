@@ -1,11 +1,12 @@
 """An open question as plain data for the page. Pure."""
 
 import math
-from typing import Any, Callable, Dict, List
+from typing import Any, Callable, Dict, Iterable, List, Sequence, Union
 
-from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem, VisitedState
 from smach_oracle.oracle.records.events import FailureKind
 from smach_oracle.oracle.records.short_text import shortened
+from smach_oracle.oracle.records.visits import Visit
 from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 
@@ -13,6 +14,7 @@ from ...followed_server import ListedQuestion
 from ...wording import failure_words, standing_words, still_runs
 from ..feeds.views import number
 from ..trials.recovery_statistics import RecoveryCounts
+from ..trials.ways import Level
 
 LONGEST_TEXT = 8000
 LONGEST_VALUE = 4000
@@ -30,12 +32,14 @@ def question_view(
     epoch_s: float,
     recovery_counts: Callable[[str], RecoveryCounts],
     rule: FailureRule,
+    above: Sequence[Level] = (),
 ) -> Dict[str, Any]:
     """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
     :param recovery_counts: how often going to a state has helped.
     :param rule: tells which outcomes are failures.
+    :param above: the containers around that of the failed state, the outermost first.
     """
     goal = listed.goal
     return {
@@ -65,13 +69,15 @@ def question_view(
         if listed.deadline_s == math.inf
         else round(epoch_s + listed.deadline_s, 1),
         'fallback': goal.fallback,
-        'history': [
+        'history': _visits(goal.history),
+        'above': [
             {
-                'state': visit.state,
-                'outcome': visit.outcome,
-                'result': _VISITS.get(visit.result, ''),
+                'path': level.path,
+                'state': level.state,
+                'visits': _visits(level.visits),
+                'missing': level.missing,
             }
-            for visit in goal.history
+            for level in above
         ],
         'choices': _choices(goal, recovery_counts),
         'supersede': _supersede(goal, rule),
@@ -85,6 +91,13 @@ def question_view(
         ],
         'userdata': [_item(item) for item in goal.userdata],
     }
+
+
+def _visits(visits: Iterable[Union[VisitedState, Visit]]) -> List[Dict[str, str]]:
+    return [
+        {'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')}
+        for visit in visits
+    ]
 
 
 def _choices(

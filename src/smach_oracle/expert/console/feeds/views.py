@@ -9,7 +9,13 @@ from typing import Any, Dict, Optional
 
 from smach_oracle.msg import OracleEvent, OracleRates
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import NOT_COUNTED, is_counted, told_in_words
+from smach_oracle.oracle.records.facts import (
+    BRANCHES,
+    LAST_SEQ,
+    NOT_COUNTED,
+    is_counted,
+    told_in_words,
+)
 from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.failure_rule import RULE, rule_in
 
@@ -27,7 +33,9 @@ def event_of(message: OracleEvent) -> Event:
     if kind == EventKind.TRIAL_START:
         data = {'recovers': '"recovers": false' not in message.data, **_rule_in(message.data)}
     elif kind == EventKind.RESUMED:
-        data = _rule_in(message.data)
+        data = {**_told(message.data, LAST_SEQ), **_rule_in(message.data)}
+    elif kind == EventKind.CONTAINER_START:
+        data = _told(message.data, BRANCHES)
     elif kind == EventKind.TRANSITION and NOT_COUNTED in message.data:
         data = {NOT_COUNTED: True}
     elif kind in (EventKind.JUMP, EventKind.DECISION):
@@ -59,6 +67,12 @@ def parsed(data: str) -> Any:
         return json.loads(data)
     except (ValueError, RecursionError):
         return None
+
+
+def _told(data: str, name: str) -> Dict[str, Any]:
+    """One of the facts in the data of an event, where it is there."""
+    found = parsed(data) if name in data else None
+    return {name: found[name]} if isinstance(found, dict) and name in found else {}
 
 
 def _rule_in(data: str) -> Dict[str, Any]:

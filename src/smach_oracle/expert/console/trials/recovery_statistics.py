@@ -18,7 +18,7 @@ class RecoveryCounts(NamedTuple):
     tried: int
 
 
-def _takes_out(event: Event) -> bool:
+def takes_out(event: Event) -> bool:
     """Whether it may be an answer that ends a state which still runs: it does not say wait on."""
     return event.kind == EventKind.QUERY_ANSWERED and (event.outcome, event.target) != (
         'goto',
@@ -44,7 +44,7 @@ class RecoveryStatistics:
         trying = self._trying.setdefault((event.trial_id, event.path), {})
         if event.kind == EventKind.FAILURE:
             self._count(robot, event.path, event.state, trying.pop(event.state, None), False)
-        elif _takes_out(event) and event.state in trying:
+        elif takes_out(event) and event.state in trying:
             self._count(robot, event.path, event.state, trying.pop(event.state), False)
         elif event.kind == EventKind.SUPERSEDE:
             trying[event.state] = ''  # the jump that follows is where its outcome leads, and no try

@@ -17,6 +17,7 @@ from ..feeds.views import event_view
 from .counts_table import counts_table, has_oracle
 from .packed_texts import PackedTexts
 from .recovery_statistics import RecoveryCounts, RecoveryStatistics
+from .ways import Level, TrialWays
 
 MOST_TRIALS = 1000
 # of so many trials the events are kept, of the others the counts. Those that run come first
@@ -63,6 +64,7 @@ class TrialLog:
         self._lock = threading.Lock()
         self._trials: 'OrderedDict[str, _LoggedTrial]' = OrderedDict()
         self._recoveries = RecoveryStatistics()
+        self._ways = TrialWays()
         self._version = 0
         self._bytes = 0  # of the events of all trials
 
@@ -86,6 +88,7 @@ class TrialLog:
                 return  # it was heard: a bag of the trial is played
             trial.last_seq = event.seq
             trial.heard.add(event)
+            self._ways.add(event)
             if trial.detailed and len(trial.events) < MOST_EVENTS:
                 before = trial.events.size
                 trial.events.append(json.dumps(event_view(event), allow_nan=False))
@@ -157,6 +160,11 @@ class TrialLog:
         """
         with self._lock:
             return self._recoveries.recovery_counts(place, target)
+
+    def way_above(self, trial_id: str, path: str) -> List[Level]:
+        """Return the visits of the containers around one of a trial, the outermost first."""
+        with self._lock:
+            return self._ways.above(trial_id, path)
 
     def _known(self, robot: str, trial_id: str) -> _LoggedTrial:
         """The trial of an id, also one that is new; with the lock held."""

@@ -5,6 +5,9 @@
 import { Colour, Vector } from './drawing/types';
 import { DownMachine } from './down';
 import { HeldMachine } from './holding';
+import {
+  FailureClass, InterfaceOutput, KeptImage, PreconditionStatus, QueryServer, Question,
+} from './question';
 
 export type Role = 'viewer' | 'operator' | 'teleoperator';
 
@@ -79,6 +82,8 @@ export interface Onlooker {
   session: string; // of its browser, in short
 }
 
+<<<<<<< HEAD
+=======
 // --- questions
 
 /** An open question. */
@@ -191,6 +196,7 @@ export interface InterfaceOutput {
   lines: string[]; // that it printed
 }
 
+>>>>>>> aed5288d (console: call people by webhook and e-mail (as built))
 // --- robots
 
 /** What the containers of a robot do. */
@@ -415,3 +421,4 @@ export interface HandState {
 
 export * from './commands';
 export * from './holding';
+export * from './question';

@@ -8,6 +8,7 @@ import { NoReply, unlessLost } from '../page/connection.js';
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
 import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { Calls } from './calls.js';
@@ -45,8 +46,7 @@ export class QuestionDetail {
     this.claimed = Promise.resolve(); // the latest claim has its reply
     this.held = false; // this page has claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
-    this.sending = false;
-    this.ended = false; // it is shown no longer
+    this.sending = this.ended = false; // the latter once it is shown no longer
     this.problem = this.takenWords = ''; // the latter when somebody has taken it over
     /** @type {FollowUp | null} */
     this.followUp = null;
@@ -58,6 +58,7 @@ export class QuestionDetail {
     this.machine = new MachineView(machinesNow(app.store), () => {});
     this.hand = new MachineHand(app);
     this.camera = new SituationCamera(app, question);
+    this.way = h('div', {}, visitsCard(question));
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
     this.time = h('span', { class: 'time' });
@@ -87,7 +88,7 @@ export class QuestionDetail {
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
           h('section', { class: 'card mini-machine' }, this.hand.root, this.machine.root),
-          visitsCard(question), userdataCard(question)),
+          this.way, userdataCard(question)),
         this.answers));
   }
 
@@ -318,7 +319,10 @@ export class QuestionDetail {
     if (changed('reach')) this.calls.show();
     if (changed('images', 'cameras')) this.camera.update();
     if (changed('sensors')) this.showPerception();
-    if (changed('questions')) this.showClaim();
+    if (changed('questions')) {
+      if (this.now) redraw(this.way, visitsCard(this.now)); // events may come after the question
+      this.showClaim();
+    }
     const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
     if (machines || changed('questions')) {
       this.machine.update();

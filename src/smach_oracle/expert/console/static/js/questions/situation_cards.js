@@ -1,9 +1,10 @@
 // @ts-check
 // What a question says of the situation: the failure, the way there, and the userdata.
 import { h } from '../page/dom.js';
-import { FAILURE_CLASSES, chip, rateBar } from '../page/format.js';
+import { FAILURE_CLASSES, breakable, chip, rateBar } from '../page/format.js';
 
 /** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').LevelVisits} LevelVisits */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').UserdataItem} UserdataItem */
 /** @typedef {import('../server').Visit} Visit */
@@ -13,6 +14,9 @@ const RESULTS = { success: { sign: '✓', kind: 'good' }, failure: { sign: '✗'
   superseded: { sign: '☞', kind: 'accent' }, preempted: { sign: '■', kind: 'warn' },
   '': { sign: '?', kind: '' } };
 const MOST_VISITS = 24;
+/** What is missing before the visits that are shown. */
+const MISSING = { unheard: 'not known: this console has not heard all that came before',
+  older: '… earlier ones' };
 const LONG = 160; // characters of a value
 const BEGINNING = 80;
 const CONTINUOUS = 'It failed again without a success in between';
@@ -54,9 +58,29 @@ function fact(name, value) {
 }
 
 /** @param {Question} question */
-export function visitsCard({ history }) {
-  return history.length > 0 && h('section', { class: 'card' }, h('h3', {}, 'How it came here'),
-    h('ol', { class: 'visits' }, history.slice(-MOST_VISITS).map(visitItem)));
+export function visitsCard({ path, state, history, above }) {
+  const cut = history.length > MOST_VISITS ? 'older' : '';
+  /** @type {LevelVisits} */
+  const own = { path, state, visits: history.slice(-MOST_VISITS), missing: cut };
+  return (history.length > 0 || above.length > 0) && h('section', { class: 'card way' },
+    h('h3', {}, 'How it came here'),
+    h('div', { class: 'levels' }, above.map((level) => levelOf(level, true)),
+      levelOf(own, false)));
+}
+
+/**
+ * The visits of one container.
+ * @param {LevelVisits} level
+ * @param {boolean} runs whether its state is one that the way goes on in
+ */
+function levelOf({ path, state, visits, missing }, runs) {
+  return h('div', { class: 'level' }, h('p', { class: 'dim' }, breakable(path, '/')),
+    h('ol', { class: 'visits', 'aria-label': 'Visited in ' + path },
+      missing && h('li', { class: 'missing' }, MISSING[missing]),
+      visits.map(visitItem),
+      runs ? h('li', { class: 'here' }, state, ' ', h('span', { class: 'sign' }, '▾'),
+        h('span', { class: 'dim' }, ' in it'))
+        : !visits.length && h('li', { class: 'missing' }, 'nothing before')));
 }
 
 /** @param {Visit} visit */
