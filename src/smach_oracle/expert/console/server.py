@@ -293,18 +293,7 @@ def _parameter(name: str, default: object) -> object:
 
 def main() -> None:
     """Entry point of the node `expert_console`."""
-<<<<<<< HEAD
     parameters_only(DESCRIPTION)
-=======
-    parameters_only(
-        'Node: a web page from which people watch robots and answer their questions. Parameters: '
-        '~address, '
-        '~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, ~stores, '
-        '~cameras, ~idle_s, ~public_address, ~trusted_proxy, '
-        '~on_call; '
-        'see doc/console.md.'
-    )
->>>>>>> aed5288d (console: call people by webhook and e-mail (as built))
     init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()
