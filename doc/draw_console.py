@@ -272,7 +272,7 @@ def drive_the_hand(browser, folder):
     expect(browser, 'You drive.', '.driver')
     browser.click('[data-arm=right]')
     browser.click('[data-frame=base]')
-    until(lambda: browser.run(PICTURED, '.drive-camera canvas'), 'the camera')
+    until(lambda: browser.run(PICTURED, '.drive-stage canvas'), 'the camera')
     browser.run('document.querySelector(".manipulation").scrollIntoView()')
     browser.hold('r')
     until(lambda: 'mm/s' in browser.text('.manipulation'), 'the hand moves')

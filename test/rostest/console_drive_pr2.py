@@ -245,7 +245,7 @@ class Drive(unittest.TestCase):
         self.assertTrue(
             wait_for(
                 lambda: browser.run(
-                    'const c = document.querySelector(".drive-camera canvas");'
+                    'const c = document.querySelector(".drive-stage canvas");'
                     'if (!c || c.width < 100) return false; const d = '
                     'c.getContext("2d").getImageData(0, 0, c.width, c.height);'
                     'return new Set(d.data).size > 50'

@@ -5,12 +5,16 @@ on demand.
 
 import os
 import sys
+import threading
 import time
 import unittest
 from functools import partial
 
+import numpy as np
 import rospy
 import rostest
+from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from console_page import WITH_BROWSER, ConsolePage
@@ -19,6 +23,7 @@ from teleoperation_fixtures import FakeArm
 from waiting import assert_soon, stays, wait_for
 
 from smach_oracle.msg import ConsoleCommand, TeleopCommand, TeleopState
+from smach_oracle.ros.images import colour_image
 
 if WITH_BROWSER:
     from browser import Browser
@@ -327,6 +332,73 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.pad(held=False)
         self.pad(forward=self.forward)
         self.assertTrue(self.moves(), (self.states[-1], self.browser.text('.manipulation')))
+
+    def seen(self):
+        return self.browser.run(
+            'return [...document.querySelectorAll(".drive-stage .view")].map((view) => '
+            'view.dataset.topic)'
+        )
+
+    def look(self, topic):
+        self.browser.click('[data-view="{}"]'.format(topic))
+
+    def test_4_the_cameras_stand_side_by_side_with_the_robot_in_3d(self):
+        browser, over = self.browser, threading.Event()
+        own, foreign = ['/alpha/left', '/alpha/right'], '/beta/camera'
+        publishers = [rospy.Publisher(each, Image, queue_size=1) for each in [*own, foreign]]
+        noise = np.random.RandomState(1).randint(0, 255, (480, 640, 3)).astype(np.uint8)
+
+        def stream():
+            while not over.wait(0.1):
+                for each in publishers:
+                    each.publish(colour_image(noise, Header(stamp=rospy.Time.now())))
+
+        streaming = threading.Thread(target=stream)
+        streaming.start()
+        self.addCleanup(streaming.join)
+        self.addCleanup(over.set)
+        self.assertTrue(wait_for(lambda: self.seen() == own[:1], 40.0), 'its first camera')
+        self.look(own[1])
+        self.look('/robot_description')
+        self.assertEqual(self.seen(), [*own, '/robot_description'])
+        self.assertTrue(wait_for(lambda: self.widths() == [640, 640]))
+        self.assert_accessible('cameras and a robot beside the controls')
+        tops = browser.run(
+            'return [...document.querySelectorAll(".drive-stage .view")].slice(0, 2).map((view) => '
+            'view.getBoundingClientRect().top)'
+        )
+        self.assertEqual(tops[0], tops[1], 'side by side')
+        browser.run(
+            'const more = document.querySelector(".drive-views select"); more.value = arguments[0];'
+            'more.dispatchEvent(new Event("change"))',
+            foreign,
+        )
+        self.assertTrue(browser.says('Not known as a camera of this robot: ' + foreign))
+        self.assertEqual(self.seen(), [own[1], '/robot_description', foreign], 'three at most')
+        self.look(own[1])
+        self.look('/robot_description')
+        self.assertEqual(self.seen(), [foreign])
+        self.look(own[0])
+        self.assertNotIn(foreign, browser.run('return localStorage.getItem("drive views")'))
+        self.link(100_000)
+        self.addCleanup(self.link, -1)
+        self.assertTrue(wait_for(lambda: max(self.widths()) < 640, 40.0), 'narrower')
+        self.assertTrue(browser.says('px (slow link)', '.drive-stage'))
+        self.link(-1)
+        self.assertTrue(wait_for(lambda: min(self.widths()) == 640, 40.0), 'wide again')
+
+    def widths(self):
+        """Pixels across of the images that are shown."""
+        return self.browser.run(
+            'return [...document.querySelectorAll(".drive-stage canvas.image")].map((canvas) => '
+            'canvas.width)'
+        )
+
+    def link(self, bytes_per_s):
+        """Make the browser's link that slow; -1: as it is."""
+        self.browser.driver.set_network_conditions(
+            latency=0, download_throughput=bytes_per_s, upload_throughput=-1
+        )
 
     def drive_by_key(self):
         # the page had given the link up meanwhile

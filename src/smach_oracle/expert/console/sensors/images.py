@@ -22,7 +22,8 @@ NO_PICTURES = (
     'OpenCV is missing, so the console shows no pictures; install python3-opencv, or '
     'opencv-python-headless by pip, and start the console again'
 )
-WIDTHS = (320, 640, 1280)  # px that a browser may ask for
+WIDTHS = (160, 320, 640, 1280)  # px that a browser may ask for
+USUAL_WIDTH = 640  # px
 MOST_BYTES = 2**26  # of a message
 MOST_PIXELS = 2**26
 JPEG_QUALITY = 88

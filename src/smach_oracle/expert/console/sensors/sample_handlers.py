@@ -15,7 +15,7 @@ import tornado.web
 
 from ..web.access import ClientRateLimits
 from ..web.handlers import SignedInHandler
-from .images import WIDTHS
+from .images import USUAL_WIDTH, WIDTHS
 from .robot_clocks import ImageAges
 from .robot_stream import RobotStream
 from .sensor_streams import SensorSample, SensorStream, SensorStreams
@@ -141,7 +141,7 @@ class SampleHandler(SensorHandler):
 
     def _arguments(self) -> Tuple[int, int, str]:
         given = {name: self.get_query_arguments(name) for name in self.request.query_arguments}
-        after, width = given.pop('after', ['0']), given.pop('width', [str(WIDTHS[1])])
+        after, width = given.pop('after', ['0']), given.pop('width', [str(USUAL_WIDTH)])
         robot = given.pop('robot', [''])
         if (
             given

@@ -1,18 +1,26 @@
 // @ts-check
 // What a hand does: in a word, and in numbers.
 
+import { percent } from '../page/format.js';
+
 /** @typedef {import('../server').HandState} HandState */
 /** @typedef {import('../server').Manipulation} Manipulation */
 
+const SLOWED = 0.995; // of what is asked: what is above it is called 100 %
+
 /**
- * Whether it moves, and what is in its way; `kind`: good, warn or bad.
+ * Whether it moves, and what is in its way; `kind`: good, warn or bad; `share`: how much of the
+ * asked speed is left, 0 to 1.
  * @param {HandState | undefined} state
  */
 export function lightOf(state) {
-  if (!state) return { text: 'Nothing is heard of the hand yet.', kind: '' };
-  if (state.refused) return { text: 'Refused: ' + state.refused, kind: 'bad' };
-  if (state.limit) return { text: state.limit, kind: 'warn' };
-  return state.moving ? { text: 'Moves freely', kind: 'good' } : { text: 'Stands', kind: '' };
+  if (!state) return { text: 'Nothing is heard of the hand yet.', kind: '', share: 0 };
+  if (state.refused) return { text: 'Refused: ' + state.refused, kind: 'bad', share: 0 };
+  const share = state.moving ? state.share ?? 1 : 0;
+  const slowed = share > 0 && share < SLOWED ? 'Slowed to ' + percent(share) + ': ' : '';
+  if (state.limit) return { text: slowed + state.limit, kind: 'warn', share };
+  return { text: state.moving ? 'Moves freely' : 'Stands', kind: state.moving ? 'good' : '',
+    share };
 }
 
 /**
@@ -35,7 +43,7 @@ export function factsOf({ boxes, arms }, state) {
 function speedOf({ speed, moving, share }) {
   const now = speed === null ? '–' : Math.round(1000 * speed) + ' mm/s';
   const asked = moving && share !== null;
-  return now + (asked ? ', ' + Math.round(100 * share) + ' % of what is asked' : '');
+  return now + (asked ? ', ' + percent(share) + ' of what is asked' : '');
 }
 
 /** @param {HandState} state */

@@ -7,9 +7,9 @@ import { h, setText } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
-import { DriveCamera } from './drive_camera.js';
 import { DriveInput } from './drive_input.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
+import { DriveViews } from './drive_views.js';
 import { factsOf, lightOf } from './hand_state.js';
 
 /** @typedef {import('../page/types').App} App */
@@ -69,7 +69,7 @@ export class ManipulationPanel {
     this.pads = new Map(MOVES.map((move) => [move, this.pad(move)]));
     this.light = h('div', { class: 'drive-light' });
     this.facts = h('dl', { class: 'drive-facts' });
-    this.camera = new DriveCamera(app, question.robot);
+    this.views = new DriveViews(app, question.robot);
     this.hint = h('p', { class: 'dim hint' });
     this.root = this.build();
     this.showScale();
@@ -86,7 +86,7 @@ export class ManipulationPanel {
         h('span', { class: 'spacer' }), this.wheelButton, this.stopButton),
       this.problem, h('p', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP),
       h('div', { class: 'manipulation-body' },
-        h('div', { class: 'manipulation-see' }, this.light, this.camera.root, this.facts),
+        h('div', { class: 'manipulation-see' }, this.light, this.views.root, this.facts),
         this.buildControls()));
   }
 
@@ -142,7 +142,7 @@ export class ManipulationPanel {
   stop() {
     this.input.stop();
     clearInterval(this.timer);
-    this.camera.stop();
+    this.views.stop();
     if (!this.wheel) return;
     this.app.connection.request('leave_wheel', { question: this.question.key }).catch(() => {});
   }
@@ -270,11 +270,12 @@ export class ManipulationPanel {
       this.input.unsettle(); // the person has not chosen it
     }
     this.showArms(now || UNKNOWN);
-    const { text, kind } = lightOf(state);
+    const { text, kind, share } = lightOf(state);
     setText(this.light, text);
     this.light.dataset['kind'] = kind;
+    this.light.style.setProperty('--share', String(share));
     this.showFacts(now && state ? factsOf(now, state) : []);
-    this.camera.update();
+    this.views.update();
   }
 
   /** @param {Manipulation | undefined} now */

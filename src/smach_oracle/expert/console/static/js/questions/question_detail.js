@@ -313,7 +313,9 @@ export class QuestionDetail {
   update(names) {
     /** @param {...string} wanted */
     const changed = (...wanted) => wanted.some((name) => names.includes(name));
-    if (changed('questions', 'manipulation', 'interface_output', 'sensors')) this.showInterface();
+    if (changed('questions', 'manipulation', 'interface_output', 'sensors', 'cameras')) {
+      this.showInterface();
+    }
     if (changed('preconditions')) this.showTime();
     if (changed('onlookers')) this.onlookers.show();
     if (changed('reach')) this.calls.show();

@@ -40,8 +40,9 @@ export class CameraView {
     setText(this.note, text);
     this.note.hidden = !text;
     this.root.classList.toggle('stale', Boolean(text));
-    const rate = this.feed ? this.feed.rate : 0; // it may say something as soon as it is made
-    setText(this.rate, rate ? rate.toFixed(1) + ' /s' : '');
+    const { feed } = this; // none yet: it may say something as soon as it is made
+    const width = feed && feed.link.isNarrow ? ', ' + feed.link.now + ' px (slow link)' : '';
+    setText(this.rate, feed && feed.rate ? feed.rate.toFixed(1) + ' /s' + width : '');
   }
 
   /**

@@ -1,6 +1,7 @@
 // @ts-check
 // The newest message of a sensor, again and again: the next one is asked for when the last one is
-// on the screen.
+// on the screen. Images get narrower where the link is slow.
+import { LinkWidth } from './link_width.js';
 
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').SensorFacts} SensorFacts */
@@ -35,7 +36,7 @@ export function numberOf(app, topic, type) {
  * @typedef {object} Use
  * @property {(answer: Response, facts: Facts) => Promise<void> | void} take shows a message
  * @property {(text: string, missing: Missing) => void} say '' where all is well
- * @property {number} [width] px of images
+ * @property {number} [width] px of images, at most
  * @property {number} [every] ms between two of them, at least
  * @property {() => number | undefined} [beside] the number of a robot where the facts tell
  *   the sensor's place, undefined for none
@@ -55,7 +56,7 @@ export class SensorFeed {
     this.which = which;
     this.root = root;
     this.use = use;
-    this.width = use.width || 640;
+    this.link = new LinkWidth(use.width || 640);
     this.every = use.every || LEAST_PAUSE_MS;
     this.lost = false; // its place is not known
     /** @type {number[]} */
@@ -119,7 +120,7 @@ export class SensorFeed {
   async once(id, after, beside) {
     this.controller = new AbortController();
     const { signal } = this.controller;
-    const query = 'after=' + after + '&width=' + this.width + (beside ? '&robot=' + beside : '');
+    const query = 'after=' + after + '&width=' + this.link.now + (beside ? '&robot=' + beside : '');
     const answer = await this.app.connection.fetch('sample/' + id + '?' + query, { signal });
     if (answer.status === 204) {
       if (after) this.use.say('Nothing new comes.', 'next');
@@ -143,7 +144,9 @@ export class SensorFeed {
     /** @type {Facts} */
     const facts = header ? JSON.parse(header) : await answer.json();
     this.lost = 'astray' in facts;
+    const begun = performance.now(); // the first of its bytes have come
     await this.use.take(answer, facts);
+    if (this.use.width) this.link.took(performance.now() - begun);
     this.times.push(performance.now());
     this.use.say('', '');
     return facts.sequence;

@@ -1,0 +1,128 @@
+// @ts-check
+// What is seen beside the controls of a hand: cameras side by side, and the robot in 3D. The
+// likeliest of the robot's own cameras is there from the beginning. Views of others are shown to
+// who chooses them, and never remembered.
+import { h, replace } from '../page/dom.js';
+import { breakable } from '../page/format.js';
+import { remember, remembered } from '../page/preferences.js';
+import { redraw } from '../page/redraw.js';
+import { CameraView } from '../sensors/camera_view.js';
+import { robotOf } from '../sensors/robot_feed.js';
+import { RobotView } from '../sensors/robot_view.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').Sensor} Sensor */
+/** @typedef {{ root: HTMLElement, stop(): void }} View */
+
+const WIDTH = 640; // px
+const MOST = 3; // at a time
+const PREFERENCE = 'drive views';
+const NONE = 'No camera of its own';
+const OTHERS = 'Show another camera…';
+const NOT_ITS_OWN = 'Not known as a camera of this robot: ';
+const IN_3D = 'Robot in 3D';
+
+export class DriveViews {
+  /**
+   * @param {App} app
+   * @param {string} robot
+   */
+  constructor(app, robot) {
+    this.app = app;
+    this.robot = robot;
+    /** @type {Sensor[]} */
+    this.own = [];
+    /** @type {Sensor[]} */
+    this.others = []; // cameras that are not known as its own
+    this.chosen = remembered(PREFERENCE, '').split('\n').filter(Boolean); // topics
+    this.key = ''; // of what there is and of what is chosen
+    /** @type {Map<string, View>} */
+    this.views = new Map(); // by topic
+    this.choices = h('div', { class: 'row wrap', role: 'group', 'aria-label': 'Views' });
+    this.more = h('select', { 'aria-label': OTHERS, onchange: () => this.turn(this.more.value) });
+    this.foreign = h('p', { class: 'warn-note', hidden: true });
+    this.stage = h('div', { class: 'drive-stage' });
+    this.root = h('div', { class: 'drive-views' },
+      h('div', { class: 'row wrap' }, this.choices, this.more), this.foreign, this.stage);
+  }
+
+  stop() { for (const view of this.views.values()) view.stop(); }
+
+  update() {
+    const { sensors } = this.app.store;
+    const ownTopics = this.app.store.get('cameras')?.[this.robot] || [];
+    const model = robotOf(this.app, this.robot + '/');
+    const cameras = sensors.filter((each) => each.kind === 'image');
+    /** @param {Sensor} sensor */
+    const isOwn = ({ topic }) => ownTopics.includes(topic);
+    this.own = [
+      ...cameras.filter(isOwn).sort((one, other) => (
+        ownTopics.indexOf(one.topic) - ownTopics.indexOf(other.topic))),
+      ...sensors.filter((each) => each.kind === 'robot' && each.topic === model)];
+    this.others = cameras.filter((each) => !isOwn(each));
+    this.show();
+  }
+
+  /** The sensors that are looked at, in the order in which they were chosen. */
+  get looked() {
+    const known = [...this.own, ...this.others];
+    const found = this.chosen.flatMap((topic) => known.find((each) => each.topic === topic) || []);
+    const first = this.own.find((each) => each.kind === 'image');
+    return found.length || !first ? found : [first];
+  }
+
+  /** @param {string} topic that is looked at from now on, or no longer */
+  turn(topic) {
+    const before = this.looked.map((each) => each.topic);
+    this.chosen = before.includes(topic) ? before.filter((each) => each !== topic)
+      : [...before, topic].slice(-MOST);
+    const own = this.own.map((each) => each.topic);
+    remember(PREFERENCE, this.chosen.filter((each) => own.includes(each)).join('\n'));
+    this.show();
+  }
+
+  show() {
+    const { looked, others } = this;
+    const key = JSON.stringify([this.own, others, looked]);
+    if (key === this.key) return;
+    this.key = key;
+    const topics = looked.map((each) => each.topic);
+    redraw(this.choices, this.own.length
+      ? this.own.map((each) => this.button(each, topics.includes(each.topic)))
+      : h('span', { class: 'dim' }, NONE));
+    replace(this.more, h('option', { value: '' }, OTHERS), others.map(({ topic }) => (
+      h('option', { value: topic }, (topics.includes(topic) ? 'Close ' : '') + topic))));
+    this.more.hidden = !others.length;
+    const foreign = others.map((each) => each.topic).filter((each) => topics.includes(each));
+    replace(this.foreign, NOT_ITS_OWN + foreign.join(', '));
+    this.foreign.hidden = !foreign.length;
+    this.open(looked);
+  }
+
+  /**
+   * @param {Sensor} sensor
+   * @param {boolean} isLookedAt
+   */
+  button({ kind, topic }, isLookedAt) {
+    return h('button', { key: topic, class: 'tool', 'data-view': topic, 'aria-pressed': isLookedAt,
+      onclick: () => this.turn(topic) },
+    kind === 'robot' ? IN_3D : breakable(topic.replace(/^\//, ''), '/'));
+  }
+
+  /** @param {Sensor[]} looked */
+  open(looked) {
+    for (const [topic, view] of this.views) {
+      if (looked.some((each) => each.topic === topic)) continue;
+      view.stop();
+      view.root.remove();
+      this.views.delete(topic);
+    }
+    for (const { kind, topic, type } of looked) {
+      if (this.views.has(topic)) continue;
+      const view = kind === 'robot' ? new RobotView(this.app, topic)
+        : new CameraView(this.app, topic, type, WIDTH);
+      this.views.set(topic, view);
+      this.stage.append(view.root);
+    }
+  }
+}
