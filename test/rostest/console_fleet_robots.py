@@ -37,13 +37,13 @@ class Plan(smach.State):
         return 'succeeded'
 
 
-def run(number, robots):
-    """One robot, until it is told to end."""
+def run(number, robots, lacks):
+    """One robot, until it is told to end. `lacks`: the number of a plan that it does not have."""
     rospy.init_node('robot_{}'.format(number), disable_signals=False)
     sm = smach.StateMachine(OUTCOMES)
     with sm:
         smach.StateMachine.add('WORK', Work())
-        for each in range(robots):
+        for each in set(range(robots)) - {lacks}:
             smach.StateMachine.add('PLAN_{}'.format(each), Plan(each))
     OracleContainer.wrap(
         sm, name='JOB', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0}
@@ -53,13 +53,15 @@ def run(number, robots):
     rospy.spin()
 
 
-def main(robots):
-    """Fork, so that what is imported is imported once; ends with all of them."""
+def main(robots, odd=-1):
+    """Fork, so that what is imported is imported once; ends with all of them. `odd`: the number of
+    a robot that has no PLAN_0.
+    """
     children = []
     for number in range(robots):
         child = os.fork()
         if not child:
-            run(number, robots)
+            run(number, robots, 0 if number == odd else -1)
             os._exit(0)
         children.append(child)
 
@@ -73,4 +75,4 @@ def main(robots):
 
 
 if __name__ == '__main__':
-    main(int(sys.argv[1]))
+    main(*map(int, sys.argv[1:]))

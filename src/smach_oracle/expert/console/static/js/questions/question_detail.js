@@ -14,6 +14,7 @@ import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { Calls } from './calls.js';
 import { ClaimBar } from './claim_bar.js';
 import { Onlookers } from './onlookers.js';
+import { URGENT_S } from './queue_view.js';
 import { SilenceBar } from './silence_bar.js';
 import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
 import { SituationCamera } from './situation_camera.js';
@@ -22,7 +23,6 @@ import { SituationCamera } from './situation_camera.js';
 /** @typedef {import('../server').Answer} Answer */
 /** @typedef {import('../server').Question} Question */
 
-export const URGENT_S = 20;
 const RETRY_MS = 3000; // after a claim that was lost, and could not be made again
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
@@ -42,11 +42,10 @@ export class QuestionDetail {
     this.ways = ways;
     this.holderBefore = ''; // when this page claimed it last
     this.settled = false; // this page has answered it
-    this.claiming = false;
     this.claimed = Promise.resolve(); // the latest claim has its reply
     this.held = false; // this page has claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
-    this.sending = this.ended = false; // the latter once it is shown no longer
+    this.claiming = this.sending = this.ended = false; // ended: it is shown no longer
     this.problem = this.takenWords = ''; // the latter when somebody has taken it over
     /** @type {FollowUp | null} */
     this.followUp = null;

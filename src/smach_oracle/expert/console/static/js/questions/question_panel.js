@@ -1,18 +1,19 @@
 // @ts-check
 // The queue of all robots' open questions, and the one that is worked on.
 import { waits } from '../page/alerts.js';
-import { SETTLING_MS, wasMeant } from '../page/deliberate.js';
+import { SETTLING_MS } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
 import { moveFocus } from '../page/focus.js';
-import { breakable, chip, counted, duration, percent, rateBar } from '../page/format.js';
+import { counted } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
+import { AlikeAnswer } from './alike_answer.js';
 import { Unreached } from './calls.js';
-import { readersOf } from './onlookers.js';
 import { tellPresses } from './presence.js';
-import { QuestionDetail, URGENT_S } from './question_detail.js';
+import { QuestionDetail } from './question_detail.js';
+import { QueueTools, queueList } from './queue_view.js';
 
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../page/types').Panel} Panel */
@@ -23,7 +24,7 @@ export const questions = { id: 'questions', title: 'Questions',
   create: (app) => new QuestionPanel(app) };
 
 const NO_SERVER = 'No robot with an expert query server is known yet.';
-const LONGEST_NAME = 14; // of a reader, in the list
+const MOST_NAMED = 3; // query servers
 const GONE = 'The question of this address is not open: it was answered or taken back, or its time '
   + 'was over.';
 const QUIET = 'Robots recover by themselves where they can; they ask here where they cannot.';
@@ -32,21 +33,25 @@ class QuestionPanel {
   /** @param {App} app */
   constructor(app) {
     this.app = app;
-    /** @type {QuestionDetail | null} */
+    /** @type {QuestionDetail | AlikeAnswer | null} */
     this.detail = null;
+    /** @type {string[]} */
+    this.order = []; // keys, as the list has them, also of the one that is shown and gone
     /** @type {QuestionDetail | null} */
     this.aside = null; // still held: what took its place may have been opened by accident
     this.asideTimer = 0;
     /** @type {string | null} */
     this.wanted = null; // what an address names, until it is known whether it is open; '': the list
     this.missing = ''; // the question of an address, where it is not open
+    this.tools = new QueueTools(() => this.showQueue());
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
     this.unreached = new Unreached(app);
     this.servers = h('p', { class: 'dim servers' });
     this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.queue, this.unreached.root, this.servers, this.ages,
+      h('aside', { class: 'queue-side' }, this.tools.root, this.queue, this.unreached.root,
+        this.servers, this.ages,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
@@ -56,10 +61,13 @@ class QuestionPanel {
 
   get open() { return this.app.store.questions; }
 
-  /** What `n` would open: the oldest question that nobody works on. */
+  /** What `n` would open: of those that nobody works on the next on the list, and round again. */
   get next() {
     if (!this.takesKeys || !keysOn()) return undefined;
-    return this.open.find(({ status, key }) => status === 'pending' && !this.isChosen(key));
+    const at = this.order.indexOf(this.detail?.key || '') + 1;
+    const free = [...this.order.slice(at), ...this.order.slice(0, at)]
+      .map((each) => this.open.find(({ key }) => key === each));
+    return free.find((each) => each && each.status === 'pending' && !this.isChosen(each.key));
   }
 
   get takesKeys() {
@@ -119,60 +127,51 @@ class QuestionPanel {
   }
 
   showServers() {
-    const servers = (this.app.store.get('servers') || [])
-      .map(({ name, connected }) => name + (connected ? '' : ' (gone)'));
-    setText(this.servers, servers.length ? 'Listening to ' + servers.join(', ') : NO_SERVER);
+    const servers = this.app.store.get('servers') || [];
+    const gone = servers.filter(({ connected }) => !connected).map(({ name }) => name + ' (gone)');
+    const names = servers.length > MOST_NAMED
+      ? [counted(servers.length, 'expert query server'), ...gone]
+      : servers.map(({ name, connected }) => name + (connected ? '' : ' (gone)'));
+    setText(this.servers, servers.length ? 'Listening to ' + names.join(', ') : NO_SERVER);
   }
 
   showQueue() {
-    const { open } = this;
-    redraw(this.queue, open.length ? open.map((question) => this.row(question))
-      : h('p', { class: 'empty' }, 'No open questions.'));
+    const { open, app } = this;
+    const groups = this.tools.groups(app);
+    const keys = groups.flatMap(({ questions }) => questions.map(({ key }) => key));
+    const chosen = this.detail?.key || '';
+    if (chosen && !keys.includes(chosen)) {
+      const at = Math.max(0, this.order.indexOf(chosen)); // where it was
+      keys.splice(at, 0, chosen);
+    }
+    this.order = keys;
+    redraw(this.queue, groups.length ? queueList(app, groups, this.ways)
+      : h('p', { class: 'empty' }, open.length ? [counted(open.length, 'open question'),
+        ', none of which is wanted. ', h('button', { class: 'inline', 'data-action': 'show-all',
+          onclick: () => this.showAll() }, 'Show all')] : 'No open questions.'));
+  }
+
+  /** @type {import('./queue_view.js').Ways} */
+  get ways() {
+    return { isChosen: (key) => this.isChosen(key), choose: (...each) => this.choose(...each),
+      answerAlike: (alike) => this.answerAlike(alike) };
+  }
+
+  showAll() {
+    this.tools.clear();
+    this.showQueue();
+  }
+
+  /** @param {string} alike which group */
+  answerAlike(alike) {
+    const group = this.tools.groups(this.app).find((each) => each.alike === alike);
+    if (!group) return;
+    this.close();
+    this.turnTo(new AlikeAnswer(this.app, group.questions, () => this.leave()));
   }
 
   /** @param {string} key */
   isChosen(key) { return Boolean(this.detail && this.detail.key === key); }
-
-  /** @param {Question} question */
-  row(question) {
-    const { key, status, state, robot, path, rate } = question;
-    const silent = this.app.liveness.whoIsSilent(question) ? ' silent' : '';
-    return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
-      'data-deliberate': 'open ' + key, 'aria-current': this.isChosen(key),
-      onclick: (/** @type {Event} */ event) => this.choose(key, wasMeant(event)) },
-    h('span', { class: 'row' }, h('strong', { class: 'ellipsis' }, breakable(state, '_')),
-      h('span', { class: 'spacer' }), this.statusChip(question)),
-    h('span', { class: 'row dim' }, h('span', { class: 'where' }, robot + ' · ' + path),
-      h('span', { class: 'spacer' }),
-      h('span', { title: 'How often it is expected to fail, as learned' },
-        rateBar(rate, undefined, 'est. ' + percent(rate) + ' fail'))),
-    this.times(question));
-  }
-
-  /** @param {Question} question */
-  statusChip(question) {
-    const { key, status, holder, interface: name } = question;
-    if (status === 'interface') {
-      return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
-    }
-    if (waits(question) && holder) {
-      return chip((this.app.isMine(question) ? 'yours' : holder) + ' · idle', 'bad',
-        'Whoever holds it has pressed nothing for a while');
-    }
-    if (!holder) return chip(readWords(readersOf(this.app, key)), 'bad');
-    return this.app.isMine(question) ? chip('yours', 'good') : chip(holder, 'warn');
-  }
-
-  /** @param {Question} question */
-  times({ asked, deadline }) {
-    const now = this.app.store.now();
-    const left = deadline === null ? Infinity : deadline - now;
-    return h('span', { class: 'row' },
-      h('span', { class: 'dim' }, 'asked ' + duration(now - asked) + ' ago'),
-      h('span', { class: 'spacer' }),
-      left < Infinity && h('span', { class: 'left' + (left < URGENT_S ? ' urgent' : '') },
-        duration(left) + ' left'));
-  }
 
   /**
    * Open a question.
@@ -185,16 +184,23 @@ class QuestionPanel {
     const back = this.aside?.key === key ? this.aside : null;
     if (back) this.aside = null;
     this.missing = '';
-    if (!meant && this.detail?.held && !this.detail.settled) this.putAside(this.detail);
-    else this.close();
-    this.detail = back || new QuestionDetail(this.app, question,
-      { leave: () => this.leave(), choose: (...next) => this.choose(...next) });
-    this.showStage();
-    this.showQueue();
-    moveFocus(this.detail.title);
-    this.detail.begin();
+    const before = this.detail;
+    if (!meant && before instanceof QuestionDetail && before.held && !before.settled) {
+      this.putAside(before);
+    } else this.close();
+    this.turnTo(back || new QuestionDetail(this.app, question,
+      { leave: () => this.leave(), choose: (...next) => this.choose(...next) }));
     if (back) back.update(['questions', 'images']); // what it has missed
     this.app.went();
+  }
+
+  /** @param {QuestionDetail | AlikeAnswer} detail */
+  turnTo(detail) {
+    this.detail = detail;
+    this.showStage();
+    this.showQueue();
+    moveFocus(detail.title);
+    detail.begin();
   }
 
   /**
@@ -243,7 +249,7 @@ class QuestionPanel {
     const title = waiting ? counted(waiting, 'question waits', 'questions wait')
       : (this.open.length ? 'Nobody is waited for' : 'All quiet');
     const choose = keysOn() ? ['Choose one, or press ', h('kbd', {}, 'n'),
-      ' for the oldest that nobody works on.'] : 'Choose one.';
+      ' for the next that nobody works on, and ', h('kbd', {}, '/'), ' to search.'] : 'Choose one.';
     const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
       : 'each of the ' + this.open.length + ' open questions.');
     const gone = this.missing && h('p', { class: 'question-gone', role: 'status' }, GONE);
@@ -258,25 +264,13 @@ class QuestionPanel {
       || turnedOff(event)) return;
     if (event.key === 'n') {
       if (this.next) this.choose(this.next.key, this.nextKey.meant);
+    } else if (event.key === '/' && !this.tools.root.hidden && !this.detail) {
+      event.preventDefault(); // it would be typed
+      this.tools.search.focus();
     } else if (event.key === 'Escape') {
       if (this.detail && !this.detail.cancel()) this.leave();
     } else if (this.detail) {
       this.detail.press(event.key);
     }
   }
-}
-
-/**
- * What is said of a question that nobody works on.
- * @param {string[]} readers others who look at it
- */
-function readWords(readers) {
-  if (!readers.length) return 'waiting';
-  const who = readers.length === 1 ? shortened(readers[0]) + ' reads' : readers.length + ' read';
-  return 'waiting · ' + who;
-}
-
-/** @param {string} name */
-function shortened(name) {
-  return name.length > LONGEST_NAME ? name.slice(0, LONGEST_NAME - 1) + '…' : name;
 }

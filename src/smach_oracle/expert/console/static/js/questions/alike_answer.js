@@ -1,0 +1,249 @@
+// @ts-check
+// The same answer for several like questions. Each is checked, claimed and answered by itself:
+// where the answer is not offered it is not sent, and that is said.
+import { NoReply, unlessLost } from '../page/connection.js';
+import { h, setText } from '../page/dom.js';
+import { breakable, counted, duration, percent, robotMark } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../server').Answer} Answer */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {{ ok: boolean, words: string }} Check */
+/** @typedef {{ answer: Answer, words: string, offered: number, advised: number }} Offer */
+
+const PAUSE_MS = 250; // between two questions: two commands each, and ten a second are allowed
+const BY_ITSELF = ' Answer it by itself.';
+
+export class AlikeAnswer {
+  /**
+   * @param {App} app
+   * @param {Question[]} questions
+   * @param {() => void} leave
+   */
+  constructor(app, questions, leave) {
+    this.app = app;
+    this.questions = questions;
+    this.key = ''; // it is no question
+    this.held = this.settled = false;
+    this.leave = leave;
+    this.ended = false;
+    /** @type {Set<string>} */
+    this.unwanted = new Set(); // keys of questions that a person has left out
+    /** @type {Map<string, Check>} */
+    this.results = new Map(); // by key, of those that were sent
+    this.sending = false;
+    const [{ state, path, what }] = questions;
+    this.offers = offersOf(questions);
+    this.title = h('h2', { tabindex: -1 }, breakable(state, '_'), ' ', what, ': the same answer');
+    this.choice = h('select', { id: 'alike-answer', onchange: () => this.show() },
+      h('option', { value: '' }, 'Choose an answer'),
+      this.offers.map(({ words, offered, advised }, index) => h('option', { value: index },
+        words + ' (offered by ' + offered + (advised ? ', recommended by ' + advised : '') + ')')));
+    this.why = h('input', { type: 'text', maxlength: 2000, placeholder: 'Reason (optional)',
+      'aria-label': 'Reason, for the record' });
+    this.list = h('div', { class: 'alike-list' });
+    this.send = h('button', { class: 'primary', 'data-action': 'send-alike',
+      onclick: () => this.sendAll() });
+    this.said = h('p', { class: 'dim', role: 'status' });
+    this.root = h('article', { class: 'detail alike' },
+      h('header', { class: 'detail-head' }, h('button', { class: 'back',
+        'aria-label': 'Back to the list', onclick: leave }, '‹'),
+      h('div', {}, this.title, h('p', { class: 'dim' },
+        counted(questions.length, 'question'), ' · ', breakable(path, '/')))),
+      h('section', { class: 'card' }, h('label', { for: 'alike-answer' }, 'The answer'),
+        this.choice, this.why, this.list, this.said,
+        h('div', { class: 'row' }, this.send,
+          h('button', { 'data-action': 'leave-alike', onclick: leave }, 'Back to the list'))));
+    this.show();
+  }
+
+  /** @returns {Answer | undefined} */
+  get answer() {
+    const offer = this.choice.value && this.offers[Number(this.choice.value)];
+    return offer ? { ...offer.answer, why: this.why.value } : undefined;
+  }
+
+  /** Those to which it would be sent now. */
+  get ready() {
+    const { answer } = this;
+    return answer ? this.questions.filter(({ key }) => !this.unwanted.has(key)
+      && !this.results.has(key) && this.check(key, answer).ok) : [];
+  }
+
+  /**
+   * @param {string} key
+   * @param {Answer} answer
+   * @returns {Check}
+   */
+  check(key, answer) {
+    const now = this.app.store.questions.find((each) => each.key === key);
+    if (!now) return { ok: false, words: 'is open no longer' };
+    const silent = this.app.liveness.whoIsSilent(now);
+    if (silent) return { ok: false, words: 'nothing is heard from ' + silent };
+    if (now.holder && !this.app.isMine(now)) {
+      return { ok: false, words: now.holder + ' works on it' };
+    }
+    if (now.status === 'interface') return { ok: false, words: now.interface + ' runs for it' };
+    return fits(answer, now, this.app.store.get('preconditions')?.[key] || {});
+  }
+
+  show() {
+    const { answer, ready } = this;
+    redraw(this.list, this.questions.map((question) => this.row(question, answer)));
+    setText(this.send, this.sending ? 'Sending…' : 'Send to ' + ready.length);
+    this.send.dataset['deliberate'] = 'alike ' + ready.length + ' ' + this.choice.value;
+    this.send.disabled = this.sending || !ready.length || !this.app.mayAnswer;
+    this.choice.disabled = this.sending;
+  }
+
+  /**
+   * @param {Question} question
+   * @param {Answer | undefined} answer
+   */
+  row({ key, robot, asked }, answer) {
+    const result = this.results.get(key);
+    const found = result || (answer && this.check(key, answer));
+    const mark = found && (found.ok ? '✓ ' : '✗ ');
+    const box = h('input', { type: 'checkbox', disabled: Boolean(result) || this.sending,
+      onchange: ({ target }) => {
+        if (target instanceof HTMLInputElement && target.checked) this.unwanted.delete(key);
+        else this.unwanted.add(key);
+        this.show();
+      } });
+    box.checked = !this.unwanted.has(key);
+    const kind = found ? (found.ok ? 'good' : 'bad') : '';
+    return h('label', { key, class: 'alike-row', 'data-key': key }, box, robotMark(robot),
+      h('b', {}, robot), h('span', { class: 'dim' },
+        'waits ' + duration(this.app.store.now() - asked)),
+      h('span', { class: 'check ' + kind }, found && mark + found.words));
+  }
+
+  /** One after the other. What this page has not held is let go where the answer is refused. */
+  async sendAll() {
+    const { answer, ready } = this;
+    if (!answer || this.sending) return;
+    this.sending = true;
+    for (const { key } of ready) {
+      if (this.ended) break;
+      const check = this.check(key, answer); // it may have changed meanwhile
+      this.results.set(key, check.ok ? await this.sendOne(key, answer) : check);
+      this.show();
+      await new Promise((done) => { setTimeout(done, PAUSE_MS); });
+    }
+    this.sending = false;
+    const sent = ready.filter(({ key }) => this.results.get(key)?.ok).length;
+    setText(this.said, 'Sent to ' + sent + ' of ' + ready.length + '.');
+    this.show();
+  }
+
+  /**
+   * @param {string} question
+   * @param {Answer} answer
+   * @returns {Promise<Check>}
+   */
+  async sendOne(question, answer) {
+    const { connection } = this.app;
+    try {
+      const claim = await connection.request('claim', { question });
+      if (!claim.ok) return { ok: false, words: claim.message };
+      const reply = await connection.request('answer', { question, ...answer });
+      if (!reply.ok) connection.request('release', { question }).catch(() => {});
+      return { ok: reply.ok, words: reply.ok ? 'sent' : reply.message };
+    } catch (err) {
+      unlessLost(err);
+      return { ok: false, words: err instanceof NoReply ? 'not confirmed in time'
+        : 'the connection was lost' };
+    }
+  }
+
+  begin() { this.show(); }
+
+  end() { this.ended = true; }
+
+  pause() {}
+
+  connected() {}
+
+  shown() { this.show(); }
+
+  tick() { this.show(); }
+
+  /** @param {string[]} names of sections */
+  update(names) {
+    if (names.includes('questions') || names.includes('preconditions')) this.show();
+  }
+
+  cancel() { return false; }
+
+  /** @param {string} key */
+  press(key) { if (key === 'Enter') this.show(); }
+}
+
+/**
+ * The answers that some of the questions offer: states to go to, and outcomes where nothing is to
+ * be entered. Interfaces and giving up are for one question at a time.
+ * @param {Question[]} questions
+ * @returns {Offer[]} those that are recommended first, then those that most of them offer
+ */
+function offersOf(questions) {
+  /** @type {Map<string, Offer>} */
+  const found = new Map();
+  /**
+   * @param {'goto' | 'supersede'} kind
+   * @param {string} name
+   * @param {string} container
+   * @param {string} words
+   * @param {boolean} advised
+   */
+  const count = (kind, name, container, words, advised) => {
+    const id = JSON.stringify([kind, name, container]);
+    const offer = found.get(id) || { words, offered: 0, advised: 0,
+      answer: { kind, name, container, outputs: [], why: '' } };
+    offer.offered += 1;
+    offer.advised += Number(advised);
+    found.set(id, offer);
+  };
+  for (const { choices, supersede, state, outputs } of questions) {
+    for (const { state: name, container, recommended } of choices) {
+      count('goto', name, container, 'Go to ' + (container && container + '/') + name,
+        Boolean(recommended));
+    }
+    for (const { outcome } of outputs.length ? [] : supersede) {
+      count('supersede', outcome, '', state + ' is done, with ' + outcome, false);
+    }
+  }
+  return [...found.values()].sort((one, other) => (
+    other.advised - one.advised || other.offered - one.offered));
+}
+
+/**
+ * Whether a question offers an answer, and what is to be expected of it there.
+ * @param {Answer} answer
+ * @param {Question} question
+ * @param {{ [state: string]: import('../server').PreconditionStatus[] | undefined }} statuses
+ * @returns {Check}
+ */
+export function fits({ kind, name, container }, question, statuses) {
+  if (kind === 'supersede') {
+    if (question.outputs.length) return { ok: false, words: 'has outputs to enter.' + BY_ITSELF };
+    const there = question.supersede.some(({ outcome }) => outcome === name);
+    return there ? { ok: true, words: 'offered' } : { ok: false, words: name + ' is not offered' };
+  }
+  const choice = question.choices.find((each) => each.state === name
+    && each.container === container);
+  if (kind !== 'goto' || !choice) return { ok: false, words: name + ' is not offered' };
+  if (choice.blocked) return { ok: false, words: 'blocked: ' + choice.blocked };
+  const unmet = container ? undefined : statuses[name]?.find(({ holds }) => holds === false);
+  if (unmet) return { ok: false, words: unmet.name + ' does not hold.' + BY_ITSELF };
+  const { missing, repeats, success, recommended } = choice;
+  if (missing.length) {
+    return { ok: false, words: 'userdata would be missing: ' + missing.join(', ') + '.'
+      + BY_ITSELF };
+  }
+  if (repeats.length) {
+    return { ok: false, words: 'would repeat ' + repeats.join(', ') + '.' + BY_ITSELF };
+  }
+  return { ok: true, words: recommended ? 'recommended: ' + recommended
+    : 'offered' + (success === null ? '' : ', est. ' + percent(success) + ' ok') };
+}

@@ -1,0 +1,206 @@
+// @ts-check
+// The cards of the queue, and the tools to sort, filter and search them.
+import { waits } from '../page/alerts.js';
+import { wasMeant } from '../page/deliberate.js';
+import { h } from '../page/dom.js';
+import {
+  FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar, robotMark,
+} from '../page/format.js';
+import { remember, remembered } from '../page/preferences.js';
+import { readersOf } from './onlookers.js';
+import { FILTERS, ORDERS, advice, causeOf, grouped, wanted } from './queue_wishes.js';
+
+/** @typedef {import('../page/types').App} App */
+/** @typedef {import('../page/types').Child} Child */
+/** @typedef {import('../server').Question} Question */
+/** @typedef {import('./queue_wishes.js').Filter} Filter */
+/** @typedef {import('./queue_wishes.js').Group} Group */
+/** @typedef {import('./queue_wishes.js').Order} Order */
+/** @typedef {import('./queue_wishes.js').Wishes} Wishes */
+
+export const URGENT_S = 20;
+const LONGEST_NAME = 14; // of a reader
+const FEW = 3; // questions, which need no tools
+const CONTINUOUS = 'It failed again without a success in between';
+
+/** The tools above the list. */
+export class QueueTools {
+  /** @param {() => void} changed */
+  constructor(changed) {
+    const order = remembered('queue-order', 'oldest');
+    this.order = choiceOf('Order', ORDERS, order, changed);
+    this.filter = choiceOf('Which ones', FILTERS, 'all', changed);
+    this.search = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search',
+      class: 'queue-search', oninput: changed });
+    this.together = h('input', { type: 'checkbox', onchange: changed });
+    this.together.checked = remembered('queue-together', 'yes') === 'yes';
+    this.root = h('div', { class: 'queue-tools', role: 'search' }, this.search, this.order,
+      this.filter, h('label', {}, this.together, ' Like ones together'));
+  }
+
+  /** @returns {Wishes} */
+  get wishes() {
+    return { order: /** @type {Order} */ (this.order.value), text: this.search.value,
+      filter: /** @type {Filter} */ (this.filter.value), together: this.together.checked };
+  }
+
+  /**
+   * The questions to show. Few are all shown, unless somebody has asked for less.
+   * @param {App} app
+   * @returns {Group[]}
+   */
+  groups(app) {
+    const open = app.store.questions;
+    const { wishes } = this;
+    this.root.hidden = open.length <= FEW && wishes.filter === 'all' && !wishes.text;
+    remember('queue-order', wishes.order);
+    remember('queue-together', wishes.together ? 'yes' : 'no');
+    const questions = wanted(open, wishes, { waits, isMine: (each) => app.isMine(each) });
+    return grouped(questions, wishes.together);
+  }
+
+  clear() {
+    this.search.value = '';
+    this.filter.value = 'all';
+  }
+}
+
+/**
+ * @param {string} title
+ * @param {{ [value: string]: string }} words
+ * @param {string} value
+ * @param {() => void} onchange
+ */
+function choiceOf(title, words, value, onchange) {
+  return h('select', { 'aria-label': title, title, onchange }, Object.keys(words).map((each) => (
+    h('option', { value: each, selected: each === value }, words[each]))));
+}
+
+/**
+ * @typedef {object} Ways
+ * @property {(key: string) => boolean} isChosen
+ * @property {(key: string, meant: boolean) => void} choose
+ * @property {(alike: string) => void} answerAlike
+ */
+
+/**
+ * The list: groups of like questions under their heads, flat, so that what stays is never moved.
+ * @param {App} app
+ * @param {Group[]} groups
+ * @param {Ways} ways
+ * @returns {Child[]}
+ */
+export function queueList(app, groups, ways) {
+  let before = false; // a group with a head
+  return groups.flatMap(({ alike, questions }) => {
+    const many = questions.length > 1;
+    const head = many ? groupHead(app, alike, questions, ways)
+      : before && h('p', { key: 'after ' + alike, class: 'group-end', 'aria-hidden': true });
+    before = many;
+    return [head, ...questions.map((question) => card(app, question, ways))];
+  });
+}
+
+/**
+ * @param {App} app
+ * @param {string} alike
+ * @param {Question[]} questions
+ * @param {Ways} ways
+ */
+function groupHead(app, alike, questions, { answerAlike }) {
+  const [{ state, path, what }] = questions;
+  return h('div', { key: 'head ' + alike, class: 'group-head', role: 'heading', 'aria-level': 2 },
+    h('span', {}, h('strong', {}, counted(questions.length, 'question')), ' alike: ',
+      breakable(path, '/'), '/', breakable(state, '_'), ' ', what),
+    app.mayAnswer && h('button', { class: 'tool', 'data-action': 'alike',
+      onclick: () => answerAlike(alike) }, 'The same answer for these'));
+}
+
+/**
+ * @param {App} app
+ * @param {Question} question
+ * @param {Ways} ways
+ */
+function card(app, question, { isChosen, choose }) {
+  const { key, status, state, robot, path, what, text } = question;
+  const silent = app.liveness.whoIsSilent(question) ? ' silent' : '';
+  const cause = causeOf(text);
+  return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
+    'data-deliberate': 'open ' + key, 'aria-current': isChosen(key),
+    onclick: (/** @type {Event} */ event) => choose(key, wasMeant(event)) },
+  h('span', { class: 'row' }, robotMark(robot), h('span', { class: 'where' }, h('b', {}, robot),
+    h('span', { class: 'dim' }, ' · ', breakable(path, '/'))),
+  h('span', { class: 'spacer' }), statusChip(app, question)),
+  h('span', { class: 'sentence' }, h('strong', {}, breakable(state, '_')), ' ', what),
+  cause && h('span', { class: 'cause', title: cause }, cause),
+  adviceLine(question), severity(question), times(app, question));
+}
+
+/** @param {Question} question */
+function adviceLine(question) {
+  const found = advice(question);
+  if (!found) return null;
+  const { choice: { state, container, helped: [helped, tried] }, why } = found;
+  return h('span', { class: 'advice', title: why },
+    h('strong', {}, '→ ', container && container + '/', breakable(state, '_')), ' ',
+    why ? 'recommended: ' + why : 'led on ' + helped + ' of ' + tried + ' before');
+}
+
+/** @param {Question} question */
+function severity({ class: rank, continuous, rate }) {
+  const words = FAILURE_CLASSES[rank];
+  return h('span', { class: 'chips' },
+    words && chip(words + ' failure rate', 'class-' + rank),
+    continuous && chip('again and again', 'warn', CONTINUOUS),
+    h('span', { class: 'spacer' }),
+    h('span', { title: 'How often it is expected to fail, as learned' },
+      rateBar(rate, undefined, 'est. ' + percent(rate) + ' fail')));
+}
+
+/**
+ * @param {App} app
+ * @param {Question} question
+ */
+function times(app, { asked, deadline, status }) {
+  const now = app.store.now();
+  const left = deadline === null ? Infinity : deadline - now;
+  return h('span', { class: 'row times' },
+    h('span', { class: 'dim' }, (status === 'pending' ? 'waits ' : 'asked ') + duration(now - asked)
+      + (status === 'pending' ? '' : ' ago')),
+    h('span', { class: 'spacer' }),
+    left < Infinity ? h('span', { class: 'left' + (left < URGENT_S ? ' urgent' : '') },
+      duration(left) + ' left') : h('span', { class: 'dim' }, 'no time limit'));
+}
+
+/**
+ * @param {App} app
+ * @param {Question} question
+ */
+function statusChip(app, question) {
+  const { key, status, holder, interface: name } = question;
+  if (status === 'interface') {
+    return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
+  }
+  const mine = app.isMine(question);
+  if (waits(question) && holder) {
+    return chip((mine ? 'yours' : holder) + ' · idle', 'bad',
+      'Whoever holds it has pressed nothing for a while');
+  }
+  if (!holder) return chip(readWords(readersOf(app, key)), 'bad');
+  return mine ? chip('yours', 'good') : chip(holder, 'warn');
+}
+
+/**
+ * What is said of a question that nobody works on.
+ * @param {string[]} readers others who look at it
+ */
+function readWords(readers) {
+  if (!readers.length) return 'waiting';
+  const who = readers.length === 1 ? shortened(readers[0]) + ' reads' : readers.length + ' read';
+  return 'waiting · ' + who;
+}
+
+/** @param {string} name */
+function shortened(name) {
+  return name.length > LONGEST_NAME ? name.slice(0, LONGEST_NAME - 1) + '…' : name;
+}
