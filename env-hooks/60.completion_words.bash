@@ -29,12 +29,15 @@ _smach_oracle_words() {
     'compare variants --by')
       echo 'file folder node host version settings script day' ;;
     'compare what_if')
-      echo '--help --high-from --json --memory --moderate-from --policy --prior --wide -h' ;;
+      echo '--estimator --help --high-from --json --memory --moderate-from --policy --prior
+--wide -h' ;;
+    'compare what_if --estimator')
+      echo 'exponential window' ;;
     'compare what_if --policy')
       echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
 retry step_back' ;;
     'expert_console')
-      echo '--help --version -h' ;;
+      echo '--bags --help --port --stores --version -h' ;;
     'expert_query_server')
       echo '--help --version -h' ;;
     'expert_terminal')
@@ -54,7 +57,7 @@ retry step_back' ;;
     'oracle_disk')
       echo '--delete --help --keep-days --keep-gb --version -h' ;;
     'oracle_run')
-      echo '--check --checkpoint --config --from --help --name --no-nested --policy
+      echo '--check --checkpoint --config --from --help --machine-name --no-nested --policy
 --rates-file --record --record-topic --repeat --resume --resume-map --version
 --without-oracle -h' ;;
     'oracle_run --policy')
@@ -91,11 +94,10 @@ retry step_back' ;;
     'pr2_world')
       echo '--help --version -h' ;;
     'run_trials')
-      echo '--abandon-freeze --answer-delay --benign --estimator --extra-causes --freeze
---frozen --help --high-from --hours --hung-after --jobs --lasting
---max-recoveries --memory --moderate-from --output --plan --policy --prior
---protocol --replicates --scheduler --seed --task --trials --variants --version
---without-tls -h' ;;
+      echo '--answer-delay --benign --estimator --extra-causes --frozen --help --high-from
+--hours --hung-after --jobs --lasting --max-recoveries --memory --moderate-from
+--output --plan --policy --prior --protocol --replicates --scheduler --seed
+--task --trials --variants --version --without-tls -h' ;;
     'run_trials --estimator')
       echo 'exponential window' ;;
     'run_trials --policy')

@@ -25,7 +25,7 @@ GENERATED = {'Reference': ['api']}
 # pages that a sidebar shows below another one, when that one is opened
 BELOW = {
     'commands': ['options'],
-    'console': ['open_console', 'console_security'],
+    'console': ['on_call', 'open_console', 'console_security'],
     'expert': ['many_robots'],
     'install': ['noetic', 'container'],
     'policies': ['ways'],

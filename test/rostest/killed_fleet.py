@@ -144,7 +144,7 @@ class KilledFleet:
                     '--checkpoint',
                     os.path.join(folder, 'robots.db'),
                     '--resume=recover',
-                    '--name',
+                    '--machine-name',
                     'JOB_' + number,
                     os.path.join(HERE, 'killed_robot.py'),
                     folder,

@@ -120,7 +120,10 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
         help='with bags in it or below it; or a bag',
     )
     parser.add_argument(
-        '--figure', metavar='OUT', type=path_of, help='write the time series to OUT.svg and OUT.png'
+        '--figure',
+        metavar='STEM',
+        type=path_of,
+        help='write the time series to STEM.svg and STEM.png',
     )
     parser.add_argument(
         '--columns',
@@ -137,18 +140,18 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     )
     parser.add_argument(
         '--json',
-        metavar='OUT',
+        metavar='FILE',
         type=path_of,
         help='write the table, all trials and the skipped bags as JSON',
     )
     parser.add_argument(
         '--html',
-        metavar='OUT',
+        metavar='FILE',
         type=path_of,
         help='write a report to hand in: one page with all tables, those by state among them, '
         'figures, graphs, and what each word means',
     )
-    parser.add_argument('--csv', metavar='OUT', type=path_of, help='write one line a trial')
+    parser.add_argument('--csv', metavar='FILE', type=path_of, help='write one line a trial')
     parser.add_argument(
         '--by',
         choices=BY,

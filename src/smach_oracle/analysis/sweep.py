@@ -191,7 +191,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare oracles')
         help='with bags in it or below it; or a bag',
     )
     parser.add_argument(
-        '--figure', metavar='OUT', type=path_of, help='write the figure to OUT.svg and OUT.png'
+        '--figure', metavar='STEM', type=path_of, help='write the figure to STEM.svg and STEM.png'
     )
     parser.add_argument(
         '--failing-outcomes',

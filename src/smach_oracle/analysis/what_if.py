@@ -22,6 +22,7 @@ import sys
 import textwrap
 from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence
 
+from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.errors import OracleError
@@ -260,6 +261,9 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
     )
     parser.add_argument('--memory', nargs='+', type=int, metavar='N', help='values to try')
     parser.add_argument('--policy', nargs='+', choices=sorted(POLICIES), help='policies to try')
+    parser.add_argument(
+        '--estimator', nargs='+', choices=sorted(ESTIMATORS), help='of failure rates: those to try'
+    )
     for name in ('moderate_from', 'high_from', 'prior'):
         parser.add_argument(
             '--' + name.replace('_', '-'), nargs='+', type=float, metavar='X', help='values to try'
@@ -268,7 +272,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
         '--wide', action='store_true', help='lines of 150 columns and more in place of 100'
     )
     parser.add_argument(
-        '--json', metavar='OUT', type=path_of, help='write the tables and what was skipped as JSON'
+        '--json', metavar='FILE', type=path_of, help='write the tables and what was skipped as JSON'
     )
     args = parser.parse_args(argv)
     varied = {

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.analysis import bag_statistics
-from smach_oracle.analysis.compare_command.renamed_option import RenamedOption
 from smach_oracle.cluster import ClusterError, WorkerCluster, add_options
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS
 from smach_oracle.oracle.decision.policies import POLICIES
@@ -24,6 +23,7 @@ from smach_oracle.oracle.settings.checks import number, whole
 from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.packages import lacking
+from smach_oracle.renamed_option import RenamedOption
 
 from .freeze import ABANDONED, FROZEN, checkout, run_freeze
 from .job import HUNG_AFTER_S, LONGEST, ExperimentJob
@@ -47,6 +47,7 @@ from .stop_signals import StopRequested
 
 FAILED, LACKING, LOST = 1, 2, 3  # exit codes
 JOBS = 2  # at a time
+FREEZING = 'benchmarks/freeze_seeds.py'  # a script of developers
 DEFAULT_TASK = 'pick_and_place'
 LONGEST_DELAY = 3600.0  # s, of the operator
 COUNT, SEED = whole(1, '1 or more'), whole(0, '0 or more')
@@ -90,21 +91,28 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--trials',
+        metavar='N',
         type=int,
         help='per variant and replicate (default: {})'.format(
             ', '.join('{} of {}'.format(each.trials, task) for task, each in sorted(TASKS.items()))
         ),
     )
     parser.add_argument(
-        '--seed', type=int, default=1, help='of the first trial; the next has the next (default: 1)'
+        '--seed',
+        metavar='N',
+        type=int,
+        default=1,
+        help='of the first trial; the next has the next (default: 1)',
     )
     parser.add_argument(
         '--replicates',
+        metavar='N',
         type=int,
         help='complete repetitions on further seeds, each learns from the beginning (default: 1)',
     )
     parser.add_argument(
         '--jobs',
+        metavar='N',
         type=int,
         help='replicates of variants at a time (default: 2; of a cluster: what its workers take)',
     )
@@ -146,6 +154,7 @@ def make_parser() -> argparse.ArgumentParser:
         parser.add_argument('--' + name.replace('_', '-'), type=kind, metavar='X', help=what)
     parser.add_argument(
         '--answer-delay',
+        metavar='S',
         type=float,
         default=15.0,
         help='s of simulated time that the scripted operator takes, in the median (default: 15)',
@@ -177,20 +186,11 @@ def make_parser() -> argparse.ArgumentParser:
         'as many in all (default: {:.0f})'.format(HUNG_AFTER_S),
     )
     add_options(parser, 'runs the trials, each with a master and a world there')
-    freezing = parser.add_mutually_exclusive_group()
-    freezing.add_argument(
-        '--freeze',
-        metavar='NOTE',
-        help='run nothing: make the evaluation seeds of doc/protocol.md, and log '
-        'that in doc/freezes.csv, with the note',
-    )
-    freezing.add_argument(
-        '--abandon-freeze',
-        metavar='NOTE',
-        help='run nothing: log that the last freeze is abandoned, and why',
-    )
+    for option in ('--freeze', '--abandon-freeze'):  # as the frozen text of the protocol has them
+        parser.add_argument(option, help=argparse.SUPPRESS)
     parser.add_argument(
         '--output',
+        metavar='FOLDER',
         type=lambda text: Path(path_of(text)),
         help='folder: new, empty, or of this experiment, which goes on (default: trials-DATE-TIME)',
     )
@@ -234,6 +234,8 @@ def parse(argv: Optional[List[str]]) -> argparse.Namespace:
                     name, task
                 )
             )
+    if args.freeze is not None and args.abandon_freeze is not None:
+        parser.error('--abandon-freeze: not with --freeze')
     if args.without_tls and not args.scheduler:
         parser.error('--without-tls: name a --scheduler')
     if args.jobs is None and not args.scheduler:
@@ -395,8 +397,15 @@ def limit_text(hung_after_s: float) -> str:
 
 def freeze_seeds(args: argparse.Namespace) -> int:
     """Freeze the protocol, or abandon the last freeze, and return the exit code."""
-    what = ABANDONED if args.freeze is None else FROZEN
-    note = args.abandon_freeze if args.freeze is None else args.freeze
+    abandons = args.freeze is None
+    print(
+        'run_trials: {} is now called {}'.format(
+            *(('--abandon-freeze', FREEZING + ' --abandon') if abandons else ('--freeze', FREEZING))
+        ),
+        file=sys.stderr,
+    )
+    what = ABANDONED if abandons else FROZEN
+    note = args.abandon_freeze if abandons else args.freeze
     try:
         print(run_freeze(checkout(), what, note))
     except (ExperimentError, OSError) as err:

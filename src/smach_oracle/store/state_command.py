@@ -48,7 +48,9 @@ def _parser() -> argparse.ArgumentParser:
         'stopped, and change it before it goes on. Nothing is changed while a program holds the '
         'machine.',
     )
-    parser.add_argument('path', help='the store, as the setting `checkpoint` names it')
+    parser.add_argument(
+        'path', metavar='STORE', help='the store, as the setting `checkpoint` names it'
+    )
     parser.set_defaults(work=_list)
     works = parser.add_subparsers(metavar='WHAT')
     works.add_parser('list', help='all trials (default)').set_defaults(work=_list)

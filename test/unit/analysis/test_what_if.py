@@ -263,6 +263,18 @@ def test_the_command(tmp_path, capsys):
     assert 'no such folder' in capsys.readouterr().err
 
 
+def test_another_estimator_can_be_tried(tmp_path, capsys):
+    record(tmp_path, run(40))
+    capsys.readouterr()
+    assert what_if.main([str(tmp_path), '--estimator', 'window', 'exponential']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    as_recorded, other = (
+        next(line for line in lines if line.startswith('estimator ' + name))
+        for name in ('window', 'exponential')
+    )
+    assert as_recorded.endswith('   0 of 40') and not other.endswith('   0 of 40')
+
+
 def test_the_tables_as_json_are_those_that_are_printed(tmp_path, capsys):
     record(tmp_path / 'bags', run(40))
     capsys.readouterr()

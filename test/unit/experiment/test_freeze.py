@@ -2,6 +2,8 @@
 
 import csv
 import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -134,11 +136,25 @@ def test_a_freeze_says_why(root):
 def test_the_command_freezes_and_runs_nothing(root, monkeypatch, capsys):
     monkeypatch.setattr(command, 'checkout', lambda: root)
     assert command.main(['--freeze', 'the first']) == 0
-    assert last_freeze(root).commit in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert last_freeze(root).commit in told.out
+    assert '--freeze is now called benchmarks/freeze_seeds.py' in told.err
     (root / 'code/one/a.py').write_text('changed')
     assert command.main(['--freeze', 'the second']) == 1
     assert 'not committed' in capsys.readouterr().err
     assert command.main(['--abandon-freeze', 'a fault']) == 0
+
+
+def test_the_script_of_developers_freezes_the_checkout_that_it_lies_in(root):
+    script = Path(__file__).resolve().parents[3] / 'benchmarks/freeze_seeds.py'
+    code = (
+        'import runpy, sys, smach_oracle.experiment.freeze as f; f.checkout = lambda: f.Path.cwd()'
+    )
+    run = [sys.executable, '-c', code + "; runpy.run_path(sys.argv[0], run_name='__main__')"]
+    run[-1] = run[-1].replace('sys.argv[0]', 'sys.argv.pop(1)')
+    for words, frozen in ((['the first'], True), (['--abandon', 'a fault'], False)):
+        subprocess.run([*run, str(script), *words], cwd=str(root), check=True, timeout=60)
+        assert bool(standing_freezes(root)) == frozen
 
 
 def test_the_protocol_names_folders_that_are_there():

@@ -34,6 +34,7 @@ ARROWS: Dict[str, Set[str]] = {
         'bag_format',
         'forking',
         'packages',
+        'renamed_option',
         'smach_common',
         'store',
     },
@@ -46,6 +47,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.records',
         'oracle.settings',
         'packages',
+        'renamed_option',
         'user_cache',
     },
     'interfaces': {
@@ -97,6 +99,7 @@ ARROWS: Dict[str, Set[str]] = {
         'cluster',
         'forking',
         'packages',
+        'renamed_option',
     },
     'tasks': set(),
     'inspection_robot': set(),  # a robot as any ROS user writes it
@@ -122,6 +125,7 @@ ARROWS: Dict[str, Set[str]] = {
     'forking': set(),
     'packages': set(),
     'release': set(),
+    'renamed_option': set(),
     'user_cache': set(),
 }
 ROOMS = sorted(path.parent.name for path in PACKAGE.glob('*/__init__.py'))
@@ -154,6 +158,7 @@ ROS_FREE = [
     'commands',
     'forking',
     'packages',
+    'renamed_option',
     'user_cache',
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}

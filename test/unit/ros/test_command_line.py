@@ -3,7 +3,13 @@
 import pytest
 
 from smach_oracle.ros.oracle_run import options, script_runner
-from smach_oracle.ros.oracle_run.options import OPTIONS_WITH_VALUE, make_parser, parse, split
+from smach_oracle.ros.oracle_run.options import (
+    OLDER_WITH_VALUE,
+    OPTIONS_WITH_VALUE,
+    make_parser,
+    parse,
+    split,
+)
 
 
 @pytest.fixture
@@ -35,7 +41,7 @@ def test_every_option_that_takes_a_value_is_known_to_the_splitter():
         for name in action.option_strings
         if action.nargs not in (0, '?') and name.startswith('--')
     }
-    assert takes_value == set(OPTIONS_WITH_VALUE)
+    assert takes_value == {*OPTIONS_WITH_VALUE, *OLDER_WITH_VALUE}
 
 
 def test_options_become_settings_and_options_of_the_process(script, tmp_path):

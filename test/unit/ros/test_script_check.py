@@ -203,7 +203,7 @@ TWO = "machine('A').execute(); machine('B').execute(); machine('A').execute()"
     'text, options, names',
     [
         (TWO, (), ('TASK', 'TASK_2')),
-        (TWO, ('--name', 'kitchen'), ('kitchen', 'kitchen_2')),
+        (TWO, ('--machine-name', 'kitchen'), ('kitchen', 'kitchen_2')),
         ("rospy.init_node('cook')\n" + TWO, (), ('cook', 'cook_2')),
     ],
 )

@@ -138,7 +138,7 @@ def test_a_program_that_wraps_its_machine_is_told_once_which_options_are_not_in_
 
 
 def test_nothing_is_told_where_no_option_is_out_of_force(run, tmp_path):
-    assert 'in force' not in run(WRAPS_ITSELF, options=['--name', 'TASK']).stdout
+    assert 'in force' not in run(WRAPS_ITSELF, options=['--machine-name', 'TASK']).stdout
     wrapped_here = """
         smach.set_loggers(print, print, print, print)
         top = smach.StateMachine(['succeeded', 'aborted', 'preempted'])
@@ -288,8 +288,8 @@ def test_machines_of_one_structure_share_a_name_and_others_get_their_own(run):
 
 def test_a_name_can_be_given(run):
     text = 'sm = machine(); sm.execute(); print(sm.name)'
-    assert run(text, options=['--name', 'KITCHEN']).stdout == 'KITCHEN\n'
-    refused = run(text, options=['--name', 'a/b'])
+    assert run(text, options=['--machine-name', 'KITCHEN']).stdout == 'KITCHEN\n'
+    refused = run(text, options=['--machine-name', 'a/b'])
     assert refused.returncode == 2 and 'a name without /' in refused.stderr
 
 

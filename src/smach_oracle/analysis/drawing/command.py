@@ -94,7 +94,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare figures')
     parser.add_argument('folder', metavar='FOLDER', type=path_of, help='with rows below it')
     parser.add_argument('former', metavar='OUT', nargs='?', type=path_of, help=argparse.SUPPRESS)
     parser.add_argument(
-        '--output', metavar='OUT', type=path_of, help='folder of the figures and tables'
+        '--output', metavar='FOLDER', type=path_of, help='folder of the figures and tables'
     )
     args = parser.parse_args(argv)
     if (args.output is None) == (args.former is None):

@@ -18,10 +18,10 @@ from typing import List, Optional, Sequence
 
 from smach_oracle.oracle.records.rates_format import write_learned
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.renamed_option import RenamedOption
 
 from ..bag_events import BagError, SkippedBag
 from ..compare_command.inputs import instead_of_bags
-from ..compare_command.renamed_option import RenamedOption
 from ..reading import report_error, report_skipped
 from ..trials import load_replicates
 from .record import MachineRecord, read_record, states_named
@@ -45,7 +45,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     )
     parser.add_argument(
         '--rates-file',
-        metavar='OUT',
+        metavar='FILE',
         type=path_of,
         help='write what was learned to this file, which must not be there yet',
     )

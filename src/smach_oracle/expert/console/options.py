@@ -10,5 +10,22 @@ DESCRIPTION = (
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return the parser. All is set by ROS parameters."""
-    return argparse.ArgumentParser(description=DESCRIPTION)
+    """Return the parser. The rest is set by ROS parameters."""
+    parser = argparse.ArgumentParser(prog='expert_console', description=DESCRIPTION)
+    parser.add_argument(
+        '--port', metavar='N', type=int, help='of the page (default: ~port, else 8090)'
+    )
+    parser.add_argument(
+        '--bags',
+        metavar='FOLDER',
+        action='append',
+        help='recorded trials to replay (default: ~bags); may be given several times',
+    )
+    parser.add_argument(
+        '--stores',
+        metavar='STORE',
+        action='append',
+        help='shows the machines in it whose program has stopped (default: ~stores); may be given '
+        'several times',
+    )
+    return parser

@@ -5,8 +5,9 @@ import socket
 import ssl
 import threading
 import time
+from functools import partial
 from pathlib import Path
-from typing import List, Optional
+from typing import List, Mapping, Optional
 
 import rospy
 import tornado.ioloop
@@ -14,7 +15,7 @@ import tornado.netutil
 import tornado.web
 
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.ros.command_line import init_beside_others, parameters_only
+from smach_oracle.ros.command_line import init_beside_others
 from smach_oracle.ros.master_watch import start_master_watch
 
 from ..front_end import FrontEnd
@@ -31,7 +32,7 @@ from .answering.teleoperation import Teleoperation
 from .commands.commands import MOST_BYTES
 from .feeds.node_pulse import NodePulse
 from .graphs.layout_worker import LayoutWorker
-from .options import DESCRIPTION
+from .options import make_parser
 from .page_socket import OpenPages, PageSocket
 from .reach.on_call import read_on_call
 from .reach.reach import Reach
@@ -286,19 +287,21 @@ def _shown(address: str) -> str:
     return '[{}]'.format(address) if ':' in address else address
 
 
-def _parameter(name: str, default: object) -> object:
-    value: object = rospy.get_param('~' + name, default)
+def parameter(options: Mapping[str, object], name: str, default: object) -> object:
+    """Return the value of an option, else of the parameter of its name, else the default."""
+    given = options.get(name)
+    value: object = rospy.get_param('~' + name, default) if given is None else given
     return value
 
 
 def main() -> None:
     """Entry point of the node `expert_console`."""
-    parameters_only(DESCRIPTION)
+    options = vars(make_parser().parse_args(rospy.myargv()[1:]))
     init_beside_others('expert_console')
     start_master_watch()
     tornado.ioloop.IOLoop.current()
     try:
-        console = Console(read_settings(_parameter))
+        console = Console(read_settings(partial(parameter, options)))
     except SettingsError as err:
         rospy.logfatal('%s', err)
         raise SystemExit(2) from err

@@ -6,12 +6,13 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tup
 
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.renamed_option import RenamedOption
 
 USAGE = 'oracle_run [options] SCRIPT [arguments of the script]'
 NONE = 'none'  # what a launch file gives for a script that nobody has named
 OPTIONS_WITH_VALUE = (
     '--config',
-    '--name',
+    '--machine-name',
     '--policy',
     '--rates-file',
     '--record',
@@ -21,6 +22,7 @@ OPTIONS_WITH_VALUE = (
     '--resume-map',
     '--repeat',
 )
+OLDER_WITH_VALUE = ('--name',)
 # those that a machine gets when `oracle_run` wraps it
 _OPTIONS_OF_WRAPPING = (
     '--config',
@@ -63,7 +65,7 @@ def split(args: Sequence[str]) -> CommandLine:
             return CommandLine(options, word, rest + remappings)
         else:
             options.append(word)
-            if word in OPTIONS_WITH_VALUE and rest:
+            if word in OPTIONS_WITH_VALUE + OLDER_WITH_VALUE and rest:
                 options.append(rest.pop(0))
     return CommandLine(options, None, remappings)
 
@@ -84,7 +86,17 @@ def make_parser() -> argparse.ArgumentParser:
         '--rates-file', metavar='FILE', help='keep learned failure rates in this file across runs'
     )
     parser.add_argument(
-        '--name', default='', help="name of the first machine (default: the node's)"
+        '--machine-name',
+        metavar='NAME',
+        default='',
+        help="name of the first machine (default: the node's)",
+    )
+    parser.add_argument(
+        '--name',
+        dest='machine_name',
+        default=argparse.SUPPRESS,
+        action=RenamedOption,
+        help=argparse.SUPPRESS,
     )
     parser.add_argument('--no-nested', action='store_true', help='wrap the top-level machines only')
     parser.add_argument(
@@ -109,8 +121,8 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         '--checkpoint',
-        metavar='FILE',
-        help='store in this file where the machines stand, to go on from there after a crash',
+        metavar='STORE',
+        help='keep in this file where the machines stand, to go on from there after a crash',
     )
     parser.add_argument(
         '--resume',
@@ -181,8 +193,8 @@ def parse(args: Sequence[str]) -> Invocation:
     line = split(args)
     parser = make_parser()
     given = parser.parse_args(line.options)
-    if '/' in given.name:
-        parser.error('--name {}: a name without / is wanted'.format(given.name))
+    if '/' in given.machine_name:
+        parser.error('--machine-name {}: a name without / is wanted'.format(given.machine_name))
     if line.script is None or line.script == NONE:
         parser.error(
             'no script is given: name it after the options, or with script:=FILE under roslaunch'
@@ -208,7 +220,7 @@ def parse(args: Sequence[str]) -> Invocation:
         not given.without_oracle,
         record,
         tuple(given.record_topic),
-        given.name,
+        given.machine_name,
         given.check,
         [each for each in _OPTIONS_OF_WRAPPING if each in _names_of(line.options)],
     )
