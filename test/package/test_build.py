@@ -75,6 +75,12 @@ def test_every_command_is_installed_for_rosrun(installed):
     assert commands == {path.name for path in (installed / 'installed/lib/smach_oracle').iterdir()}
 
 
+def test_the_commands_for_users_are_on_the_path(installed):
+    where = in_installed(installed, 'command -v oracle_run; oracle_run --version').splitlines()
+    assert where[0] == str(installed / 'installed/bin/oracle_run')
+    assert where[1].startswith('oracle_run of smach_oracle ')
+
+
 def test_help_points_to_a_page_that_is_installed_with_all_that_it_links_to(installed):
     share = installed / 'installed/share/smach_oracle'
     shown = in_installed(installed, 'rosrun smach_oracle oracle_disk --help')

@@ -2,12 +2,22 @@
 
 import ast
 import functools
+import re
 import subprocess
 from pathlib import Path
 from typing import Iterator, List, Tuple
 
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ('src', 'scripts', 'test', 'benchmarks', 'examples', 'cmake')
+# the commands that catkin also puts into bin/, which is on the PATH
+ON_PATH = (
+    re.findall(
+        r'^foreach\(command([\s\w]+)\)\n  catkin_install_python\(PROGRAMS scripts/\$\{command\} '
+        r'DESTINATION \$\{CATKIN_GLOBAL_BIN_DESTINATION\}\)',
+        (ROOT / 'CMakeLists.txt').read_text(encoding='utf-8'),
+        re.MULTILINE,
+    )[0]
+).split()
 
 
 def is_python(path: Path) -> bool:

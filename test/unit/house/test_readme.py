@@ -10,7 +10,7 @@ import sys
 import xml.etree.ElementTree as ElementTree
 
 import pytest
-from house import ROOT, shown
+from house import ON_PATH, ROOT, shown
 
 README = (ROOT / 'README.md').read_text(encoding='utf-8')
 DOCUMENTS = [ROOT / 'README.md', ROOT / 'CONTRIBUTING.md'] + sorted((ROOT / 'doc').glob('**/*.md'))
@@ -26,7 +26,7 @@ def command_lines():
         for line in block.splitlines():
             words = shlex.split(line, comments=True)
             if words:
-                yield words
+                yield ['rosrun', 'smach_oracle', *words] if words[0] in ON_PATH else words
 
 
 def run_python(*arguments):

@@ -3,7 +3,7 @@
 The trials are of one machine, under a policy that goes by ways: escalating, any_way or learned. The
 rates of its states and what their ways have led to go to a file, with which a machine begins:
 
-    rosrun smach_oracle learn bags --rates-file model.json
+    learn bags --rates-file model.json
 
 The setting `rates_file: model.json` has it go on from there.
 

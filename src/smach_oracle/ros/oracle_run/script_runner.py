@@ -1,4 +1,4 @@
-"""Run an unmodified SMACH script under an oracle: `rosrun smach_oracle oracle_run SCRIPT`.
+"""Run an unmodified SMACH script under an oracle: `oracle_run SCRIPT`.
 
 All state machines of the script are wrapped. It runs as `python3 SCRIPT` would run it: __main__,
 __file__, sys.argv, sys.path[0], exit code and tracebacks are its own.
