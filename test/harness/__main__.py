@@ -11,7 +11,6 @@ import fnmatch
 import signal
 import sys
 import time
-from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Dict, List, Optional
 
@@ -26,30 +25,27 @@ from checks import (
     upstream_checks,
 )
 from processes import Runner
-from report import Outcome, on_upstream, second_attempts, show, write_junit
+from report import Outcome, on_upstream, second_attempts, write_junit
+from schedule import GROUPS, ROWS, run_side_by_side
 from upstream import UpstreamError, environment
 
 ROOT = Path(__file__).resolve().parents[2]
-# what may run side by side: rostests wait most of their time, benchmarks must be alone
-JOBS = {'lint': 2, 'unit': 2, 'ros': 2, 'upstream': 2, 'package': 1, 'bench': 1}
 
 
 def find_checks(group: str, upstream: Optional[Path], python: Optional[Path]) -> Dict[str, Check]:
     """The checks of one group, by name."""
     if python is not None:
-        return pytest_checks(
-            ROOT, 'unit', by_folder=True, python=str(python), env=interpreter.environment(python)
-        )
+        return pytest_checks(ROOT, 'unit', python=str(python), env=interpreter.environment(python))
     if group == 'upstream':
         return upstream_checks(ROOT, upstream) if upstream is not None else {}
     if group == 'lint':
         return lint_checks(ROOT)
     if group == 'unit':
-        return pytest_checks(ROOT, 'unit', by_folder=True)
+        return pytest_checks(ROOT, 'unit')
     if group == 'ros':
         return rostest_checks(ROOT)
     if group == 'package':
-        return pytest_checks(ROOT, 'package', by_folder=False)
+        return pytest_checks(ROOT, 'package')
     return benchmark_checks(ROOT)
 
 
@@ -62,22 +58,6 @@ def select(checks: Dict[str, Check], pattern: str) -> Dict[str, Check]:
     }
 
 
-def run_group(checks: Dict[str, Check], bench: Bench, jobs: int) -> List[Outcome]:
-    """Run `checks`, `jobs` at a time, showing each as it ends."""
-    outcomes = []
-    with ThreadPoolExecutor(max_workers=jobs) as pool:
-        futures = [pool.submit(check, bench) for check in checks.values()]
-        try:
-            for future in as_completed(futures):
-                outcomes.append(future.result())
-                show(outcomes[-1])
-                sys.stdout.flush()
-        except KeyboardInterrupt:
-            bench.runner.stop()
-            raise
-    return outcomes
-
-
 def parse_arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog='scripts/test', description='Set up, then check everything.'
@@ -85,7 +65,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         'group',
         nargs='?',
-        choices=sorted(JOBS) + ['all'],
+        choices=GROUPS + ['all'],
         default='all',
         help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
         'upstream: on the engine of --upstream; package: build and install; bench: limits on '
@@ -97,7 +77,7 @@ def parse_arguments() -> argparse.Namespace:
         default='',
         help='only checks with this in their name; * is a wildcard',
     )
-    parser.add_argument('--jobs', type=int, help='checks at a time (default: 2, benchmarks 1)')
+    parser.add_argument('--jobs', type=int, help='checks at a time (default: 3, benchmarks 1)')
     parser.add_argument(
         '--upstream',
         metavar='PATH',
@@ -147,13 +127,16 @@ def main() -> int:
     started = time.monotonic()
     outcomes: List[Outcome] = []
     try:
-        for group in JOBS if arguments.group == 'all' else [arguments.group]:
-            checks = select(
-                find_checks(group, arguments.upstream, arguments.python), arguments.pattern
-            )
+        for row in ROWS:
+            checks: Dict[str, Check] = {}
+            for group in row.groups:
+                if arguments.group in ('all', group):
+                    checks.update(find_checks(group, arguments.upstream, arguments.python))
+            checks = select(checks, arguments.pattern)
             if checks:
-                print('--- {}'.format(group))
-                outcomes += run_group(checks, bench, arguments.jobs or JOBS[group])
+                jobs = arguments.jobs or row.jobs
+                print('--- {} checks, {} at a time'.format(len(checks), jobs))
+                outcomes += run_side_by_side(checks, bench, jobs)
     except KeyboardInterrupt:
         print('interrupted; what ran has been stopped')
         return 130

@@ -37,11 +37,16 @@ class Bench:
         """Run one command that passes or fails as a whole."""
         log = self.results / 'log' / (name.replace('/', '_').replace(' ', '_') + '.log')
         started = time.monotonic()
-        problem = self.runner.run(command, log, timeout_s, self.root, env)
-        outcome = Outcome(name, seconds=time.monotonic() - started, log=str(log))
-        if problem:
+        ended = self.runner.run(command, log, timeout_s, self.root, env)
+        outcome = Outcome(
+            name,
+            seconds=time.monotonic() - started,
+            processor_s=ended.processor_s,
+            log=str(log),
+        )
+        if ended.problem:
             outcome.failed = 1
-            outcome.detail = '{}\n{}'.format(tail_of(log), problem)
+            outcome.detail = '{}\n{}'.format(tail_of(log), ended.problem)
         else:
             outcome.passed = 1
         return outcome
@@ -83,21 +88,16 @@ def _roslaunch_check() -> str:
 def pytest_checks(
     root: Path,
     folder: str,
-    by_folder: bool,
     python: str = sys.executable,
     env: Optional[Dict[str, str]] = None,
 ) -> Dict[str, Check]:
-    """pytest on test/FOLDER, as one check or as one per folder and file in it.
+    """pytest on test/FOLDER, as one check for each folder and file in it.
 
     :param python: the interpreter that it runs under, with the variables `env`.
     """
     top = root / 'test' / folder
-    parts = (
-        sorted({path.relative_to(top).parts[0] for path in top.rglob('test_*.py')})
-        if by_folder
-        else ['']
-    )
-    names = ['/'.join(filter(None, [folder, part])) for part in parts]
+    parts = sorted({path.relative_to(top).parts[0] for path in top.rglob('test_*.py')})
+    names = ['{}/{}'.format(folder, part) for part in parts]
     return {name: partial(_pytest, name, env=env, python=python) for name in names}
 
 
@@ -125,7 +125,9 @@ def _pytest(
 
 def _with_junit(outcome: Outcome, results: List[Path]) -> Outcome:
     """Replace the count of one command by the counts of the cases it reported."""
-    counted = Outcome(outcome.name, seconds=outcome.seconds, log=outcome.log)
+    counted = Outcome(
+        outcome.name, seconds=outcome.seconds, processor_s=outcome.processor_s, log=outcome.log
+    )
     read_junit([path for path in results if path.exists()], counted)
     if outcome.failed and not counted.failed:
         # it died, or failed outside every case
@@ -175,6 +177,7 @@ def _at_most_twice(attempt: Attempt, bench: Bench) -> Outcome:
     second = attempt()
     second.attempts = 2
     second.seconds += first.seconds
+    second.processor_s += first.processor_s
     second.note = '{} at the second attempt; the first:\n{}\nlog: {}'.format(
         'passed' if second.ok else 'failed', first.detail.rstrip(), first_log
     )

@@ -12,11 +12,18 @@ import threading
 import time
 import uuid
 from pathlib import Path
-from typing import Dict, List, Optional
+from typing import Dict, List, NamedTuple, Optional
 
 MARK = 'SMACH_ORACLE_CHECK'
 # roslaunch alone would wait 15 s for a node that does not listen
 STOP_GRACE_S = 5.0
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    problem: str  # '' on success, else what went wrong
+    processor_s: float  # user and system time, of the command and of all that it has waited for
 
 
 class Runner:
@@ -34,14 +41,14 @@ class Runner:
         timeout_s: float,
         cwd: Path,
         env: Optional[Dict[str, str]] = None,
-    ) -> str:
-        """Run `command` with its output in `log`. Return '' on success, else what went wrong."""
+    ) -> Ended:
+        """Run `command` with its output in `log`."""
         mark = uuid.uuid4().hex
         log.parent.mkdir(parents=True, exist_ok=True)
         with log.open('wb') as output:
             with self._lock:
                 if self.stopped:
-                    return 'interrupted'
+                    return Ended('interrupted', 0.0)
                 process = subprocess.Popen(
                     command,
                     stdout=output,
@@ -53,7 +60,7 @@ class Runner:
                 )
                 self._running.append(process)
         try:
-            problem = _wait(process, timeout_s)
+            ended = _wait(process, timeout_s)
         finally:
             with self._lock:
                 self._running.remove(process)
@@ -61,7 +68,7 @@ class Runner:
         if left:
             with log.open('a') as output:
                 output.write('\nleft behind, and killed:\n  {}\n'.format('\n  '.join(left)))
-        return 'interrupted' if self.stopped else problem
+        return ended._replace(problem='interrupted') if self.stopped else ended
 
     def stop(self) -> None:
         """End what runs, as Ctrl-C would, or by force where that takes long; start nothing any
@@ -80,22 +87,47 @@ class Runner:
                 _signal(process, signal.SIGKILL)
 
 
-def _wait(process: subprocess.Popen, timeout_s: float) -> str:
-    try:
-        status = process.wait(timeout_s)
-    except subprocess.TimeoutExpired:
+def _wait(process: subprocess.Popen, timeout_s: float) -> Ended:
+    in_time = _has_ended(process, timeout_s)
+    if not in_time:
         # roslaunch needs a while to take its nodes down one after the other
         for number, grace_s in ((signal.SIGINT, 20.0), (signal.SIGKILL, 5.0)):
             _signal(process, number)
-            try:
-                process.wait(grace_s)
+            if _has_ended(process, grace_s):
                 break
-            except subprocess.TimeoutExpired:
-                continue
-        return 'not done after {:g} s'.format(timeout_s)
+    processor_s = _processor_s(process.pid)
+    if not in_time:
+        process.poll()
+        return Ended('not done after {:g} s'.format(timeout_s), processor_s)
+    status = process.wait()
     if status < 0:
-        return 'killed by {}'.format(signal.Signals(-status).name)
-    return 'exit status {}'.format(status) if status else ''
+        return Ended('killed by {}'.format(signal.Signals(-status).name), processor_s)
+    return Ended('exit status {}'.format(status) if status else '', processor_s)
+
+
+def _has_ended(process: subprocess.Popen, timeout_s: float) -> bool:
+    """Wait for it, and leave it to be read in /proc what it has used."""
+    deadline = time.monotonic() + timeout_s
+    while process.returncode is None:
+        try:
+            if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
+                break
+        except ChildProcessError:
+            break  # `Runner.stop` has seen its end
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True
+
+
+def _processor_s(pid: int) -> float:
+    try:
+        stat = Path('/proc', str(pid), 'stat').read_text('utf-8')
+    except OSError:
+        return 0.0
+    # behind the name: the times of itself and of its children, user and system, are 14 to 17
+    ticks = [int(each) for each in stat.rsplit(')', 1)[1].split()[11:15]]
+    return sum(ticks) / os.sysconf('SC_CLK_TCK')
 
 
 def _signal(process: subprocess.Popen, number: int) -> None:

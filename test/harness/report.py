@@ -15,6 +15,7 @@ class Outcome:
     failed: int = 0
     skipped: int = 0
     seconds: float = 0.0
+    processor_s: float = 0.0  # user and system time of all its processes
     detail: str = ''
     note: str = ''  # what is to be seen of a check that passed
     attempts: int = 1
@@ -74,8 +75,12 @@ def show(outcome: Outcome) -> None:
     for count, word in ((outcome.failed, 'failed'), (outcome.skipped, 'skipped')):
         counts += ', {} {}'.format(count, word) if count else ''
     print(
-        '{} {:<44} {:>6.1f} s  {}'.format(
-            'ok  ' if outcome.ok else 'FAIL', outcome.name, outcome.seconds, counts
+        '{} {:<44} {:>6.1f} s {:>6.1f} CPU s  {}'.format(
+            'ok  ' if outcome.ok else 'FAIL',
+            outcome.name,
+            outcome.seconds,
+            outcome.processor_s,
+            counts,
         )
     )
     if not outcome.ok:

@@ -13,8 +13,16 @@ from waiting import wait_for
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
 import checks
+import schedule
 import upstream
-from checks import Bench, benchmark_checks, rostest_checks, upstream_checks
+from checks import (
+    Bench,
+    benchmark_checks,
+    lint_checks,
+    pytest_checks,
+    rostest_checks,
+    upstream_checks,
+)
 from processes import Runner, kill_marked
 from report import (
     Outcome,
@@ -99,6 +107,69 @@ def test_nothing_is_left_running_even_what_left_its_process_group(bench):
     bench.run('detached', [sys.executable, '-c', DETACHED.format('61.' + UNIQUE, 'pass')], 20.0)
     assert not sleeping('61.' + UNIQUE)
     assert 'left behind, and killed' in (bench.results / 'log/detached.log').read_text()
+
+
+BURN = """
+import subprocess, sys, time
+while time.process_time() < 0.3: pass
+if sys.argv[1:]: subprocess.run([sys.executable, '-c', sys.argv[1]])
+"""
+
+
+def test_the_processor_time_is_that_of_the_command_and_of_all_that_it_waits_for(bench):
+    alone = bench.run('alone', [sys.executable, '-c', BURN], 20.0)
+    two = bench.run('two', [sys.executable, '-c', BURN, BURN], 20.0)
+    idle = bench.run('idle', ['sleep', '0.5'], 20.0)
+    assert alone.processor_s > 0.25 and two.processor_s > alone.processor_s + 0.2
+    assert idle.seconds >= 0.5 and idle.processor_s < 0.2
+    hung = bench.run('hung', [sys.executable, '-c', BURN + 'time.sleep(60)'], 3.0)
+    assert not hung.ok and hung.processor_s > 0.1
+
+
+def test_the_first_computes_the_second_waits_and_the_third_does_nothing_else():
+    names = ['ruff', 'rostest/a', 'unit/x', 'unit/y', 'rostest/b', 'upstream/rostest/c']
+    queues = schedule.Queues(names)
+    first, second, third = schedule.THREE_WORKERS
+    assert [queues.take(each) for each in (first, second, third)] == ['ruff', *names[1:5:3]]
+    assert [queues.take(each) for each in (third, third)] == [names[5], '']
+    assert [queues.take(each) for each in (second, first, first)] == ['unit/x', 'unit/y', '']
+    queues = schedule.Queues(names[:2])
+    assert [queues.take(first) for _ in range(3)] == ['ruff', 'rostest/a', '']
+
+
+def test_the_longest_begin_and_each_runs_once():
+    names = ['a', *reversed(schedule.LONGEST)]
+    queues = schedule.Queues(names)
+    taken = list(iter(lambda: queues.take([schedule.COMPUTES, schedule.WAITS]), ''))
+    assert sorted(taken) == sorted(names) and taken[0] == schedule.LONGEST[0]
+    assert [name for name in taken if name in schedule.LONGEST][-1] == schedule.LONGEST[-1]
+
+
+def test_the_longest_are_checks_that_there_are():
+    there = {
+        **lint_checks(ROOT),
+        **pytest_checks(ROOT, 'unit'),
+        **pytest_checks(ROOT, 'package'),
+        **rostest_checks(ROOT),
+    }
+    assert schedule.LONGEST and set(schedule.LONGEST) <= set(there)
+
+
+def test_checks_run_side_by_side_and_all_are_told(bench, capsys):
+    barrier = threading.Barrier(3, timeout=20.0)
+
+    def check(name):
+        def run(_):
+            barrier.wait()
+            return Outcome(name, passed=1)
+
+        return run
+
+    checks_of = {name: check(name) for name in ('unit/x', 'rostest/a', 'rostest/b')}
+    outcomes = schedule.run_side_by_side(checks_of, bench, 3)
+    assert {each.name for each in outcomes} == set(checks_of)
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in checks_of)
 
 
 def test_an_interrupt_ends_what_runs_and_starts_nothing_more(bench):

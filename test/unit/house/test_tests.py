@@ -14,6 +14,7 @@ SLEEPS = ('sleep', 'wallsleep', 'Timer')
 # helpers that look again and again, each with a deadline: by file and function
 POLLS = {
     ('processes.py', 'stop'),
+    ('processes.py', '_has_ended'),
     ('processes.py', 'kill_marked'),
     ('waiting.py', 'wait_for'),
     ('waiting.py', 'wait_in_loop'),

@@ -74,7 +74,7 @@ class Copy:
             limit_s,
             self.folder,
             dict(env, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE='1', PYTHONHASHSEED='0'),
-        )
+        ).problem
         if problem == 'interrupted':
             raise KeyboardInterrupt
         if problem in NOT_RUN:
