@@ -9,10 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from expert_fixtures import make_question
 from fake_trials import play
 from geometry_msgs.msg import PointStamped, Vector3
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import BatteryState, JointState
 from std_msgs.msg import Header
 
 from smach_oracle.analysis.graphs.container_graph import (
@@ -43,6 +44,7 @@ from smach_oracle.expert.console.reach.reach import Reach
 from smach_oracle.expert.console.reach.secret_file import Secret
 from smach_oracle.expert.console.robots.down_machines import DownMachines
 from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
+from smach_oracle.expert.console.robots.robot_health import RobotHealth
 from smach_oracle.expert.console.sensors import sample_handlers
 from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
 from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
@@ -229,6 +231,17 @@ def put_down(sections):
         DownMachines([path, folder + '/none.db'], sections).look()
 
 
+def put_health(sections):
+    """One robot with a battery and a part that has failed, one with neither."""
+    health = RobotHealth()
+    health.on_battery('/alpha/battery', BatteryState(percentage=0.5, voltage=math.nan))
+    health.on_diagnostics(
+        '/diagnostics', DiagnosticArray(status=[DiagnosticStatus(level=2, name='alpha: motor')])
+    )
+    health.write_sections(sections, ['/alpha', '/beta'])
+    assert sections.get('health')['/alpha']['problems']
+
+
 def put_machines(sections):
     """A robot that is only heard, without a layout, and one container with it."""
     alpha = FollowedRobot('/alpha')
@@ -263,6 +276,7 @@ def put_machines(sections):
     )
     alpha.write_sections(sections, NoLayouter())
     put_down(sections)
+    put_health(sections)
     structure = ContainerGraph('TASK', ('A',), ('done',), (GraphEdge('A', 'ok', 'done'),), 'ORACLE')
     place = (1.0, 2.0, 3.0, 4.0)
     curve = ([(1.0, 2.0), (3.0, 4.0)], (5.0, 6.0))

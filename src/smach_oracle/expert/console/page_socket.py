@@ -37,6 +37,7 @@ LONGEST_UNSEEN_S = 60.0
 MOST_AT_WORK = 8
 MOST_EVENTS_AT_ONCE = 500
 LONGEST_DRIVE = 2000
+LONGEST_STOP = 16384  # of many robots
 NAME_FIRST = 'say your name first: the robot and the records have it'
 TOO_FAST = 4008
 FORGED = 4003
@@ -199,7 +200,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         if not self._bucket(message).take():
             if not self._limits.unruly.take():
                 if _only_stops(message):
-                    self._at_once(parse(message))  # no limit holds it up
+                    self._stop_at_last(parse(message))  # no limit holds it up
                 self.end(TOO_FAST, 'too many commands')
                 return
             if not _only_stops(message):
@@ -220,6 +221,11 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             return
         self._at_work += 1
         self._begin(self._in_turn(command))
+
+    def _stop_at_last(self, command: PageCommand) -> None:
+        """Obey the last command of a page that is closed: it stops something."""
+        if self._at_once(command) is None:
+            self._begin(self._stop_machine(command))
 
     def _begin(self, work: Coroutine[Any, Any, None]) -> None:
         task = asyncio.get_running_loop().create_task(work)
@@ -414,7 +420,7 @@ def _by_anybody(command: PageCommand) -> bool:
 
 def _only_stops(message: Union[str, bytes]) -> bool:
     """Whether a message is a command that can only stop something."""
-    if len(message) > LONGEST_DRIVE:
+    if len(message) > LONGEST_STOP:
         return False
     try:
         command = parse(message)

@@ -40,6 +40,7 @@ from .robots.down_machine_hand import DownMachineHand
 from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
 from .robots.machine_hand import MachineHand
+from .robots.robot_health import RobotHealth
 from .sensors.images import NO_PICTURES, cv2
 from .sensors.question_images import ImageStore, QuestionImages
 from .sensors.robot_clocks import ImageAges, RobotClocks
@@ -131,6 +132,7 @@ class Console:
         self._robots = FollowedRobots(
             self._sections, self._log, layouts, self._clocks, stop_calls.look_up
         )
+        self._health = RobotHealth()
         self._down = DownMachines(settings.stores, self._sections)
         self._front_end = FrontEnd('expert_console')
         self._discovery = SensorDiscovery(self._sections, self._front_end, settings.cameras)
@@ -206,6 +208,7 @@ class Console:
         self._teleoperation.start()
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
         repeat(self._down.look, ROBOTS_PERIOD_S)
+        repeat(self._health.discover, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
         if self._reach is not None:
             repeat(self._reach.look, REACH_PERIOD_S)
@@ -227,9 +230,9 @@ class Console:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)
             self._pages.write_trials()
-            self._discovery.cameras.write_sections(
-                self._sections, {*self._robots.nodes(), *(each.goal.robot for each in questions)}
-            )
+            robots = {*self._robots.nodes(), *(each.goal.robot for each in questions)}
+            self._discovery.cameras.write_sections(self._sections, robots)
+            self._health.write_sections(self._sections, robots)
 
 
 def _listen(settings: ConsoleSettings) -> List[socket.socket]:

@@ -31,6 +31,7 @@ SECTIONS = {
     'images',
     'robots',
     'down',
+    'health',
     'trials',
     'bags',
     'sensors',

@@ -54,6 +54,20 @@ def text(longest: int, least: int = 0) -> Check:
     return check
 
 
+def texts(most: int, longest: int) -> Check:
+    """Return a check that admits a list of at most `most` texts, none of them empty."""
+    one = text(longest, 1)
+
+    def check(value: object) -> List[str]:
+        if not isinstance(value, list) or len(value) > most:
+            raise ValueError(
+                '{} is not allowed; allowed: a list of at most {} texts'.format(shown(value), most)
+            )
+        return [one(each) for each in value]
+
+    return check
+
+
 def one_of(allowed: Tuple[str, ...]) -> Check:
     """Return a check that admits a few words."""
     return _argument(checks.choice(allowed))

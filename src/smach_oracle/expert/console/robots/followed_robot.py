@@ -13,14 +13,17 @@ from smach_oracle.analysis.graphs.container_graph import (
     structure_from_counts,
 )
 from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
+from smach_oracle.oracle.records.short_text import shortened
 
+from ...wording import event_words
 from ..feeds.control_view import MachineView, control_view
-from ..feeds.views import number, rates_view
+from ..feeds.views import event_of, number, rates_view
 from ..graphs.layout_worker import LayoutWorker
 from ..web.sections import PageSections
 from .same_machine import Source
 
 MOST_CONTAINERS = 200
+LONGEST_WORDS = 200
 _LEAVES_ORACLE = (
     OracleEvent.JUMP,
     OracleEvent.SUPERSEDE,
@@ -49,6 +52,7 @@ class FollowedRobot:
         self._counts: Dict[str, List[List[Any]]] = {}
         self._trial = ''
         self._unwell = ''  # why it waits until it is well
+        self._last: Optional[Dict[str, Any]] = None  # what it said last, and when
         # how its machines stand. None means they cannot be held
         self.machines: Optional[List[MachineView]] = None
 
@@ -104,9 +108,13 @@ class FollowedRobot:
 
     def on_event(self, message: OracleEvent) -> None:
         """The path that is taken, and where it failed."""
+        event = event_of(message)
+        words, time_s = event_words(event), event.wall_time
         with self._lock:
             self.learns = True
             self._trial = message.trial_id
+            if words:
+                self._last = {'words': shortened(words, LONGEST_WORDS), 'at': time_s}
             self._take_health(message)
             if message.kind == OracleEvent.TRIAL_START:
                 self._failed.clear()
@@ -139,6 +147,7 @@ class FollowedRobot:
                 'trial': self._trial,
                 'alive': self.alive,
                 'unwell': self._unwell,
+                'last': self._last,
                 'active': dict(self._active),
                 'latest': dict(self._latest),
                 'failed': dict(self._failed),

@@ -17,7 +17,7 @@ from smach_oracle.srv import (
 
 from ...stop_calls import StopCalls, in_thread
 from ..commands.commands import CommandReply, PageCommand
-from ..commands.holding import MACHINE_STARTS
+from ..commands.holding import MACHINE_STARTS, MANY_STOPPED
 from ..web.audit import Audit, Person
 
 MOST_AT_ONCE = 4  # equal stops that are under way: a robot that hangs needs no more of them
@@ -31,6 +31,7 @@ SERVICES = {
 }
 NO_HAND = 'There is no robot {} here whose machines can be held.'
 NO_MACHINE = 'There is no machine {} of {} here.'
+MANY_TOLD = 'Asked to {}: {} of {}.'
 NO_ANSWER = '{} has not answered within {:.0f} s: whether it has heard that is not known.'
 # by robot the paths of its containers
 Holdable = Callable[[], Mapping[str, Collection[str]]]
@@ -64,9 +65,29 @@ class MachineHand:
 
     async def stop(self, command: PageCommand, person: Person) -> CommandReply:
         """Stop or pause, whatever else is at work. It is called in the loop."""
-        reply = await self._stop(command, _by(person))
+        many = MANY_STOPPED.get(command.name)
+        by = _by(person)
+        reply = await (self._stop_many(command, many, by) if many else self._stop(command, by))
         self._note(command, person, reply)
         return reply
+
+    async def _stop_many(self, command: PageCommand, each_is_sent: str, by: str) -> CommandReply:
+        """Stop or pause several robots at once: none of them waits for another."""
+        robots = sorted(set(command.arguments['robots']) or self._holdable())
+        stops = [
+            PageCommand(command.number, each_is_sent, {'robot': robot, 'path': ''})
+            for robot in robots
+        ]
+        replies = await asyncio.gather(*(self._stop(stop, by) for stop in stops))
+        refused = [
+            '{}: {}'.format(robot, reply.message)
+            for robot, reply in zip(robots, replies)
+            if not reply.ok
+        ]
+        count = len(robots) - len(refused)
+        word = 'stop' if each_is_sent == 'stop_machine' else 'pause'
+        told = MANY_TOLD.format(word, count, len(robots))
+        return CommandReply(bool(robots) and not refused, ' '.join([told, *refused]))
 
     async def _stop(self, command: PageCommand, by: str) -> CommandReply:
         robot = command.arguments['robot']

@@ -166,6 +166,8 @@ def test_viewers_may_only_look_and_stop():
         'stop_hand',
         'stop_machine',
         'pause_machine',
+        'stop_robots',
+        'pause_robots',
     }
     assert {needed_role(name) for name in COMMANDS} == {'viewer', 'operator', 'teleoperator'}
     assert {name for name in COMMANDS if needed_role(name) == 'teleoperator'} == {
@@ -200,6 +202,7 @@ def test_no_command_names_a_topic_a_service_or_a_type():
         'container',
         'seen',
         'robot',
+        'robots',
         'path',
         'pattern',
         'remove',
@@ -209,3 +212,11 @@ def test_no_command_names_a_topic_a_service_or_a_type():
         'key',
         'json',
     }
+
+
+def test_robots_to_stop_are_a_list_of_names_and_none_means_all():
+    assert parse(text(do='stop_robots', robots=[])).arguments == {'robots': []}
+    assert parse(text(do='pause_robots', robots=['/a', '/b'])).arguments['robots'] == ['/a', '/b']
+    for wrong in (None, '/a', {}, [''], [1], ['/a'] * 201, ['x' * 401], [['/a']]):
+        with pytest.raises(CommandError):
+            parse(text(do='stop_robots', robots=wrong))

@@ -125,6 +125,50 @@ def test_what_lets_a_machine_go_on_must_be_heard(held):
     assert held.start(path='OTHER').ok is False
 
 
+class Fleet(Held):
+    """A hand on three robots, of which /b hangs until it is set free."""
+
+    def __init__(self):
+        super().__init__()
+        self.hand = MachineHand(
+            lambda: {robot: ['TASK'] for robot in ('/a', '/b', '/c')},
+            self,
+            lambda robot, seen: self.silent,
+            self,
+        )
+
+    def call(self, robot, service, request):
+        if robot == '/b':
+            assert self.calls.free.wait(20)
+        self.called.append((service, request.path))
+        return CommandMachineResponse(robot != '/c', 'it does not run')
+
+    def stop_many(self, name, *robots):
+        command = PageCommand(1, name, {'robots': list(robots)})
+        return asyncio.run(self.hand.stop(command, NOBODY))
+
+
+def test_all_robots_are_stopped_at_once_and_none_waits_for_another(monkeypatch):
+    monkeypatch.setattr(machine_hand, 'CALL_LIMIT_S', 0.3)
+    fleet = Fleet()
+    reply = fleet.stop_many('stop_robots')
+    assert sorted(fleet.called) == [('/a/oracle/preempt', ''), ('/c/oracle/preempt', '')]
+    assert not reply.ok and reply.message.startswith('Asked to stop: 1 of 3. /b: /b has not')
+    assert reply.message.endswith('/c: it does not run')
+    assert fleet.records == [('', 'stop_robots', False)]
+    fleet.calls.free.set()
+
+
+def test_several_robots_are_paused_and_no_other():
+    fleet = Fleet()
+    fleet.calls.free.set()
+    fleet.silent = 'silent'
+    reply = fleet.stop_many('pause_robots', '/b', '/a', '/b')
+    assert (reply.ok, reply.message) == (True, 'Asked to pause: 2 of 2.')
+    assert sorted(fleet.called) == [('/a/oracle/pause', ''), ('/b/oracle/pause', '')]
+    assert 'no robot /z' in fleet.stop_many('stop_robots', '/z').message
+
+
 class Proxy:
     """A service at the first of two places, then at the second."""
 

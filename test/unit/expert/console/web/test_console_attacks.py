@@ -16,7 +16,13 @@ from smach_oracle.expert.console import page_socket
 from smach_oracle.expert.console.commands.commands import COMMANDS, CommandReply
 from smach_oracle.expert.console.server import STATIC
 from smach_oracle.expert.console.web import sessions
-from smach_oracle.expert.console.web.access import ROLES, AccessTokens, ClientRateLimits
+from smach_oracle.expert.console.web.access import (
+    ROLES,
+    AccessTokens,
+    ClientRateLimits,
+    RateLimit,
+    SocketRateLimits,
+)
 
 ARGUMENTS = {
     'question': 'q',
@@ -35,6 +41,7 @@ ARGUMENTS = {
     'region': [[0, 0], [9, 0], [9, 9]],
     'strokes': [],
     'robot': '/r',
+    'robots': [],
     'path': '',
     'pattern': 'A',
     'remove': False,
@@ -255,6 +262,19 @@ class TestPages(console_case.ConsoleCase):
         assert (await self.say(page, 100, do='leave_wheel', question='q'))['ok']
         for command in ('stop_machine', 'pause_machine'):
             assert (await self.say(page, 101, do=command, robot='/r', path=''))['ok']
+
+    @tornado.testing.gen_test
+    async def test_a_stop_that_comes_too_fast_is_obeyed_before_the_page_is_closed(self):
+        page = await self.open_page(*await self.signed('operator'))
+        socket = next(iter(self.pages.open))
+        socket._limits = SocketRateLimits(*[RateLimit(0.0, 0.0)] * 3)
+        robots = ['/a_robot_with_a_long_name_{:03}'.format(number) for number in range(200)]
+        await page.write_message(json.dumps({'id': 9, 'do': 'stop_robots', 'robots': robots}))
+        await self.until(lambda: self.machine_hand.done)
+        assert self.machine_hand.done == [('stop_robots', 'ann', 'operator')]
+        while await page.read_message() is not None:
+            pass
+        assert page.close_code == page_socket.TOO_FAST
 
     @tornado.testing.gen_test
     async def test_what_a_page_drives_stops_as_soon_as_the_page_is_closed_for_too_much(self):

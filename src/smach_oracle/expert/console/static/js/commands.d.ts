@@ -58,6 +58,8 @@ export interface Commands {
   stop_hand: OfQuestion;
   stop_machine: OfMachine;
   pause_machine: OfMachine;
+  stop_robots: { robots: string[] }; // []: all that can be held
+  pause_robots: { robots: string[] };
   resume_machine: OfMachine & { seen?: number };
   step_machine: OfMachine & { seen?: number };
   confirm_state: OfMachine & { seen?: number };

@@ -4,6 +4,7 @@
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 import { Colour, Vector } from './drawing/types';
 import { DownMachine } from './down';
+import { RobotHealth } from './fleet';
 import { HeldMachine } from './holding';
 import { Reach } from './reach';
 import {
@@ -50,6 +51,7 @@ export interface Sections {
   images: ByKey<KeptImage[]>;
   cameras: { [robot: string]: string[] | undefined }; // topics of its own, the likeliest first
   robots: string[]; // names of their nodes
+  health: { [robot: string]: RobotHealth | undefined };
   down: DownMachine[];
   trials: TrialOverview;
   bags: BagOverview;
@@ -90,6 +92,7 @@ export interface LiveMachines {
   trial: string;
   alive: boolean;
   unwell: string; // why it waits until it is well; '' where it does not
+  last: { words: string; at: number } | null; // what it said last
   active: ByPath<string[]>;
   latest: ByPath<[from: string, to: string]>; // transitions; from '': the oracle
   failed: ByPath<{ state: string; rate: number | null }>;
@@ -306,6 +309,7 @@ export interface HandState {
 }
 
 export * from './commands';
+export * from './fleet';
 export * from './holding';
 export * from './reach';
 export * from './question';

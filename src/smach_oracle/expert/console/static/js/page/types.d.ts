@@ -19,11 +19,11 @@ type Handlers = {
 };
 
 type AttributeName = 'alt' | 'autocomplete' | 'class' | 'cx' | 'cy' | 'd' | 'disabled' | 'for'
-  | 'height' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth' | 'marker-end'
-  | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient' | 'placeholder' | 'r' | 'refX'
-  | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope' | 'selected' | 'spellcheck' | 'src'
-  | 'step' | 'tabindex' | 'text-anchor' | 'title' | 'transform' | 'type' | 'value' | 'viewBox'
-  | 'width' | 'x' | 'x1' | 'x2' | 'y' | 'y1' | 'y2';
+  | 'height' | 'href' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth'
+  | 'marker-end' | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient' | 'placeholder'
+  | 'r' | 'refX' | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope' | 'selected'
+  | 'spellcheck' | 'src' | 'step' | 'tabindex' | 'text-anchor' | 'title' | 'transform' | 'type'
+  | 'value' | 'viewBox' | 'width' | 'x' | 'x1' | 'x2' | 'y' | 'y1' | 'y2';
 
 /** Attributes, properties of the style (--hue), listeners; `key`: which one it is, for redraw. */
 export type Properties = Handlers & {

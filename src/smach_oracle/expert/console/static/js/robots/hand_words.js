@@ -24,7 +24,7 @@ export function listed(states) { return states.map(inWords).join(', '); }
  * The states that run, but for those within which others are active.
  * @param {HeldMachine} machine
  */
-function running({ active }) {
+export function running({ active }) {
   const around = new Set(active.map(({ path }) => path));
   return active.filter(({ held, path, state }) => !held && !around.has(path + '/' + state));
 }
@@ -55,11 +55,11 @@ export function byContainer(states) {
 /**
  * Whether a state is the oracle of its container. One that has not been heard to act is the state
  * that no rates are told of.
- * @param {ActiveState} active
+ * @param {Pick<ActiveState, 'path' | 'state'>} active
  * @param {string} robot
  * @param {Pick<Store, 'get'>} store
  */
-function isOracle({ path, state }, robot, store) {
+export function isOracle({ path, state }, robot, store) {
   const graph = store.get(`graph ${robot} ${path}`);
   if (!graph) return false;
   return graph.oracle ? graph.oracle === state : !graph.states.some(({ label }) => label === state);
