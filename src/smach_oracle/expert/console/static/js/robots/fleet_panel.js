@@ -21,6 +21,7 @@ const NO_ROBOTS = 'No robots yet. Every state machine that runs under the oracle
   + 'structure, appears here by itself.';
 const CANNOT_STOP = 'There is no connection: this page cannot stop them.';
 const REPLY_LASTS_MS = 20000; // it is of the past then
+const BETWEEN_MS = 200; // two drawings
 const AT_REST_MS = 4000; // since a person has touched the list: only then cards change places
 
 class FleetPanel {
@@ -32,6 +33,7 @@ class FleetPanel {
     /** @type {RobotFacts[]} */
     this.facts = [];
     this.touchedAt = this.repliedAt = -Infinity; // ms
+    this.timer = 0;
     this.summary = h('p', { class: 'fleet-summary', role: 'status' });
     this.reply = h('p', { class: 'fleet-reply', role: 'status' });
     this.stopAll = this.button('stop', 'all');
@@ -78,7 +80,15 @@ class FleetPanel {
   update(names) {
     if (this.app.current !== 'fleet') return;
     if (names.some((name) => ['robots', 'questions', 'health', 'heard'].includes(name)
-      || name.startsWith('live '))) this.show();
+      || name.startsWith('live '))) this.showSoon();
+  }
+
+  /** Robots of a large fleet say something all the time: they are shown a few times a second. */
+  showSoon() {
+    this.timer = this.timer || setTimeout(() => {
+      this.timer = 0;
+      this.show();
+    }, BETWEEN_MS);
   }
 
   show() {
