@@ -190,6 +190,8 @@ class ReplicateRecords:
         summary = recorded.summary
         if summary.ending in (TrialEnding.UNFINISHED, TrialEnding.PREEMPTED) or seed not in truths:
             return False
+        if summary.cause is None and not summary.outcome:  # it was ended as it began
+            return False
         if truths[seed].shared and not self.takes_shared:
             return False
         if summary.cause is not None and summary.cause.seed != seed:

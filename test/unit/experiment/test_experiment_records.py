@@ -117,6 +117,14 @@ def test_an_interrupted_trial_is_dropped_with_its_truth_and_its_rates(
     assert job.tidy_up().next_trial == 3 and job.kept_rates() == job.learned(2)
 
 
+def test_a_trial_that_was_ended_as_it_began_is_run_again(job: RecordedJob) -> None:
+    """The shutdown came before its first state, and before the world told its seed."""
+    job.record('succeeded', '')
+    progress = job.tidy_up()
+    assert (progress.next_trial, len(progress.done), len(progress.dropped)) == (1, 1, 1)
+    assert job.seeds_told() == [FIRST_SEED]
+
+
 def test_a_recorder_that_was_killed_leaves_a_trial_to_run_anew(job: RecordedJob) -> None:
     job.record('succeeded', 'succeeded', 'succeeded')
     bag = sorted(job.folder.glob('*.bag'))[1]
