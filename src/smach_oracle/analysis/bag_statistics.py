@@ -12,7 +12,6 @@ import sys
 from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.cluster import ClusterError, WorkerCluster, add_options
-from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -21,7 +20,7 @@ from .bag_events import BagError
 from .comparing.groups import BY, TrialGroup, groups_by
 from .counting.trial_summary import TrialSummary
 from .reading import report_error, report_skipped
-from .trials import Trials, load_by_state, load_trials, load_with_events
+from .trials import Trials, load_by_state, load_trials
 from .variants import VariantCounts, count_variants, time_series
 
 # What an option alone needs is imported where that is there: to import it takes longer than to
@@ -30,10 +29,8 @@ if TYPE_CHECKING:
     from .by_state.rows import VariantStates
     from .by_state.state_counts import StatesOfTrials
 
-# the trials, the events of each for a report, and what happened in the states of each
-_Loaded = Tuple[
-    Trials, Optional[Mapping[str, Sequence[Event]]], Optional[Mapping[str, 'StatesOfTrials']]
-]
+# the trials, and what happened in the states of each
+_Loaded = Tuple[Trials, Optional[Mapping[str, 'StatesOfTrials']]]
 
 
 def main(argv: Optional[Sequence[str]] = None) -> int:
@@ -48,7 +45,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
                 if args.scheduler
                 else None
             )
-            found, events, by_trial = _load(args, rule, cluster)
+            found, by_trial = _load(args, rule, cluster)
             for text in cluster.messages if cluster else ():
                 sys.stderr.write('bag_statistics: {}\n'.format(text))
         variants = count_variants(found.trials)
@@ -57,8 +54,8 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
         groups = _print_groups(args, found) if args.by else None
         code = report_skipped(found.skipped)
         _write_files(args, found, variants, states, groups)
-        if events is not None:
-            _write_report(args, rule, found, events, groups)
+        if args.html:
+            _write_report(args, rule, found, groups)
     except ClusterError as err:
         return report_error('bag_statistics', err)
     except (BagError, ImportError, OSError) as err:
@@ -88,17 +85,9 @@ def _print_groups(args: argparse.Namespace, found: Trials) -> List[TrialGroup]:
 def _load(
     args: argparse.Namespace, rule: Optional[FailureRule], cluster: Optional[WorkerCluster]
 ) -> _Loaded:
-    if args.html:
-        found, events = load_with_events(args.folders, rule)
-        if not args.by_state:
-            return found, events, None
-        from .by_state.follower import states_of
-
-        return found, events, {key: states_of(each, rule) for key, each in events.items()}
     if args.by_state:
-        found, by_trial = load_by_state(args.folders, rule, _processes(), cluster)
-        return found, None, by_trial
-    return load_trials(args.folders, rule, _processes(), cluster), None, None
+        return load_by_state(args.folders, rule, _processes(), cluster)
+    return load_trials(args.folders, rule, _processes(), cluster), None
 
 
 def _processes() -> int:
@@ -174,7 +163,7 @@ def _parse(argv: Optional[Sequence[str]]) -> argparse.Namespace:
     add_options(parser, 'counts the bags')
     args = parser.parse_args(argv)
     if args.scheduler and args.html:
-        parser.error('--scheduler: not with --html, whose report needs all events in one place')
+        parser.error('--scheduler: not with --html, whose report reads the bags here')
     if args.without_tls and not args.scheduler:
         parser.error('--without-tls: name a --scheduler')
     return args
@@ -214,16 +203,16 @@ def _write_report(
     args: argparse.Namespace,
     rule: Optional[FailureRule],
     found: Trials,
-    events: Mapping[str, Sequence[Event]],
     groups: Optional[List[TrialGroup]],
 ) -> None:
     from .reporting.contents import ReportOptions  # with Jinja2 and matplotlib
+    from .reporting.events_again import EventsAgain
     from .reporting.page import write_report
 
     write_report(
         args.html,
         found,
-        events,
+        EventsAgain(found.trials),
         ReportOptions(args.folders, rule, args.by or '', args.x_axis),
         groups,
     )

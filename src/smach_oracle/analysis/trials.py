@@ -47,13 +47,6 @@ class TrialsByState(NamedTuple):
     states: Mapping[str, 'StatesOfTrials']  # by trial id
 
 
-class TrialsWithEvents(NamedTuple):
-    """All that was found in some folders, and the events of each trial."""
-
-    found: Trials
-    events: Mapping[str, List[Event]]  # by trial id, in the order of their numbers
-
-
 def load_trials(
     places: Sequence[str],
     rule: Optional[FailureRule] = None,
@@ -88,11 +81,6 @@ def load_by_state(
     return TrialsByState(*_load(places, counting, cluster))
 
 
-def load_with_events(places: Sequence[str], rule: Optional[FailureRule] = None) -> TrialsWithEvents:
-    """Read the same, and keep the events. As `load_trials`."""
-    return TrialsWithEvents(*_load(places, Counting(rule, list)))
-
-
 def _load(
     places: Sequence[str], counting: Counting, cluster: Optional['WorkerCluster'] = None
 ) -> Tuple[Trials, Dict[str, Any]]:
@@ -115,7 +103,7 @@ def _load(
                 summaries[summary.trial_id], taken[summary.trial_id] = summary, part
             else:
                 spread[known.trial_id] = (*spread.get(known.trial_id, known.bags), bag.path)
-    for trial in _read_again(spread):
+    for trial in read_again(spread):
         summaries[trial.trial_id] = trial.summary(counting.rule)
         taken[trial.trial_id] = counting.take and counting.take(trial.events)
     if not summaries:
@@ -137,12 +125,15 @@ def _judged(trials: Iterable[TrialSummary]) -> Iterator[TrialSummary]:
         yield trial._replace(truth=truth) if truth else trial
 
 
-def _read_again(bags_of: Mapping[str, Tuple[str, ...]]) -> Iterator[TrialOfBags]:
+def read_again(
+    bags_of: Mapping[str, Tuple[str, ...]], reader: Optional[EventReader] = None
+) -> Iterator[TrialOfBags]:
     """Yield some trials, given the bags of each, which are read again. Those of one bag together.
 
+    :param reader: one that has read others of these bags is quicker.
     :raises BagError: where a bag cannot be read any more.
     """
-    reader = EventReader()
+    reader = reader or EventReader()
     by_bags: Dict[Tuple[str, ...], Set[str]] = {}
     for trial_id, bags in bags_of.items():
         by_bags.setdefault(bags, set()).add(trial_id)
@@ -166,7 +157,7 @@ def events_of(trials: Iterable[TrialSummary]) -> Iterator[Tuple[TrialSummary, Li
     :raises BagError: where a bag cannot be read any more.
     """
     known = {trial.trial_id: trial for trial in trials}
-    for trial in _read_again({trial_id: each.bags for trial_id, each in known.items()}):
+    for trial in read_again({trial_id: each.bags for trial_id, each in known.items()}):
         yield known[trial.trial_id], trial.events
 
 

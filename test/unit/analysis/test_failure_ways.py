@@ -14,8 +14,9 @@ from smach_oracle.analysis.reporting.failure_ways import (
     failure_ways,
     precondition_counts,
 )
-from smach_oracle.analysis.reporting.taken import TakenJump, taken_in
-from smach_oracle.analysis.trials import load_with_events
+from smach_oracle.analysis.reporting.taken import TakenJump, add_taken, nothing_taken
+from smach_oracle.analysis.trials import events_of as events_in_bags
+from smach_oracle.analysis.trials import load_trials
 from smach_oracle.oracle.records.events import EventKind
 
 OLD_BAGS = Path(__file__).parents[2] / 'data/v0_1/trials'
@@ -53,7 +54,8 @@ def test_the_sums_over_kinds_are_the_counts_of_the_states(name):
     if name == 'machines':
         trials = run(30)
     else:
-        trials = list(load_with_events([str(OLD_BAGS)]).events.values())
+        found = load_trials([str(OLD_BAGS)]).trials
+        trials = [events for _, events in events_in_bags(found)]
     for events in trials:
         states, found = states_of(events).states, failure_ways(events)
         for state, counts in states.items():
@@ -111,7 +113,8 @@ def test_transitions_and_jumps_are_counted():
             {'target': 'A', 'by': 'ann', 'data': {'from': 'TOP/A/B', 'to': 'TOP/A/C'}},
         ),
     )
-    taken = taken_in(events)
+    taken = nothing_taken()
+    add_taken(taken, events)
     assert {(each.path, *each.edge): number for each, number in taken.transitions.items()} == {
         ('TOP', 'PICK', 'succeeded', 'PLACE'): 2
     }

@@ -12,14 +12,14 @@ from failing_machines import run
 from test_by_state import story
 
 from smach_oracle.analysis import bag_statistics
-from smach_oracle.analysis.bag_events import RecordedCause, SkippedBag
+from smach_oracle.analysis.bag_events import BagError, RecordedCause, SkippedBag
 from smach_oracle.analysis.comparing.groups import groups_by
 from smach_oracle.analysis.counting.trial_summary import summarise
-from smach_oracle.analysis.reporting import machine_graphs
+from smach_oracle.analysis.reporting import events_again, machine_graphs
 from smach_oracle.analysis.reporting.contents import ReportOptions, report_on
 from smach_oracle.analysis.reporting.inline_svg import for_page
 from smach_oracle.analysis.reporting.page import LONGEST, page_of, shown, write_report
-from smach_oracle.analysis.trials import Trials
+from smach_oracle.analysis.trials import Trials, events_of, load_trials
 from smach_oracle.oracle.records.events import Event, EventKind
 
 ROOT = Path(__file__).parents[3]
@@ -209,6 +209,41 @@ def test_missing_events_and_unknown_truth_stand_at_the_top():
     warnings = page.text[: page.text.index('In short')]
     assert '1 event is missing in 1 trial' in warnings
     assert 'No judge saw 3 trials' in warnings and '"person needed" is a lower bound' in warnings
+
+
+def test_the_page_is_the_same_however_few_events_are_held(record, tmp_path, monkeypatch):
+    folder, out = record('bags', 7), tmp_path / 'r.html'
+    found = load_trials([folder])
+    whole = {trial.trial_id: events for trial, events in events_of(found.trials)}
+    text = page_of(report_on(found, whole, ReportOptions([folder])))
+    for most in (events_again.MOST_HELD, 1):
+        monkeypatch.setattr(events_again, 'MOST_HELD', most)
+        assert report(folder, '--html', out) == 0
+        assert out.read_text(encoding='utf-8') == text
+
+
+def test_few_events_are_held_except_those_of_one_bag(record, monkeypatch):
+    monkeypatch.setattr(events_again, 'MOST_HELD', 2)
+    found = load_trials([record('bags', 5)]).trials
+    events = events_again.EventsAgain(found)
+    for trial in found:
+        assert summarise(events[trial.trial_id]).trial_id == trial.trial_id
+        assert len(events._held) <= 2
+    one_bag = [each._replace(bags=found[0].bags) for each in found]
+    with pytest.raises(BagError, match='no trial'):
+        events_again.EventsAgain(one_bag)[found[1].trial_id]
+
+
+@pytest.mark.parametrize('by_state', [True, False])
+def test_a_bag_that_goes_while_the_report_is_made_is_named(record, tmp_path, monkeypatch, by_state):
+    folder, real = record('bags', 2), bag_statistics.count_variants
+    bag = sorted(Path(folder).glob('*.bag'))[0]
+    monkeypatch.setattr(
+        bag_statistics, 'count_variants', lambda trials: (bag.unlink(), real(trials))[1]
+    )
+    options = ['--by-state'] if by_state else []
+    assert report(folder, '--html', tmp_path / 'r.html', *options) == 2
+    assert not (tmp_path / 'r.html').exists()
 
 
 @pytest.mark.parametrize('out', ['missing/r.html', '.'])

@@ -17,6 +17,7 @@ from ..graphs.container_graph import ContainerGraph
 from ..trials import Trials
 from ..variants import VariantCounts, VariantTrials, count_variant, find_variants, time_series
 from .drawn import RateChart, Survival, rate_charts, survivals
+from .events_again import EventsInTurn
 from .failure_ways import (
     FailureWays,
     PreconditionCounts,
@@ -26,10 +27,10 @@ from .failure_ways import (
 )
 from .inline_svg import time_series_svg
 from .learned_rates import LearnedRates, learned_rates
-from .machine_graphs import ContainerDrawing, Drawer, graphs_of, jumps_of
+from .machine_graphs import ContainerDrawing, Drawer, SeenContainers, graphs_of, jumps_of
 from .notices import warnings_about
 from .survival import hours_of, stretches
-from .taken import taken_in
+from .taken import add_taken, nothing_taken
 
 MOST_FIGURES = 12  # of each kind, of an experiment
 MOST_RATES = 12  # states of one oracle
@@ -181,8 +182,9 @@ def _chapter(
     mine = [trial for trial in trials if trial.experiment == experiment]
     own = [each for each in variants if each.experiment == experiment]
     drawer.problem = ''
-    graphs = graphs_of(mine, [event for trial in mine for event in events[trial.trial_id]])
-    parts = [_part(each, events, asked, graphs, drawer) for each in own]
+    seen, gathered = _gather(mine, own, events, asked.rule)
+    graphs = graphs_of(mine, seen)
+    parts = [_part(each, what, events, asked, graphs, drawer) for each, what in zip(own, gathered)]
     series = time_series(mine)
     return Chapter(
         experiment,
@@ -200,44 +202,72 @@ def _chapter(
     )
 
 
+class _Gathered:
+    """The counts of the events of a variant's trials."""
+
+    def __init__(self) -> None:
+        self.states = StatesOfTrials()
+        self.ways = FailureWays()
+        self.preconditions: PreconditionCounts = {}
+        self.taken = nothing_taken()
+
+    def add(self, events: Sequence[Event], rule: Optional[FailureRule]) -> None:
+        self.states.add(states_of(events, rule))
+        self.ways.add(failure_ways(events, rule))
+        add_preconditions(self.preconditions, precondition_counts(events))
+        add_taken(self.taken, events)
+
+
+def _gather(
+    trials: Sequence[TrialSummary],
+    variants: Sequence[VariantTrials],
+    events: EventsOf,
+    rule: Optional[FailureRule],
+) -> Tuple[SeenContainers, List[_Gathered]]:
+    """Go through the events of an experiment's trials once. Return what is of each variant."""
+    seen, gathered = SeenContainers(), [_Gathered() for _ in variants]
+    of_trial = {
+        trial.trial_id: what for each, what in zip(variants, gathered) for trial in each.trials
+    }
+    for trial in trials:
+        told = events[trial.trial_id]
+        seen.add(told)
+        of_trial[trial.trial_id].add(told, rule)
+    return seen, gathered
+
+
 def _part(
     variant: VariantTrials,
+    gathered: _Gathered,
     events: EventsOf,
     asked: ReportOptions,
     graphs: Sequence[ContainerGraph],
     drawer: Drawer,
 ) -> VariantPart:
-    states, ways = StatesOfTrials(), FailureWays()
-    preconditions: PreconditionCounts = {}
-    for trial in variant.trials:
-        states.add(states_of(events[trial.trial_id], asked.rule))
-        ways.add(failure_ways(events[trial.trial_id], asked.rule))
-        add_preconditions(preconditions, precondition_counts(events[trial.trial_id]))
-    taken = taken_in(event for trial in variant.trials for event in events[trial.trial_id])
     paths = [graph.path for graph in graphs]
     rates = [] if variant.recovers is False else _rates(variant, events, asked.places)
     return VariantPart(
         variant,
         count_variant(variant),
         sum(map(hours_of, variant.trials)),
-        states,
-        ways,
-        preconditions,
+        gathered.states,
+        gathered.ways,
+        gathered.preconditions,
         survivals(stretches(variant.trials)),
         rates[:MOST_FIGURES],
         max(0, len(rates) - MOST_FIGURES),
-        [drawer.draw(graph, taken, states, paths) for graph in graphs],
-        jumps_of(taken),
+        [drawer.draw(graph, gathered.taken, gathered.states, paths) for graph in graphs],
+        jumps_of(gathered.taken),
     )
 
 
 def _rates(variant: VariantTrials, events: EventsOf, places: Sequence[str]) -> List[RatesOfFolder]:
-    folders: Dict[str, List[Sequence[Event]]] = {}
+    folders: Dict[str, List[str]] = {}
     for trial in variant.trials:
-        folders.setdefault(trial.replicate, []).append(events[trial.trial_id])
+        folders.setdefault(trial.replicate, []).append(trial.trial_id)
     found = []
     for folder in sorted(folders):
-        rates = learned_rates(folders[folder], variant.settings)
+        rates = learned_rates(EventsInTurn(events, folders[folder]), variant.settings)
         if rates is not None:
             charts = rate_charts(rates, MOST_RATES)
             found.append(RatesOfFolder(_below(folder, places), rates, charts))

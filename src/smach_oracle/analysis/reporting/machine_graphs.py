@@ -5,9 +5,9 @@ by the hue alone.
 """
 
 import math
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.records.short_text import shortened
 
 from ..bag_machines import read_machines
@@ -15,7 +15,7 @@ from ..by_state.state_counts import StatesOfTrials
 from ..counting.trial_summary import TrialSummary
 from ..graphs.container_graph import ContainerGraph, GraphEdge, GraphLayout, dot_text
 from ..graphs.dot import LayoutError, lay_out
-from ..graphs.recorded import graph_from_events, recorded_graphs
+from ..graphs.recorded import SeenContainer, recorded_graphs
 from .taken import Taken
 
 MOST_GRAPHS = 30  # containers of a machine
@@ -80,7 +80,20 @@ class ContainerDrawing(NamedTuple):
     problem: str  # why it is not drawn
 
 
-def graphs_of(trials: Sequence[TrialSummary], events: Sequence[Event]) -> List[ContainerGraph]:
+class SeenContainers:
+    """The containers that ran in some trials, by path."""
+
+    def __init__(self) -> None:
+        self.by_path: Dict[str, SeenContainer] = {}
+
+    def add(self, events: Iterable[Event]) -> None:
+        """Take the events of a trial."""
+        for event in events:
+            if event.path:
+                self.by_path.setdefault(event.path, SeenContainer()).add(event)
+
+
+def graphs_of(trials: Sequence[TrialSummary], seen: SeenContainers) -> List[ContainerGraph]:
     """Return the graphs of the containers that ran, the top machine first.
 
     The latest bag that has structures tells them, else the transitions in the events.
@@ -92,26 +105,22 @@ def graphs_of(trials: Sequence[TrialSummary], events: Sequence[Event]) -> List[C
         known = _structures(path)
         if known:
             break
-    paths = sorted({event.path for event in events if event.path})[:MOST_GRAPHS]
-    return [
-        known.get(path) or _without_oracle(graph_from_events(path, events), events)
-        for path in paths
-    ]
+    paths = sorted(seen.by_path)[:MOST_GRAPHS]
+    return [known.get(path) or _without_oracle(path, seen.by_path[path]) for path in paths]
 
 
-def _without_oracle(graph: ContainerGraph, events: Sequence[Event]) -> ContainerGraph:
+def _without_oracle(path: str, seen: SeenContainer) -> ContainerGraph:
     """Return a graph of transitions without the meta state, which looks like an outcome there.
 
     A container with decisions ends in each of its outcomes, and never in the meta state.
     """
-    mine = [event for event in events if event.path == graph.path]
-    if not any(event.kind == EventKind.DECISION for event in mine):
+    graph = seen.graph(path)
+    if not seen.has_decisions:
         return graph
-    ends = {event.outcome for event in mine if event.kind == EventKind.CONTAINER_END}
     edges = tuple(
-        edge for edge in graph.edges if edge.target in graph.states or edge.target in ends
+        edge for edge in graph.edges if edge.target in graph.states or edge.target in seen.ends
     )
-    outcomes = tuple(outcome for outcome in graph.outcomes if outcome in ends)
+    outcomes = tuple(outcome for outcome in graph.outcomes if outcome in seen.ends)
     return graph._replace(outcomes=outcomes, edges=edges)
 
 

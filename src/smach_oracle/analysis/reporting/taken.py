@@ -32,16 +32,18 @@ class Taken(NamedTuple):
     jumps: Dict[TakenJump, int]
 
 
-def taken_in(events: Iterable[Event]) -> Taken:
-    """Count those of some trials."""
-    transitions: Dict[Transition, int] = Counter()
-    jumps: Dict[TakenJump, int] = Counter()
+def nothing_taken() -> Taken:
+    """Return counts to which those of trials are added."""
+    return Taken(Counter(), Counter())
+
+
+def add_taken(taken: Taken, events: Iterable[Event]) -> None:
+    """Count those of a trial."""
     for event in events:
         if event.kind == EventKind.TRANSITION and event.outcome:
             edge = GraphEdge(event.state, event.outcome, event.target)
-            transitions[Transition(event.path, edge)] += 1
+            taken.transitions[Transition(event.path, edge)] += 1
         elif event.kind == EventKind.JUMP:
             data: Mapping[str, object] = event.data if isinstance(event.data, Mapping) else {}
             target = str(data.get(JUMPED_TO, '')) or '/'.join((event.path, event.target))
-            jumps[TakenJump('/'.join(left_by(event)), target, is_act_of_person(event))] += 1
-    return Taken(transitions, jumps)
+            taken.jumps[TakenJump('/'.join(left_by(event)), target, is_act_of_person(event))] += 1
