@@ -7,12 +7,13 @@
 bags, each in a process of its own on one core, in turns. Shown are processor seconds, the least of
 the rounds, their ratio, and the peak memory. `bag_statistics` counts them three times: with nothing
 kept, again by what it has kept, and with nothing kept on two cores. The seconds in which one bag is
-counted, most of which are Python's start, are shown, and taken off from those of counting again. Of
-two cores the seconds of the clock are compared: they mean something on an idle machine. Next to the
-events a bag has what oracle_run records with them: rates, and structure and status of two
-containers. With --images each trial begins and ends with so many images. With --folder the bags of
-a folder are counted. With --check 300 and 1,000 bags are counted, and the exit status is 1 where a
-limit is missed. Needs no ROS master.
+counted, most of which are Python's start, are shown, and taken off from those of counting again and
+from those of two cores. Of two cores the processor seconds of the process that had more of them are
+compared: that is the time that the count takes where both cores are free. The seconds of the clock
+mean something on an idle machine. Next to the events a bag has what oracle_run records with them:
+rates, and structure and status of two containers. With --images each trial begins and ends with so
+many images. With --folder the bags of a folder are counted. With --check 300 and 1,000 bags are
+counted, and the exit status is 1 where a limit is missed. Needs no ROS master.
 """
 
 import argparse
@@ -35,7 +36,9 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.ros.recorder import TrialRecorder
 
 CHECKED, KEPT = 300, 1000  # bags. So many that their counts are kept
-LEAST_RATIO = 2.2  # times as fast as rosbag's API. 2.8 to 3.3 was measured. The aim is 3
+# times as fast as rosbag's API. Beside other work 4.1 to 4.6 was measured for 300 bags, and 3.2 to
+# 3.6 for 1,000. An idle machine gave four fifths of what a busy one gave
+LEAST_RATIO, LEAST_RATIO_OF_KEPT = 2.8, 2.2
 MOST_AGAIN = 0.2  # of the seconds of the first count, both without the start. The aim is 0.1
 EVENTS = '/oracle/events'  # end of the name of a topic
 SETTLED_S = 2.1
@@ -59,10 +62,13 @@ for path in glob.glob(sys.argv[1] + '/*.bag'):
 print(dict(ends), dict(failures))
 """
 PEAK = 'VmHWM:'  # in /proc: the peak of the process since it runs its program
+OWN = 'own s:'
 AROUND = """
-import atexit, os
+import atexit, os, time
 os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:{}])
-atexit.register(lambda: print(open('/proc/self/status').read()))
+atexit.register(
+    lambda: print(open('/proc/self/status').read(), 'own s:', time.process_time())
+)
 {}
 """
 
@@ -70,7 +76,8 @@ atexit.register(lambda: print(open('/proc/self/status').read()))
 class Taken(NamedTuple):
     """The resources that a process took."""
 
-    cpu_s: float
+    cpu_s: float  # its children's among them
+    own_s: float  # of cpu_s, without its children's
     wall_s: float
     peak_mb: float
 
@@ -138,7 +145,8 @@ def take(program: str, *args: str, cache: str = '', cores: int = 1) -> Taken:
     if status:
         sys.exit('it failed:\n' + said)
     peak_kb = int(said.rsplit(PEAK, 1)[1].split()[0])
-    return Taken(used.ru_utime + used.ru_stime, wall_s, peak_kb / 1024.0)
+    own_s = float(said.rsplit(OWN, 1)[1].split()[0])
+    return Taken(used.ru_utime + used.ru_stime, own_s, wall_s, peak_kb / 1024.0)
 
 
 def measure(bags: int, images: int, rounds: int) -> Tuple[float, float]:
@@ -186,10 +194,13 @@ def compare(folder: Path, rounds: int) -> Tuple[float, float]:
         )
     theirs, start, ours, again, _ = (min(one.cpu_s for one in each) for each in taken.values())
     *_, on_one, _, on_two = (min(one.wall_s for one in each) for each in taken.values())
+    busier = min(max(one.own_s - start, one.cpu_s - one.own_s) for one in taken['on two cores'])
     share = (again - start) / (ours - start)
     print(
         '  {:.2f} times as fast as rosbag; again {:.2f} of it; two cores {:.2f} times as fast as '
-        'one'.format(theirs / ours, share, on_one / on_two)
+        'one, by the clock {:.2f}'.format(
+            theirs / ours, share, (ours - start) / busier, on_one / on_two
+        )
     )
     return theirs / ours, share
 
@@ -208,8 +219,9 @@ def main() -> int:
     options = parser.parse_args()
     if options.check:
         ratio, _ = measure(CHECKED, 0, options.rounds)
-        _, share = measure(KEPT, 0, options.rounds)
-        return 0 if ratio >= LEAST_RATIO and share <= MOST_AGAIN else 1
+        ratio_of_kept, share = measure(KEPT, 0, options.rounds)
+        is_fast = ratio >= LEAST_RATIO and ratio_of_kept >= LEAST_RATIO_OF_KEPT
+        return 0 if is_fast and share <= MOST_AGAIN else 1
     if options.folder:
         compare(options.folder, options.rounds)
         return 0

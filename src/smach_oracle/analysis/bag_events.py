@@ -41,6 +41,7 @@ MENDING = (
     'recorder in this folder saves what can be read behind it, too'
 )
 NO_EVENTS = 'no events of the executive in it'
+_BACKUP = '.orig.bag'
 _EVENTS = '/oracle/events'
 _WRAP = 2**32
 _MOST_DECODERS = 100
@@ -143,18 +144,38 @@ def find_bags(places: Sequence[str]) -> List[str]:
             raise BagError('{}: no such folder'.format(place))
         else:
             # below a real folder all folders are real: links to some are left out
-            for path in walk_bags(os.path.realpath(place)):
-                found[os.path.realpath(path) if os.path.islink(path) else path] = None
+            for entry in _bags_below(os.path.realpath(place)):
+                found[os.path.realpath(entry.path) if entry.is_symlink() else entry.path] = None
     return sorted(found)
 
 
 def walk_bags(folder: str) -> Iterator[str]:
     """Yield the paths of bags, by their names, in a folder and below. Not by links to folders."""
-    for parent, _, names in os.walk(folder):
-        for name in names:
-            backup_of = name[: -len('.orig.bag')] + '.bag' if name.endswith('.orig.bag') else None
-            if name.endswith(('.bag', '.bag.active')) and backup_of not in names:
-                yield os.path.join(parent, name)
+    return (entry.path for entry in _bags_below(folder))
+
+
+def _bags_below(folder: str) -> Iterator['os.DirEntry[str]']:
+    left = [folder]
+    while left:
+        entries: List['os.DirEntry[str]'] = []
+        with contextlib.suppress(OSError), os.scandir(left.pop()) as found:
+            entries.extend(found)  # a folder without rights, or that is gone, has none
+        names = {entry.name for entry in entries}
+        for entry in entries:
+            name = entry.name
+            if name.endswith(_BACKUP) and name[: -len(_BACKUP)] + '.bag' in names:
+                continue
+            if name.endswith(('.bag', '.bag.active')) and not _is_folder(entry):
+                yield entry
+            elif _is_folder(entry) and not entry.is_symlink():
+                left.append(entry.path)
+
+
+def _is_folder(entry: 'os.DirEntry[str]') -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:
+        return False
 
 
 class MessageStores:

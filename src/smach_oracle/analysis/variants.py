@@ -130,8 +130,13 @@ def _by_settings(
 ) -> List[VariantTrials]:
     """One variant for each settings of the oracle, named by what differs, one without oracle."""
     parts: Dict[SettingsKey, List[TrialSummary]] = {}
+    same: Dict[int, List[TrialSummary]] = {}  # that share one tuple of settings, as most do
     for trial in trials:
-        parts.setdefault(_settings_key(trial) if recovers else (), []).append(trial)
+        part = same.get(id(trial.settings))
+        if part is None:
+            part = parts.setdefault(_settings_key(trial) if recovers else (), [])
+            same[id(trial.settings)] = part
+        part.append(trial)
     in_order = [(dict(parts[key][0].settings), tuple(parts[key])) for key in sorted(parts)]
     differing = _differing([settings for settings, _ in in_order])
     return [
@@ -258,8 +263,9 @@ def make_count(
 
     There is at least one. `parts`: the same by replicate.
     """
-    number = sum(map(happened, trials))
-    shares = [sum(map(happened, part)) / len(part) for part in parts]
+    by_part = [sum(map(happened, part)) for part in parts]
+    number = sum(by_part)
+    shares = [one / len(part) for one, part in zip(by_part, parts)]
     return Count(
         name,
         number,

@@ -249,6 +249,19 @@ def test_a_process_that_dies_costs_nothing(cache, folder, monkeypatch):
     assert load_trials([folder], None, 2) == whole
 
 
+def test_without_other_processes_this_one_counts(cache, folder, monkeypatch):
+    whole = load_trials([folder])
+    cache.unlink()
+
+    def no_fork():
+        raise BlockingIOError('no more processes')
+
+    before = len(os.listdir('/proc/self/fd'))
+    monkeypatch.setattr(os, 'fork', no_fork)
+    assert load_trials([folder], None, 3) == whole
+    assert len(os.listdir('/proc/self/fd')) == before
+
+
 def test_ctrl_c_ends_all_processes_quietly(cache, folder):
     """The signal goes to the whole group, as that of a terminal does."""
     script = """

@@ -6,7 +6,7 @@ group are counted here, or by another process while this one takes the groups be
 
 from collections import deque
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Callable, Deque, Dict, Iterator, List, Optional, Sequence
+from typing import TYPE_CHECKING, Callable, Deque, Iterator, List, Optional, Sequence
 
 from ..bag_events import EventReader
 from .counted_bag import BeginCount, CountedBag, Counting, count_bag
@@ -42,7 +42,7 @@ def count_bags(
             begin = ClusterCount(cluster, counting, begin).begin
             ahead = CLUSTER_AHEAD * cluster.slots()
         elif counting.processes > 1 and len(paths) >= SHARED_FROM:
-            begin, ahead = _shared(counting, begin, closing), 2 * counting.processes
+            begin, ahead = _shared(counting, paths, begin, closing), 4 * counting.processes
         if counting.take is None and len(paths) >= KEPT_FROM:
             begin = _kept(counting, begin, closing)
         begun: Deque[Callable[[], List[CountedBag]]] = deque()
@@ -54,7 +54,9 @@ def count_bags(
             yield from counted()
 
 
-def _shared(counting: Counting, begin_here: BeginCount, closing: ExitStack) -> BeginCount:
+def _shared(
+    counting: Counting, all_paths: Sequence[str], begin_here: BeginCount, closing: ExitStack
+) -> BeginCount:
     """Return what has other processes count. They are started once there is something to count."""
     processes: Optional[BeginCount] = None
 
@@ -63,7 +65,8 @@ def _shared(counting: Counting, begin_here: BeginCount, closing: ExitStack) -> B
         if processes is None and paths:
             from .other_processes import OtherProcesses  # it takes a while, and what is kept none
 
-            others = OtherProcesses(counting, begin_here)
+            number = counting.processes - 1  # this process counts, too
+            others = OtherProcesses(counting, all_paths, begin_here, number)
             closing.callback(others.close)
             processes = others.begin
         return processes(paths) if processes and paths else begin_here(paths)
@@ -74,31 +77,26 @@ def _shared(counting: Counting, begin_here: BeginCount, closing: ExitStack) -> B
 def _kept(counting: Counting, begin_others: BeginCount, closing: ExitStack) -> BeginCount:
     """Return what takes the counts that are kept, has the others counted, and keeps these."""
     from .kept_counts import KeptCounts  # with a database: only where there are many bags
-    from .summary_text import summaries_in, text_of
+    from .summary_text import summaries_in_all, text_of
 
     kept = KeptCounts(counting.rule)
     closing.callback(kept.close)
 
     def begin(paths: Sequence[str]) -> Callable[[], List[CountedBag]]:
-        known: Dict[str, CountedBag] = {}
-        keys: Dict[str, bytes] = {}
-        for path in paths:
-            key = kept.key_of(path)
-            if key is None:
-                continue
-            try:
-                found = summaries_in(kept.text(key), path)
-            except (LookupError, TypeError, ValueError):  # it is not kept, or was damaged
-                keys[path] = key
-            else:
-                known[path] = CountedBag(path, [(summary, None) for summary in found])
+        keys = {path: key for path, key in ((path, kept.key_of(path)) for path in paths) if key}
+        texts = kept.texts(list(keys.values()))
+        read = summaries_in_all({path: texts[key] for path, key in keys.items() if key in texts})
+        known = {
+            path: CountedBag(path, [(summary, None) for summary in found])
+            for path, found in read.items()
+        }
         others = begin_others([path for path in paths if path not in known])
 
         def counted() -> List[CountedBag]:
             found = {bag.path: bag for bag in others()}
             kept.keep(
                 {
-                    keys[path]: text_of([summary for summary, _ in bag.trials])
+                    keys[path]: bag.text or text_of([summary for summary, _ in bag.trials])
                     for path, bag in found.items()
                     if path in keys and not bag.reason
                 }

@@ -16,6 +16,7 @@ class CountedBag(NamedTuple):
     path: str
     trials: Sequence[Tuple[TrialSummary, Any]] = ()  # each with what was taken of it
     reason: str = ''
+    text: str = ''  # of its summaries, where that is known
 
 
 class Counting(NamedTuple):

@@ -12,7 +12,7 @@ import sqlite3
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Iterator, Mapping, Optional
+from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.user_cache import cache_folder
@@ -61,13 +61,15 @@ class KeptCounts:
         )
         return hashlib.blake2b(told + self._counted_by, digest_size=16).digest()
 
-    def text(self, key: bytes) -> str:
-        """Return what is kept under a key, '' where there is nothing."""
+    def texts(self, keys: Sequence[bytes]) -> Dict[bytes, str]:
+        """Return what is kept under some keys, by key."""
+        found: Dict[bytes, str] = {}
         with self._usable():
             if self._open is not None:
-                for (text,) in self._open.execute('SELECT text FROM counts WHERE key = ?', (key,)):
-                    return str(text)
-        return ''
+                asked = 'SELECT key, text FROM counts WHERE key IN ({})'
+                marks = ','.join('?' * len(keys))
+                found.update(self._open.execute(asked.format(marks), keys))
+        return found
 
     def keep(self, texts: Mapping[bytes, str]) -> None:
         """Keep some texts by their keys, once it is closed."""
@@ -101,13 +103,21 @@ class KeptCounts:
 
 def _version() -> str:
     """Return a digest of the names, sizes and times of change of the files that count."""
-    files = [
-        path
-        for part in _COUNTS
-        for path in ((_PACKAGE / part).rglob('*.py') if '.' not in part else [_PACKAGE / part])
-    ]
-    told = sorted(
-        (str(path), stat.st_size, stat.st_mtime_ns)
-        for path, stat in ((path, path.stat()) for path in files)
-    )
+    with os.scandir(str(_PACKAGE)) as entries:
+        told = sorted(
+            (entry.path, stat.st_size, stat.st_mtime_ns)
+            for part in entries
+            if part.name in _COUNTS
+            for entry, stat in _sources(part)
+        )
     return hashlib.blake2b(repr(told).encode(), digest_size=16).hexdigest()
+
+
+def _sources(entry: 'os.DirEntry[str]') -> Iterator[Tuple['os.DirEntry[str]', os.stat_result]]:
+    """Yield the Python files of a folder and below, or a file itself."""
+    if entry.is_dir():
+        with os.scandir(entry.path) as entries:
+            for each in entries:
+                yield from _sources(each)
+    elif entry.name.endswith('.py'):
+        yield entry, entry.stat()

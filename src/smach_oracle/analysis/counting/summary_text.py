@@ -4,8 +4,9 @@ What many trials share, such as the settings, is a text of its own: it is read o
 """
 
 import json
+from contextlib import suppress
 from functools import lru_cache
-from typing import Any, List, NamedTuple, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
@@ -19,6 +20,12 @@ _FAILURES, _INPUTS, _BAGS, _ENDING, _CAUSE, _SETTINGS, _ORIGIN, _RULE = map(
     ('failures_by_state', 'inputs', 'bags', 'ending', 'cause', 'settings', 'origin', 'rule'),
 )
 _encode = json.JSONEncoder(separators=(',', ':')).encode
+
+
+_MOST_TEXTS = 100
+_NO_TEXT = (LookupError, TypeError, ValueError)  # what another text raises
+# by the identity of settings and origin, and by the rule
+_texts: Dict[Tuple[int, int, FailureRule], Tuple['_Shared', str]] = {}
 
 
 class _Shared(NamedTuple):
@@ -39,10 +46,30 @@ def summaries_in(text: str, path: str) -> List[TrialSummary]:
     return [_summary(each, path) for each in json.loads(text)]
 
 
+def summaries_in_all(texts: Mapping[str, str]) -> Dict[str, List[TrialSummary]]:
+    """Return the summaries in some texts, by the path of the bag. To read all at once is quicker.
+
+    A text that `text_of` did not make is left out.
+    """
+    try:
+        lists = json.loads('[{}]'.format(','.join(texts.values())))
+        if len(lists) == len(texts):
+            return {
+                path: [_summary(each, path) for each in found] for path, found in zip(texts, lists)
+            }
+    except _NO_TEXT:
+        pass
+    found = {}
+    for path, text in texts.items():
+        with suppress(*_NO_TEXT):
+            found[path] = summaries_in(text, path)
+    return found
+
+
 def _data_of(trial: TrialSummary) -> List[Any]:
     data: List[Any] = list(trial)
     data[_ENDING], data[_BAGS] = trial.ending.value, None
-    data[_SETTINGS] = _encode(_Shared(trial.settings, trial.origin, trial.rule))
+    data[_SETTINGS] = _text_of_shared(_Shared(trial.settings, trial.origin, trial.rule))
     data[_ORIGIN] = data[_RULE] = None
     return data
 
@@ -55,6 +82,17 @@ def _summary(data: List[Any], path: str) -> TrialSummary:
         seed, task, kinds, details = data[_CAUSE]
         data[_CAUSE] = RecordedCause(seed, task, tuple(kinds), tuple(details))
     return TrialSummary._make(data)
+
+
+def _text_of_shared(shared: _Shared) -> str:
+    """Return the text of what many trials share. The same objects are encoded once."""
+    key = (id(shared.settings), id(shared.origin), shared.rule)
+    known = _texts.get(key)
+    if known is None:
+        if len(_texts) == _MOST_TEXTS:
+            _texts.clear()
+        known = _texts[key] = shared, _encode(shared)  # it holds them, so that none is another
+    return known[1]
 
 
 @lru_cache(maxsize=100)

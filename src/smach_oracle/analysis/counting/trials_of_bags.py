@@ -25,6 +25,13 @@ class TrialOfBags(NamedTuple):
 
 def trials_of(contents: Mapping[str, BagContent]) -> List[TrialOfBags]:
     """Return the trials of some bags, by path. A bag may have many, and a trial may be in many."""
+    if len(contents) == 1:
+        ((path, content),) = contents.items()
+        if len(content.nodes) == 1:  # as most have it
+            ((trial_id, node),) = content.nodes.items()
+            by_number = {event.seq: event for event in content.events}
+            in_order = [by_number[seq] for seq in sorted(by_number)]
+            return [TrialOfBags(trial_id, (path,), in_order, content.causes.get(trial_id), node)]
     events: Dict[str, Dict[int, Event]] = {}
     bags: Dict[str, Dict[str, None]] = {}
     causes: Dict[str, RecordedCause] = {}

@@ -53,10 +53,20 @@ class EventDecoder:
         is_plain = all(kind == STRING or kind in PLAIN_CODES for kind, _ in fields[:begin])
         if not is_plain or any(names.index(name) < begin for name in _REST):
             raise NotPlain('fields in another order')
-        self._head = _Head(fields[:begin])
+        self._fields = fields[:begin]
+        self._decode_head = FieldsDecoder(self._fields)
         self._decode_rest = FieldsDecoder(fields[begin:])
         self._pick = itemgetter(*map(self._decode_rest.names.index, _REST))
-        self._rests: Dict[bytes, Sequence[Any]] = {}
+        self._rests: Dict[bytes, Tuple[Any, ...]] = {}
+        places = dict(_places(self._fields))
+        self._numbers = itemgetter(*(places[name] for name in _NUMBERS))
+        # length and bytes of each text. A Header has one, and the trial's id is another
+        texts = [name for kind, name in self._fields if kind == STRING]
+        self._texts = itemgetter(*(places[name] - back for name in texts for back in (1, 0)))
+        # of the event before: the texts are mostly the same
+        self._layout = struct.Struct('')
+        self._known: Sequence[Any] = ()
+        self._trial_id = ''
 
     def __call__(self, data: bytes, start: int, end: int) -> StampedEvent:
         """Return the event that stands from `start` to `end`, with its stamp.
@@ -64,56 +74,35 @@ class EventDecoder:
         :raises NotPlain: where it is not as its definition says.
         :raises ValueError: where its data are no JSON.
         """
-        (second, rest, kind, seq, wall_time), trial_id, at = self._head.read(data, start)
-        if at > end:
-            raise NotPlain('a message of another length')
+        at = start + self._layout.size
+        values = self._layout.unpack_from(data, start) if at <= end else ()
+        if not values or self._texts(values) != self._known:
+            at = self._learn_layout(data, start)
+            if at > end:
+                raise NotPlain('a message of another length')
+            values = self._layout.unpack_from(data, start)
+        second, rest, kind, seq, wall_time = self._numbers(values)
         told = data[at:end]
         more = self._rests.get(told) or self._decoded(told)
-        event = _new_tuple(Event, (_KINDS.get(kind, kind), trial_id, seq, wall_time, *more))
-        return second + rest / _NS, event
+        fields = (_KINDS.get(kind, kind), self._trial_id, seq, wall_time) + more
+        return second + rest / _NS, _new_tuple(Event, fields)
 
-    def _decoded(self, told: bytes) -> Sequence[Any]:
+    def _learn_layout(self, data: bytes, start: int) -> int:
+        """Take the layout of the first fields of this event. Return where they end."""
+        decoded, end = self._decode_head.begin(data, start)
+        codes = ''.join(_codes(self._fields, decoded))
+        self._layout = struct.Struct('<' + codes)
+        self._known = self._texts(self._layout.unpack_from(data, start))
+        self._trial_id = decoded[self._decode_head.names.index(_TRIAL)]
+        return end
+
+    def _decoded(self, told: bytes) -> Tuple[Any, ...]:
         more = _read(self._pick(self._decode_rest(told)))
         if len(told) <= _LONGEST_REMEMBERED:
             if len(self._rests) == _MOST_REMEMBERED:
                 self._rests.clear()
             self._rests[told] = more
         return more
-
-
-class _Head:
-    """The first fields of an event. Their texts are mostly those of the event before."""
-
-    def __init__(self, fields: Sequence[Field]) -> None:
-        """:raises NotPlain: where a field is of another type."""
-        self._decode = FieldsDecoder(fields)
-        self._fields = fields
-        self._trial_at = [name for _, name in fields].index(_TRIAL)
-        places = dict(_places(fields))
-        self._numbers = itemgetter(*(places[name] for name in _NUMBERS))
-        # length and bytes of each text. A Header has one, and the trial's id is another
-        texts = [name for kind, name in fields if kind == STRING]
-        self._texts = itemgetter(*(places[name] - back for name in texts for back in (1, 0)))
-        self._layout = struct.Struct('')
-        self._known: Sequence[Any] = ()
-        self._trial_id = ''
-
-    def read(self, data: bytes, at: int) -> Tuple[Tuple[Any, ...], str, int]:
-        """Return the numbers, the trial's id, and where the fields end.
-
-        :raises NotPlain: where they are not as their definition says.
-        """
-        layout = self._layout
-        if at + layout.size <= len(data) and self._known:
-            values = layout.unpack_from(data, at)
-            if self._texts(values) == self._known:
-                return self._numbers(values), self._trial_id, at + layout.size
-        decoded, end = self._decode.begin(data, at)
-        codes = ''.join(_codes(self._fields, decoded))
-        self._layout = struct.Struct('<' + codes)
-        values = self._layout.unpack_from(data, at)
-        self._known, self._trial_id = self._texts(values), decoded[self._trial_at]
-        return self._numbers(values), self._trial_id, end
 
 
 def _places(fields: Sequence[Field]) -> Iterator[Tuple[str, int]]:
@@ -130,7 +119,7 @@ def _codes(fields: Sequence[Field], values: Sequence[Any]) -> Iterator[str]:
         yield 'I{}s'.format(len(value.encode())) if kind == STRING else PLAIN_CODES[kind]
 
 
-def _read(more: Sequence[Any]) -> Sequence[Any]:
+def _read(more: Sequence[Any]) -> Tuple[Any, ...]:
     data = more[-1]
     parsed: Optional[Mapping[str, Any]] = json.loads(data) if data else None
     return (*more[:-1], parsed)

@@ -56,7 +56,6 @@ _NOT_SOUND = (
     struct.error,
 )
 _UNPACK_UINT32 = UINT32.unpack_from
-_new_tuple = tuple.__new__
 
 # of a message: what unpacks header, time and size, and the header up to the time. b'': not known
 _RecordLayout = Tuple[struct.Struct, bytes]
@@ -77,21 +76,9 @@ class PlainConnection(NamedTuple):
     md5sum: str  # of the definition, in hexadecimal digits
 
 
-class BagMessage(NamedTuple):
-    """A message as it was recorded, where it stands in some bytes."""
-
-    stamp: int  # ns
-    order: int  # of its connection
-    number: int  # of the messages that were found
-    connection: PlainConnection
-    source: bytes
-    start: int
-    end: int
-
-    @property
-    def data(self) -> bytes:
-        """Return its bytes alone."""
-        return self.source[self.start : self.end]
+# a message as it was recorded: its stamp in ns, the order of its connection, its number among
+# those that were found, its connection, and some bytes, with where in them its own begin and end
+BagMessage = Tuple[int, int, int, PlainConnection, bytes, int, int]
 
 
 class _RawRecord(NamedTuple):
@@ -164,6 +151,7 @@ class KnownHeaders:
         :raises NotPlain: where an entry leads to no message of the connection.
         """
         layout, head = self._records.get(number, _NO_RECORD)
+        order = connection.order
         name = _CONNECTION_FIELD + UINT32.pack(number)
         for second, rest, place in entries:
             if head:
@@ -178,8 +166,7 @@ class KnownHeaders:
                 layout, head = _record_layout(data[place : start - 4])
                 self._records[number] = layout, head
             stamp = second * 10**9 + rest
-            message = (stamp, connection.order, len(found), connection, data, start, end)
-            found.append(_new_tuple(BagMessage, message))
+            found.append((stamp, order, len(found), connection, data, start, end))
 
 
 class _KnownConnections(NamedTuple):
