@@ -24,6 +24,7 @@ ARROWS = {
     'interfaces': {'page', 'drawing', 'sensors', 'answering'},
     'questions': {'page', 'robots', 'sensors', 'answering', 'interfaces'},
     'trials': {'page', 'robots', 'sensors'},
+    'people': {'page'},
 }
 # a function of a module, or a method; with what is above the brace in lines of its own
 HEAD = re.compile(r'(?:export )?(?:async )?function \w+\(|  (?:async |get |set |static )*\w+\(')

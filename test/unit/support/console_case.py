@@ -12,6 +12,8 @@ from waiting import wait_in_loop
 from smach_oracle.expert.console.commands.commands import MOST_BYTES, CommandReply
 from smach_oracle.expert.console.graphs.layout_worker import LayoutWorker
 from smach_oracle.expert.console.page_socket import OpenPages
+from smach_oracle.expert.console.people.people import People
+from smach_oracle.expert.console.people.shift_journal import ShiftJournal
 from smach_oracle.expert.console.sensors.question_images import ImageStore
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
 from smach_oracle.expert.console.server import make_app, tls_context
@@ -25,6 +27,7 @@ from smach_oracle.expert.console.web.connections import LimitedServer
 from smach_oracle.expert.console.web.proxies import TrustedProxies
 from smach_oracle.expert.console.web.sections import PageSections
 from smach_oracle.expert.console.web.settings import ConsoleSettings
+from smach_oracle.expert.console.web.shifts import Shifts
 
 os.environ.setdefault('ASYNC_TEST_TIMEOUT', '30')  # s; the machine may be loaded
 TOKENS = {
@@ -134,6 +137,7 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
             self.teleoperation,
             self.machine_hand,
             self.down_machine_hand,
+            People(ShiftJournal(), Shifts(), self.audit),
         )
         self.sensors = SensorStreams()
         self.files = ImageStore()

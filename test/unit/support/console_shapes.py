@@ -32,6 +32,9 @@ from smach_oracle.expert.console.answering.precondition_sections import status_v
 from smach_oracle.expert.console.answering.question_view import question_view
 from smach_oracle.expert.console.answering.sensor_discovery import SensorDiscovery
 from smach_oracle.expert.console.feeds.views import event_of, event_view
+from smach_oracle.expert.console.people.answer_times import AnsweredQuestion
+from smach_oracle.expert.console.people.people import People
+from smach_oracle.expert.console.people.shift_journal import ShiftJournal
 from smach_oracle.expert.console.reach.on_call import (
     CallStep,
     OnCallList,
@@ -54,10 +57,12 @@ from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.expert.console.trials.recovery_statistics import RecoveryCounts
 from smach_oracle.expert.console.trials.ways import Level
 from smach_oracle.expert.console.web.audit import Person
+from smach_oracle.expert.console.web.shifts import Shifts
 from smach_oracle.expert.followed_server import ListedQuestion, ListNews
 from smach_oracle.expert.interface_outputs import InterfaceOutputs
 from smach_oracle.msg import (
     ActiveState,
+    ConsoleCommand,
     ControlStatus,
     InterfaceOutput,
     MachineControl,
@@ -199,6 +204,17 @@ def put_people(sections):
         lambda: {'/robot': ['/node']},
         lambda: None,
     ).write_sections(sections)
+
+
+def put_notes(sections):
+    """Notes and times of people, and what they did."""
+    journal = ShiftJournal()
+    journal.write_note('ann', 'The gripper is worn.')
+    for times in ((1.0, 2.0, 3.0), (None, 2.0, None)):
+        journal.add_answered(AnsweredQuestion(1e9, 'ann', *times))
+    people = People(journal, Shifts(), None)
+    people.acts.take(ConsoleCommand(command='answer', expert='ann', arguments='{"kind": "goto"}'))
+    people.write_sections(sections)
 
 
 def put_down(sections):

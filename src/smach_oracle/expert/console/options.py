@@ -5,7 +5,8 @@ import argparse
 DESCRIPTION = (
     'Node: a web page from which people watch robots and answer their questions. Parameters: '
     '~address, ~port, ~allow_remote, ~token_file, ~hosts, ~certificate, ~private_key, ~bags, '
-    '~stores, ~cameras, ~idle_s, ~public_address, ~trusted_proxy, ~on_call; see doc/console.md.'
+    '~stores, ~cameras, ~idle_s, ~public_address, ~trusted_proxy, ~on_call, '
+    '~shift_file, ~shifts; see doc/console.md.'
 )
 
 

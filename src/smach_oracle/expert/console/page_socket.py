@@ -18,7 +18,9 @@ from .answering.teleoperation import Teleoperation
 from .commands.commands import CommandError, CommandReply, PageCommand, needed_role, parse, stops
 from .commands.driving import DRIVING_COMMANDS, STOPPING_COMMANDS
 from .commands.holding import HOLDING_COMMANDS, MACHINE_STOPS
+from .commands.people import PEOPLE_COMMANDS
 from .commands.stored import STORED_COMMANDS
+from .people.people import People
 from .robots.down_machine_hand import DownMachineHand
 from .robots.machine_hand import MachineHand
 from .trials.trial_log import TrialLog
@@ -26,7 +28,7 @@ from .web import sessions
 from .web.access import RateLimit, SocketRateLimits, may
 from .web.audit import Person
 from .web.handlers import access_of, set_security_headers
-from .web.row_lists import SentLists
+from .web.row_lists import LOOKED_AT, SentLists
 from .web.sections import PageSections
 
 MOST_SOCKETS = 64
@@ -56,6 +58,7 @@ class OpenPages:
         teleoperation: Teleoperation,
         machine_hand: MachineHand,
         down_machine_hand: DownMachineHand,
+        people: People,
     ) -> None:
         self.sections = sections
         self.log = log
@@ -63,6 +66,7 @@ class OpenPages:
         self.teleoperation = teleoperation
         self.machine_hand = machine_hand
         self.down_machine_hand = down_machine_hand
+        self.people = people
         self.onlookers = Onlookers(sections)
         self.open: Set['PageSocket'] = set()
         self.sockets: Set['PageSocket'] = set()  # those that have said hello
@@ -77,6 +81,8 @@ class OpenPages:
             return self.machine_hand.carry_out
         if command.name in STORED_COMMANDS:
             return self.down_machine_hand.carry_out
+        if command.name in PEOPLE_COMMANDS:
+            return self.people.carry_out
         return (
             self.teleoperation.carry_out
             if command.name in DRIVING_COMMANDS
@@ -97,7 +103,7 @@ class OpenPages:
         with self._trials_lock:
             version = self.log.version
             if version != self._trials_version and any(
-                socket.lists.looks for socket in list(self.sockets)
+                'trials' in socket.lists.looks for socket in list(self.sockets)
             ):
                 self._trials_version = version
                 self.sections.put('trials', self.log.overview())
@@ -280,7 +286,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
             self._watched, self._watched_from = command.arguments['trial'], 0
             return self._note(command, CommandReply(True))
         if command.name == 'look':
-            self.lists.looks = bool(command.arguments['at'])
+            self.lists.looks = LOOKED_AT.get(command.arguments['at'], ())
             self._pages.write_trials()
             return self._note(command, CommandReply(True))
         if command.name == 'pressed':

@@ -34,6 +34,8 @@ from .feeds.node_pulse import NodePulse
 from .graphs.layout_worker import LayoutWorker
 from .options import make_parser
 from .page_socket import OpenPages, PageSocket
+from .people.people import People
+from .people.shift_journal import ShiftJournal
 from .reach.on_call import read_on_call
 from .reach.reach import Reach
 from .robots.down_machine_hand import DownMachineHand
@@ -129,8 +131,14 @@ class Console:
         layouts = LayoutWorker()
         self._clocks = RobotClocks()
         stop_calls = StopCalls()
+        self._people = People(ShiftJournal(settings.shift_file), settings.shifts, self._audit)
         self._robots = FollowedRobots(
-            self._sections, self._log, layouts, self._clocks, stop_calls.look_up
+            self._sections,
+            self._log,
+            layouts,
+            self._clocks,
+            stop_calls.look_up,
+            self._people.take_event,
         )
         self._health = RobotHealth()
         self._down = DownMachines(settings.stores, self._sections)
@@ -165,6 +173,7 @@ class Console:
             self._teleoperation,
             self._machine_hand,
             DownMachineHand(self._down, self._audit),
+            self._people,
         )
         secret = settings.tokens.cookie_secret if settings.tokens else secrets.token_hex(32)
         access = AccessControl(settings._replace(port=port), secret, self._audit)
@@ -209,6 +218,8 @@ class Console:
         repeat(self._robots.discover, ROBOTS_PERIOD_S)
         repeat(self._down.look, ROBOTS_PERIOD_S)
         repeat(self._health.discover, ROBOTS_PERIOD_S)
+        repeat(self._people.acts.follow, ROBOTS_PERIOD_S)
+        repeat(self._people.keep, ROBOTS_PERIOD_S)
         repeat(self._write_sections, SECTIONS_PERIOD_S)
         if self._reach is not None:
             repeat(self._reach.look, REACH_PERIOD_S)
@@ -230,6 +241,7 @@ class Console:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)
             self._pages.write_trials()
+            self._people.write_sections(self._sections)
             robots = {*self._robots.nodes(), *(each.goal.robot for each in questions)}
             self._discovery.cameras.write_sections(self._sections, robots)
             self._health.write_sections(self._sections, robots)

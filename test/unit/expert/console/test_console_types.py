@@ -37,6 +37,8 @@ SECTIONS = {
     'sensors',
     'manipulation',
     'interface_output',
+    'people',
+    'acts',
     'reach',
     'live',
     'graph',
@@ -95,6 +97,7 @@ class WhatIsSent(console_case.ConsoleCase):
             console_shapes.put_machines,
             console_shapes.put_sensors,
             console_shapes.put_interfaces,
+            console_shapes.put_notes,
         ):
             put(self.sections)
         return console_shapes.put_trials(self.sections, self.log, str(self.folder))
@@ -124,6 +127,11 @@ class WhatIsSent(console_case.ConsoleCase):
             reply = 'Reply<"take_wheel">' if message.get('re') == 4 else 'Reply'
             found.append((reply if 're' in message else 'Batch', message))
             seen |= set(message) | {message.get('re')}
+        await socket.write_message(json.dumps({'do': 'look', 'at': 'people', 'id': 9}))
+        while 'acts' not in found[-1][1].get('lists', {}):
+            found.append(('Batch', json.loads(await socket.read_message())))
+            if 're' in found[-1][1]:
+                found[-1] = ('Reply', found[-1][1])
         pushing.stop()
         return found
 

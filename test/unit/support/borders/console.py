@@ -64,6 +64,8 @@ _ARGUMENTS: Dict[str, Any] = {
     'arm': words('', 'left'),
     'down': words('robot.db#1'),
     'moment': st.integers(0, 9),
+    'text': words('the gripper is worn'),
+    'note': words('1.5-7'),
     'label': words('A', 'KITCHEN/LOOK'),
     'key': words('cups'),
     'json': st.one_of(json_texts, texts),
@@ -116,7 +118,7 @@ class Socket(page_socket.PageSocket):
         carried = _Carried()
         with mock.patch.object(page_socket, 'ThreadPoolExecutor', mock.Mock()):
             pages = page_socket.OpenPages(
-                PageSections(), TrialLog(), carried, carried, _Hand(), carried
+                PageSections(), TrialLog(), carried, carried, _Hand(), carried, carried
             )
         pages.workers = None  # of the loop
         self._prepare(pages)

@@ -14,6 +14,7 @@ from .driving import DRIVING_COMMANDS
 from .driving import stops as stops_hand
 from .holding import HOLDING_COMMANDS, MACHINE_STOPS
 from .marking import MARKING_COMMANDS
+from .people import PEOPLE_COMMANDS
 from .stored import STORED_COMMANDS
 
 MOST_BYTES = 65536
@@ -110,7 +111,7 @@ def _person(value: object) -> str:
 COMMANDS: Dict[str, CommandSpec] = {
     'hello': CommandSpec('viewer', {'xsrf': text(200, 1), 'expert': _person}),
     'watch': CommandSpec('viewer', {'trial': text(400)}),
-    'look': CommandSpec('viewer', {'at': one_of(('', 'trials'))}),
+    'look': CommandSpec('viewer', {'at': one_of(('', 'trials', 'people'))}),
     'view': CommandSpec('viewer', {'question': text(1000)}),
     'claim': CommandSpec('operator', QUESTION),
     'take_over': CommandSpec('operator', QUESTION),
@@ -132,4 +133,5 @@ COMMANDS: Dict[str, CommandSpec] = {
     **DRIVING_COMMANDS,
     **HOLDING_COMMANDS,
     **STORED_COMMANDS,
+    **PEOPLE_COMMANDS,
 }

@@ -10,6 +10,7 @@ import rospy
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.msg import ControlStatus, NodeTrials, OracleEvent, OracleRates
+from smach_oracle.oracle.records.events import Event
 from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
@@ -47,8 +48,13 @@ class FollowedRobots:
         layouts: LayoutWorker,
         clocks: Optional[RobotClocks] = None,
         look_up: Callable[[Sequence[str]], None] = lambda robots: None,
+        on_event: Callable[[Event], None] = lambda event: None,
     ) -> None:
-        """`look_up`: learns where robots are stopped, before they are followed."""
+        """
+        :param look_up: learns where robots are stopped, before they are followed.
+        :param on_event: called with each event that is new, in a ROS thread.
+        """
+        self._on_event = on_event
         self._look_up = look_up
         self._clocks = clocks or RobotClocks()
         self._sections = sections
@@ -170,7 +176,9 @@ class FollowedRobots:
 
         def take_event(message: OracleEvent) -> None:
             take(message)
-            self._log.add(robot.name, event_of(message))
+            event = event_of(message)
+            if self._log.add(robot.name, event):
+                self._on_event(event)
 
         return take_event
 

@@ -78,14 +78,14 @@ class TrialLog:
         """Return what the events of all trials take."""
         return self._bytes
 
-    def add(self, robot: str, event: Event) -> None:
-        """Take in one event of a robot."""
+    def add(self, robot: str, event: Event) -> bool:
+        """Take in one event of a robot. Return whether it is a new one."""
         ended = event.kind in (EventKind.CONTAINER_END, EventKind.TRIAL_END)
         with self._lock:
             self._version += 1
             trial = self._known(robot, event.trial_id)
             if event.seq <= trial.last_seq:
-                return  # it was heard: a bag of the trial is played
+                return False  # it was heard: a bag of the trial is played
             trial.last_seq = event.seq
             trial.heard.add(event)
             self._ways.add(event)
@@ -101,6 +101,7 @@ class TrialLog:
                 ended
                 and (not event.outcome or trial.heard.rule.meaning(event.outcome) in _NOT_WELL),
             )
+        return True
 
     def take_told(self, robot: str, told: Sequence[ToldTrial]) -> None:
         """Take in the latest trials of a robot's machines, as the robot tells them.

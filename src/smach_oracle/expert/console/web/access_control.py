@@ -27,7 +27,7 @@ class AccessControl:
         self.cookie = 'console_{}'.format(settings.port)
         self.requests = ClientRateLimits(rate=30.0, burst=150.0, for_all=5.0)
         # a page has some 100. A browser may open many pages
-        self.files = ClientRateLimits(rate=100.0, burst=2000.0, for_all=5.0)
+        self.files = ClientRateLimits(rate=100.0, burst=2600.0, for_all=5.0)
         # wrong tokens: those that are answered as such, and those that are heard at all
         self.sign_ins = ClientRateLimits(rate=0.2, burst=5.0, for_all=4.0)
         self.wrong_tokens = ClientRateLimits(rate=2.0, burst=20.0, for_all=5.0)

@@ -1,14 +1,16 @@
 """Long lists of the page: of each only what has changed is sent, and only to pages that look.
 
-A list is a section whose `trials` are rows, each with an id.
+A list is a section with rows, each with an id.
 """
 
 import json
 import threading
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-LISTS = ('trials', 'bags')
-ROWS = 'trials'
+# each list, with the name that its rows have
+LISTS = {'trials': 'trials', 'bags': 'trials', 'acts': 'acts'}
+# what a page looks at, with the lists that it gets then
+LOOKED_AT: Mapping[str, Tuple[str, ...]] = {'trials': ('trials', 'bags'), 'people': ('acts',)}
 
 
 class RowList(NamedTuple):
@@ -27,8 +29,8 @@ class RowLists:
 
     def put(self, name: str, data: Dict[str, Any]) -> None:
         """Set a list to plain data without NaN."""
-        rest = {key: value for key, value in data.items() if key != ROWS}
-        rows = {row['id']: _text(row) for row in data[ROWS]}
+        rest = {key: value for key, value in data.items() if key != LISTS[name]}
+        rows = {row['id']: _text(row) for row in data[LISTS[name]]}
         with self._lock:
             self._lists[name] = RowList(_text(rest), rows)
 
@@ -36,7 +38,7 @@ class RowLists:
         """Return a list as it is now, None where there is none."""
         found = self.now().get(name)
         return found and dict(
-            json.loads(found.rest), **{ROWS: [json.loads(row) for row in found.rows.values()]}
+            json.loads(found.rest), **{LISTS[name]: list(map(json.loads, found.rows.values()))}
         )
 
     def now(self) -> Dict[str, RowList]:
@@ -49,7 +51,7 @@ class SentLists:
     """The rows of the lists that one page has."""
 
     def __init__(self) -> None:
-        self.looks = False  # whether it is to get more
+        self.looks: Tuple[str, ...] = ()  # names of the lists of which it is to get more
         self._sent: Dict[str, Optional[RowList]] = {}
 
     def changes(self, lists: RowLists) -> str:
@@ -58,7 +60,7 @@ class SentLists:
             return ''
         parts = []
         now = lists.now()
-        for name in LISTS:
+        for name in self.looks:
             found = now.get(name)
             if found is None:
                 # the page may have one of an earlier connection

@@ -11,6 +11,7 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .access import AccessTokens, AllowedHosts, is_loopback, load_tokens
 from .proxies import PublicAddress, TrustedProxies
+from .shifts import DEFAULT_SHIFTS, Shifts
 
 # a parameter by its name, or the default
 GetParameter = Callable[[str, object], object]
@@ -38,6 +39,8 @@ class ConsoleSettings(NamedTuple):
     public: Optional[PublicAddress] = None  # by which people reach it
     proxies: TrustedProxies = TrustedProxies()
     on_call: str = ''  # file that says who is reached, '' where nobody is
+    shift_file: str = ''  # file that keeps notes and times, '' where nothing does
+    shifts: Shifts = Shifts()
 
     @property
     def scheme(self) -> str:
@@ -95,6 +98,8 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
         public,
         proxies,
         on_call,
+        _path(get, 'shift_file'),
+        Shifts(_text(get, 'shifts', DEFAULT_SHIFTS)),
     )
 
 

@@ -211,6 +211,8 @@ def test_no_command_names_a_topic_a_service_or_a_type():
         'label',
         'key',
         'json',
+        'text',
+        'note',
     }
 
 

@@ -25,6 +25,8 @@ from smach_oracle.expert.console.web.access import (
 )
 
 ARGUMENTS = {
+    'text': 'the gripper is worn',
+    'note': '1.5-7',
     'question': 'q',
     'kind': 'goto',
     'name': 'x',

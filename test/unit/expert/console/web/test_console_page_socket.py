@@ -57,9 +57,9 @@ def test_of_two_threads_that_write_the_list_of_trials_the_later_one_lasts():
             return {'heard': version, 'trials': []}
 
     log, sections = Log(), PageSections()
-    pages = page_socket.OpenPages(sections, log, None, None, None, None)
+    pages = page_socket.OpenPages(sections, log, None, None, None, None, None)
     socket = Socket()
-    socket.lists = SimpleNamespace(looks=True)
+    socket.lists = SimpleNamespace(looks=('trials', 'bags'))
     pages.sockets.add(socket)
     first = threading.Thread(target=pages.write_trials, daemon=True)
     first.start()

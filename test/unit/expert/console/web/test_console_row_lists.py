@@ -21,7 +21,10 @@ PUT_TOGETHER = """
 const steps = JSON.parse(require("fs").readFileSync(0));
 let list;
 const found = steps.map((step) => {
-  if (step.trials !== undefined) list = step.trials && changed(list, step.trials);
+  if (step.trials !== undefined) {
+    list = step.trials && { ...list, ...step.trials.rest,
+      trials: changed(list && list.trials, step.trials) };
+  }
   return list;
 });
 process.stdout.write(JSON.stringify(found));"""
@@ -29,7 +32,7 @@ process.stdout.write(JSON.stringify(found));"""
 
 def looking():
     page = SentLists()
-    page.looks = True
+    page.looks = ('trials', 'bags')
     return page
 
 

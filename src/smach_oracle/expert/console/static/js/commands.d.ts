@@ -42,7 +42,7 @@ export interface DriveWish {
 export interface Commands {
   hello: { xsrf: string; expert: string };
   watch: { trial: string };
-  look: { at: 'trials' | '' }; // whether the lists of trials are looked at
+  look: { at: 'trials' | 'people' | '' }; // which lists are looked at
   claim: OfQuestion;
   take_over: OfQuestion;
   release: OfQuestion;
@@ -67,6 +67,8 @@ export interface Commands {
   goto_stored: OfDown & { label: string };
   edit_stored: OfDown & { container: string; key: string; json: string };
   drop_stored: OfDown;
+  write_note: { text: string };
+  drop_note: { note: string }; // its id
   drive: OfQuestion & DriveWish & { frame: DriveFrame; arm: string; sent: number }; // ms
 }
 

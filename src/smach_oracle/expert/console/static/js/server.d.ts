@@ -6,6 +6,7 @@ import { Colour, Vector } from './drawing/types';
 import { DownMachine } from './down';
 import { RobotHealth } from './fleet';
 import { HeldMachine } from './holding';
+import { Act, ActOverview, People } from './people';
 import { Reach } from './reach';
 import {
   FailureClass, InterfaceOutput, KeptImage, PreconditionStatus, QueryServer, Question,
@@ -29,15 +30,19 @@ export interface Batch {
   now: number;
   all?: true; // what is not among the sections is gone
   sections?: { [Name in keyof Sections]?: Sections[Name] | null }; // null: it is gone
-  lists?: { trials?: ListChange<TrialOverview> | null; bags?: ListChange<BagOverview> | null };
+  lists?: {
+    trials?: ListChange<TrialOverview, Trial> | null;
+    bags?: ListChange<BagOverview, Trial> | null;
+    acts?: ListChange<ActOverview, Act> | null;
+  };
   events?: EventSlice;
 }
 
 /** What has changed in a list; only pages that look at it get this. */
-export interface ListChange<List> {
+export interface ListChange<List, Row> {
   all?: true; // no row of before is left
-  rest?: Omit<List, 'trials'>; // what is beside the rows
-  rows: [before: string, row: Trial][]; // with the id of the row before it; '': it is the first
+  rest?: Omit<List, 'trials' | 'acts'>; // what is beside the rows
+  rows: [before: string, row: Row][]; // with the id of the row before it; '': it is the first
   gone?: string[]; // ids
 }
 
@@ -55,6 +60,8 @@ export interface Sections {
   down: DownMachine[];
   trials: TrialOverview;
   bags: BagOverview;
+  acts: ActOverview;
+  people: People;
   sensors: { sensors: Sensor[]; perception: ByKey<PerceptionSensors> };
   manipulation: ByKey<Manipulation>;
   interface_output: ByKey<InterfaceOutput>;
@@ -312,4 +319,5 @@ export * from './commands';
 export * from './fleet';
 export * from './holding';
 export * from './reach';
+export * from './people';
 export * from './question';

@@ -54,7 +54,8 @@ export class App {
     this.connection.gate = new Gate(this.liveness, () => Boolean(this.expert),
       () => this.nameOneself());
     this.connection.wantedExpert = remembered('expert', '');
-    this.looking = new Looking(this.connection, () => this.current === 'trials');
+    this.looking = new Looking(this.connection, () => (
+      this.current === 'trials' || this.current === 'people' ? this.current : ''));
     this.note = takeNote();
     this.current = '';
     this.status = h('span', { id: 'status', class: 'status' });

@@ -15,6 +15,7 @@ const GOING_ON = new Set(['resume_machine', 'step_machine', 'confirm_state']);
 /** @type {Set<Name>} */
 const NAMED = new Set(['claim', 'take_over', 'answer', 'mark', 'use_frame', 'hand_over',
   'give_up_interface', 'take_wheel', 'set_breakpoint', 'goto_stored', 'edit_stored', 'drop_stored',
+  'write_note', 'drop_note',
   ...GOING_ON]);
 const NO_NAME = 'Not done: your name is needed for it.';
 

@@ -3,53 +3,53 @@
 import { unlessLost } from './connection.js';
 
 /** @typedef {import('./connection.js').Connection} Connection */
-/** @typedef {import('../server').Trial} Trial */
+/** @typedef {'trials' | 'people' | ''} Place what lists belong to */
 
 /**
- * A list after a change.
- * @template {{ trials: Trial[] }} List
- * @param {List | undefined} list
- * @param {import('../server').ListChange<List>} change
- * @returns {List}
+ * The rows of a list after a change.
+ * @template {{ id: string }} Row
+ * @param {Row[] | undefined} old
+ * @param {{ all?: true, rows: [before: string, row: Row][], gone?: string[] }} change
  */
-export function changed(list, { all, rest, rows, gone = [] }) {
+export function changed(old, { all, rows, gone = [] }) {
   const left = new Set(gone);
-  const trials = !list || all ? [] : list.trials.filter((trial) => !left.has(trial.id));
-  const places = new Map(trials.map((trial, place) => [trial.id, place]));
+  const list = !old || all ? [] : old.filter((row) => !left.has(row.id));
+  const places = new Map(list.map((row, place) => [row.id, place]));
   const fresh = rows.filter(([, row]) => !places.has(row.id));
   for (const [, row] of rows) {
     const place = places.get(row.id);
-    if (place !== undefined) trials[place] = row;
+    if (place !== undefined) list[place] = row;
   }
   for (const [before, row] of fresh) {
-    trials.splice(before ? trials.findIndex(({ id }) => id === before) + 1 : 0, 0, row);
+    list.splice(before ? list.findIndex(({ id }) => id === before) + 1 : 0, 0, row);
   }
-  return /** @type {List} */ ({ ...list, ...rest, trials });
+  return list;
 }
 
-/** Tells the server whether the lists are looked at. */
+/** Tells the server which lists are looked at. */
 export class Looking {
   /**
    * @param {Connection} connection
-   * @param {() => boolean} wanted whether what is shown has them
+   * @param {() => Place} wanted where what is shown has lists
    */
   constructor(connection, wanted) {
     this.connection = connection;
     this.wanted = wanted;
-    this.told = false;
+    /** @type {Place} */
+    this.told = '';
     document.addEventListener('visibilitychange', () => this.tell());
   }
 
   /** The server knows nothing of this page yet. */
   connected() {
-    this.told = false;
+    this.told = '';
     this.tell();
   }
 
   tell() {
-    const looks = this.wanted() && !document.hidden;
+    const looks = document.hidden ? '' : this.wanted();
     if (looks === this.told || !this.connection.connected) return;
     this.told = looks;
-    this.connection.request('look', { at: looks ? 'trials' : '' }).catch(unlessLost);
+    this.connection.request('look', { at: looks }).catch(unlessLost);
   }
 }

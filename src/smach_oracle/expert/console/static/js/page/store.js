@@ -1,10 +1,13 @@
 // @ts-check
 // The newest sections that the server has sent; they are kept while the connection is away.
-import { changed as listAfter } from './row_lists.js';
+import { changed as rowsAfter } from './row_lists.js';
 
 /** @typedef {import('../server').Batch} Batch */
 /** @typedef {import('../server').EventSlice} EventSlice */
 /** @typedef {import('../server').Sections} Sections */
+/** @typedef {import('../server').Trial} Trial */
+
+const LISTS = new Set(['trials', 'bags', 'acts']); // of these come changes alone
 
 export class Store {
   constructor() {
@@ -55,14 +58,15 @@ export class Store {
     const changed = new Map(Object.entries(sections));
     if (all) {
       for (const name of this.sections.keys()) {
-        if (!changed.has(name) && name !== 'trials' && name !== 'bags') changed.set(name, null);
+        if (!changed.has(name) && !LISTS.has(name)) changed.set(name, null);
       }
     }
-    const { trials, bags } = lists;
-    if (trials !== undefined) {
-      changed.set('trials', trials && listAfter(this.get('trials'), trials));
+    const { trials, bags, acts } = lists;
+    if (trials !== undefined) changed.set('trials', trials && this.withTrials('trials', trials));
+    if (bags !== undefined) changed.set('bags', bags && this.withTrials('bags', bags));
+    if (acts !== undefined) {
+      changed.set('acts', acts && { acts: rowsAfter(this.get('acts')?.acts, acts) });
     }
-    if (bags !== undefined) changed.set('bags', bags && listAfter(this.get('bags'), bags));
     for (const [name, section] of changed) {
       if (section === null) this.sections.delete(name);
       else this.sections.set(name, section);
@@ -70,5 +74,14 @@ export class Store {
     const names = [...changed.keys()];
     if (names.length) this.listeners.forEach((listener) => listener(names));
     if (events) this.eventListeners.forEach((listener) => listener(events));
+  }
+
+  /**
+   * @param {'trials' | 'bags'} name
+   * @param {import('../server').ListChange<unknown, Trial>} change
+   */
+  withTrials(name, change) {
+    const old = this.get(name);
+    return { ...old, ...change.rest, trials: rowsAfter(old?.trials, change) };
   }
 }

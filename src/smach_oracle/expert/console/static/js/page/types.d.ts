@@ -18,8 +18,8 @@ type Handlers = {
     ((event: GlobalEventHandlersEventMap[Type]) => void) | null;
 };
 
-type AttributeName = 'alt' | 'autocomplete' | 'class' | 'cx' | 'cy' | 'd' | 'disabled' | 'for'
-  | 'height' | 'href' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth'
+type AttributeName = 'alt' | 'autocomplete' | 'class' | 'colspan' | 'cx' | 'cy' | 'd' | 'disabled'
+  | 'for' | 'height' | 'href' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth'
   | 'marker-end' | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient' | 'placeholder'
   | 'r' | 'refX' | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope' | 'selected'
   | 'spellcheck' | 'src' | 'step' | 'tabindex' | 'text-anchor' | 'title' | 'transform' | 'type'
