@@ -20,6 +20,7 @@ from ..sensors.images import BrowserFile
 
 LONGEST_NAME = 100
 LONGEST_TEXT = 300
+LONGEST_WAIT_S = 86400.0  # a deadline beyond it is not told: a time of day would not say which day
 _MARKDOWN = re.compile(r'([\\`*_{}\[\]()#+!|<>~-])')
 
 
@@ -49,11 +50,11 @@ def called_question(
         for text in (goal.robot, goal.container_path, goal.failed_state)
     )
     epoch_s = time.time() - time.monotonic()
-    why = shortened(clean(goal.text), LONGEST_TEXT)
+    why = shortened(clean(goal.text), LONGEST_TEXT).rstrip('. ')
     sentence = '{}: {} (in {}) {}{}.'.format(
         robot, state, path, shortened(failure_words(goal), LONGEST_TEXT), ': ' + why if why else ''
-    ).replace('..', '.')
-    if listed.deadline_s != float('inf'):
+    )
+    if listed.deadline_s - time.monotonic() < LONGEST_WAIT_S:
         until = time.strftime('%H:%M:%S', time.localtime(epoch_s + listed.deadline_s))
         fallback = shortened(clean(goal.fallback), LONGEST_NAME) or 'its fallback'
         sentence += ' It waits until {}, then: {}.'.format(until, fallback)

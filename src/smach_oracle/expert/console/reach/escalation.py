@@ -34,6 +34,12 @@ class _WaitingQuestion:
         self.called: Set[str] = set()
         self.passed_over: List[str] = []  # in their quiet hours
         self.again: List[str] = []  # whose call was not made
+        self.unreached: Set[str] = set()
+
+    @property
+    def nobody_was_reached(self) -> bool:
+        """Whether all that were called could not be."""
+        return bool(self.called) and self.called <= self.unreached
 
     def count(self, now_s: float, waits: bool) -> None:
         """Let the time go on."""
@@ -71,6 +77,12 @@ class Escalation:
         if waiting is not None:
             waiting.again.append(due.person)
 
+    def not_reached(self, due: DueCall) -> None:
+        """A person could not be reached. Where nobody was, the next step is taken at once."""
+        waiting = self._waiting.get(due.key)
+        if waiting is not None:
+            waiting.unreached.add(due.person)
+
     def next_call(self, key: str, moment: datetime) -> Optional[NextCall]:
         """Return who comes next for a question, None where nobody does."""
         waiting = self._waiting.get(key)
@@ -81,11 +93,11 @@ class Escalation:
         return NextCall(people or list(step.people), max(0.0, step.after_s - waiting.waited_s))
 
     def _call(self, waiting: _WaitingQuestion, moment: datetime) -> List[str]:
-        """Take the steps that are due. One in which all are in their quiet hours takes no time."""
+        """Take the steps that are due. One in which nobody can be called takes no time."""
         found = [each for each in waiting.again if self._may_call(each, moment)]
         waiting.again.clear()
         steps = self._on_call.steps
-        skips = False
+        skips = waiting.nobody_was_reached
         while waiting.step < len(steps):
             step = steps[waiting.step]
             if step.after_s > waiting.waited_s and not skips:

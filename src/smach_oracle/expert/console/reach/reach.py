@@ -50,6 +50,7 @@ class Reach:
         self._waiting: Set[str] = set()
         self._results: Dict[str, 'OrderedDict[Receiver, CallResult]'] = {}  # of open questions
         self._dropped: List[DueCall] = []
+        self._unreached: List[DueCall] = []
         self._failed: Deque[Dict[str, Any]] = deque(maxlen=MOST_FAILED)
         self._next: Dict[str, Dict[str, Any]] = {}
         self._seen_s: Dict[str, float] = {}
@@ -68,8 +69,11 @@ class Reach:
         self._forget(listed)
         with self._lock:
             dropped, self._dropped = self._dropped, []
+            unreached, self._unreached = self._unreached, []
         for due in dropped:
             self._escalation.take_back(due)
+        for due in unreached:
+            self._escalation.not_reached(due)
         ready = {key: waiting for key, waiting in waits.items() if self._is_ready(key, now_s)}
         for due in self._escalation.due(now_s, moment, ready):
             picture = self._picture(due.key) if self._on_call.pictures else None
@@ -105,6 +109,9 @@ class Reach:
             results = self._results.setdefault(result.key, OrderedDict())
             results[result.receiver] = result
             if result.status == FAILED:
+                ways = self._on_call.people[result.receiver.person].receivers
+                if all(way in results and results[way].status == FAILED for way in ways):
+                    self._unreached.append(DueCall(result.key, result.receiver.person))
                 self._failed.append(
                     {
                         'to': result.receiver.words,

@@ -123,6 +123,11 @@ def test_a_deadline_and_what_comes_then_are_told():
     assert told.endswith('then: PICK_AND_PLACE ends with aborted.')
 
 
+@pytest.mark.parametrize('left_s', [math.inf, 1e300, 1e9])
+def test_a_deadline_that_is_far_off_is_not_told(left_s):
+    assert 'It waits until' not in question(deadline_s=time.monotonic() + left_s).sentence
+
+
 def test_a_webhook_with_tls_is_checked(serve, folder):
     server = serve(receiving.WebhookServer(certificate=str(folder / 'own.pem')))
     post(server.url, ca_file=str(folder / 'own.pem'))

@@ -76,6 +76,16 @@ def test_a_call_that_was_not_made_is_made_when_the_question_waits_again():
     assert called(calls, 3) == []
 
 
+def test_where_nobody_was_reached_the_next_is_called_at_once():
+    calls = escalation(steps=((0.0, 'ann', 'bob'), (300.0, 'eve')))
+    ann, bob = calls.due(0, NOON, {'q': True})
+    calls.not_reached(ann)
+    assert called(calls, 1) == [], 'bob was'
+    calls.not_reached(bob)
+    assert called(calls, 2) == ['eve']
+    assert called(calls, 3) == []
+
+
 def test_who_comes_next_is_known():
     calls = escalation(quiet=['eve'])
     assert calls.next_call('q', NOON) is None

@@ -140,6 +140,13 @@ def test_a_receiver_that_fails_is_shown_and_the_next_is_called(begin, servers, c
     assert calls.shown()['failed'], 'it stays when the question is gone'
 
 
+def test_the_next_is_called_at_once_where_the_first_cannot_be_reached(begin, servers):
+    servers[0].statuses = [404]
+    calls = begin(after_s=5000)
+    calls.ask()
+    assert calls.until(lambda: calls.status('bob') == ('sent', ''))
+
+
 def test_a_receiver_that_hangs_delays_nothing(begin, servers):
     rude = receiving.RudeServer(receiving.hangs)
     calls = begin(one='http://127.0.0.1:{}/x'.format(rude.port))
