@@ -18,7 +18,7 @@ from waiting import stays, wait_for
 from smach_msgs.msg import SmachContainerStatus
 from smach_oracle.analysis.trials import load_trials
 from smach_oracle.msg import MoveArmsAsideAction, OracleEvent
-from smach_oracle.oracle.records.trial_counter import TrialEnding
+from smach_oracle.trial_counter import TrialEnding
 
 SCRIPT = """
 import sys, rospy, smach, smach_ros

@@ -2,7 +2,7 @@
 
 from typing import Protocol
 
-from smach_oracle.oracle.records.trial_counter import (
+from smach_oracle.trial_counter import (
     AUTONOMOUS_DECISIONS,
     TrialCounter,
     TrialEnding,

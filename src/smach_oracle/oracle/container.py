@@ -16,7 +16,7 @@ from .identity import renew_attributes
 from .machine.oracle import oracle_of, read_by_hand, write_by_hand
 from .machine.tree import Tree, new_id
 from .machine.tree_node import TreeNode, entered_by_failures_alone, marked_node
-from .machine.userdata_view import StateView, write_constants
+from .machine.userdata import StateView, write_constants
 from .machine.wrapped_classes import rebuild, two_classes
 from .records.events import EventKind
 from .records.visits import StateRateRow, TransitionRow
@@ -86,7 +86,7 @@ class OracleContainer(smach.StateMachine):
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
         tree = Tree(OracleContainer, recover, expert, health)
         self._oracle = TreeNode(self, tree, checked, name)
-        self._oracle.in_force.wrap_with(strict)
+        self._oracle.in_force.strict = strict
 
     @classmethod
     def wrap(
@@ -325,9 +325,9 @@ class OracleContainer(smach.StateMachine):
         node, how = self._oracle, 'starting'
         if node.execution.starts_in in self._states:
             self._set_current_state(node.execution.starts_in)
-        entry = node.tree.resumed.take_entry(node)
+        entry = node.tree.resumed.take_entry(node.records)
         if entry is not None:
-            entry.enter(node)
+            entry.enter()
             how = 'going on'
         smach.loginfo(
             "State machine {} in state '{}' with userdata: \n\t{}".format(

@@ -129,7 +129,8 @@ class OperatorHand:
         held = control.step(path)
         if held:
             return self._told('step', _runs(held), by, path)
-        text = self._nothing_waits(path)
+        where = ' in ' + path if path else ''
+        text = 'nothing waits{}. {}'.format(where, self._how_it_pauses())
         raise OperatorError(text if was_paused else self._told('pause', text, by))
 
     def confirm(self, path: str = '', by: str = '') -> str:
@@ -170,7 +171,8 @@ class OperatorHand:
         :raises OperatorError: where there is no such container or state, where it cannot be
             entered now, and where an unconfirmed state may be repeated.
         """
-        node = self._node_at(path, state)
+        found = self._nodes_at(path)
+        node = next((each for each in found if state in each.labels()), found[0])
         place = TreePlace(node, state)
         prospect = prospect_of(place, tuple(written))
         if prospect.why_not:
@@ -346,7 +348,8 @@ class OperatorHand:
         if not top.machine.is_running():
             return '{} does not run; it will wait before its first state'.format(top.path)
         waits = [_in_words(each) for each in self._active() if each.held_by]
-        runs, asks = self._what_runs(), self._what_recovers()
+        runs = self._what_runs()
+        asks = [each.path for each in self._active() if self._is_oracle(each)]
         told = ['waits before ' + ', '.join(waits)] if waits else []
         if asks:
             told.append('the oracle is at work in ' + ', '.join(asks))
@@ -369,10 +372,6 @@ class OperatorHand:
             and not self._is_oracle(each)
         ]
 
-    def _what_recovers(self) -> List[str]:
-        """Return the paths of the containers whose oracle decides or asks now."""
-        return [each.path for each in self._active() if self._is_oracle(each)]
-
     def _is_oracle(self, active: ActiveState) -> bool:
         return any(
             node.path == active.path and node.is_oracle(active.state)
@@ -392,14 +391,6 @@ class OperatorHand:
             runs = self._what_runs()
             text += ', and this runs on: ' + ', '.join(runs) if runs else ''
         return text + ('; still to be confirmed: ' + ', '.join(asks) if asks else '')
-
-    def _nothing_waits(self, path: str) -> str:
-        return 'nothing waits{}. {}'.format(' in ' + path if path else '', self._how_it_pauses())
-
-    def _node_at(self, path: str, state: str) -> TreeNode:
-        """Return the container at a path. Of branches, which have one path, that of the state."""
-        found = self._nodes_at(path)
-        return next((node for node in found if state in node.labels()), found[0])
 
     def _nodes_at(self, path: str) -> List[TreeNode]:
         """Return the containers at a path, '': the top machine.

@@ -1,6 +1,6 @@
 """Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
 
-from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, FrozenSet, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -8,16 +8,15 @@ from .decision.failure_rate import FailureClass
 from .decision.policy import Action, Past, Policy, Preconditions, Situation
 from .decision.ways import WayKind
 from .machine.nesting import nodes_of
-from .machine.places import TreePlace, direct_levels, name_of
+from .machine.places import TreePlace, direct_levels, links_to, name_of
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
-from .recovery.menu import leading_to
-from .recovery.unguarded import Unguarded
+from .recovery.options import Drawn, leading_to
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
 from .settings.settings import ALLOW, Settings, StateSettings
-from .smach_private import initial_label_of, states_of
+from .smach_private import initial_label_of, states_of, transitions_of
 
 Actions = Tuple[Tuple[FailureClass, Tuple[Action, ...]], ...]
 
@@ -74,6 +73,76 @@ class ContainerProspect(NamedTuple):
     unknown_ends: Tuple[str, ...] = ()
 
 
+# -- the ways on which no guarded state (`on_retry`) is executed, as they are drawn
+
+_Place = Tuple[TreeNode, str]
+
+
+class Unguarded:
+    """The ways through one tree. It looks at each state once."""
+
+    def __init__(self, top: TreeNode) -> None:
+        self._ends: Dict[_Place, FrozenSet[str]] = {}
+        self._within: Dict[_Place, List[TreeNode]] = {}
+        for each in nodes_of(top.machine):
+            # an Iterator may have no item, and then executes nothing
+            if each.parent is not None and not any(
+                isinstance(link.inner_container, smach.Iterator) for link in links_to(each)
+            ):
+                place = each.parent, each.labels_from_parent[0]
+                self._within.setdefault(place, []).append(each)
+
+    def transitions(self, node: TreeNode) -> Drawn:
+        """Return the transitions that a container may take so, by state and outcome."""
+        drawn = transitions_of(node.machine)
+        return {
+            label: {
+                outcome: target
+                for outcome, target in drawn.get(label, {}).items()
+                if outcome in self.ends(node, label)
+            }
+            for label in node.labels()
+        }
+
+    def ends(self, node: TreeNode, label: str) -> FrozenSet[str]:
+        """Return the outcomes with which a state may end so."""
+        place = node, label
+        if place not in self._ends:
+            self._ends[place] = frozenset(self._ends_of(node, label))
+        return self._ends[place]
+
+    def _ends_of(self, node: TreeNode, label: str) -> Set[str]:
+        if node.settings_of(label).on_retry != ALLOW:
+            return set()
+        state = states_of(node.machine)[label]
+        found = set(state.get_registered_outcomes())
+        for each in self._within.get((node, label), ()):
+            ends = set(self._ends_within(each))
+            if isinstance(state, smach.StateMachine):
+                return ends
+            if not ends:  # all branches of a Concurrence run
+                return set()
+        return found
+
+    def _ends_within(self, node: TreeNode) -> Iterator[str]:
+        """Yield the outcomes with which a container may end so, or the branch of a Concurrence."""
+        if not node.site.is_container:
+            for label in node.labels():
+                yield from self.ends(node, label)
+            return
+        met = [initial_label_of(node.machine)]
+        for label in met:
+            for outcome in self.ends(node, label):
+                route = route_of(node.machine, label, outcome)
+                if not route.is_state:
+                    yield route.target
+                elif route.target not in met:
+                    met.append(route.target)
+
+
+# -- what is told
+
+
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
     nodes = list(nodes_of(machine))
@@ -113,7 +182,7 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
 def _container(node: TreeNode, decides: bool, unguarded: Unguarded) -> ContainerProspect:
     machine: Any = node.machine
     initial = initial_label_of(machine) or next(iter(node.labels()), '')
-    shown = node.site.shown(node)
+    shown = node.site.shown()
     states = tuple(_state(node, label, decides, unguarded) for label in node.labels())
     return ContainerProspect(
         node.path,
@@ -134,7 +203,7 @@ def _unknown_ends(node: TreeNode, states: Sequence[StateProspect]) -> Tuple[str,
     """Return the ends whose meaning is not known, of a nested container where that matters."""
     if not node.site.is_container:
         return ()
-    unknown = node.in_force.rule.unknown(node.site.shown(node).get_registered_outcomes())
+    unknown = node.in_force.rule.unknown(node.site.shown().get_registered_outcomes())
     if node.parent is None:
         return unknown
     if len(node.labels_from_parent) > 1:
@@ -144,13 +213,13 @@ def _unknown_ends(node: TreeNode, states: Sequence[StateProspect]) -> Tuple[str,
     return tuple(
         end
         for end in unknown
-        if any(_ends_by_failure(state, end) for state in states)
+        if any(
+            each.is_failure and each.route == Route(end, False)
+            for state in states
+            for each in state.outcomes
+        )
         and not _outcome(around, label, end, settings).is_failure
     )
-
-
-def _ends_by_failure(state: StateProspect, end: str) -> bool:
-    return any(each.is_failure and each.route == Route(end, False) for each in state.outcomes)
 
 
 def _guarded(node: TreeNode) -> Iterator[str]:
@@ -224,7 +293,7 @@ def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) 
         node.site.in_words(route, outcome),
         kind is not FailureKind.NOT_A_FAILURE,
         kind is not FailureKind.NOT_A_FAILURE
-        and node.site.foresees(node, outcome, route, kind, settings),
+        and node.site.foresees(outcome, route, kind, settings),
     )
 
 

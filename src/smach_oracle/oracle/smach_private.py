@@ -61,13 +61,6 @@ def states_of(container: HasStates) -> Dict[str, smach.State]:
     return container._states
 
 
-def tables_of(
-    machine: smach.StateMachine,
-) -> Tuple[Dict[str, smach.State], Dict[str, Transitions]]:
-    """Return the states of a machine and its transitions, each by the label of the state."""
-    return machine._states, machine._transitions
-
-
 def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
     """Return where each outcome leads, by the label of the state. None leads nowhere."""
     return machine._transitions
@@ -78,22 +71,9 @@ def remappings_of(container: HasStates) -> Dict[str, Mapping[str, str]]:
     return container._remappings
 
 
-def remapping_of(container: HasStates, label: str) -> Mapping[str, str]:
-    """Return the container's names of a state's keys.
-
-    It is empty for an unknown label, and on upstream where the author gave None.
-    """
-    return container._remappings.get(label) or {}
-
-
 def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, Any]:
     """Return what is written into the userdata before each visit of a state."""
     return machine._constants.get(label) or {}
-
-
-def initial_label_of(machine: smach.StateMachine) -> str:
-    """Return the label of the state in which a machine begins, '' while it has none."""
-    return machine._initial_state_label or ''
 
 
 def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
@@ -298,7 +278,7 @@ def items_label_of(container: object) -> Optional[str]:
     return None if label is None else str(label)
 
 
-def initial_label_in(container: object) -> str:
+def initial_label_of(container: object) -> str:
     """Return the label of the state in which a container begins."""
     return str(own_mark(container, '_initial_state_label') or '')
 
@@ -309,7 +289,7 @@ def transitions_in(container: object, label: str) -> Transitions:
     return tables.get(label) or {}
 
 
-def remapping_in(container: object, label: str) -> Mapping[str, str]:
+def remapping_of(container: object, label: str) -> Mapping[str, str]:
     """Return the container's names of a state's keys."""
     tables = cast(Dict[str, Mapping[str, str]], own_mark(container, '_remappings') or {})
     return tables.get(label) or {}
@@ -324,20 +304,6 @@ class EngineProbe:
     class wants every transition told. `has_own_loop`: whether the engine itself calls for the next
     step, and no class of a user's. `stepped`: whether this execution has come to a state.
     """
-
-    __slots__ = (
-        'stepped',
-        'lock_is_held',
-        'attentive',
-        'stays_attentive',
-        'tells_transitions',
-        'has_own_loop',
-        '_class',
-        '_is_class_known',
-        '_class_steps_as_drawn',
-        '_class_is_asked',
-        '_class_step',
-    )
 
     def __init__(self) -> None:
         self._class: Optional[type] = None  # of the machine when it was looked at last

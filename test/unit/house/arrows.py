@@ -37,6 +37,7 @@ ARROWS: Dict[str, Set[str]] = {
         'renamed_option',
         'smach_common',
         'store',
+        'trial_counter',
     },
     'geometry': set(),
     'analysis': {
@@ -48,6 +49,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.settings',
         'packages',
         'renamed_option',
+        'trial_counter',
         'user_cache',
     },
     'interfaces': {
@@ -71,6 +73,7 @@ ARROWS: Dict[str, Set[str]] = {
         'packages',
         'smach_common',
         'store',
+        'trial_counter',
     },
     'pr2': {
         'oracle.errors',
@@ -120,6 +123,7 @@ ARROWS: Dict[str, Set[str]] = {
     # it starts modules of the rooms by their names
     'commands': {'documentation', 'packages', '__version__'},
     'bag_format': {'oracle.errors'},
+    'trial_counter': {'oracle.records', 'oracle.settings'},
     'cluster': {'oracle.errors', 'packages', 'release'},
     'documentation': set(),
     'forking': set(),
@@ -159,6 +163,7 @@ ROS_FREE = [
     'forking',
     'packages',
     'renamed_option',
+    'trial_counter',
     'user_cache',
 ]
 WITH_SMACH = {'oracle', 'ros', 'tasks', 'testing'}

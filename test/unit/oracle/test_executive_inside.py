@@ -157,7 +157,7 @@ def test_an_execution_leaves_no_snapshot_and_no_entry_behind(row, options, tmp_p
             for name, is_left in (
                 ('running', machine.is_running()),
                 ('start below', node.execution.starts_below),
-                ('resumed', node.tree.resumed.goes_on(node)),
+                ('resumed', node.tree.resumed.goes_on(node.records)),
                 ('questions', node.tree.resumed._questions),
                 ('precondition', node.tree._preconditions),
                 ('runs around', node.execution.runs_around),

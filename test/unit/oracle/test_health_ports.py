@@ -11,7 +11,7 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.machine import health_ports
+from smach_oracle.oracle.machine import health_watch
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.scope.scope import Reason, Scope
 
@@ -39,7 +39,7 @@ def test_what_a_function_may_say(said, text):
 
 
 def test_a_function_that_does_not_return_counts_as_unwell(monkeypatch):
-    monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.1)
+    monkeypatch.setattr(health_watch, 'FUNCTION_LIMIT_S', 0.1)
     go = threading.Event()
 
     def sleeps():
@@ -80,8 +80,8 @@ def test_functions_of_the_settings_and_the_given_one_must_all_be_well(health):
 
 
 def test_a_function_that_takes_too_long_counts_as_unwell_whatever_it_says(monkeypatch):
-    monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
-    port = health_ports.HealthFunctionPort('is_well', lambda: True)
+    monkeypatch.setattr(health_watch, 'FUNCTION_LIMIT_S', 0.0)
+    port = health_watch.HealthFunctionPort('is_well', lambda: True)
     assert port.why_unwell(Scope()) == 'is_well took too long'
 
 
@@ -171,11 +171,11 @@ def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
         ended.set()
         return True  # as it was when it began
 
-    port = health_ports.HealthFunctionPort('is_well', is_well)
+    port = health_watch.HealthFunctionPort('is_well', is_well)
     preempted = Scope(look=lambda: Reason.PREEMPTED if begun.is_set() else None)
     assert port.why_unwell(preempted) == ''  # nobody waits for it
     if is_asked_meanwhile:
-        monkeypatch.setattr(health_ports, 'FUNCTION_LIMIT_S', 0.0)
+        monkeypatch.setattr(health_watch, 'FUNCTION_LIMIT_S', 0.0)
         assert port.why_unwell(Scope()) == 'is_well does not return'
         monkeypatch.undo()
     go.set()

@@ -8,7 +8,7 @@ from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, su
 from test_still_running import asked, told
 from waiting import wait_for
 
-from smach_oracle.oracle.machine import jump_path
+from smach_oracle.oracle.machine import places
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
 from smach_oracle.oracle.scope.alarm_clock import AlarmClock
@@ -160,7 +160,7 @@ def test_the_answer_waits_until_the_robot_is_well():
 def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatch):
     closed = []
     monkeypatch.setattr(
-        jump_path, 'why_closed', lambda node, label: 'still runs' if closed and label == 'B' else ''
+        places, 'why_closed', lambda node, label: 'still runs' if closed and label == 'B' else ''
     )
 
     class ClosesB(Gate):

@@ -3,8 +3,8 @@
 import pytest
 
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
-from smach_oracle.oracle.records.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.settings.failure_rule import FailureRule
+from smach_oracle.trial_counter import TrialCounter, TrialEnding
 
 STATE, END = EventKind.STATE_START, EventKind.TRIAL_END
 

@@ -1,5 +1,6 @@
 """Gives the plain states of the Concurrences and Iterators of a wrapped tree their branches."""
 
+from functools import partial
 from typing import Dict, List, Optional, Tuple, cast
 
 import smach
@@ -85,11 +86,12 @@ def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
     parent, container = wrapper.parent, wrapper.container
     is_item = isinstance(wrapper, IteratorWrapper)
     branch = Branch(label, is_alone=is_item)
-    node = TreeNode(cast(smach.StateMachine, branch), parent.tree, parent.settings, '')
+    site = partial(IteratorSite if is_item else BranchSite, container=container, label=label)
+    machine = cast(smach.StateMachine, branch)
+    node = TreeNode(machine, parent.tree, parent.settings, '', site)
     set_mark(branch, node)
     renew_attributes(branch)
-    node.in_force.wrap_with(parent.in_force.strict, parent.in_force.nested, inherits=True)
-    node.site = (IteratorSite if is_item else BranchSite)(container, label)
+    node.in_force.inherit(parent.in_force)
     node.lie_below(parent, wrapper.labels_from_parent)
     node.configure(parent.settings)
     return branch

@@ -10,7 +10,7 @@ from ..machine.execution import runs_around
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..recovery.verdict import outcome_of_early_end
-from ..smach_private import Transitions, data_of, remapping_in, state_ended, step_once
+from ..smach_private import Transitions, data_of, remapping_of, state_ended, step_once
 
 COULD_NOT = 'Could not execute state '  # how a machine begins to pass on what a state has raised
 End = Tuple[object, Optional[Exception]]  # of a state: its outcome, and what it has raised
@@ -74,7 +74,7 @@ class Branch(smach.Container):
         label, outcomes = self._initial_state_label, state.get_registered_outcomes()
         self.userdata = container.userdata
         self.state = self._states[label] = state
-        self._remappings[label] = {} if self.hands_on_userdata else remapping_in(container, label)
+        self._remappings[label] = {} if self.hands_on_userdata else remapping_of(container, label)
         if set(self._outcomes) != set(outcomes) or label not in self._transitions:
             self._outcomes = set(outcomes)
             self._transitions[label] = dict.fromkeys(outcomes)
@@ -87,7 +87,9 @@ class Branch(smach.Container):
         self._execution_number += 1
         # the same for all items
         self._is_watched = bool(
-            node.in_force.limits_autonomy or node.tree.resumed.concerns(node) or runs_around(node)
+            node.in_force.limits_autonomy
+            or node.tree.resumed.concerns(node.records)
+            or runs_around(node)
         )
         self._find_record()
 
@@ -189,7 +191,7 @@ class Branch(smach.Container):
                     '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
                 )
                 return outcome_of_early_end(node)
-            outcome = node.tree.resumed.take_outcome(node) if end is None else None
+            outcome = node.tree.resumed.take_outcome(node.records) if end is None else None
             if outcome is None:
                 outcome = self._step_to_end(end)
             return outcome_of_early_end(node) if outcome is None else outcome

@@ -7,8 +7,8 @@ import smach
 from ..decision.ways import RESTORE
 from ..machine.items import TrackedItems
 from ..machine.nesting import children_of, machines_below
-from ..machine.snapshots import restore, take_snapshot
 from ..machine.tree_node import TreeNode, node_of
+from ..machine.userdata import restore, take_snapshot
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import Labels, data_of, items_of, mark_on, states_of

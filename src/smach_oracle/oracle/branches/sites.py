@@ -7,8 +7,7 @@ import smach
 
 from ..asking.question import OutcomeChoice
 from ..identity import attribute_of
-from ..machine.nesting import wrapper_of
-from ..machine.site import Route, Site, failure_kind, route_of
+from ..machine.site import Route, Site, judged_at
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.settings import Settings, StateSettings
@@ -19,6 +18,7 @@ from ..smach_private import (
     outcome_map_of,
     states_of,
 )
+from .wrapper import wrapper_of
 
 NEXT_ITEM = 'the next item'
 _LEAVES = frozenset((EventKind.TRANSITION, EventKind.SUPERSEDE, EventKind.GIVE_UP))
@@ -30,11 +30,12 @@ class BranchSite(Site):
     is_container = False
     begins_by = EventKind.STATE_START
 
-    def __init__(self, container: smach.Container, label: str) -> None:
+    def __init__(self, node: TreeNode, container: smach.Container, label: str) -> None:
+        super().__init__(node)
         self.container = container
         self.label = label
 
-    def shown(self, node: TreeNode) -> smach.Container:
+    def shown(self) -> smach.Container:
         """Return the container that people see."""
         return self.container
 
@@ -59,20 +60,15 @@ class BranchSite(Site):
         )
 
     def foresees(
-        self,
-        node: TreeNode,
-        outcome: str,
-        route: Route,
-        kind: FailureKind,
-        settings: StateSettings,
+        self, outcome: str, route: Route, kind: FailureKind, settings: StateSettings
     ) -> bool:
         """Whether the author has said what is to happen at this failing outcome."""
-        return settings.author_recoveries != 'override' and self._is_drawn(node, outcome)
+        return settings.author_recoveries != 'override' and self._is_drawn(outcome)
 
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
+    def _is_drawn(self, outcome: str) -> bool:
         """Whether the outcome map names it for the branch, and leads to what is no failure."""
         return any(
-            not is_failure_above(node, name)
+            not is_failure_above(self._node, name)
             for name, conditions in _entries(outcome_map_of(self.container))
             if dict(_entries(conditions)).get(self.label) == outcome
         )
@@ -84,25 +80,25 @@ class BranchSite(Site):
     def _leads_to(self, outcome: str) -> str:
         return 'the end of this branch'
 
-    def choices(self, node: TreeNode, label: str) -> Tuple[OutcomeChoice, ...]:
+    def choices(self, label: str) -> Tuple[OutcomeChoice, ...]:
         """Return the outcomes, and where they lead. Those that lead to the next item come first."""
         choices = (
             OutcomeChoice(outcome, self._leads_to(outcome))
-            for outcome in states_of(node.machine)[label].get_registered_outcomes()
+            for outcome in states_of(self._node.machine)[label].get_registered_outcomes()
         )
         return tuple(
             sorted(choices, key=lambda choice: (choice.target != NEXT_ITEM, str(choice.outcome)))
         )
 
-    def ended_by(self, node: TreeNode, event: Event) -> Optional[str]:
+    def ended_by(self, event: Event) -> Optional[str]:
         """Return the outcome with which the branch ends at an event, None for other events."""
         outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
-        is_end = event.kind in _LEAVES and outcome and not node.is_oracle(outcome)
-        return outcome if is_end and outcome not in states_of(node.machine) else None
+        is_end = event.kind in _LEAVES and outcome and not self._node.is_oracle(outcome)
+        return outcome if is_end and outcome not in states_of(self._node.machine) else None
 
-    def is_line_over(self, node: TreeNode, event: Event) -> bool:
+    def is_line_over(self, event: Event) -> bool:
         """Whether the branch is over by an event."""
-        return event.kind is EventKind.TRANSITION and not node.is_oracle(event.target)
+        return event.kind is EventKind.TRANSITION and not self._node.is_oracle(event.target)
 
 
 class IteratorSite(BranchSite):
@@ -112,12 +108,12 @@ class IteratorSite(BranchSite):
         """Return the settings of the whole machine as they are: its state runs alone."""
         return settings
 
-    def _is_drawn(self, node: TreeNode, outcome: str) -> bool:
+    def _is_drawn(self, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""
         if loops(self.container, outcome):
             return True
         mapped = final_outcomes_of(self.container)
-        return outcome in mapped and not is_failure_above(node, mapped[outcome])
+        return outcome in mapped and not is_failure_above(self._node, mapped[outcome])
 
     def _leads_to(self, outcome: str) -> str:
         if loops(self.container, outcome):
@@ -126,13 +122,13 @@ class IteratorSite(BranchSite):
             final_outcomes_of(self.container).get(outcome, outcome)
         )
 
-    def tell_item_passed_over(self, node: TreeNode, label: str, outcome: str) -> None:
+    def tell_item_passed_over(self, label: str, outcome: str) -> None:
         """Say which item is passed over where this failing outcome leads to the next one."""
         wrapper = wrapper_of(self.container)
         item = wrapper.in_words() if wrapper is not None else ''
         if item and loops(self.container, outcome):
             text = '{} is passed over with {}, as its author has drawn it'
-            node.warn(text.format(item, outcome), label)
+            self._node.warn(text.format(item, outcome), label)
 
 
 def loops(iterator: smach.Container, outcome: str) -> bool:
@@ -150,13 +146,7 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     if parent is None or len(node.labels_from_parent) != 1:
         return outcome in node.in_force.failing
     (label,) = node.labels_from_parent
-    kind = failure_kind(
-        outcome,
-        route_of(parent.machine, label, outcome),
-        parent.settings_of(label),
-        parent.in_force.failing,
-    )
-    return kind is not FailureKind.NOT_A_FAILURE
+    return judged_at(parent, label, outcome)[1] is not FailureKind.NOT_A_FAILURE
 
 
 def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:

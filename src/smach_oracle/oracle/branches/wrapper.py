@@ -2,28 +2,31 @@
 
 import contextlib
 import threading
-from typing import (
-    Any,
-    Callable,
-    Dict,
-    Iterator,
-    List,
-    Mapping,
-    Optional,
-    Tuple,
-)
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
 
 import smach
 
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
 from ..machine.items import TrackedItems
+from ..machine.nesting import branching_below
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..smach_private import Labels, data_of, is_executing, mark_on
 from .branch import Branch
+
+
+class StoredPort(Protocol):
+    """The part of a stored container that a Concurrence or an Iterator goes on from."""
+
+    keys: Dict[str, Any]  # of its userdata
+    gone: List[str]  # keys that are not to be there
+    item: int  # number of the one to begin with, from 1. 0 means the first
+
+    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+        """Have the values that were not stored in the snapshots, too."""
 
 
 class WrappedExecution:
@@ -55,7 +58,7 @@ class ContainerWrapper:
         self.runners: Dict[str, Branch] = {}
         self._lock = threading.Lock()
         self._is_in_use = False
-        self._resumed: Optional[Tuple[nesting.StoredPort, str]] = None  # with the id of its trial
+        self._resumed: Optional[Tuple[StoredPort, str]] = None  # with the id of its trial
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
@@ -130,11 +133,8 @@ class ContainerWrapper:
         for node in nodes:
             node.begin_once_more()
         if nodes:
-            nodes[0].emit(
-                EventKind.CONTAINER_START,
-                state=', '.join(self.branches),
-                data={BRANCHES: list(self.branches)},
-            )
+            labels = list(self.branches)
+            nodes[0].emit(EventKind.CONTAINER_START, ', '.join(labels), data={BRANCHES: labels})
         self._begin()
         self.runners = dict(self.branches)
         return True
@@ -150,10 +150,9 @@ class ContainerWrapper:
         """
         nodes = self.nodes()
         if nodes:
+            told = outcome if isinstance(outcome, str) else ''
             nodes[0].emit(
-                EventKind.CONTAINER_END,
-                text=why_no_outcome(outcome, error),
-                outcome=outcome if isinstance(outcome, str) else '',
+                EventKind.CONTAINER_END, outcome=told, text=why_no_outcome(outcome, error)
             )
         for runner in self.runners.values():
             runner.end()
@@ -163,7 +162,7 @@ class ContainerWrapper:
 
     # -- going on after the program was stopped
 
-    def resume(self, stored: nesting.StoredPort) -> None:
+    def resume(self, stored: StoredPort) -> None:
         """Go on from there at the next execution of this trial, once its inputs are copied."""
         self._resumed = stored, self.parent.tree.trial_id
 
@@ -176,7 +175,7 @@ class ContainerWrapper:
         """Whether its next execution goes on where the program was stopped."""
         return self._to_resume() is not None
 
-    def _to_resume(self) -> Optional[nesting.StoredPort]:
+    def _to_resume(self) -> Optional[StoredPort]:
         """Return how it goes on, unless that was of a trial before."""
         if self._resumed is None or self._resumed[1] != self.parent.tree.trial_id:
             return None
@@ -214,3 +213,27 @@ def wrapper_of(state: object) -> Optional[ContainerWrapper]:
     """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
     wrapper = nesting.wrapper_of(state)
     return wrapper if isinstance(wrapper, ContainerWrapper) else None
+
+
+def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
+    """Return them, each with its path, the outermost first."""
+    parent = node.parent
+    if parent is None or not node.runs_in_branch:
+        return []
+    found = []
+    for below, container in branching_below(parent.machine):
+        wrapper = wrapper_of(container)
+        if wrapper is not None and node.labels_from_parent[: len(below)] == below:
+            found.append(('/'.join((parent.key,) + below), wrapper))
+    return found
+
+
+def wrappers_in(node: TreeNode, label: str) -> List[Tuple[str, ContainerWrapper]]:
+    """Return those in a state of a machine, down to the next machines, each with its path."""
+    return [
+        ('/'.join((node.key,) + below), wrapper)
+        for below, wrapper in (
+            (below, wrapper_of(container)) for below, container in branching_below(node.machine)
+        )
+        if wrapper is not None and below[0] == label
+    ]

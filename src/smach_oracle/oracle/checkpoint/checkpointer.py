@@ -11,7 +11,8 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, G
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..machine.nesting import Wrapper, nodes_of, wrappers_around, wrappers_in
+from ..branches.wrapper import ContainerWrapper, wrappers_around, wrappers_in
+from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
@@ -107,7 +108,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # by key of a container: its node, and what stands around it
-        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, Wrapper]]]] = {}
+        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, ContainerWrapper]]]] = {}
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
@@ -163,7 +164,7 @@ class Checkpointer:
         """
         return (
             event.kind in _COMMITTED
-            or node.site.is_line_over(node, event)
+            or node.site.is_line_over(event)
             or event.seq >= self._seq_stored + SEQ_RESERVE - 1
             or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
         )
@@ -252,12 +253,17 @@ class Checkpointer:
     def _facts_of(self, node: TreeNode) -> ContainerFacts:
         facts = self._facts.get(node.key)
         if facts is None:
-            facts = self._facts[node.key] = ContainerFacts(node, self._before.container(node.key))
+            facts = self._facts[node.key] = ContainerFacts(
+                node.key,
+                node.records,
+                lambda label: node.settings_of(label).on_retry if node.has(label) else None,
+                self._before.container(node.key),
+            )
         return facts
 
     def _enters_again(self, node: TreeNode) -> bool:
         """Whether a container is to go on where it stood: it has not the stored userdata yet."""
-        return self._top.tree.resumed.entry_of(node) is not None
+        return self._top.tree.resumed.entry_of(node.records) is not None
 
     # -- what a moment has
 
@@ -275,7 +281,7 @@ class Checkpointer:
             ]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
             if is_container and not (
-                any(self._top.tree.resumed.goes_on(each) for each in below)
+                any(self._top.tree.resumed.goes_on(each.records) for each in below)
                 or any(wrapper.is_resumed for _, wrapper in wrappers_in(node, label))
             ):
                 yield from self._not_begun_below(path)
@@ -297,7 +303,7 @@ class Checkpointer:
         elif kind in _CLOSES and self._top.tree.early_end.why is None:
             yield Fact(node.key, ASKED, None)
         elif not _is_on_its_way(node):
-            outcome = node.site.ended_by(node, event)
+            outcome = node.site.ended_by(event)
             if outcome is not None:
                 yield fact_of(node.key, AT, [outcome, ENDED])
 
@@ -321,7 +327,7 @@ class Checkpointer:
     def _below(self, path: str) -> List[TreeNode]:
         return [node for key, node in self._nodes.items() if (key + '/').startswith(path + '/')]
 
-    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, Wrapper]]:
+    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
         """Return what `wrappers_around` does, looked for once for each container."""
         kept = self._wrappers.get(node.key)
         if kept is None or kept[0] is not node:

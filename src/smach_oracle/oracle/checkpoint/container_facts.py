@@ -32,8 +32,7 @@ from smach_oracle.store.names import (
 )
 from smach_oracle.store.rows import Fact
 
-from ..machine.state_record import StateRecord
-from ..machine.tree_node import TreeNode
+from ..machine.container_records import ContainerRecords
 from ..records.history import History
 from ..records.visits import Visit
 from ..smach_private import remapping_of, states_of
@@ -51,10 +50,15 @@ def fact_of(path: str, name: str, plain: object) -> Fact:
 class ContainerFacts:
     """Tells what of a container's records differs from what is stored."""
 
-    def __init__(self, node: TreeNode, before: StoredContainer) -> None:
-        """`before`: what is stored of it."""
-        self._node = node
-        self._path = node.key
+    def __init__(
+        self,
+        path: str,
+        records: ContainerRecords,
+        on_retry: Callable[[str], Optional[str]],
+        before: StoredContainer,
+    ) -> None:
+        """`on_retry`: that of a state, None where it is not there. `before`: what is stored."""
+        self._path, self._records, self._on_retry = path, records, on_retry
         self._execution = before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
         self._ways: Dict[str, Dict[str, object]] = {}  # by label
@@ -66,17 +70,17 @@ class ContainerFacts:
         """Yield what is new where the container begins to execute."""
         self._execution += 1
         self._visits = 0
-        self._node.records.history.count_visits()
+        self._records.history.count_visits()
         yield fact_of(self._path, EXECUTION, self._execution)
 
     def changed(self, labels: List[str]) -> Iterator[Fact]:
         """Yield what is new of the history, and of these states."""
-        history = self._node.records.history
+        history = self._records.history
         yield from self._new_visits(history)
         yield from self._if_new(HISTORY, history.told())
         yield from self.streaks()
         for label in labels:
-            record = self._node.records.by_label.get(label)
+            record = self._records.by_label.get(label)
             if record is not None:
                 counts = (record.visits, record.recoveries, record.fallbacks, record.unwell_repeats)
                 told = {
@@ -86,34 +90,29 @@ class ContainerFacts:
                     'shared': record.shared,
                 }
                 yield from self._if_new(STATE + label, told)
-                yield from self._ways_of(record)
-
-    def _ways_of(self, record: StateRecord) -> Iterator[Fact]:
-        """Yield the results of ways of a state, where one was added: most visits add none."""
-        ways, stored = record.way_results(), self._ways.get(record.label, _NOTHING)
-        if ways is not stored and (ways or stored):
-            self._ways[record.label] = ways
-            yield fact_of(self._path, WAYS + record.label, ways)
+                ways, stored = record.way_results(), self._ways.get(label, _NOTHING)
+                if ways is not stored and (ways or stored):  # most visits add none
+                    self._ways[label] = ways
+                    yield fact_of(self._path, WAYS + label, ways)
 
     def streaks(self) -> Iterator[Fact]:
         """Yield what is new of the ways that were gone."""
-        streaks = self._node.records.streaks.told()
+        streaks = self._records.streaks.told()
         if streaks or STREAKS in self._stored:  # else there is none, as under most policies
             yield from self._if_new(STREAKS, streaks)
 
     def all_states(self) -> Iterator[Fact]:
         """Yield what is new of every state."""
-        yield from self.changed(list(self._node.records.by_label))
+        yield from self.changed(list(self._records.by_label))
 
     def marks(self) -> Iterator[Fact]:
         """Yield what is new of the states that have begun: a jump changes marks of many at once."""
-        for label, mark in self._node.records.marks.told():
+        for label, mark in self._records.marks.told():
             if self._marks.get(label) != mark:
                 self._marks[label] = mark
-                if label in states_of(self._node.machine):
-                    yield fact_of(
-                        self._path, MARK + label, [*mark, self._node.settings_of(label).on_retry]
-                    )
+                on_retry = self._on_retry(label)
+                if on_retry is not None:
+                    yield fact_of(self._path, MARK + label, [*mark, on_retry])
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits = history.visits

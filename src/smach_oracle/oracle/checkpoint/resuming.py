@@ -7,12 +7,12 @@ import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
 from smach_oracle.store.rows import StoredTrial
 
+from ..branches.wrapper import wrapper_of, wrappers_in
 from ..errors import SettingsError
 from ..machine.items import can_be_indexed
-from ..machine.jump_path import JumpPath, jump_path_to
-from ..machine.nesting import branching_below, children_of, nodes_of, wrapper_of, wrappers_in
-from ..machine.places import TreePlace, place_named, places_of
-from ..machine.repeats import leave_unconfirmed, why_held_back
+from ..machine.nesting import branching_below, children_of, nodes_of
+from ..machine.places import JumpPath, TreePlace, jump_path_to, place_named, places_of
+from ..machine.repeats import begin_once_more, leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
@@ -20,9 +20,10 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
 from ..settings.failure_rule import RULE, FailureRule
+from ..settings.settings import ALLOW
 from ..smach_private import data_of, initial_label_of, set_current_label, states_of, transitions_of
 from .checkpointer import SEQ_RESERVE, must_stop
-from .stored_marks import Marks, let_repeat, take_over_marks
+from .stored_marks import Marks
 from .stored_tree import StoredContainer, StoredTree
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
@@ -107,27 +108,29 @@ def _end_goals(top: TreeNode, resumption: Resumption) -> None:
 class EntryPoint:
     """The place where one container goes on. It is used up when that begins to execute."""
 
-    def __init__(self, stored: StoredContainer, down: Sequence[TreePlace] = ()) -> None:
+    def __init__(
+        self, node: TreeNode, stored: StoredContainer, down: Sequence[TreePlace] = ()
+    ) -> None:
         """`down`: the states in which the containers below begin, where it is sent to one."""
-        self._stored, self._down = stored, tuple(down)
+        self._node, self._stored, self._down = node, stored, tuple(down)
 
     @property
     def label(self) -> str:
         """Return the state in which it goes on."""
         return self._stored.label
 
-    def take_over_records(self, node: TreeNode) -> None:
+    def take_over_records(self) -> None:
         """Have the visits of the execution that was stopped."""
-        stored = self._stored
+        node, stored = self._node, self._stored
         if stored.history:
             node.records.history.take_over(
                 stored.visits, stored.visits_of_execution, stored.history, node.has
             )
 
-    def enter(self, node: TreeNode) -> None:
+    def enter(self) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
-        stored, machine = self._stored, node.machine
-        data = data_of(machine.userdata)
+        node, stored = self._node, self._stored
+        data = data_of(node.machine.userdata)
         for key in stored.gone:
             data.pop(key, None)
         data.update(stored.keys)
@@ -144,15 +147,9 @@ class EntryPoint:
         for label, snapshot in stored.snapshots.items():
             if node.has(label):
                 node.record(label).snapshot = snapshot
-        set_current_label(machine, stored.label)
+        set_current_label(node.machine, stored.label)
         if self._down:
             node.record(stored.label).go_down(self._down)
-
-
-def _down_to(node: TreeNode, path: str) -> Sequence[TreePlace]:
-    """Return the way down from a container to a place to which a jump was under way."""
-    way = jump_path_to(node, next((each for each in places_of(node) if each.path == path), None))
-    return way.entered_places[1:] if way is not None and way.meeting_node is node else ()
 
 
 def forget_resumed(node: TreeNode) -> None:
@@ -168,8 +165,8 @@ def _forget(node: TreeNode) -> None:
     resumed = node.tree.resumed
     for each in nodes_of(node.machine):
         if each is not node:
-            resumed.forget(each)
-        resumed.forget_states(each)
+            resumed.forget(each.records)
+        resumed.forget_states(each.records)
         for _, container in branching_below(each.machine):
             wrapper = wrapper_of(container)
             if wrapper is not None:
@@ -207,10 +204,51 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         leave_unconfirmed(top, way.first_label)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
     if resumption.begins_at and way is not None:
-        top.tree.resumed.enter_at(top, EntryPoint(stood, way.entered_places[1:]))
+        top.tree.resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
         _Setting(resumption, nodes).ask_at(way.entered_places)
     else:
         _Setting(resumption, nodes).set_container(top)
+
+
+def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> int:
+    """Have the marks of a stored trial, and return the number of the latest visit.
+
+    `in_doubt`: any guarded state may have run that the store does not know of.
+    """
+    by_key = {node.key: node for node in nodes}
+    for (path, label), mark in marks.items():
+        node = by_key.get(path)
+        if node is not None and (mark.done or mark.reached) and label in node.labels():
+            node.record(label)  # of a state that only a precondition has run, too
+            node.records.marks.take_over(label, mark)
+    for place in (TreePlace(node, label) for node in nodes if in_doubt for label in node.labels()):
+        if place.node.settings_of(place.label).on_retry != ALLOW:
+            place.node.record(place.label)
+            unknown = place.node.records.marks.of(place.label)
+            unknown.done = unknown.spent = True
+    return max((max(mark.reached, mark.executed) for mark in marks.values()), default=0)
+
+
+def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequence[str]]) -> None:
+    """Let states begin once more, as a person has said, in the settings or by oracle_state.
+
+    :raises SettingsError: for a state of the settings that is not there.
+    """
+    for path in [*paths, *(by_command or ())]:
+        place = place_named(top, path, at_rest=True)
+        if place is None and path in paths:
+            raise SettingsError(
+                'resume_repeat',
+                path,
+                'the label of a state of {}, or the path of one below it'.format(top.path),
+            )
+        if place is not None:
+            begin_once_more(place.node, place.label)
+            smach.logwarn(
+                '{}: may be repeated once, as somebody has said (--repeat {})'.format(
+                    place.path, path
+                )
+            )
 
 
 def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
@@ -241,15 +279,25 @@ class _Setting:
         :returns: whether a person is asked in it before anything moves, where that is wanted.
         """
         stored = self._resumption.tree.container(node.key)
-        moved = stored if stored.moved_to else self._left_below(node, stored)
-        if moved is not None:
+        key = '{}/{}'.format(node.key, stored.label)
+        if (
+            not stored.moved_to
+            and stored.phase == IN
+            and all(one.key != key for one in self._nodes)
+        ):
+            moved = self._resumption.tree.container(key)  # the container that was left is gone
+        else:
+            moved = stored
+        if moved.moved_to:
             self._go_on_elsewhere(node, moved)
             return True
         if not node.has(stored.label):
             self._ask_at_beginning(node, stored, stored.label)
             return True
         if node.site.is_container:
-            self._resumed.enter_at(node, EntryPoint(stored, self._way_down(node, stored)))
+            self._resumed.enter_at(
+                node.records, EntryPoint(node, stored, self._way_down(node, stored))
+            )
         record = node.record(stored.label)
         # a question of an earlier moment may have been answered since: it is asked again
         if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
@@ -273,29 +321,26 @@ class _Setting:
                 wrapper.resume(self._resumption.tree.container(path))
         asked = [self.set_container(each) for each in inside]
         if self._resumption.asks and not any(asked):
-            self._ask_behind(node, label=stored.label, inside=inside)
-
-    def _ask_behind(self, node: TreeNode, label: str, inside: List[TreeNode]) -> None:
-        """Have a person asked before what follows a state in which all had ended.
-
-        That is the next item of an Iterator, or a state of the container or of one above it.
-        """
-        around = [node, *node.around()]
-        self._resumed.ask_before_next(
-            around + inside,
-            _why(self._resumption),
-            [node.record(label)]
-            + [
-                each.parent.record(each.labels_from_parent[0])
+            # before the next item of an Iterator, or a state of the container or of one above it
+            around = [node, *node.around()]
+            passes = [TreePlace(node, stored.label)]
+            passes += (
+                TreePlace(each.parent, each.labels_from_parent[0])
                 for each in around
                 if each.parent is not None
-            ],
-        )
+            )
+            self._resumed.ask_before_next(
+                [each.records for each in around + inside],
+                _why(self._resumption),
+                [each.node.record(each.label) for each in passes],
+            )
 
     def _way_down(self, node: TreeNode, stored: StoredContainer) -> Sequence[TreePlace]:
         """Return the rest of a jump: below, nothing has begun yet. Empty for no jump."""
         tree, state = self._resumption.tree, '{}/{}/'.format(node.key, stored.label)
-        down = _down_to(node, stored.jumped_to)
+        jumped_to = next((each for each in places_of(node) if each.path == stored.jumped_to), None)
+        way = jump_path_to(node, jumped_to)
+        down = way.entered_places[1:] if way is not None and way.meeting_node is node else ()
         # the jump led to the first item of an Iterator
         has_begun = any(tree.container(place.node.key).phase for place in down) or any(
             told.item > 1 for key, told in tree.containers.items() if (key + '/').startswith(state)
@@ -314,7 +359,7 @@ class _Setting:
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():
-                self._resumed.had_ended(node, stored.label)
+                self._resumed.had_ended(node.records, stored.label)
                 return False
             self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
@@ -322,13 +367,6 @@ class _Setting:
         else:
             self._ask_before(node, initial_label_of(node.machine))
         return True
-
-    def _left_below(self, node: TreeNode, stored: StoredContainer) -> Optional[StoredContainer]:
-        """Return the container in a state under way whose own states are elsewhere now."""
-        key = '{}/{}'.format(node.key, stored.label)
-        below = self._resumption.tree.container(key)
-        is_gone = stored.phase == IN and all(each.key != key for each in self._nodes)
-        return below if is_gone and below.moved_to else None
 
     def _go_on_elsewhere(self, node: TreeNode, stored: StoredContainer) -> None:
         """Send the machine to where the state stands now that was under way in a container."""
@@ -341,7 +379,7 @@ class _Setting:
             return
         stood = self._resumption.tree.container(top.key)
         stood.at, asked, at = [way.first_label, BEFORE], stored.asked, stored.at_there
-        self._resumed.enter_at(top, EntryPoint(stood, way.entered_places[1:]))
+        self._resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
         there = StoredContainer(at)
         record = place.node.record(place.label)
         if asked and asked[0] == place.label and not self._resumption.is_earlier:
@@ -359,7 +397,7 @@ class _Setting:
         label = initial if initial in labels else labels[0]
         stored.at, stored.asked = [label, BEFORE], []
         if node.site.is_container:
-            self._resumed.enter_at(node, EntryPoint(stored))
+            self._resumed.enter_at(node.records, EntryPoint(node, stored))
         self._interrupt(node, label, GONE.format(gone))
 
     def ask_at(self, down: Sequence[TreePlace]) -> None:

@@ -4,16 +4,9 @@ A trial may go on from an earlier moment, or with other names of states. Neither
 the robot has done. A guarded state (`on_retry`) that may come again for that is spent.
 """
 
-from typing import Callable, Dict, Mapping, Optional, Sequence, Tuple
+from typing import Callable, Dict, Mapping, Tuple
 
-import smach
-
-from ..errors import SettingsError
-from ..machine.places import TreePlace, place_named
-from ..machine.repeats import begin_once_more
-from ..machine.tree_node import TreeNode
 from ..records.visits import VisitMark
-from ..settings.settings import ALLOW
 from .stored_tree import StoredContainer, StoredTree
 
 StatePlace = Tuple[str, str]  # path of a container or branch, label
@@ -70,44 +63,3 @@ def _joined(one: VisitMark, other: VisitMark) -> VisitMark:
     one.reached, one.executed = max(one.reached, other.reached), max(one.executed, other.executed)
     one.done = one.done or other.done
     return one
-
-
-def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> int:
-    """Have the marks of a stored trial, and return the number of the latest visit.
-
-    `in_doubt`: any guarded state may have run that the store does not know of.
-    """
-    by_key = {node.key: node for node in nodes}
-    for (path, label), mark in marks.items():
-        node = by_key.get(path)
-        if node is not None and (mark.done or mark.reached) and label in node.labels():
-            node.record(label)  # of a state that only a precondition has run, too
-            node.records.marks.take_over(label, mark)
-    for place in (TreePlace(node, label) for node in nodes if in_doubt for label in node.labels()):
-        if place.node.settings_of(place.label).on_retry != ALLOW:
-            place.node.record(place.label)
-            unknown = place.node.records.marks.of(place.label)
-            unknown.done = unknown.spent = True
-    return max((max(mark.reached, mark.executed) for mark in marks.values()), default=0)
-
-
-def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequence[str]]) -> None:
-    """Let states begin once more, as a person has said, in the settings or by oracle_state.
-
-    :raises SettingsError: for a state of the settings that is not there.
-    """
-    for path in [*paths, *(by_command or ())]:
-        place = place_named(top, path, at_rest=True)
-        if place is None and path in paths:
-            raise SettingsError(
-                'resume_repeat',
-                path,
-                'the label of a state of {}, or the path of one below it'.format(top.path),
-            )
-        if place is not None:
-            begin_once_more(place.node, place.label)
-            smach.logwarn(
-                '{}: may be repeated once, as somebody has said (--repeat {})'.format(
-                    place.path, path
-                )
-            )

@@ -26,10 +26,10 @@ from ..errors import SettingsError
 from ..machine.nesting import children_of
 from ..smach_private import (
     final_outcomes_of,
-    initial_label_in,
+    initial_label_of,
     loop_outcomes_of,
     outcome_map_of,
-    remapping_in,
+    remapping_of,
     transitions_in,
 )
 from .stored_tree import StoredTree
@@ -136,7 +136,7 @@ def _container(container: smach.Container, meta: str) -> Plain:
         'outcomes': _sorted(container.get_registered_outcomes()),
         'input_keys': _sorted(container.get_registered_input_keys()),
         'output_keys': _sorted(container.get_registered_output_keys()),
-        'initial': initial_label_in(container),
+        'initial': initial_label_of(container),
         'states': {
             label: _state(container, label, state)
             for label, state in _states(container, meta).items()
@@ -173,7 +173,7 @@ def _state(container: smach.Container, label: str, state: smach.State) -> Plain:
         if isinstance(state, smach.State)
         else []
     )
-    transitions, remapping = transitions_in(container, label), remapping_in(container, label)
+    transitions, remapping = transitions_in(container, label), remapping_of(container, label)
     return {
         'class': _kind(state),
         'transitions': {str(outcome): str(target) for outcome, target in transitions.items()},

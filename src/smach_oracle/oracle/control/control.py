@@ -9,7 +9,7 @@ import math
 import threading
 from dataclasses import dataclass
 from enum import Enum
-from typing import Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
+from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 from ..scope.clock import Clock, Flag
 from ..scope.scope import Reason, Scope
@@ -76,14 +76,6 @@ class Engine(Protocol):
 
     attentive: bool
     stays_attentive: bool  # whatever the operator wants
-
-
-class HasKey(Protocol):
-    """A container that executes."""
-
-    @property
-    def key(self) -> str:
-        """The path by which jumps of it are asked for."""
 
 
 class Jump(NamedTuple):
@@ -157,14 +149,14 @@ class Control:
         self._engines[id(engine)] = engine
         self.calm(engine)
 
-    def leave(self, engine: Engine, container: 'HasKey') -> Optional[Jump]:
+    def leave(self, engine: Engine, key_of: Callable[[], str]) -> Optional[Jump]:
         """Forget a machine whose execution is over, and return the jump that it has not made."""
         self._engines.pop(id(engine), None)
         if not (self._moving or self._jumps):
             return None
         with self._lock:
-            self.arrived(container.key)
-            return self.take_jump(container.key)
+            self.arrived(key_of())
+            return self.take_jump(key_of())
 
     def calm(self, engine: Engine) -> None:
         """Let a machine take the short way again, where nothing is set.

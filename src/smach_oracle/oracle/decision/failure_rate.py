@@ -41,6 +41,8 @@ def classify(rate: float, moderate_from: float, high_from: float) -> FailureClas
 class _Totals:
     """What both estimators keep: their memory and prior, and the counts of all results."""
 
+    kind = ''
+
     def __init__(self, memory: int, prior: float) -> None:
         """`memory`: results. `prior`: failure rate, 0 to 1.
 
@@ -54,6 +56,10 @@ class _Totals:
         self.prior = float(prior)
         self.successes = 0
         self.failures = 0
+
+    def _told(self) -> Snapshot:
+        counts = {'successes': self.successes, 'failures': self.failures}
+        return {'estimator': self.kind, **counts}
 
 
 class FailureRate(_Totals):
@@ -133,12 +139,7 @@ class FailureRate(_Totals):
         for position in self._failed:
             if position >= oldest:
                 window[position - oldest] = 1
-        return {
-            'estimator': self.kind,
-            'successes': self.successes,
-            'failures': self.failures,
-            'window': window,
-        }
+        return dict(self._told(), window=window)
 
     def restore(self, learned: Learned) -> None:
         """Take over a `snapshot`, also one made with another memory: its newest results count.
@@ -209,12 +210,7 @@ class ExponentialFailureRate(_Totals):
 
     def snapshot(self) -> Snapshot:
         """Return what was learned as plain data, for `restore` and the rates file."""
-        return {
-            'estimator': self.kind,
-            'successes': self.successes,
-            'failures': self.failures,
-            'rate': self._rate,
-        }
+        return dict(self._told(), rate=self._rate)
 
     def restore(self, learned: Learned) -> None:
         """Take over a `snapshot`. One of the other estimator gives the totals alone.

@@ -5,17 +5,7 @@ from typing import Dict, Mapping, Tuple
 from ..errors import SettingsError
 from .by_ways import AnyWay, Escalating
 from .learned import Learned
-from .policy import (
-    Algorithm1,
-    AlwaysAsk,
-    Ladder,
-    Policy,
-    Prose,
-    Random,
-    Restart,
-    Retry,
-    StepBack,
-)
+from .policy import Algorithm1, AlwaysAsk, Ladder, Policy, Prose, Random, Restart, Retry, StepBack
 
 BASELINES: Tuple[Policy, ...] = (Restart(), Retry(), StepBack(), Random(), AlwaysAsk(), Ladder())
 POLICIES: Dict[str, Policy] = {

@@ -2,7 +2,7 @@
 
 The *menu* of a failure is the list of its ways. A *streak* is the failures of one state in one
 execution of its container, up to its next success. doc/ways.md says what is on the menu, and
-`recovery.menu` makes it.
+`recovery.options` makes it.
 """
 
 from enum import Enum

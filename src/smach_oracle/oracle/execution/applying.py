@@ -2,20 +2,17 @@
 
 from typing import Mapping, Optional, Sequence
 
-from ..machine.jump_path import JumpPath
 from ..machine.repeats import note_superseded
 from ..machine.site import route_of
-from ..machine.state_record import StateRecord
-from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import missing_keys
+from ..machine.userdata import missing_keys
 from ..records.events import EventKind
 from ..records.facts import JUMPED_FROM, JUMPED_TO
 from ..records.visits import VisitResult
 from ..recovery.levels import unnoticed
-from ..recovery.occasions import FirstStep, Occasion, Superseding
+from ..recovery.occasions import FirstStep, Superseding
 from ..recovery.phases import OracleState
+from ..recovery.recovery import Recovery
 from ..recovery.verdict import (
-    ChosenWay,
     GiveUp,
     JumpTo,
     Preempted,
@@ -26,14 +23,7 @@ from ..recovery.verdict import (
 )
 from ..smach_private import data_of
 from .jump_entry import prepare_entry, start_over
-from .transitions import (
-    be_back,
-    go_to,
-    message_of,
-    obey_preempt,
-    stop_left_behind,
-    terminate,
-)
+from .transitions import be_back, go_to, message_of, obey_preempt, stop_left_behind, terminate
 
 
 class Applying:
@@ -42,13 +32,11 @@ class Applying:
     Its methods return the container's outcome, or None where the machine goes on.
     """
 
-    def __init__(
-        self, node: TreeNode, record: StateRecord, occasion: Occasion, meta: OracleState
-    ) -> None:
-        self._node = node
-        self._machine = node.machine
-        self._record = record
-        self._occasion = occasion
+    def __init__(self, recovery: Recovery, meta: OracleState) -> None:
+        self._node = recovery.node
+        self._machine = recovery.node.machine
+        self._record = recovery.record
+        self._occasion = recovery.occasion
         self._meta = meta
 
     def apply(self, verdict: Verdict) -> Optional[str]:
@@ -98,28 +86,19 @@ class Applying:
             entry = prepare_entry(way, jump.written, 'jumping')
             userdata, missing = entry.userdata, entry.missing
         self._note_entry(way.first_label)
-        told = self._told_of(way, jump.chosen)
-        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, told)
-
-    def _told_of(self, way: JumpPath, chosen: Optional[ChosenWay]) -> Mapping[str, str]:
-        """Return what is told of a jump by a way of the menu, or across containers."""
         lower = self._occasion.lower_verdict
-        return {
-            **({} if chosen is None else {'way': chosen.gone.way}),
+        told = {  # of a jump by a way of the menu, or across containers
+            **({} if jump.chosen is None else {'way': jump.chosen.gone.way}),
             **({} if lower is None else {JUMPED_FROM: lower.failed_path}),
             **({JUMPED_TO: way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
         }
+        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, told)
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:
         route = route_of(self._machine, self._record.label, verdict.outcome)
-        self._node.emit(
-            EventKind.SUPERSEDE,
-            state=self._record.label,
-            outcome=verdict.outcome,
-            target=route.target,
-            by=verdict.by,
-            text=verdict.text,
-        )
+        told = {'by': verdict.by, 'text': verdict.text}
+        label = self._record.label
+        self._node.emit(EventKind.SUPERSEDE, label, verdict.outcome, route.target, **told)
         if not route.is_state:
             return self._terminate(route.target)
         self._note_entry(route.target)
@@ -136,14 +115,8 @@ class Applying:
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
         if ending.state is None and unnoticed(node, self._occasion.failure) is None:
             node.execution.give_up()
-        node.emit(
-            EventKind.GIVE_UP,
-            state=self._record.label,
-            outcome=ending.outcome or '',
-            target=ending.state or '',
-            by=verdict.by,
-            text=told,
-        )
+        outcome, target = ending.outcome or '', ending.state or ''
+        node.emit(EventKind.GIVE_UP, self._record.label, outcome, target, by=verdict.by, text=told)
         if ending.error is not None:  # SMACH has logged it where it was made
             raise ending.error
         if ending.state is not None:
@@ -179,24 +152,15 @@ class Applying:
         across: Optional[Mapping[str, str]] = None,
     ) -> None:
         """Leave the meta state for a state."""
-        node = self._node
-        if missing is None:
-            missing = missing_keys(self._machine, target, data_of(self._machine.userdata))
-        if self._is_told(target, by):
+        node, label = self._node, self._record.label
+        again = self._occasion.first_step is FirstStep.ENTER_AGAIN and target == label
+        if by or not again:
+            if missing is None:
+                missing = missing_keys(self._machine, target, data_of(self._machine.userdata))
             data = {'missing_keys': list(missing), 'userdata': userdata, **(across or {})}
-            self._tell_jump(target, by, text, data)
+            node.emit(EventKind.JUMP, label, target=target, by=by, text=text, data=data)
+            node.records.count_oracle_edge(target)
         go_to(node, message_of(node.settings.oracle_label, target, target), target)
-
-    def _is_told(self, target: str, by: str) -> bool:
-        """Whether the observers hear of it: not where an uncounted visit is made again."""
-        again = self._occasion.first_step is FirstStep.ENTER_AGAIN and target == self._record.label
-        return bool(by) or not again
-
-    def _tell_jump(self, target: str, by: str, text: str, data: Mapping[str, object]) -> None:
-        self._node.emit(
-            EventKind.JUMP, state=self._record.label, target=target, by=by, text=text, data=data
-        )
-        self._node.records.count_oracle_edge(target)
 
     def _terminate(self, outcome: str) -> str:
         """Leave the meta state for a container outcome."""

@@ -27,7 +27,7 @@ from ..records.events import EventKind
 from ..records.facts import PASSED_BY
 from ..recovery.operator_wait import wait_for_operator, wait_until_let_go
 from ..recovery.stop import is_asked_around
-from ..recovery.verdict import ending_at_once, route_at_preempt
+from ..recovery.verdict import failing_outcome, route_at_preempt
 from ..scope.scope import Reason, Scope
 from ..settings.failing_outcomes import PREEMPTED
 from ..settings.settings import ANNOUNCE, CONFIRM_FIRST
@@ -145,13 +145,9 @@ def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]
     if hold is not None and (stops or obeyed):
         return _preempted_before(node, asked)
     if level == ANNOUNCE:
-        _announce(node, place)
+        smach.loginfo('{}: is about to enter {}'.format(*place))
+        node.emit(EventKind.ANNOUNCE, place.state, text='about to enter ' + place.state)
     return None if hold is None else _hold(node, hold)
-
-
-def _announce(node: TreeNode, place: HeldPlace) -> None:
-    smach.loginfo('{}: is about to enter {}'.format(*place))
-    node.emit(EventKind.ANNOUNCE, state=place.state, text='about to enter ' + place.state)
 
 
 def _hold(node: TreeNode, hold: Hold) -> Optional[Stop]:
@@ -175,15 +171,9 @@ def _preempted_before(node: TreeNode, asked: bool) -> Optional[Stop]:
     :param asked: whether the container itself is to obey.
     """
     stop = _pass_by(node) if asked and not node.tree.control.holds_all else None
-    return stop or _end_preempted(node)
-
-
-def _end_preempted(node: TreeNode) -> Optional[Stop]:
-    """End the container at once, preempted. Return None where it has no outcome for that.
-
-    Then its state is executed under the request, as without an oracle.
-    """
-    machine, outcome = node.machine, ending_at_once(node)
+    if stop is not None:
+        return stop
+    machine, outcome = node.machine, failing_outcome(node, (PREEMPTED,))
     if outcome is None:
         return None
     label = current_label_of(machine)
@@ -219,9 +209,7 @@ def _pass_by(node: TreeNode) -> Optional[Stop]:
     if down:
         record.go_down(down)
         return Stop()  # to the next boundary, which is before the same state
-    node.emit(
-        EventKind.TRANSITION, state=label, outcome=PREEMPTED, target=route.target, **PASSED_BY
-    )
+    node.emit(EventKind.TRANSITION, label, PREEMPTED, route.target, **PASSED_BY)
     go_to(node, message_of(label, PREEMPTED, route.target), route.target)
     return Stop()
 
@@ -248,7 +236,7 @@ def _machine_in(node: TreeNode, label: str) -> Optional[TreeNode]:
     if not isinstance(state, node.tree.container_class):
         return None
     inner = marked_node(state)
-    goes_on = node.tree.resumed.entry_of(inner) is not None
+    goes_on = node.tree.resumed.entry_of(inner.records) is not None
     return inner if inner.parent is node and not goes_on else None
 
 

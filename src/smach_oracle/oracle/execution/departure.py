@@ -8,16 +8,14 @@ is preempted, and waited for.
 from typing import List, Optional, cast
 
 import smach
-from smach_common.foreign import repr_of
 
 from ..branches.iterator_wrapper import IteratorWrapper
 from ..branches.wrapper import wrapper_of
-from ..machine.jump_path import repeated_on, why_closed_on
 from ..machine.nesting import gave_up_in, nodes_in
-from ..machine.places import levels_above, links_to
+from ..machine.places import levels_above, links_to, repeated_on, why_closed_on
 from ..machine.tree_node import TreeNode
+from ..machine.workers import request_preempt
 from ..records.events import FailureKind
-from ..records.visits import VisitResult
 from ..recovery.failure import Failure
 from ..recovery.occasions import LowerVerdict
 from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
@@ -62,10 +60,6 @@ class Departure:
             closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
         )
 
-    def result_of(self, node: TreeNode) -> VisitResult:
-        """Return how the visit counts that a container was in when it was left."""
-        return VisitResult.FAILURE if self.is_own(node) else VisitResult.PREEMPTED
-
     def is_own(self, node: TreeNode) -> bool:
         """Whether a container's own oracle has decided, as if its state had failed."""
         return isinstance(self.verdict, JumpTo) and self.verdict.decided_by is node
@@ -90,7 +84,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     nodes = [*left_nodes, level]
     others = _claim(nodes, departure)
     if others:
-        _preempt(_container_apart(nodes, others))
+        request_preempt(_container_apart(nodes, others))
         _preempt_left_nodes(nodes[: -len(others)])
         return False
     smach.loginfo(
@@ -98,7 +92,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
             level.path, current_label_of(level.machine), _in_words(verdict)
         )
     )
-    _preempt(current_state_of(level.machine))
+    request_preempt(current_state_of(level.machine))
     _preempt_left_nodes(left_nodes)
     return True
 
@@ -107,14 +101,6 @@ def _in_words(verdict: Verdict) -> str:
     if isinstance(verdict, JumpTo):
         return verdict.jump_path.entered_places[-1].path
     return 'its end with {}'.format(verdict.ending.outcome if isinstance(verdict, GiveUp) else '')
-
-
-def _preempt(state: Optional[smach.State]) -> None:
-    try:
-        if state is not None:
-            state.request_preempt()
-    except Exception as err:  # it is the user's
-        smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 
 
 def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
@@ -132,7 +118,7 @@ def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
         if isinstance(wrapper, IteratorWrapper):
             wrapper.note_left()
         if not container.preempt_requested():
-            _preempt(container)
+            request_preempt(container)
 
 
 def _nodes_left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:

@@ -4,20 +4,26 @@ An Iterator that has failed or was left goes on there with the item that was not
 that is started over has its userdata as it was at first, in all containers of the tree.
 """
 
-from typing import Collection, Iterable, NamedTuple, Optional, Tuple
+from typing import Collection, NamedTuple, Optional, Tuple
 
 from ..asking.question import names
 from ..branches.iterator_wrapper import ask_to_go_on
 from ..checkpoint.resuming import forget_resumed
 from ..control.control import Jump
 from ..decision.ways import KEEP, RESTORE
-from ..machine.jump_path import JumpPath, jump_path_to, missing_on, repeated_on, why_closed_on
 from ..machine.nesting import nodes_of, settle_ways
-from ..machine.places import TreePlace, place_at
+from ..machine.places import (
+    JumpPath,
+    TreePlace,
+    jump_path_to,
+    missing_on,
+    place_at,
+    repeated_on,
+    why_closed_on,
+)
 from ..machine.repeats import leave_for, why_closed
-from ..machine.snapshots import restore
-from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode
+from ..machine.userdata import restore
 from ..records.events import EventKind
 from ..smach_private import current_label_of, data_of, is_executing, remapping_of
 from .transitions import go_to
@@ -70,11 +76,6 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
 
 
 # -- a script that is started over
-
-
-def may_start_over(tree: Tree, nodes: Iterable[TreeNode]) -> bool:
-    """Whether a policy of the tree may start its top machine over."""
-    return tree.recover and any(each.in_force.policy.restarts for each in nodes)
 
 
 def keep_start(node: TreeNode) -> None:

@@ -43,19 +43,14 @@ def check_preconditions(node: TreeNode) -> None:
             for named in spec.labels():
                 why_not = why_unfit(node, label, named)
                 if why_not:
-                    _complain(
-                        node,
-                        UnfitName(
-                            SettingsError(
-                                'states.{}.preconditions'.format(label),
-                                named,
-                                allowed_for(node, label),
-                                problem='is not allowed: ' + why_not,
-                            ),
-                            named,
-                            UnfitKind.PRECONDITION,
-                        ),
+                    unfit = _unfit(
+                        'states.{}.preconditions'.format(label),
+                        named,
+                        allowed_for(node, label),
+                        'is not allowed: ' + why_not,
+                        UnfitKind.PRECONDITION,
                     )
+                    _complain(node, unfit)
 
 
 def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
@@ -77,7 +72,7 @@ def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
     ]
     for key, name, kind in named:
         if name not in known and not any(matches(name, each) for each in known):
-            yield UnfitName(_no_state(key, name, known), name, kind)
+            yield _no_state(key, name, known, kind)
 
 
 def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
@@ -87,18 +82,12 @@ def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
     known = sorted(set(paths_below(top.machine)))
     for name in top.in_force.nested:
         if not any(matches(name, path) for path in known):
-            yield UnfitName(
-                SettingsError(
-                    'nested',
-                    name,
-                    'a path or a pattern of the machines in {}, and of the states of '
-                    'its Concurrences and Iterators: {}'.format(
-                        top.path, ', '.join(known) or 'none'
-                    ),
-                    problem='names nothing in {}{}'.format(top.path, did_you_mean(name, known)),
-                ),
-                name,
-            )
+            allowed = (
+                'a path or a pattern of the machines in {}, and of the states of '
+                'its Concurrences and Iterators: {}'
+            ).format(top.path, ', '.join(known) or 'none')
+            problem = 'names nothing in {}{}'.format(top.path, did_you_mean(name, known))
+            yield _unfit('nested', name, allowed, problem)
 
 
 def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
@@ -113,7 +102,7 @@ def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
     ]
     for key, name, kind in named:
         if name.strip('/') not in known:
-            yield UnfitName(_no_state(key, name, known), name.strip('/'), kind)
+            yield _no_state(key, name, known, kind)._replace(name=name.strip('/'))
 
 
 def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
@@ -133,16 +122,9 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     for key, name, outcome, kind in named:
         known = _outcomes_of(top, name)
         if known and outcome not in known:
-            yield UnfitName(
-                SettingsError(
-                    key,
-                    outcome,
-                    'the outcomes: ' + ', '.join(sorted(known)),
-                    problem='is no outcome' + did_you_mean(outcome, known),
-                ),
-                outcome,
-                kind,
-            )
+            allowed = 'the outcomes: ' + ', '.join(sorted(known))
+            problem = 'is no outcome' + did_you_mean(outcome, known)
+            yield _unfit(key, outcome, allowed, problem, kind)
 
 
 def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
@@ -157,13 +139,15 @@ def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
     return {each for each in found if isinstance(each, str)}
 
 
-def _no_state(key: str, name: str, known: Set[str]) -> SettingsError:
-    return SettingsError(
-        key,
-        name,
-        'the states of the machine: ' + ', '.join(sorted(known)),
-        problem='is no state' + did_you_mean(name, known),
-    )
+def _no_state(key: str, name: str, known: Set[str], kind: UnfitKind) -> UnfitName:
+    allowed = 'the states of the machine: ' + ', '.join(sorted(known))
+    return _unfit(key, name, allowed, 'is no state' + did_you_mean(name, known), kind)
+
+
+def _unfit(
+    key: str, name: str, allowed: str, problem: str, kind: UnfitKind = UnfitKind.NAME
+) -> UnfitName:
+    return UnfitName(SettingsError(key, name, allowed, problem=problem), name, kind)
 
 
 def _known_names(top: TreeNode) -> Set[str]:

@@ -24,14 +24,8 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, STOPPING, TAKEN_UP, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
-from ..recovery.announced import Announced, announced_by
-from ..recovery.failure import (
-    Failure,
-    judge,
-    tell_failure,
-    visit_result,
-)
-from ..recovery.occasions import Occasion
+from ..recovery.failure import Announced, Failure, announced_by, judge, tell_failure
+from ..recovery.occasions import FirstStep, Occasion
 from ..recovery.phases import OracleState
 from ..recovery.recovery import Recovery
 from ..recovery.stack_room import too_deep_below, too_deep_here
@@ -50,15 +44,7 @@ from ..settings.failing_outcomes import is_preempted
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
 from .departure import Departure, depart, is_settled, take_departure
-from .transitions import (
-    Stop,
-    be_back,
-    go_to,
-    message_of,
-    obey_preempt,
-    stop_left_behind,
-    terminate,
-)
+from .transitions import Stop, be_back, go_to, message_of, obey_preempt, stop_left_behind, terminate
 from .wrapping import sync_oracle
 
 Facts = Mapping[str, object]
@@ -134,9 +120,16 @@ class Step:
         if announced is not None:
             return self._announced(outcome, announced)
         if isinstance(judged, Route):
-            result = visit_result(outcome, stopping)
+            is_stopped = stopping or is_preempted(outcome)
+            result = VisitResult.PREEMPTED if is_stopped else VisitResult.SUCCESS
             node.records.visit_ended(record, outcome, result)
-            learn = result is VisitResult.SUCCESS and not self._may_fail(outcome, judged)
+            failing, listed = node.in_force.failing, record.settings.failure_outcomes
+            may_fail = (
+                outcome in failing
+                or outcome in listed
+                or (not judged.is_state and judged.target in failing)
+            )
+            learn = result is VisitResult.SUCCESS and not may_fail
             facts = self._facts_of_stop(outcome) if stopping else NO_FACTS
             return self._advance(outcome, judged, learn, facts)
         stopping = stopping or winds_down(node)
@@ -166,7 +159,9 @@ class Step:
             )
         if error is not None:
             self._warn_raised(error, 'left')
-        node.records.visit_ended(record, told, departure.result_of(node))
+        node.records.visit_ended(
+            record, told, VisitResult.FAILURE if departure.is_own(node) else VisitResult.PREEMPTED
+        )
         if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
             recall_preempts(states_of(self._machine)[record.label])
         if departure.arrives_at is not node:
@@ -286,7 +281,7 @@ class Step:
         record.last_failure = failure.kind, failure.outcome, failure.text
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
-            node.site.tell_item_passed_over(node, failure.state, failure.outcome)
+            node.site.tell_item_passed_over(failure.state, failure.outcome)
             if node.tree.recover:
                 self._tell_own_loop(failure)
             return self._end(failure, natural_ending(node, failure))
@@ -295,7 +290,7 @@ class Step:
             if ending.state is None:
                 node.execution.give_up()
             return self._end(failure, ending)
-        asked = node.tree.resumed.take_asked(node, record) if node.tree.is_resumed else None
+        asked = node.tree.resumed.take_asked(node.records, record) if node.tree.is_resumed else None
         if asked is not None:
             return occasions.interrupted(failure, context, asked, continuous)
         if why_unwell:
@@ -317,19 +312,10 @@ class Step:
         """Return what the visits so far say about a failure of the state."""
         return failure_context(self._node, self._record)
 
-    def _may_fail(self, outcome: str, route: Route) -> bool:
-        """Whether the same outcome may be, or report, a failure another time."""
-        failing = self._node.in_force.failing
-        return (
-            outcome in failing
-            or outcome in self._record.settings.failure_outcomes
-            or (not route.is_state and route.target in failing)
-        )
-
     def _author_recovers(self, failure: Failure) -> bool:
         node = self._node
         return failure.route is not None and node.site.foresees(
-            node, failure.outcome, failure.route, failure.kind, self._record.settings
+            failure.outcome, failure.route, failure.kind, self._record.settings
         )
 
     def _tell_own_loop(self, failure: Failure) -> None:
@@ -409,7 +395,8 @@ class Step:
         lock = lock_of(machine)
         record = node.record(occasion.failure.state)  # or an earlier one, which this one reports
         try:
-            meta.begin(Recovery(node, record, occasion))
+            recovery = Recovery(node, record, occasion)
+            meta.begin(recovery)
             if has_preempt_flag(machine):
                 meta.request_preempt()  # it came from a callback on the way here
             lock.release()
@@ -418,7 +405,7 @@ class Step:
                 verdict = self._in_time(occasion, meta.take_verdict())
             finally:
                 lock.acquire()
-            return Applying(node, record, occasion, meta).apply(verdict)
+            return Applying(recovery, meta).apply(verdict)
         except BaseException:
             be_back(node, self._record.label)
             raise
@@ -427,16 +414,11 @@ class Step:
         node, record, meta_label = self._node, self._record, self._node.settings.oracle_label
         occasions.log_occasion(occasion, '{}/{}'.format(node.path, occasion.failure.state))
         sync_oracle(node)
-        if occasion.is_told:
+        if occasion.first_step is not FirstStep.ENTER_AGAIN:
             record.left_by(occasion.what, meta_label)
             save_rates(node)
-            node.emit(
-                EventKind.TRANSITION,
-                state=record.label,
-                outcome=occasion.outcome,
-                target=meta_label,
-                **_facts_of(occasion, record.label),
-            )
+            facts = _facts_of(occasion, record.label)
+            node.emit(EventKind.TRANSITION, record.label, occasion.outcome, meta_label, **facts)
         # sync_oracle refuses any other state of this name
         meta = cast(OracleState, states_of(self._machine)[meta_label])
         go_to(node, message_of(record.label, occasion.what, meta_label), meta_label)

@@ -20,7 +20,7 @@ from ..smach_private import (
     set_preempt_flag,
     set_preempted_state,
     states_of,
-    tables_of,
+    transitions_of,
 )
 
 
@@ -104,7 +104,7 @@ def end_plainly(
     It returns the container's outcome, None where more is to be done than that.
     """
     machine, label = node.machine, record.label
-    states, transitions = tables_of(machine)
+    states, transitions = states_of(machine), transitions_of(machine)
     try:
         edge = record.fast[outcome]
         drawn = transitions[label][outcome]

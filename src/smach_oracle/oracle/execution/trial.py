@@ -4,7 +4,7 @@ Also what one execution of any container begins and ends.
 """
 
 import time
-from typing import Callable, Dict, List, Optional
+from typing import Callable, Dict, Iterable, List, Optional, Set, Tuple
 
 import smach
 from smach_oracle.forking import in_child
@@ -22,11 +22,9 @@ from ..records.facts import ENDED_BY, INPUTS, ORIGIN, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
-from ..settings.failure_rule import RULE
+from ..settings.failure_rule import RULE, FailureRule
 from ..smach_private import initial_label_of, states_of
-from .jump_entry import may_start_over
 from .origin import inputs_of, origin_of
-from .unknown_ends import tell_unknown_ends
 from .wrapping import adopt, bring_up_to_date
 
 _running: List[TreeNode] = []  # top nodes of the trials of this process
@@ -58,7 +56,7 @@ class ContainerRun(Execution):
         if is_top:
             self._begin_trial(new_trial_id)
         elif node.tree.is_resumed:
-            self.outcome = node.tree.resumed.take_outcome(node)
+            self.outcome = node.tree.resumed.take_outcome(node.records)
             if self.outcome is not None:
                 return False
         self._is_executed = True
@@ -82,7 +80,9 @@ class ContainerRun(Execution):
             if not each.machine.is_running():
                 each.begin_trial(node.tree.trial_id)
         begin_watching(node.tree, nodes)
-        node.tree.restarts.begin_trial(may_start_over(node.tree, nodes))
+        node.tree.restarts.begin_trial(
+            node.tree.recover and any(each.in_force.policy.restarts for each in nodes)
+        )
         node.tree.budget.begin(node.settings.budget)
         if store is not None:
             store.begin_trial(resumed)
@@ -142,11 +142,13 @@ def _end_trial(
             why is TrialEnd.OUTCOME and outcome in node.in_force.failing
         )
         settle_ways(node, False if is_lost and not node.execution.was_preempted else None)
+    with_rates = bool(node.settings.rates_file)
+    learned = {'learned': learned_by(nodes_of(node.machine))} if with_rates else {}
     node.emit(
         EventKind.TRIAL_END,
         outcome=outcome or '',
         text=why_no_outcome(outcome, error),
-        data={ENDED_BY: why.value, **_learned(node)},
+        data={ENDED_BY: why.value, **learned},
     )
     save_rates(node)
     if store is not None:
@@ -172,16 +174,6 @@ def _settings(node: TreeNode) -> Dict[str, object]:
         'high_from': defaults.high_from,
         'max_recoveries': defaults.max_recoveries,
     }
-
-
-def _learned(node: TreeNode) -> Dict[str, object]:
-    """Return what was learned so far, where it is kept in a file.
-
-    A record of the trial then has all that is needed to go on after it.
-    """
-    if not node.settings.rates_file:
-        return {}
-    return {'learned': learned_by(nodes_of(node.machine))}
 
 
 def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
@@ -212,3 +204,21 @@ def _leave_to_parent() -> None:
 
 
 in_child(_leave_to_parent)
+
+
+UNKNOWN_ENDS = (
+    '{}: nothing says whether an end in {} is a success or a failure. Statistics count it as '
+    '"other end". To settle it, list all failing ends in failing_outcomes, or choose a name that '
+    'says it, such as {}_succeeded'
+)
+_MOST_TOLD = 1000  # machines. A program may make up machines without end
+_told: Set[Tuple[str, Tuple[str, ...]]] = set()
+
+
+def tell_unknown_ends(name: str, ends: Iterable[object], rule: FailureRule) -> None:
+    """Name the ends of a top machine whose meaning is not known, once in a process."""
+    unknown = rule.unknown(ends)
+    if not unknown or (name, unknown) in _told or len(_told) >= _MOST_TOLD:
+        return
+    _told.add((name, unknown))
+    smach.loginfo(UNKNOWN_ENDS.format(name, ' or '.join(unknown), unknown[0]))

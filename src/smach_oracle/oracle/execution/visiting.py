@@ -5,10 +5,9 @@ from time import monotonic
 import smach
 
 from ..machine.repeats import note_visit
-from ..machine.snapshots import UserdataGate
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import view_behind
+from ..machine.userdata import UserdataGate, view_behind
 from ..machine.workers import Overrun
 from ..records.events import EventKind
 from ..recovery.failure import HeldBack
@@ -46,7 +45,7 @@ def execute_watched(
     when the state overruns, in place of `userdata`.
     """
     if node.tree.is_resumed:
-        unfinished = node.tree.resumed.take_unfinished(node, record)
+        unfinished = node.tree.resumed.take_unfinished(node.records, record)
         if unfinished is not None:
             return unfinished
     entered_by_oracle, way_down = record.entered_by_oracle, record.way_down

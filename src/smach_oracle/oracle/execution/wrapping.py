@@ -16,15 +16,7 @@ from ..machine.wrapped_classes import change_class, two_classes
 from ..recovery.phases import OracleState
 from ..settings.names import Nested, Strictness
 from ..settings.settings import Settings
-from ..smach_private import (
-    Labels,
-    remappings_of,
-    remove_mark,
-    set_mark,
-    states_of,
-    tables_of,
-    transitions_of,
-)
+from ..smach_private import Labels, remappings_of, remove_mark, set_mark, states_of, transitions_of
 from .boundary import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
 
@@ -53,7 +45,8 @@ def wrap_machine(
         machine = _put_under(given, oracle_class, tree, settings, name).machine
         _put_in_order(machine, settings, nested, strict)
     except SettingsError:  # as if nobody had tried
-        _unwrap(given, tree)
+        if isinstance(given, tree.container_class):
+            _strip(given)
         raise
     return machine
 
@@ -71,11 +64,11 @@ def _put_in_order(
     machine: smach.StateMachine, settings: Settings, nested: Nested, strict: Strictness
 ) -> None:
     top = marked_node(machine)
-    top.in_force.wrap_with(strict, nested)
+    top.in_force.strict, top.in_force.nested = strict, nested
     adopt(machine)
     _configure(machine, settings)
     for node in nodes_of(machine):
-        node.in_force.wrap_with(strict)
+        node.in_force.strict = strict
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -87,11 +80,11 @@ def bring_up_to_date(node: TreeNode) -> None:
     """
     sync_oracle(node)
     states = len(states_of(node.machine))
-    if node.in_force.is_unchecked(states):
+    if node.in_force.checked_states != states:
         if node.parent is None:
             check_names(node)
         check_preconditions(node)
-        node.in_force.note_checked(states)
+        node.in_force.checked_states = states
     load_rates(node)
 
 
@@ -129,18 +122,6 @@ def _wrap_again(
     return machine
 
 
-def _unwrap(machine: smach.StateMachine, tree: Tree) -> None:
-    """Give a machine that could not be wrapped, and what was wrapped with it, back as it was."""
-    if not isinstance(machine, tree.container_class):
-        return
-    for container in containers_in(machine):
-        made_of = two_classes(type(container))
-        if made_of is not None and (
-            container is machine or marked_node(container).in_force.inherits
-        ):
-            strip_alone(container)
-
-
 def adopt(machine: smach.StateMachine) -> None:
     """Wrap what is nested in a wrapped machine and is not wrapped yet, into one tree with it.
 
@@ -153,17 +134,13 @@ def adopt(machine: smach.StateMachine) -> None:
         if node is None:
             if not parent.wraps(below):
                 continue
-            node = _put_below(child, parent)
+            tree = parent.tree
+            node = _put_under(child, tree.container_class, tree, parent.settings, '')
+            node.in_force.inherit(parent.in_force)
         if node.parent is None or node.tree is not parent.tree:
             _move_below(node, parent, below)
-        node.in_force.wrap_with(nested=parent.in_force.nested)
+        node.in_force.nested = parent.in_force.nested
         adopt(node.machine)
-
-
-def _put_below(child: smach.StateMachine, parent: TreeNode) -> TreeNode:
-    node = _put_under(child, parent.tree.container_class, parent.tree, parent.settings, '')
-    node.in_force.wrap_with(parent.in_force.strict, inherits=True)
-    return node
 
 
 def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
@@ -175,7 +152,7 @@ def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
     node.lie_below(parent, below)
     node.join(parent.tree)
     if node.in_force.inherits:
-        node.in_force.wrap_with(parent.in_force.strict)
+        node.in_force.strict = parent.in_force.strict
     node.configure(parent.settings if node.in_force.inherits else node.settings)
 
 
@@ -188,7 +165,7 @@ def sync_oracle(node: TreeNode) -> None:
     :raises SettingsError: where its name is another's.
     """
     machine = node.machine
-    states, transitions = tables_of(machine)
+    states, transitions = states_of(machine), transitions_of(machine)
     if not node.tree.recover or not states:
         return
     label = node.in_force.of_machine.oracle_label

@@ -24,7 +24,8 @@ class ContainerSettings:
     They are those of the whole machine, those given with `add()`, and what follows from them.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, name: str = '') -> None:
+        self.name = name  # '' where nobody has given it one
         self.given_with_add: Dict[str, Dict[str, Any]] = {}  # by label
         self.strict: Strictness = True
         self.nested: Nested = True
@@ -34,7 +35,7 @@ class ContainerSettings:
     def use(self, settings: Settings) -> None:
         """Put settings of the whole machine into force. Those given with `add()` stay."""
         self.of_machine = settings
-        self._checked_states = -1  # number of states for which they were last checked
+        self.checked_states = -1  # number of states for which they were last checked
         self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
         self.rule = FailureRule(settings.failing_outcomes)
         self.failing = self.rule.failing
@@ -52,24 +53,9 @@ class ContainerSettings:
         self.limits_autonomy = self._sets('autonomy', RUN)
         self.guards_states = self._sets('on_retry', ALLOW)
 
-    def wrap_with(
-        self,
-        strict: Optional[Strictness] = None,
-        nested: Optional[Nested] = None,
-        inherits: bool = False,
-    ) -> None:
-        """Check names, and wrap what is nested, in these ways. None: as before."""
-        self.strict = self.strict if strict is None else strict
-        self.nested = self.nested if nested is None else nested
-        self.inherits = self.inherits or inherits
-
-    def is_unchecked(self, states: int) -> bool:
-        """Whether they were not checked yet for so many states."""
-        return self._checked_states != states
-
-    def note_checked(self, states: int) -> None:
-        """Note that they are."""
-        self._checked_states = states
+    def inherit(self, above: 'ContainerSettings') -> None:
+        """Be under the settings of the top machine, for being nested."""
+        self.strict, self.nested, self.inherits = above.strict, above.nested, True
 
     def _sets(self, key: str, usual: str) -> bool:
         """Whether a setting of states is not as usual, for all or for one."""
@@ -137,11 +123,6 @@ class ContainerRecords:
         self.by_label[label].restore(learned)
         if is_shared:
             self.by_label[label].shared = base_of(learned)
-
-    def forget_shared(self) -> None:
-        """Note that another rates file is used from now on, which has nothing of this yet."""
-        for record in self.by_label.values():
-            record.shared = {}
 
     def begin_trial(self) -> None:
         """Forget what belongs to a trial. The rates stay."""

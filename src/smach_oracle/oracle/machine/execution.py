@@ -101,7 +101,7 @@ class Execution:
         node.begin_execution(self)
         self.starts_in = node.start_from_above(take=True)
         if node.events.observers:
-            entry = node.tree.resumed.entry_of(node)
+            entry = node.tree.resumed.entry_of(node.records)
             begins_in = self.starts_in if entry is None else entry.label
             state = begins_in or initial_label_of(node.machine)
             node.emit(EventKind.CONTAINER_START, state=state)
@@ -113,7 +113,7 @@ class Execution:
             return False
         return (
             self.starts_in in states_of(node.machine)
-            or node.tree.resumed.entry_of(node) is not None
+            or node.tree.resumed.entry_of(node.records) is not None
         )
 
     def end(self, outcome: Optional[str], error: Optional[BaseException]) -> None:
@@ -124,7 +124,7 @@ class Execution:
             set_executing(node.machine, False)
             if ends_program(error):
                 node.tree.early_end.of_program = error
-        dropped = node.tree.control.leave(node.engine, node)
+        dropped = node.tree.control.leave(node.engine, lambda: node.key)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
         node.records.streaks.end_execution()

@@ -78,15 +78,11 @@ class TrackedItems:
                 'it goes on where that has ended'
             )
         self._count = len(source) if isinstance(source, Sized) else None
-        self.number, self.is_finished, self.is_exhausted = 0, True, False
+        self.is_finished, self.is_exhausted = True, False
         self._is_pending, self._error = False, None
-        self._pass_over()
-
-    def _pass_over(self) -> None:
-        """Leave out the items that were finished before the program was stopped."""
         passed, self.begins_with = max(0, self.begins_with - 1), 1
         for _ in range(passed):
-            next(cast(Iterator[object], self._items), None)
+            next(self._items, None)
         self.number = passed
         if passed:
             self._tell('goes on with item {}'.format(passed + 1))

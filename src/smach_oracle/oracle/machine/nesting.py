@@ -1,17 +1,7 @@
 """Finds the machines nested in others, and those of them that are under an oracle."""
 
 from collections import deque
-from typing import (
-    Any,
-    Dict,
-    Iterator,
-    List,
-    Mapping,
-    Optional,
-    Protocol,
-    Tuple,
-    cast,
-)
+from typing import Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
 
 import smach
 
@@ -23,17 +13,6 @@ from .tree_node import TreeNode, marked_node, node_of
 WRAPPER = '_oracle_wrapper'  # the mark of a Concurrence or an Iterator of a wrapped tree
 
 
-class StoredPort(Protocol):
-    """The progress of a container when the program was stopped (`checkpoint.stored_tree`)."""
-
-    keys: Dict[str, Any]  # of its userdata
-    gone: List[str]  # keys that are not to be there
-    item: int  # number of the one to begin with, from 1. 0 means the first
-
-    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
-        """Take the userdata as they are then."""
-
-
 class Wrapper(Protocol):
     """The data kept for a Concurrence or an Iterator (`branches.wrapper`)."""
 
@@ -42,20 +21,6 @@ class Wrapper(Protocol):
 
     def in_words(self) -> str:
         """Return which item is under way, such as 'item 2 of 4', or '' where none is."""
-
-    @property
-    def item_number(self) -> int:
-        """The number of the item under way, from 1. 0 means none is."""
-
-    @property
-    def is_resumed(self) -> bool:
-        """Whether its next execution goes on where the program was stopped."""
-
-    def resume(self, stored: StoredPort) -> None:
-        """Have its next execution go on there."""
-
-    def forget_resumed(self) -> None:
-        """Have it begin from the start."""
 
 
 def wrapper_of(state: object) -> Optional[Wrapper]:
@@ -116,30 +81,6 @@ def branching_below(
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
                 yield path, state
             yield from branching_below(state, path)
-
-
-def wrappers_around(node: TreeNode) -> List[Tuple[str, Wrapper]]:
-    """Return them, each with its path, the outermost first."""
-    parent = node.parent
-    if parent is None or not node.runs_in_branch:
-        return []
-    found = []
-    for below, container in branching_below(parent.machine):
-        wrapper = wrapper_of(container)
-        if wrapper is not None and node.labels_from_parent[: len(below)] == below:
-            found.append(('/'.join((parent.key,) + below), wrapper))
-    return found
-
-
-def wrappers_in(node: TreeNode, label: str) -> List[Tuple[str, Wrapper]]:
-    """Return those in a state of a machine, down to the next machines, each with its path."""
-    return [
-        ('/'.join((node.key,) + below), wrapper)
-        for below, wrapper in (
-            (below, wrapper_of(container)) for below, container in branching_below(node.machine)
-        )
-        if wrapper is not None and below[0] == label
-    ]
 
 
 def children_of(container: object) -> Mapping[str, smach.State]:

@@ -18,47 +18,6 @@ from .health_watch import ListenToHealth
 from .nesting import nodes_of
 from .tree_node import TreeNode, node_of
 
-
-def rate_rows(machine: smach.StateMachine) -> List[StateRateRow]:
-    """Return one row for each state."""
-    rows = []
-    for node in nodes_of(machine):
-        path = node.path
-        for label in node.labels():
-            record = node.record(label)
-            successes, failures = record.totals
-            rows.append(
-                StateRateRow(
-                    path,
-                    label,
-                    record.rate,
-                    int(record.failure_class),
-                    successes,
-                    failures,
-                    record.recoveries,
-                    record.has_preconditions,
-                )
-            )
-    return rows
-
-
-def transition_rows(machine: smach.StateMachine) -> List[TransitionRow]:
-    """Return one row for each edge that was taken, ORACLE's among them."""
-    rows = []
-    for node in nodes_of(machine):
-        path = node.path
-        for label, record in list(node.records.by_label.items()):
-            rows += [
-                TransitionRow(path, label, outcome, target, count)
-                for (outcome, target), count in record.transitions().items()
-            ]
-        rows += [
-            TransitionRow(path, node.settings.oracle_label, target, target, count)
-            for target, count in list(node.records.oracle_edges.items())
-        ]
-    return rows
-
-
 # -- the rates file of a tree, where the settings name one
 
 
@@ -254,11 +213,41 @@ class Oracle:
 
     def rates(self) -> List[StateRateRow]:
         """Return the learned rate of every state, of this container and all below it."""
-        return rate_rows(self._node.machine)
+        rows = []
+        for node in nodes_of(self._node.machine):
+            path = node.path
+            for label in node.labels():
+                record = node.record(label)
+                successes, failures = record.totals
+                rows.append(
+                    StateRateRow(
+                        path,
+                        label,
+                        record.rate,
+                        int(record.failure_class),
+                        successes,
+                        failures,
+                        record.recoveries,
+                        record.has_preconditions,
+                    )
+                )
+        return rows
 
     def transition_counts(self) -> List[TransitionRow]:
         """Return how often each transition was taken, in this container and all below it."""
-        return transition_rows(self._node.machine)
+        rows = []
+        for node in nodes_of(self._node.machine):
+            path = node.path
+            for label, record in list(node.records.by_label.items()):
+                rows += [
+                    TransitionRow(path, label, outcome, target, count)
+                    for (outcome, target), count in record.transitions().items()
+                ]
+            rows += [
+                TransitionRow(path, node.settings.oracle_label, target, target, count)
+                for target, count in list(node.records.oracle_edges.items())
+            ]
+        return rows
 
 
 def oracle_of(machine: object) -> Oracle:

@@ -122,8 +122,10 @@ def leave_unconfirmed(node: TreeNode, target: str) -> None:
 
     What may come again now is spent, the state itself among it: nobody has confirmed anything.
     """
-    for done in _done_since(node, target):
-        done.mark.spent = True
+    since = node.records.marks.of(target).reached
+    for done in _done_below(node):
+        if done.mark.executed >= since:
+            done.mark.spent = True
 
 
 def note_initial(node: TreeNode, label: str) -> None:
@@ -185,11 +187,6 @@ def note_precondition(node: TreeNode, label: str) -> None:
         node.tree.keep_marks()
 
 
-def _done_since(node: TreeNode, target: str) -> Iterator[_Done]:
-    since = node.records.marks.of(target).reached
-    return (done for done in _done_below(node) if done.mark.executed >= since)
-
-
 def _done_within(node: TreeNode, label: str) -> Iterator[_Done]:
     return (done for done in _done_below(node) if _is_at_or_below(done.name, label))
 
@@ -197,17 +194,12 @@ def _done_within(node: TreeNode, label: str) -> Iterator[_Done]:
 def _done_below(node: TreeNode) -> Iterator[_Done]:
     """Yield the guarded states at or below a container that were executed."""
     for each in nodes_of(node.machine):
-        yield from _done_in(node, each)
+        path = each.path[len(node.path) + 1 :]
+        for label, record in list(each.records.by_label.items()):
+            mark = each.records.marks.of(label)
+            if mark.done and record.settings.on_retry != ALLOW:
+                yield _Done('{}/{}'.format(path, label) if path else label, mark)
 
 
 def _is_at_or_below(name: str, label: str) -> bool:
     return name == label or name.startswith(label + '/')
-
-
-def _done_in(node: TreeNode, each: TreeNode) -> Iterator[_Done]:
-    """Yield the guarded states of a container at or below `node` that were executed."""
-    path = each.path[len(node.path) + 1 :]
-    for label, record in list(each.records.by_label.items()):
-        mark = each.records.marks.of(label)
-        if mark.done and record.settings.on_retry != ALLOW:
-            yield _Done('{}/{}'.format(path, label) if path else label, mark)

@@ -1,22 +1,10 @@
 """The places where a trial goes on whose program was stopped, in its containers and states."""
 
-from typing import (
-    TYPE_CHECKING,
-    Dict,
-    Iterable,
-    List,
-    Mapping,
-    NamedTuple,
-    Optional,
-    Protocol,
-    Tuple,
-)
+from typing import Dict, Iterable, List, Mapping, NamedTuple, Optional, Protocol
 
 from ..records.events import FailureKind
+from .container_records import ContainerRecords
 from .state_record import StateRecord
-
-if TYPE_CHECKING:
-    from .tree_node import TreeNode
 
 NOT_BEGUN = 'the program was stopped before it began'
 
@@ -39,10 +27,10 @@ class EntryPort(Protocol):
     def label(self) -> str:
         """The state in which it goes on."""
 
-    def take_over_records(self, node: 'TreeNode') -> None:
+    def take_over_records(self) -> None:
         """Have the visits of the execution that was stopped."""
 
-    def enter(self, node: 'TreeNode') -> None:
+    def enter(self) -> None:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
 
 
@@ -61,47 +49,48 @@ class ResumedTrial:
     """What waits for the next execution of a container, or for the coming visit of a state.
 
     `checkpoint.resuming` writes it as a stored trial goes on. Each of it is taken once. A container
-    above takes it back where the machine is sent elsewhere. In any other trial it is empty.
+    above takes it back where the machine is sent elsewhere. In any other trial it is empty. A
+    container is known by its records.
     """
 
     def __init__(self) -> None:
-        self._entries: Dict['TreeNode', EntryPort] = {}
-        self._outcomes: Dict['TreeNode', str] = {}
-        self._asked: Dict['TreeNode', _AskedOnce] = {}
+        self._entries: Dict[ContainerRecords, EntryPort] = {}
+        self._outcomes: Dict[ContainerRecords, str] = {}
+        self._asked: Dict[ContainerRecords, _AskedOnce] = {}
         self._unfinished: Dict[StateRecord, Unfinished] = {}
         self._questions: Dict[StateRecord, str] = {}
 
     # -- of a container
 
-    def enter_at(self, node: 'TreeNode', entry: EntryPort) -> None:
+    def enter_at(self, records: ContainerRecords, entry: EntryPort) -> None:
         """Have the next execution of a container go on there."""
-        self._entries[node] = entry
+        self._entries[records] = entry
 
-    def entry_of(self, node: 'TreeNode') -> Optional[EntryPort]:
+    def entry_of(self, records: ContainerRecords) -> Optional[EntryPort]:
         """Return where the next execution of a container goes on, None: it begins."""
-        return self._entries.get(node)
+        return self._entries.get(records)
 
-    def take_entry(self, node: 'TreeNode') -> Optional[EntryPort]:
+    def take_entry(self, records: ContainerRecords) -> Optional[EntryPort]:
         """Return the same, once."""
-        return self._entries.pop(node, None)
+        return self._entries.pop(records, None)
 
-    def had_ended(self, node: 'TreeNode', outcome: str) -> None:
+    def had_ended(self, records: ContainerRecords, outcome: str) -> None:
         """Have the next execution of a container be over: it was before the program stopped."""
-        self._outcomes[node] = outcome
+        self._outcomes[records] = outcome
 
-    def take_outcome(self, node: 'TreeNode') -> Optional[str]:
+    def take_outcome(self, records: ContainerRecords) -> Optional[str]:
         """Return the outcome of one that was over, once, None for any other."""
-        return self._outcomes.pop(node, None)
+        return self._outcomes.pop(records, None)
 
     def ask_before_next(
-        self, nodes: Iterable['TreeNode'], why: str, passes: Iterable[StateRecord]
+        self, containers: Iterable[ContainerRecords], why: str, passes: Iterable[StateRecord]
     ) -> None:
         """Have a person asked once, before the first state of any of some containers.
 
         `passes`: states that are entered before, once each, on the way to where it stood.
         """
         asked = _AskedOnce(why, passes)
-        self._asked.update((node, asked) for node in nodes)
+        self._asked.update((records, asked) for records in containers)
 
     # -- of a state
 
@@ -113,18 +102,20 @@ class ResumedTrial:
         """Return what stands in place of the coming visit of a state, None for nothing."""
         return self._unfinished.get(record)
 
-    def take_unfinished(self, node: 'TreeNode', record: StateRecord) -> Optional[Unfinished]:
+    def take_unfinished(
+        self, records: ContainerRecords, record: StateRecord
+    ) -> Optional[Unfinished]:
         """Return the same, once. It may be the question before any state of its container."""
         unfinished = self._unfinished.pop(record, None)
         if unfinished is None:
-            return self.take_asked(node, record)
+            return self.take_asked(records, record)
         if unfinished.snapshot is not None:
             record.snapshot = dict(unfinished.snapshot)
         return unfinished
 
-    def take_asked(self, node: 'TreeNode', record: StateRecord) -> Optional[Unfinished]:
+    def take_asked(self, records: ContainerRecords, record: StateRecord) -> Optional[Unfinished]:
         """Return the question before any state of a container, once for all of its containers."""
-        asked = self._asked.get(node)
+        asked = self._asked.get(records)
         if asked is None or not asked.why:
             return None
         if record in asked.passes:
@@ -147,30 +138,26 @@ class ResumedTrial:
 
     # -- both
 
-    def goes_on(self, node: 'TreeNode') -> bool:
+    def goes_on(self, records: ContainerRecords) -> bool:
         """Whether a container is to go on where it stood, or one of its states is."""
         return (
-            node in self._entries
-            or node in self._outcomes
-            or any(record in self._unfinished for record in node.records.by_label.values())
+            records in self._entries
+            or records in self._outcomes
+            or any(record in self._unfinished for record in records.by_label.values())
         )
 
-    def concerns(self, node: 'TreeNode') -> bool:
+    def concerns(self, records: ContainerRecords) -> bool:
         """Whether anything waits for the next execution of a container."""
-        return node in self._asked or self.goes_on(node)
+        return records in self._asked or self.goes_on(records)
 
-    def forget(self, node: 'TreeNode') -> None:
+    def forget(self, records: ContainerRecords) -> None:
         """Let a container begin from the start."""
-        self._entries.pop(node, None)
-        self._outcomes.pop(node, None)
-        self._asked.pop(node, None)
+        self._entries.pop(records, None)
+        self._outcomes.pop(records, None)
+        self._asked.pop(records, None)
 
-    def forget_states(self, node: 'TreeNode') -> None:
+    def forget_states(self, records: ContainerRecords) -> None:
         """Let the coming visits of its states be new ones."""
-        for record in node.records.by_label.values():
+        for record in records.by_label.values():
             self._unfinished.pop(record, None)
             self._questions.pop(record, None)
-
-    def __reduce__(self) -> Tuple[object, ...]:
-        """A copied or pickled machine goes on with no trial."""
-        return ResumedTrial, ()

@@ -57,6 +57,12 @@ def failure_kind(
     return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
 
 
+def judged_at(node: 'TreeNode', label: str, outcome: str) -> Tuple[Route, FailureKind]:
+    """Return where an outcome of a state leads, and whether that is a failure."""
+    route = route_of(node.machine, label, outcome)
+    return route, failure_kind(outcome, route, node.settings_of(label), node.in_force.failing)
+
+
 def author_recovers(outcome: str, route: Route, kind: FailureKind, settings: StateSettings) -> bool:
     """Whether the author's own transition from this failing outcome stays.
 
@@ -98,9 +104,12 @@ class Site:
     label = ''
     begins_by = EventKind.CONTAINER_START
 
-    def shown(self, node: 'TreeNode') -> smach.Container:
+    def __init__(self, node: 'TreeNode') -> None:
+        self._node = node
+
+    def shown(self) -> smach.Container:
         """Return the container that people see."""
-        return cast(smach.Container, node.machine)
+        return cast(smach.Container, self._node.machine)
 
     # -- settings
 
@@ -115,39 +124,34 @@ class Site:
     # -- where outcomes lead
 
     def foresees(
-        self,
-        node: 'TreeNode',
-        outcome: str,
-        route: Route,
-        kind: FailureKind,
-        settings: StateSettings,
+        self, outcome: str, route: Route, kind: FailureKind, settings: StateSettings
     ) -> bool:
         """Whether the author has said what is to happen at this failing outcome of a state."""
         recovers = author_recovers(outcome, route, kind, settings)
-        return recovers and not goes_unnoticed(node, route)
+        return recovers and not goes_unnoticed(self._node, route)
 
     def in_words(self, route: Route, outcome: str) -> Route:
         """Return where an outcome leads, for people."""
         return route
 
-    def choices(self, node: 'TreeNode', label: str) -> Tuple[OutcomeChoice, ...]:
+    def choices(self, label: str) -> Tuple[OutcomeChoice, ...]:
         """Return the outcomes of a state that lead on, and where, as an expert is shown them."""
-        outcomes = sorted(states_of(node.machine)[label].get_registered_outcomes(), key=str)
-        routes = ((outcome, route_of(node.machine, label, outcome)) for outcome in outcomes)
+        outcomes = sorted(states_of(self._node.machine)[label].get_registered_outcomes(), key=str)
+        routes = ((outcome, route_of(self._node.machine, label, outcome)) for outcome in outcomes)
         return tuple(
             OutcomeChoice(outcome, route.target) for outcome, route in routes if route.target
         )
 
     # -- what is told
 
-    def tell_item_passed_over(self, node: 'TreeNode', label: str, outcome: str) -> None:
+    def tell_item_passed_over(self, label: str, outcome: str) -> None:
         """Say what the author passes over by a failing outcome that is foreseen."""
 
-    def ended_by(self, node: 'TreeNode', event: Event) -> Optional[str]:
+    def ended_by(self, event: Event) -> Optional[str]:
         """Return the outcome with which it ends at an event of its own, None for other events."""
         is_end = event.kind is EventKind.CONTAINER_END and event.outcome
         return event.outcome if is_end else None
 
-    def is_line_over(self, node: 'TreeNode', event: Event) -> bool:
+    def is_line_over(self, event: Event) -> bool:
         """Whether no state follows in its thread, that of a Concurrence, after an event."""
-        return event.kind is EventKind.CONTAINER_END and len(node.labels_from_parent) > 1
+        return event.kind is EventKind.CONTAINER_END and len(self._node.labels_from_parent) > 1

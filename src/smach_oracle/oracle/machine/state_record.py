@@ -19,7 +19,7 @@ from ..settings.settings import StateSettings
 
 if TYPE_CHECKING:
     from .places import TreePlace
-    from .userdata_view import StateView
+    from .userdata import StateView
 
 
 class RateReading(NamedTuple):

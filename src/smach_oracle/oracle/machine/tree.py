@@ -36,11 +36,6 @@ def no_description(state: smach.State) -> str:
     return ''
 
 
-def look_for_shutdown() -> Optional[Reason]:
-    """Return whether the process goes down, of which SMACH tells nobody who does not ask."""
-    return Reason.SHUTDOWN if smach.is_shutdown() else None
-
-
 def no_store() -> None:
     """Nothing is kept."""
 
@@ -48,22 +43,6 @@ def no_store() -> None:
 def new_id() -> str:
     """Return an id that nobody else uses."""
     return uuid.uuid4().hex[:12]
-
-
-# what each tree has of its own (`Tree._be_at_rest`)
-_AT_REST = {
-    'scope',
-    'workers',
-    'budget',
-    'early_end',
-    'waiting',
-    'health',
-    'alarms',
-    'control',
-    'rates_lock',
-    'departures_lock',
-    '_lock',
-}
 
 
 class Tree:
@@ -79,32 +58,35 @@ class Tree:
         # that of wrapped machines, and what nested ones become
         self.container_class = container_class
         self.recover = recover
-        self.expert = expert
         self.events = EventSource(log_error)
-        self.restarts = Restarts()
         self.trials = 0  # begun
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
         self._visits = itertools.count(1)
-        # has a store keep which states have begun, at once, where there is no event of it
-        self.keep_marks: Callable[[], None] = no_store
         self.trial_id = ''
-        self.resumed = ResumedTrial()
         self.is_resumed = False  # whether the trial goes on after its program was stopped
         self.rates_loaded = ''  # the rates file read last
-        # what a state that failed by outcome says of it
-        self.describe_failure: Callable[[smach.State], str] = no_description
         self._questions = 0
-        # states that are executed as preconditions now, each with its container
-        self._preconditions: List[Tuple[object, smach.State]] = []
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
         self.process = os.getpid()
-        self._be_at_rest(health)
+        self.be_at_rest(expert, health)
 
-    def _be_at_rest(self, health: Optional[HealthFunction] = None) -> None:
+    def be_at_rest(
+        self, expert: Optional[Expert] = None, health: Optional[HealthFunction] = None
+    ) -> None:
         """Have nothing under way, nothing asked by an operator, and locks that nobody holds."""
         clock = Clock()
-        self.scope = Scope(look=look_for_shutdown, clock=clock)
+        self.expert = expert
+        # has a store keep which states have begun, at once, where there is no event of it
+        self.keep_marks: Callable[[], None] = no_store
+        # what a state that failed by outcome says of it
+        self.describe_failure: Callable[[smach.State], str] = no_description
+        # states that are executed as preconditions now, each with its container
+        self._preconditions: List[Tuple[object, smach.State]] = []
+        self.restarts, self.resumed = Restarts(), ResumedTrial()
+        self.scope = Scope(
+            look=lambda: Reason.SHUTDOWN if smach.is_shutdown() else None, clock=clock
+        )
         self.workers = Workers(clock)
         self.budget = TrialBudget(clock)
         self.early_end = EarlyEnd(self.scope)
@@ -202,13 +184,10 @@ class Tree:
         That is the expert, its connection, a clock that was handed in, locks, all that is under
         way and all that an operator has asked.
         """
-        state = {key: value for key, value in self.__dict__.items() if key not in _AT_REST}
-        state['expert'] = None
-        state['_preconditions'] = []
-        state['keep_marks'] = no_store
-        state['describe_failure'] = no_description
-        return state
+        at_rest = Tree.__new__(Tree)
+        at_rest.be_at_rest()
+        return {key: value for key, value in vars(self).items() if key not in vars(at_rest)}
 
     def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
-        self._be_at_rest()
+        self.be_at_rest()

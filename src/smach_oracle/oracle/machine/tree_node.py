@@ -1,28 +1,20 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 
 import copy
-from typing import Any, Dict, Iterator, Mapping, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
 
 from ..records.events import EventKind
 from ..settings.names import is_nested_at
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import (
-    EngineProbe,
-    Labels,
-    data_of,
-    is_executing,
-    mark_of,
-    mark_on,
-    states_of,
-)
+from ..smach_private import EngineProbe, Labels, data_of, is_executing, mark_of, mark_on, states_of
 from .container_records import ContainerRecords, ContainerSettings
 from .execution import Execution
 from .site import Site
-from .snapshots import NOT_COPIED, take_snapshot
 from .state_record import RateReading, StateRecord
 from .tree import Tree
+from .userdata import NOT_COPIED, take_snapshot
 
 DEFAULT_NAME = 'SM_ROOT'
 
@@ -54,24 +46,27 @@ class TreeNode:
     states run.
     """
 
-    site = Site()
-
     def __init__(
-        self, machine: smach.StateMachine, tree: Tree, settings: Settings, name: str
+        self,
+        machine: smach.StateMachine,
+        tree: Tree,
+        settings: Settings,
+        name: str,
+        site: Callable[['TreeNode'], Site] = Site,
     ) -> None:
         self.machine = machine
         self.parent: Optional['TreeNode'] = None
         self.labels_from_parent: Labels = ()
-        self._name = name
-        self.in_force = ContainerSettings(settings)
+        self.in_force = ContainerSettings(settings, name)
         self.records = ContainerRecords(settings.history_length)
         self.engine = EngineProbe()
+        self.site = site(self)
         self.join(tree)
         self.execution = Execution(self)
 
     def take_name(self, name: str) -> None:
         """Go by this name, unless it is empty."""
-        self._name = name or self._name
+        self.in_force.name = name or self.in_force.name
 
     def join(self, tree: Tree) -> None:
         """Become part of a tree."""
@@ -85,12 +80,12 @@ class TreeNode:
     @property
     def name(self) -> str:
         """Return the name of the machine."""
-        return self._name or DEFAULT_NAME
+        return self.in_force.name or DEFAULT_NAME
 
     @property
     def is_named(self) -> bool:
         """Whether it was given."""
-        return bool(self._name)
+        return bool(self.in_force.name)
 
     def lie_below(self, parent: Optional['TreeNode'], labels: Labels) -> None:
         """Have this place in a tree. None: on its own, or at the top."""
@@ -100,7 +95,7 @@ class TreeNode:
     def path(self) -> str:
         """Return the path: the top machine's name and the labels below it, joined by '/'."""
         if self.parent is None:
-            return self._name or DEFAULT_NAME
+            return self.in_force.name or DEFAULT_NAME
         labels, top = self._labels_from_top()
         return '/'.join((top.name,) + labels)
 
@@ -266,13 +261,8 @@ class TreeNode:
         """
         if self.events.observers:
             reading = reading or record.read_rate()
-            self.emit(
-                kind,
-                record.label,
-                failure_class=int(reading.failure_class),
-                rate=reading.rate,
-                **fields,
-            )
+            fields['failure_class'], fields['rate'] = int(reading.failure_class), reading.rate
+            self.emit(kind, record.label, **fields)
 
     def warn(self, text: str, label: str = '') -> None:
         """Log what the operator should know, and tell the observers."""
@@ -292,7 +282,7 @@ class TreeNode:
         """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
         self.engine.begin_trial()
-        self.tree.resumed.forget(self)
+        self.tree.resumed.forget(self.records)
         self.records.begin_trial()
 
     def begin_execution(self, execution: Execution) -> None:
@@ -302,9 +292,9 @@ class TreeNode:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
         self.engine.begin_execution()
-        entry = self.tree.resumed.entry_of(self) if self.tree.is_resumed else None
+        entry = self.tree.resumed.entry_of(self.records) if self.tree.is_resumed else None
         if entry is not None:
-            entry.take_over_records(self)
+            entry.take_over_records()
 
     def begin_once_more(self) -> None:
         """Begin an execution as the one that is there already."""
@@ -345,4 +335,5 @@ class TreeNode:
         twin.in_force = copy.copy(self.in_force)
         twin.in_force.given_with_add = dict(self.in_force.given_with_add)
         twin.engine = EngineProbe()
+        twin.site = Site(twin)
         return twin

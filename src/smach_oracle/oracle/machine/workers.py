@@ -8,7 +8,7 @@ While an abandoned thread lives, what it runs is blocked: nobody enters it again
 import contextlib
 import functools
 import threading
-from typing import Callable, Dict, List, NamedTuple
+from typing import Callable, Dict, List, NamedTuple, Optional
 
 import smach
 from smach_common.foreign import repr_of
@@ -19,7 +19,7 @@ from ..scope.clock import Clock
 from ..scope.scope import CallEnd, Reason, Scope, inside
 from ..settings.settings import StateSettings
 from ..smach_private import mark_of, set_executing
-from .snapshots import UserdataGate
+from .userdata import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
 _LATE = 'still runs since it overran its time limit'
@@ -171,10 +171,11 @@ class Workers:
             self.abandoned[id(target)] = _AbandonedCall(target, call, why)
 
 
-def request_preempt(state: smach.State) -> None:
+def request_preempt(state: Optional[smach.State]) -> None:
     """Preempt a state. A user's own `request_preempt` must not keep the machine from going on."""
     try:
-        state.request_preempt()
+        if state is not None:
+            state.request_preempt()
     except Exception as err:
         smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 

@@ -5,7 +5,7 @@ Pure, and without smach.
 
 import contextlib
 import threading
-from typing import Dict, Iterator, Mapping, Optional, Tuple
+from typing import Dict, Iterator, Mapping, Optional
 
 from ..scope.scope import Reason, Scope
 from .facts import TrialEnd
@@ -106,7 +106,3 @@ class Restarts:
     def userdata_of(self, node: object) -> Optional[Dict[str, object]]:
         """Return the userdata with which a container has begun, None where it is not known."""
         return self._userdata.get(id(node))
-
-    def __reduce__(self) -> Tuple[object, ...]:
-        """A copied or pickled machine has begun no trial."""
-        return Restarts, ()

@@ -132,22 +132,18 @@ class History:
         context = self.failure_context(state, initial, successes)
         before = self._latest_failure(1)
         failed_last = context.failed_last and before.state == state
-        own = self._failure_of(state)
+        own = self.failure_of(state)
         if own is not None:
             context = context._replace(succeeded_before=own.anchor)
         return context._replace(
             failed_last=failed_last, failing_since=failed_last and before.successes == successes
         )
 
-    def recalls_failure_of(self, state: str) -> bool:
-        """Whether the latest failure of `state` is among those that are remembered."""
-        return self._failure_of(state) is not None
-
     def _latest_failure(self, back: int = 0) -> _Failed:
         """Return the latest failure, or that one before it."""
         return self._failures[-1 - back] if back < len(self._failures) else _NONE_FAILED
 
-    def _failure_of(self, state: str) -> Optional[_Failed]:
+    def failure_of(self, state: str) -> Optional[_Failed]:
         return next((each for each in reversed(self._failures) if each.state == state), None)
 
     def keeps_failing(self, state: str) -> bool:
@@ -186,7 +182,7 @@ class History:
 
     def supersede(self, state: str, outcome: str, has_preconditions: bool) -> None:
         """Count the latest failure of `state` as neither: an expert did its work."""
-        failure = self._failure_of(state)
+        failure = self.failure_of(state)
         if failure is not None:
             self._failures = deque(
                 (each for each in self._failures if each is not failure), maxlen=_MOST_FAILURES

@@ -159,7 +159,8 @@ def read_rates(
     learners = list(learners)
     if is_shared:
         for learner in learners:
-            learner.records.forget_shared()
+            for record in learner.records.by_label.values():
+                record.shared = {}
     try:
         machines = _read(path, 'starting from the priors')
     except OSError as err:
@@ -240,7 +241,7 @@ def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> 
     free = [name for name in found if not is_claimed(path, name, if_unknown=bool(name))]
     if not free:
         return None
-    return max(free, key=lambda each: (bool(each), _size(machines[each])))
+    return max(free, key=lambda each: (bool(each), sum(map(len, machines[each].values()))))
 
 
 def _tell_other_rule(path: str, name: str, told: object, rule: FailureRule) -> None:
@@ -260,10 +261,6 @@ def _labels(learners: Sequence[Learner]) -> Labels:
     for learner in learners:  # the branches of a Concurrence have one path
         found.setdefault(learner.relative_path, set()).update(map(str, learner.labels()))
     return {place: sorted(labels) for place, labels in found.items()}
-
-
-def _size(containers: Containers) -> int:
-    return sum(len(states) for states in containers.values())
 
 
 def _tell_unusable(path: str, label: str, learner: Learner, err: Exception) -> None:

@@ -6,9 +6,8 @@ from ..decision.by_ways import action_of
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes
 from ..decision.ways import Evidence, StreakSoFar, WayKind
-from ..machine.jump_path import JumpPath, jump_path_to
 from ..machine.nesting import records_of
-from ..machine.places import TreePlace, levels_above, place_named
+from ..machine.places import JumpPath, TreePlace, jump_path_to, levels_above, place_named
 from ..records.events import EventKind
 from ..records.facts import Decider
 from ..records.streaks import OpenStreak
@@ -81,8 +80,10 @@ def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     if way is None:
         blocked = 'there is no state {!r} to go back to'.format(name)
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=blocked)
-    why_not = why_not_above(None) if action is Action.RESTART else ''
-    decider, why_not = (Decider.AUTHOR, why_not) if why_not else _what_prevents(recovery, way)
+    foreseen = why_not_above(None) if action is Action.RESTART else None
+    decider, why_not = (
+        (Decider.AUTHOR, foreseen.text) if foreseen else _what_prevents(recovery, way)
+    )
     if why_not:
         return decider, recovery.facts(Action.ASK, blocked=why_not)
     recovery.jump_path = way
@@ -158,15 +159,12 @@ def _with_menu(
         so_far = streak.so_far(budget.work_time.now())
     has_expert = node.tree.expert is not None and not budget.why_no_question()
     past = situation.past._replace(attempts=budget.recoveries, usual_minutes=budget.usual_minutes)
-    evidence = _evidence(recovery) if node.in_force.policy.learns else Evidence()
+    evidence = Evidence()
+    if node.in_force.policy.learns:
+        of_kinds = counts_of_kinds(each.ways_of_kinds() for each in records_of(node))
+        evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key, of_kinds)
     menu = Menu(tuple(each.way for each in ways), so_far, node.settings.cost, has_expert, evidence)
     return situation._replace(past=past, menu=menu)
-
-
-def _evidence(recovery: Recovery) -> Evidence:
-    """Return what the ways on from failures of the state, and of all states, have led to."""
-    of_kinds = counts_of_kinds(each.ways_of_kinds() for each in records_of(recovery.node))
-    return Evidence(recovery.record.ways_so_far(), recovery.failure_key, of_kinds)
 
 
 def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePlace]]:

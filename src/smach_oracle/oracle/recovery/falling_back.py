@@ -3,8 +3,7 @@
 from typing import Optional
 
 from ..asking.question import names
-from ..machine.jump_path import JumpPath, jump_path_to
-from ..machine.places import place_named
+from ..machine.places import JumpPath, jump_path_to, place_named
 from .options import option_on, why_repeats
 from .recovery import Recovery
 from .verdict import Verdict

@@ -167,17 +167,14 @@ class Inquiry:
             given = self._guarded(lambda told: run(offer, question, cancelled, told))
             if given is not None:
                 done = checked_type(given)
-                self._check_done(done, question)
+                if done.kind is not AnswerKind.SUPERSEDE:
+                    raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
+                self._check(done, question)
                 outcome = done.outcome
         finally:
             self._tell(EventKind.INTERFACE_END, target=offer.name, by=by, outcome=outcome)
         self._recovery.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
         return done if done is None or done.by else done._replace(by=by)
-
-    def _check_done(self, done: Answer, question: Question) -> None:
-        if done.kind is not AnswerKind.SUPERSEDE:
-            raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
-        self._check(done, question)
 
     def _tell(self, kind: EventKind, **fields: str) -> None:
         self._recovery.tell(kind, query_id=self._recovery.question_id, **fields)

@@ -1,6 +1,7 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
 
-from typing import Any, Dict, List, NamedTuple, Optional, Tuple
+from functools import partial
+from typing import Dict, List, Optional, Tuple
 
 import smach
 
@@ -8,14 +9,21 @@ from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action
 from ..decision.sentence import cause_of, decision_sentence
 from ..decision.ways import ChosenOrder
-from ..machine.jump_path import jump_path_to
-from ..machine.places import TreePlace, direct_levels, failure_context, is_direct, levels_above
-from ..machine.site import Route, author_recovers, failure_kind, goes_unnoticed, route_of
+from ..machine.places import (
+    JumpPath,
+    TreePlace,
+    direct_levels,
+    failure_context,
+    is_direct,
+    jump_path_to,
+    levels_above,
+    links_to,
+)
+from ..machine.site import author_recovers, goes_unnoticed, judged_at
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY, Decider
 from ..smach_private import (
-    Labels,
     current_label_of,
     current_state_of,
     is_executing,
@@ -26,49 +34,36 @@ from .deciding import decide_on_level
 from .failure import Failure, tell_failure
 from .occasions import failed
 from .recovery import Decided, Recovery
-from .verdict import ContainerEnding, JumpTo, natural_ending
-
-
-def _is_overridden(above: TreeNode, below: Labels) -> bool:
-    """Whether the oracle takes what the author of a container around has drawn."""
-    path = '/'.join(filter(None, (above.relative_path,) + below[:-1]))
-    return above.in_force.of_state(path, below[-1]).author_recoveries == 'override'
-
-
-class Foreseen(NamedTuple):
-    """The reason why the end of a container is left to the one above it."""
-
-    text: str
-    item_outcome: str = ''  # the outcome with which an item of an Iterator is passed over
+from .verdict import ContainerEnding, Foreseen, JumpTo, natural_ending
 
 
 def _is_item_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     """Whether an Iterator around a container goes on after it has ended with an outcome."""
     if not node.site.is_container:
         return False
-    around: Any = states_of(above.machine)[node.labels_from_parent[0]]
-    for label in node.labels_from_parent[1:-1]:
-        around = around.get_children()[label]
+    labels, path = node.labels_from_parent, above.relative_path
+    around = [*links_to(node)][-1].outer_container
+    settings = above.in_force.of_state('/'.join(filter(None, (path, *labels[:-1]))), labels[-1])
     # what only the settings call a failure its author has not foreseen
     return (
         isinstance(around, smach.Iterator)
         and outcome in loop_outcomes_of(around)
-        and not _is_overridden(above, node.labels_from_parent)
+        and settings.author_recoveries != 'override'
         and outcome in node.in_force.failing
     )
 
 
 def foreseen_above(
-    node: TreeNode, ending: ContainerEnding, below: Optional[TreeNode] = None
+    node: TreeNode, ending: ContainerEnding, way: Optional[JumpPath] = None
 ) -> Optional[Foreseen]:
     """Return what the author has drawn after the end of a container, None where that is nothing.
 
     It may be one of any level above: a failing outcome falls through from one to the next. Where a
     Concurrence lies between, nobody knows before it has ended.
 
-    :param below: the ends of the containers below this one alone count. None: of all.
+    :param way: the ends of the containers that it leaves alone count. None: of all.
     """
-    outcome = ending.outcome
+    outcome, below = ending.outcome, None if way is None else way.meeting_node
     while outcome is not None and node.parent is not None and node is not below:
         above = node.parent
         if above is not next(levels_above(node), None):
@@ -80,7 +75,7 @@ def foreseen_above(
                 else None
             )
         label = node.labels_from_parent[0]
-        route, kind = _judged_above(above, label, outcome)
+        route, kind = judged_at(above, label, outcome)
         if kind is FailureKind.NOT_A_FAILURE or not route.target:
             return None
         if author_recovers(outcome, route, kind, above.settings_of(label)):
@@ -106,12 +101,6 @@ def unnoticed(node: TreeNode, failure: Failure) -> Optional[Foreseen]:
     return Foreseen('its author ends {} with {} there'.format(node.path, route.target))
 
 
-def _judged_above(above: TreeNode, label: str, outcome: str) -> Tuple[Route, FailureKind]:
-    """Return where the end of a container leads on the level above, and what it is there."""
-    route = route_of(above.machine, label, outcome)
-    return route, failure_kind(outcome, route, above.settings_of(label), above.in_force.failing)
-
-
 def _failure_above(
     above: TreeNode, label: str, ending: ContainerEnding, text: str
 ) -> Optional[Failure]:
@@ -124,7 +113,7 @@ def _failure_above(
         return Failure(label, FailureKind.EXCEPTION, '', text, None, lambda: error)
     if ending.outcome is None:
         return None
-    route, kind = _judged_above(above, label, ending.outcome)
+    route, kind = judged_at(above, label, ending.outcome)
     if kind is FailureKind.NOT_A_FAILURE:
         return None
     return Failure(label, kind, ending.outcome, text, route)
@@ -200,7 +189,7 @@ def _decide_above(
     above = Recovery(level, record, failed(failure, context, continuous), recovery)
     reading = record.read_rate()
     record.learn(True)
-    decided = decide_on_level(above, lambda below: _foreseen_behind(level, failure, below))
+    decided = decide_on_level(above, partial(foreseen_above, level, natural_ending(level, failure)))
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
@@ -223,11 +212,6 @@ def _decide_above(
     kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
     jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
     return jump, facts.wait_s
-
-
-def _foreseen_behind(level: TreeNode, failure: Failure, below: Optional[TreeNode]) -> str:
-    foreseen = foreseen_above(level, natural_ending(level, failure), below)
-    return foreseen.text if foreseen is not None else ''
 
 
 def tell_decision(recovery: Recovery, decided: Decided) -> str:

@@ -52,8 +52,6 @@ class Occasion(NamedTuple):
     first_step: FirstStep = FirstStep.DECIDE
     superseding: Superseding = Superseding.TAKES_BACK
     continuous: bool = False
-    is_told: bool = True  # the observers hear of a transition to the oracle
-    is_logged: bool = True  # as a failure
     why: str = ''  # a person is asked, or the robot is not well, '' where a preempt came meanwhile
     keeps: bool = False  # without an answer the trial is kept for the next start
     answer: Optional[Answer] = None  # given while the state still ran
@@ -106,7 +104,6 @@ def ended_by_answer(
         outcome or 'taken_out',
         FirstStep.OBEY,
         Superseding.RECORDS,
-        is_logged=False,
         answer=answer,
     )
 
@@ -129,7 +126,6 @@ def arrived(
         outcome or 'left',
         FirstStep.OBEY,
         Superseding.TAKES_BACK if is_own else Superseding.RECORDS,
-        is_logged=False,
         lower_verdict=lower_verdict,
     )
 
@@ -140,7 +136,7 @@ def unwell(failure: Failure, context: FailureContext, why: str) -> Occasion:
     `why`: the robot is not well, or '' where a preempt or a shutdown is under way.
     """
     return failed(failure, context)._replace(
-        first_step=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, is_told=False, why=why
+        first_step=FirstStep.ENTER_AGAIN, superseding=Superseding.COUNTS, why=why
     )
 
 
@@ -159,7 +155,7 @@ def still_running(failure: Failure) -> Occasion:
 
 def log_occasion(occasion: Occasion, place: str) -> None:
     """Log why the oracle is entered. `place`: path of the state."""
-    if not occasion.is_logged:
+    if occasion.first_step is FirstStep.OBEY:  # it is no failure
         return
     failure = occasion.failure
     words = failure.details or in_words(failure)

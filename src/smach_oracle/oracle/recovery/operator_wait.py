@@ -46,18 +46,25 @@ def wait_until_let_go(node: TreeNode, hold: Hold, scope: Scope) -> Union[LetGo, 
     No lock of a machine is held. The time limits around the container stand still, and the minutes
     of its trial.
     """
-    control = node.tree.control
+    control, place, since_s = node.tree.control, hold.place, time.monotonic()
     control.begin(hold)
-    since_s = time.monotonic()
     let_go = None
     try:
-        _tell_begin(node, hold)
+        why = '{} before {}'.format(_WHY[hold.held_by], place.state)
+        by = '' if hold.held_by is HeldBy.CONFIRM else control.paused_by
+        smach.logwarn('{}: {}'.format(place.path, why))
+        node.emit(EventKind.HOLD_START, place.state, hold.held_by.value, by=by, text=why)
         with standing_still(node.execution.runs_around), node.tree.budget.paused():
             let_go = control.wait(hold, scope)
             return let_go
     finally:
         control.end(hold)
-        _tell_end(node, hold, _in_words(let_go), time.monotonic() - since_s)
+        outcome, waited_s = _in_words(let_go), time.monotonic() - since_s
+        smach.loginfo(
+            '{}: {} before {}, after {:.1f} s'.format(place.path, outcome, place.state, waited_s)
+        )
+        text, data = '{} after {:.1f} s'.format(outcome, waited_s), {'waited_s': round(waited_s, 3)}
+        node.emit(EventKind.HOLD_END, place.state, outcome, text=text, data=data)
 
 
 def _in_words(let_go: Union[LetGo, Reason, None]) -> str:
@@ -66,29 +73,3 @@ def _in_words(let_go: Union[LetGo, Reason, None]) -> str:
     if isinstance(let_go, LetGo):
         return let_go.value
     return (Reason.LEFT_BEHIND if let_go is Reason.EARLY_END else let_go).text
-
-
-def _tell_begin(node: TreeNode, hold: Hold) -> None:
-    why, place = _WHY[hold.held_by], hold.place
-    smach.logwarn('{}: {} before {}'.format(place.path, why, place.state))
-    node.emit(
-        EventKind.HOLD_START,
-        state=place.state,
-        outcome=hold.held_by.value,
-        by='' if hold.held_by is HeldBy.CONFIRM else node.tree.control.paused_by,
-        text='{} before {}'.format(why, place.state),
-    )
-
-
-def _tell_end(node: TreeNode, hold: Hold, outcome: str, waited_s: float) -> None:
-    state = hold.place.state
-    smach.loginfo(
-        '{}: {} before {}, after {:.1f} s'.format(hold.place.path, outcome, state, waited_s)
-    )
-    node.emit(
-        EventKind.HOLD_END,
-        state=state,
-        outcome=outcome,
-        text='{} after {:.1f} s'.format(outcome, waited_s),
-        data={'waited_s': round(waited_s, 3)},
-    )

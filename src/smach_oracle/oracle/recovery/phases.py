@@ -6,6 +6,7 @@ which occasion is in a table of doc/inside/executive_inside.md.
 """
 
 import threading
+from functools import partial
 from typing import Callable, Dict, FrozenSet, Optional, Tuple
 
 import smach
@@ -15,11 +16,16 @@ from ..decision.policy import Action
 from ..decision.sentence import DecisionFacts, cause_of
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
-from ..machine.jump_path import JumpPath, jump_path_to, why_closed_on
 from ..machine.nesting import settle_ways
-from ..machine.places import TreePlace, levels_above, place_at
+from ..machine.places import (
+    JumpPath,
+    TreePlace,
+    jump_path_to,
+    levels_above,
+    place_at,
+    why_closed_on,
+)
 from ..machine.repeats import repeated_by_going_to
-from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..scope.scope import standing_still
 from ..smach_private import Labels, Transitions, remapping_of
@@ -27,7 +33,6 @@ from .deciding import decide_on_level
 from .falling_back import fall_back, fallback_in_words
 from .inquiry import Inquiry
 from .levels import (
-    Foreseen,
     decided_above,
     foreseen_above,
     levels_that_may_decide,
@@ -38,7 +43,7 @@ from .levels import (
 from .occasions import FirstStep, LowerVerdict
 from .recovery import Recovery
 from .stop import preempt_beside
-from .verdict import ContainerEnding, GiveUp, JumpTo, Supersede, Verdict, leads_to
+from .verdict import ContainerEnding, Foreseen, GiveUp, JumpTo, Supersede, Verdict, leads_to
 
 # -- what comes before a decision
 
@@ -93,15 +98,12 @@ def wait_until_well(recovery: Recovery) -> Optional[Verdict]:
     again = first is FirstStep.ENTER_AGAIN
     if recovery.is_over() or not recovery.wait_until_well(FAILED if again else 'failed again', why):
         return recovery.end_early()
-    return _enter_again(recovery) if again else None
-
-
-def _enter_again(recovery: Recovery) -> Optional[Verdict]:
-    """Enter the failed state again, now that the robot is well, unless that may repeat it."""
-    node, label = recovery.node, recovery.record.label
-    if not repeated_by_going_to(node, label):
-        recovery.record.unwell_repeats += 1
-        return recovery.jump(JumpPath((), node, (TreePlace(node, label),)))
+    node, record = recovery.node, recovery.record
+    if not again:
+        return None
+    if not repeated_by_going_to(node, record.label):
+        record.unwell_repeats += 1
+        return recovery.jump(JumpPath((), node, (TreePlace(node, record.label),)))
     recovery.failure = recovery.failure._replace(
         kind=FailureKind.HELD_BACK,
         text='failed while the robot was not well, and is not repeated by itself',
@@ -124,7 +126,7 @@ def decide(recovery: Recovery) -> Optional[Verdict]:
         return None
     if recovery.budget.why_over():
         return recovery.end_unaided()
-    decided = decide_on_level(recovery, lambda below: _why_left_to_others(recovery, below))
+    decided = decide_on_level(recovery, partial(_left_to_others, recovery))
     if recovery.is_over():
         return recovery.end_early()
     _, facts = decided
@@ -189,25 +191,20 @@ def _why_nobody_is_asked(recovery: Recovery) -> Optional[Foreseen]:
     return _left_to_others(recovery) or unnoticed(recovery.node, recovery.failure)
 
 
-def _left_to_others(recovery: Recovery, below: Optional[TreeNode] = None) -> Optional[Foreseen]:
+def _left_to_others(recovery: Recovery, way: Optional[JumpPath] = None) -> Optional[Foreseen]:
     """Return why the end of the container is left to a level above, or None where it is not.
 
-    :param below: the containers below this one alone are looked at. None: all.
+    :param way: the containers that it leaves alone are looked at. None: all.
     """
     node = recovery.node
     if runs_as_precondition(node):
         return Foreseen('it runs as a precondition')
     if recovery.failure.is_held_back:  # no other oracle can confirm that it is repeated
         return None
-    foreseen = foreseen_above(node, recovery.natural_ending(), below)
+    foreseen = foreseen_above(node, recovery.natural_ending(), way)
     return foreseen and foreseen._replace(
         text='its author goes on from there ({})'.format(foreseen.text)
     )
-
-
-def _why_left_to_others(recovery: Recovery, below: Optional[TreeNode]) -> str:
-    others = _left_to_others(recovery, below)
-    return others.text if others is not None else ''
 
 
 def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
@@ -334,13 +331,9 @@ class OracleState(smach.State):
     def leads_on(self, states: Labels, outcomes: Labels, drawn: Optional[Transitions]) -> bool:
         """Whether nothing of that has changed since."""
         led_states, led_outcomes, led_drawn, count = self._led
-        return (
-            drawn is not None
-            and drawn is led_drawn
-            and len(drawn) == count
-            and led_outcomes == outcomes
-            and led_states == states
-        )
+        if drawn is None or drawn is not led_drawn or len(drawn) != count:
+            return False
+        return led_outcomes == outcomes and led_states == states
 
     def begin(self, recovery: Recovery) -> None:
         """Be ready to recover from a failure.

@@ -14,13 +14,20 @@ import smach
 from smach_common.foreign import repr_of
 
 from ..identity import truth_of
-from ..machine.jump_path import JumpPath, hand_down, hand_on, hand_up, jump_path_to
-from ..machine.places import TreePlace, links_to, place_named, why_unfit
+from ..machine.places import (
+    JumpPath,
+    TreePlace,
+    hand_down,
+    hand_on,
+    hand_up,
+    jump_path_to,
+    links_to,
+    place_named,
+    why_unfit,
+)
 from ..machine.repeats import note_precondition, repeated_by_running
-from ..machine.site import failure_kind, route_of
-from ..machine.snapshots import UserdataGate, WriteWatch, behind
-from ..machine.tree_node import TreeNode
-from ..machine.userdata_view import view_behind, write_constants
+from ..machine.site import judged_at
+from ..machine.userdata import UserdataGate, WriteWatch, behind, view_behind, write_constants
 from ..machine.workers import Overrun
 from ..records.events import FailureKind
 from ..settings.failing_outcomes import is_preempted
@@ -63,7 +70,7 @@ def _achieve(recovery: Recovery, spec: PreconditionSpec, elsewhere: 'List[_Elsew
     elif spec.kind is PreconditionKind.CALLABLE:
         _call(recovery, spec)
     elif spec.kind is PreconditionKind.STATE:
-        _run(recovery, recovery.node, recovery.watch.gate, spec.target, '')
+        _run(recovery, TreePlace(recovery.node, ''), spec.target, recovery.watch.gate)
     else:
         _run_place(recovery, spec.target, elsewhere)
 
@@ -104,35 +111,34 @@ def _run_place(recovery: Recovery, name: str, elsewhere: 'List[_Elsewhere]') -> 
     why_not = why_unfit(node, '', name) if '/' in name else ''
     if place is None or why_not:
         raise NotMet('{!r} cannot be run: {}'.format(name, why_not or 'there is no such state'))
-    state, gate = states_of(place.node.machine)[place.label], recovery.watch.gate
+    state = states_of(place.node.machine)[place.label]
     if place.node is node:
-        _run(recovery, node, gate, state, place.label)
+        _run(recovery, place, state, recovery.watch.gate)
         return
-    run = _Elsewhere(node, place, gate)
+    run = _Elsewhere(recovery, place)
     elsewhere.append(run)
-    _run(recovery, place.node, run.gate, state, place.label)
+    _run(recovery, place, state, run.gate)
     run.hand_over()
 
 
-def _run(
-    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
-) -> None:
+def _run(recovery: Recovery, place: TreePlace, state: smach.State, gate: UserdataGate) -> None:
     """Execute a state of a container, and note that.
 
+    :param place: its label is '' where the state was given itself.
     :param gate: what its userdata is written through.
-    :param label: '' where the state was given itself.
 
     :raises NotMet: where it, or a state within, would be repeated and is not to be.
     """
-    noted = label or _label_of(recovery.node, state)
+    node, states = place.node, states_of(place.node.machine)
+    noted = place.label or next((label for label in node.labels() if states[label] is state), '')
     if noted:
         repeated = repeated_by_running(node, noted)
         if repeated:
             raise _not_repeated(', '.join(repeated))
-        _check_free(recovery, states_of(node.machine)[noted])
+        _check_free(recovery, states[noted])
         note_precondition(node, noted)
     try:
-        _judge(recovery, node, state, label, _execute(recovery, node, gate, state, label))
+        _judge(recovery, place, state, _execute(recovery, place, state, gate))
     finally:
         if noted:
             note_precondition(node, noted)
@@ -142,17 +148,12 @@ def _not_repeated(what: str) -> NotMet:
     return NotMet('{} was done in this trial and is not repeated by itself'.format(what))
 
 
-def _label_of(node: TreeNode, state: smach.State) -> str:
-    """Return the label of a state that was given itself, '' where the container has it not."""
-    states = states_of(node.machine)
-    return next((label for label in node.labels() if states[label] is state), '')
-
-
 def _execute(
-    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
+    recovery: Recovery, place: TreePlace, state: smach.State, gate: UserdataGate
 ) -> object:
-    scope, origin = recovery.scope, recovery.origin
-    autonomy = node.settings_of(label).autonomy if label else RUN
+    scope, origin, (node, label) = recovery.scope, recovery.origin, place
+    settings = node.settings_of(label) if label else recovery.record.settings
+    autonomy = settings.autonomy if label else RUN
     wait_for_operator(node, (), label or type(state).__name__, autonomy, scope)
     _check_free(recovery, state)
     with origin.lock:
@@ -165,9 +166,11 @@ def _execute(
     try:
         if label:
             write_constants(behind(gate), constants_of(node.machine, label))
-        return _with_limit(recovery, node, gate, state, label)
-    except NotMet:
-        raise
+        gate = gate if settings.time_limit_s is None else gate.fork()
+        view = view_behind(gate, node.machine, label, state)
+        if settings.time_limit_s is None:
+            return state.execute(view)
+        return node.tree.workers.run(state, view, gate, label, settings)
     except Exception as err:
         raise NotMet('raised {}'.format(repr_of(err))) from err
     finally:
@@ -179,37 +182,22 @@ def _execute(
             state.recall_preempt()  # the meta state services the request in its place
 
 
-def _with_limit(
-    recovery: Recovery, node: TreeNode, gate: UserdataGate, state: smach.State, label: str
-) -> object:
-    settings = node.settings_of(label) if label else recovery.record.settings
-    if settings.time_limit_s is None:
-        return state.execute(view_behind(gate, node.machine, label, state))
-    gate = gate.fork()
-    view = view_behind(gate, node.machine, label, state)
-    outcome = node.tree.workers.run(state, view, gate, label, settings)
+def _judge(recovery: Recovery, place: TreePlace, state: smach.State, outcome: object) -> None:
     if isinstance(outcome, Overrun):
         raise NotMet(outcome.text)
-    return outcome
-
-
-def _judge(
-    recovery: Recovery, node: TreeNode, state: smach.State, label: str, outcome: object
-) -> None:
     if recovery.scope.told is not None:
         raise NotMet('preempted')
     if not is_registered(state, outcome):
         raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
-    outcome, failing = cast(str, outcome), node.in_force.failing
-    if label:
-        route = route_of(node.machine, label, outcome)
-        failed = failure_kind(outcome, route, node.settings_of(label), failing) not in (
+    outcome, node = cast(str, outcome), place.node
+    if place.label:
+        failed = judged_at(node, place.label, outcome)[1] not in (
             FailureKind.NOT_A_FAILURE,
             FailureKind.UNREGISTERED_OUTCOME,
         )
     else:
-        listed = recovery.node.settings.defaults.failure_outcomes
-        failed = outcome in failing or outcome in listed
+        listed = node.settings.defaults.failure_outcomes
+        failed = outcome in node.in_force.failing or outcome in listed
     if failed or is_preempted(outcome):
         raise NotMet('ended with {!r}'.format(outcome))
 
@@ -220,22 +208,18 @@ def _judge(
 class _Elsewhere:
     """One run of a state of another container than that of the failed state."""
 
-    def __init__(self, node: TreeNode, place: TreePlace, own: UserdataGate) -> None:
-        """`node`: the failed state's container. `own`: what its userdata is written through.
-
-        :raises NotMet: where the state cannot be run now.
-        """
-        way = jump_path_to(node, place)
+    def __init__(self, recovery: Recovery, place: TreePlace) -> None:
+        """:raises NotMet: where the state cannot be run now."""
+        way = jump_path_to(recovery.node, place)
         if way is None:
             raise NotMet('{} is in no container that is being executed'.format(place.path))
         _check(way)
-        self._own = own
-        self._userdata = node.machine.userdata
+        self._own = recovery.watch.gate
+        self._userdata = recovery.node.machine.userdata
         self._down = [link for below in way.entered_places[1:] for link in links_to(below.node)]
         self._on = [link for left in reversed(way.left_containers) for link in links_to(left)]
-        self._runs = not way.entered_places[
-            1:
-        ]  # whether its container is one around the failed state
+        # whether its container is one around the failed state
+        self._runs = not way.entered_places[1:]
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
         data = [data_of(link.inner_container.userdata) for link in self._down[:-1]]

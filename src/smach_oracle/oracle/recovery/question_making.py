@@ -1,6 +1,6 @@
 """Makes a question of a failure, with everything that an expert needs (paper, section V)."""
 
-from typing import Any, Collection, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from typing import Collection, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import smach
 from smach_common.foreign import repr_of
@@ -15,10 +15,16 @@ from ..asking.question import (
 )
 from ..decision.ways import Evidence, WayCounts, key_of, way_in_words
 from ..identity import truth_of
-from ..machine.jump_path import JumpPath, missing_on
-from ..machine.places import TreePlace, levels_above, name_of, place_named
-from ..machine.snapshots import UserdataGate, behind
-from ..machine.tree_node import TreeNode
+from ..machine.places import (
+    JumpPath,
+    TreePlace,
+    levels_above,
+    links_to,
+    missing_on,
+    name_of,
+    place_named,
+)
+from ..machine.userdata import UserdataGate, behind
 from ..records.short_text import shortened
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
@@ -39,7 +45,7 @@ def make_question(recovery: Recovery, deadline_s: float) -> Question:
     """
     node, record, failure = recovery.node, recovery.record, recovery.failure
     machine, still_runs = node.machine, failure.still_runs
-    state = states_of(machine)[record.label]
+    state, streak = states_of(machine)[record.label], streak_of(node, record)
     return Question(
         question_id=node.tree.resumed.take_question(record) or node.tree.next_question_id(),
         trial_id=node.tree.trial_id,
@@ -53,47 +59,41 @@ def make_question(recovery: Recovery, deadline_s: float) -> Question:
         continuous=recovery.occasion.continuous,
         recoveries=record.recoveries,
         reason=recovery.cause,
-        tried=(*_ways_tried(recovery), *recovery.tried),
+        tried=(*map(way_in_words, () if streak is None else streak.tried), *recovery.tried),
         history=node.records.history.latest(),
         choices=tuple(_state_choices(recovery)),
-        supersede_outcomes=node.site.choices(node, record.label),
+        supersede_outcomes=node.site.choices(record.label),
         output_keys=tuple(sorted(state.get_registered_output_keys())),
-        give_up_outcomes=_outcomes_of(node),
+        give_up_outcomes=_outcomes_of(machine),
         interfaces=() if still_runs else node.settings.offers_for(node.relative_path, record.label),
         userdata=dict(data_of(machine.userdata)),
         input_userdata=_inputs(machine, record.label, state),
         deadline_s=deadline_s,
         fallback=fallback_in_words(recovery),
-        preconditions=None if still_runs else LivePreconditionProbe(node),
+        preconditions=None if still_runs else LivePreconditionProbe(recovery),
         give_up_above=tuple(
             LevelOutcome(level.path, outcome)
             for level in levels_above(node)
-            for outcome in _outcomes_of(level)
+            for outcome in _outcomes_of(level.machine)
         ),
     )
 
 
-def _ways_tried(recovery: Recovery) -> Iterator[str]:
-    """Yield what was done about the failures before this one, of the same streak."""
-    streak = streak_of(recovery.node, recovery.record)
-    if streak is not None:
-        yield from map(way_in_words, streak.tried)
-
-
 def targets_of(recovery: Recovery) -> Mapping[Target, str]:
     """Return where the machine could go, and why it cannot go there now, '' where it can."""
-    return {_target(recovery.node, each.place): each.closed for each in places_on(recovery)}
+    return {_target(recovery, each.place): each.closed for each in places_on(recovery)}
 
 
-def _target(node: TreeNode, place: TreePlace) -> Target:
-    return '' if place.node is node else place.node.path, place.label
+def _target(recovery: Recovery, place: TreePlace) -> Target:
+    return '' if place.node is recovery.node else place.node.path, place.label
 
 
 def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
     choices = list(choices_on(recovery))
     evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key)
-    keys = [_way_key(recovery, each) for each, _ in choices]
+    names = [name_of(each.place, recovery.node) for each, _ in choices]
+    keys = [key_of(name, recovery.record.label) for name in names]
     counts = [evidence.of_way(key) for key in keys]
     streak = streak_of(recovery.node, recovery.record)
     tried = () if streak is None else tuple(streak.tried)
@@ -101,7 +101,7 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
         [(each, key in tried) for (each, _), key in zip(choices, keys)], counts
     )
     for number, (each, way) in enumerate(choices):
-        container, label = _target(recovery.node, each.place)
+        container, label = _target(recovery, each.place)
         record, jump_path = each.place.node.record(label), each.jump_path
         yield StateChoice(
             label,
@@ -123,11 +123,6 @@ def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
         )
 
 
-def _way_key(recovery: Recovery, option: Option) -> str:
-    """Return the name by which the results of ways know to go to a place."""
-    return key_of(name_of(option.place, recovery.node), recovery.record.label)
-
-
 def _recommended(
     options: Sequence[Tuple[Option, bool]], counts: Sequence[WayCounts]
 ) -> Optional[int]:
@@ -147,8 +142,8 @@ def _recommended(
     return -max(possible)[1] if possible else None
 
 
-def _outcomes_of(node: TreeNode) -> Tuple[str, ...]:
-    return tuple(sorted(node.machine.get_registered_outcomes(), key=str))
+def _outcomes_of(machine: smach.StateMachine) -> Tuple[str, ...]:
+    return tuple(sorted(machine.get_registered_outcomes(), key=str))
 
 
 def _inputs(machine: smach.StateMachine, label: str, state: smach.State) -> Dict[str, object]:
@@ -179,12 +174,9 @@ def _entered_on(way: JumpPath) -> Iterator[smach.State]:
 
     Containers between two places, such as a Concurrence in an Iterator, are among them.
     """
-    for place, below in zip(way.entered_places, way.entered_places[1:]):
-        around: Any = states_of(place.node.machine)[place.label]
-        yield around
-        for label in below.node.labels_from_parent[1:]:
-            around = around.get_children()[label]
-            yield around
+    for below in way.entered_places[1:]:
+        for link in links_to(below.node):
+            yield link.inner_container
     last = way.entered_places[-1]
     yield states_of(last.node.machine)[last.label]
 
@@ -208,8 +200,8 @@ class LivePreconditionProbe(PreconditionProbe):
     threads that nobody waits for. What a callable writes into the userdata is dropped.
     """
 
-    def __init__(self, node: TreeNode) -> None:
-        self._node = node
+    def __init__(self, recovery: Recovery) -> None:
+        node = self._node = recovery.node
         self._gate = UserdataGate(node.machine)
         self._gate.shut()
         self._specs: List[PreconditionSpec] = []

@@ -18,11 +18,10 @@ from ..decision.ways import (
     key_of,
     kind_of_choice,
 )
-from ..machine.jump_path import JumpPath
-from ..machine.places import name_of
-from ..machine.snapshots import WriteWatch
+from ..machine.places import JumpPath, name_of
 from ..machine.state_record import RateReading, StateRecord
 from ..machine.tree_node import TreeNode
+from ..machine.userdata import WriteWatch
 from ..records.events import EventKind, FailureKind
 from ..records.facts import Decider
 from ..scope.scope import Reason, Scope, standing_still
@@ -99,8 +98,8 @@ class Recovery:
         keys = () if self.failure.still_runs else node.in_force.deep_copy_keys
         self.watch = WriteWatch(node.machine, keys)
         self.lock = threading.Lock()
-        self.takes: Callable[[Answer], bool] = _takes_any
-        self.begin_question: Callable[['Recovery'], None] = _as_it_stands
+        self.takes: Callable[[Answer], bool] = lambda answer: True
+        self.begin_question: Callable[['Recovery'], None] = lambda recovery: None
 
     @property
     def origin(self) -> 'Recovery':
@@ -200,6 +199,9 @@ class Recovery:
 
     # -- waits
 
+    def _in_time(self) -> Scope:
+        return Scope(self.scope, look=lambda: Reason.TIME_OVER if self.budget.why_over() else None)
+
     def has_waited(self, seconds: float) -> bool:
         """Let time pass. Return False where something has ended the recovery meanwhile."""
         with standing_still(self.node.execution.runs_around):
@@ -222,13 +224,6 @@ class Recovery:
             place = '{}/{}'.format(node.path, self.record.label)
             is_well = node.tree.health.wait_until_well(self.tell, place, what, why, self._in_time())
         return is_well and not self.is_over()
-
-    def _in_time(self) -> Scope:
-        """Return a scope that ends with the recovery, or with the trial's time."""
-        return Scope(self.scope, look=self._look_at_budget)
-
-    def _look_at_budget(self) -> Optional[Reason]:
-        return Reason.TIME_OVER if self.budget.why_over() else None
 
     # -- verdicts
 
@@ -289,11 +284,3 @@ class Recovery:
         if self.node.tree.early_end.why is not None:
             return Preempted()
         return Preempted(preempted_ending(self.node, self.failure))
-
-
-def _takes_any(answer: Answer) -> bool:
-    return True
-
-
-def _as_it_stands(recovery: Recovery) -> None:
-    """A failure is over, and its next question says the same of it."""

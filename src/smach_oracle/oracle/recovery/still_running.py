@@ -9,7 +9,7 @@ from typing import NamedTuple, Optional
 
 import smach
 
-from ..asking.question import Answer, AnswerKind, Expert
+from ..asking.question import Answer, AnswerKind
 from ..decision.sentence import ran_in_words, still_running_sentence
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
@@ -135,7 +135,11 @@ class WatchedVisit:
         if expert is None or spent:
             self._warn(failure.text + (' Nobody is asked: ' + spent if spent else ''))
             return False
-        answer = self._inquire(recovery, expert)
+        # the state runs on, and so do the time limits around it. Whoever looks whether a state
+        # around still runs has its answer in this question
+        watched = [run for run in node.execution.runs_around if run.limit_s is None]
+        with standing_still(watched), node.tree.early_end.asking():
+            answer = Inquiry(recovery, expert, budget.within(0.0)[0]).run()
         if recovery.stopped():
             if not self._ended.is_set():
                 node.tree.early_end.end_at_shutdown()
@@ -151,13 +155,6 @@ class WatchedVisit:
             return True
         self._take_out(answer)
         return False
-
-    def _inquire(self, recovery: Recovery, expert: Expert) -> Optional[Answer]:
-        # the state runs on, and so do the time limits around it. Whoever looks whether a state
-        # around still runs has its answer in this question
-        watched = [run for run in self._node.execution.runs_around if run.limit_s is None]
-        with standing_still(watched), self._node.tree.early_end.asking():
-            return Inquiry(recovery, expert, recovery.budget.within(0.0)[0]).run()
 
     def _is_wait_on(self, answer: Answer) -> bool:
         return (

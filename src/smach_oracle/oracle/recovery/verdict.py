@@ -4,13 +4,12 @@ There are four kinds, and no other way out. `execution.applying` carries them ou
 way a container ends, or goes on, where no oracle leads it elsewhere.
 """
 
-import itertools
 from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 
 import smach
 
 from ..decision.ways import WayResult
-from ..machine.jump_path import JumpPath
+from ..machine.places import JumpPath
 from ..machine.site import Route, route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
@@ -28,6 +27,13 @@ class ContainerEnding(NamedTuple):
     outcome: Optional[str] = None
     error: Optional[Exception] = None
     obeys: bool = False  # `state` is what the author drew after `preempted`: a preempt ends there
+
+
+class Foreseen(NamedTuple):
+    """The reason why the end of a container is left to the one above it."""
+
+    text: str
+    item_outcome: str = ''  # the outcome with which an item of an Iterator is passed over
 
 
 class ChosenWay(NamedTuple):
@@ -191,23 +197,15 @@ def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     return natural_ending(node, failure)
 
 
-def failing_outcome(node: TreeNode, first: Sequence[str] = ()) -> Optional[str]:
+def failing_outcome(node: TreeNode, first: Sequence[Optional[str]] = ()) -> Optional[str]:
     """Return the failing outcome with which a container ends that nobody leads elsewhere.
 
     None means it has none. `first`: names that come before the order of the alphabet.
     """
     outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
-    named = (outcome for outcome in first if outcome in outcomes)
-    return next(
-        itertools.chain(named, (each for each in outcomes if each in node.in_force.failing)), None
-    )
-
-
-def ending_at_once(node: TreeNode) -> Optional[str]:
-    """Return the outcome with which a container ends by a preempt before a state, None for none."""
-    if PREEMPTED in node.machine.get_registered_outcomes():
-        return PREEMPTED
-    return failing_outcome(node)
+    found = [each for each in first if each in outcomes]
+    found += (each for each in outcomes if each in node.in_force.failing)
+    return found[0] if found else None
 
 
 def leaving_outcome(node: TreeNode, failure: Optional[Failure] = None) -> str:
@@ -215,12 +213,9 @@ def leaving_outcome(node: TreeNode, failure: Optional[Failure] = None) -> str:
 
     :param failure: what would have ended it.
     """
-    outcomes = sorted(node.machine.get_registered_outcomes(), key=str)
     wanted = natural_ending(node, failure).outcome if failure is not None else None
-    for outcome in (PREEMPTED, wanted):
-        if outcome in outcomes:
-            return str(outcome)
-    return failing_outcome(node) or outcomes[0]
+    found = failing_outcome(node, (PREEMPTED, wanted))
+    return found or min(node.machine.get_registered_outcomes(), key=str)
 
 
 def outcome_of_early_end(node: TreeNode) -> Optional[str]:

@@ -148,26 +148,21 @@ def _function(
     prefix: str, entry: Mapping[str, object], resolver: Optional[Resolver]
 ) -> HealthCondition:
     given = entry['function']
-    name, found = '', given
+    key, name, found = prefix + 'function', '', given
     if isinstance(given, str):
-        name, found = _resolved(prefix + 'function', given, resolver)
+        if not given.startswith(PYTHON):
+            raise SettingsError(key, given, "'python:module:attribute'")
+        if resolver is None:
+            raise SettingsError(key, given, 'a function, since names cannot be imported here')
+        name = given.rpartition(':')[2]
+        found = named_object(key, given, 'function', resolver)
     if not callable(found) or isinstance(found, type) or values.is_state(found):
         raise SettingsError(
-            prefix + 'function',
+            key,
             given,
             "'python:module:attribute' of a function without arguments, or such a function",
         )
-    name = name or name_of(found)
-    return HealthCondition(HealthKind.FUNCTION, name, function=found)
-
-
-def _resolved(key: str, given: str, resolver: Optional[Resolver]) -> Tuple[str, object]:
-    """The name and the object of 'python:module:attribute'."""
-    if not given.startswith(PYTHON):
-        raise SettingsError(key, given, "'python:module:attribute'")
-    if resolver is None:
-        raise SettingsError(key, given, 'a function, since names cannot be imported here')
-    return given.rpartition(':')[2], named_object(key, given, 'function', resolver)
+    return HealthCondition(HealthKind.FUNCTION, name or name_of(found), function=found)
 
 
 def sources_of(conditions: Tuple[HealthCondition, ...]) -> List[str]:

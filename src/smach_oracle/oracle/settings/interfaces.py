@@ -4,7 +4,7 @@ They say what is offered, for which states, and how it is started.
 """
 
 import re
-from typing import List, Mapping, NamedTuple, Optional, Tuple
+from typing import Mapping, NamedTuple, Optional, Sequence, Tuple
 
 from ..errors import SettingsError
 from . import checks as values
@@ -80,7 +80,11 @@ def _start(prefix: str, entry: Mapping[str, object]) -> Optional[InterfaceStart]
     found = pattern.fullmatch(values.text(prefix + kind, entry[kind]))
     if found is None or '..' in found.string:
         raise SettingsError(prefix + kind, entry[kind], allowed)
-    args = (_launch_args if kind == 'launch' else _node_args)(prefix + 'args', entry.get('args'))
+    key, given = prefix + 'args', entry.get('args')
+    if kind == 'launch':
+        args: Sequence[str] = _launch_args(key, given)
+    else:
+        args = values.words(key, given if as_value(given) is not None else ())
     return InterfaceStart(
         kind,
         found.group(1),
@@ -90,7 +94,7 @@ def _start(prefix: str, entry: Mapping[str, object]) -> Optional[InterfaceStart]
     )
 
 
-def _launch_args(key: str, given: object) -> List[str]:
+def _launch_args(key: str, given: object) -> Sequence[str]:
     args = []
     for name, value in values.mapping(key, given).items():
         read = as_value(value)
@@ -102,7 +106,3 @@ def _launch_args(key: str, given: object) -> List[str]:
             )
         args.append('{}:={}'.format(name, str(read).lower() if isinstance(read, bool) else read))
     return args
-
-
-def _node_args(key: str, given: object) -> Tuple[str, ...]:
-    return values.words(key, given if as_value(given) is not None else ())

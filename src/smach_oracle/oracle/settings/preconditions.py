@@ -89,7 +89,9 @@ def parse_precondition(
     if is_state(given) and not isinstance(given, type):
         return PreconditionSpec(PreconditionKind.STATE, type(given).__name__, given)
     if isinstance(given, Mapping):
-        return _parse_pair(key, _halves(key, given), resolver)
+        if set(given) != {'check', 'achieve'}:
+            raise SettingsError(key, dict(given), 'exactly the keys check and achieve')
+        return _parse_pair(key, [given['check'], given['achieve']], resolver)
     if isinstance(given, (tuple, list)) and len(given) == 2:
         return _parse_pair(key, list(given), resolver)
     if callable(given) and not (isinstance(given, type) and is_state(given)):
@@ -113,12 +115,6 @@ def _parse_text(key: str, given: str, resolver: Optional[Resolver]) -> Precondit
             problem='names a value of type {}'.format(type(found).__name__),
         )
     return parse_precondition(key, found)._replace(name=given[len(PYTHON) :].rpartition(':')[2])
-
-
-def _halves(key: str, given: Mapping[str, object]) -> List[object]:
-    if set(given) != {'check', 'achieve'}:
-        raise SettingsError(key, dict(given), 'exactly the keys check and achieve')
-    return [given['check'], given['achieve']]
 
 
 def _parse_pair(key: str, halves: List[object], resolver: Optional[Resolver]) -> PreconditionSpec:

@@ -15,7 +15,7 @@ import rospy
 from smach_common.foreign import error_text
 from smach_oracle.msg import NodeTrials, TrialCounts
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
-from smach_oracle.oracle.records.trial_counter import TrialCounter
+from smach_oracle.trial_counter import TrialCounter
 
 from ..connections import quiet_at_shutdown
 from ..event_messages import json_of

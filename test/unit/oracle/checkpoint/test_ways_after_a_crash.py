@@ -11,7 +11,7 @@ import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.checkpoint.container_facts import ContainerFacts
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.recovery import menu
+from smach_oracle.oracle.recovery import options
 from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
 
@@ -28,7 +28,7 @@ class FailingAtFirst(Noted):
 
 def fetch(diary, points):
     """HOME, and LOOK and PICK in a machine. The second way waits no time."""
-    menu.WAITS_S = (0.001,)  # of this process alone
+    options.WAITS_S = (0.001,)  # of this process alone
     inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
     with inner:
         smach.StateMachine.add('LOOK', Noted('LOOK', diary, points), {'succeeded': 'PICK'})
@@ -163,7 +163,7 @@ def test_a_jump_stores_the_streaks_around_the_failed_state_and_looks_at_no_other
     tmp_path, monkeypatch
 ):
     """The third way leaves the container of the failed state, whose streak has all three."""
-    monkeypatch.setattr(menu, 'WAITS_S', (0.001,))
+    monkeypatch.setattr(options, 'WAITS_S', (0.001,))
     store = tmp_path / 'store.db'
     machine = boxes(1, Ends('aborted', 'aborted', 'aborted'), beside=12)
     settings = {'policy': 'escalating', 'checkpoint': str(store)}

@@ -5,8 +5,8 @@ from typing import List, NamedTuple, Optional
 
 from smach_oracle.msg import NodeTrials, TrialCounts
 from smach_oracle.oracle.records.short_text import shortened
-from smach_oracle.oracle.records.trial_counter import TrialEnding
 from smach_oracle.oracle.settings.failure_rule import RULE, FailureRule, rule_in
+from smach_oracle.trial_counter import TrialEnding
 
 from .views import LATEST_S, parsed
 

@@ -8,9 +8,9 @@ from collections import defaultdict
 from enum import Enum
 from typing import Any, Callable, ClassVar, Dict, Mapping, Optional, Set, Tuple
 
-from ..settings.failure_rule import FORMER_RULE, EndMeaning, FailureRule, rule_after
-from .events import Event, EventKind, FailureKind
-from .facts import INPUTS, JUMPED_FROM, ORIGIN, TrialEnd, ended_by, last_stored
+from .oracle.records.events import Event, EventKind, FailureKind
+from .oracle.records.facts import INPUTS, JUMPED_FROM, ORIGIN, TrialEnd, ended_by, last_stored
+from .oracle.settings.failure_rule import FORMER_RULE, EndMeaning, FailureRule, rule_after
 
 AUTONOMOUS_DECISIONS = ('revisit', 'step_back', 'restart')
 
